@@ -30,7 +30,7 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.gtac import NAMES, TO_TAXEL_FRAME
+from holdfast.io.importers.gtac import NODE_COLUMNS, TO_TAXEL_FRAME
 from holdfast.metrics.masks import runs
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
@@ -161,7 +161,7 @@ def gtac_grasps(folder: Path) -> Iterator[Recording]:
             names = file.readline().strip().split(",")
             rows = np.array([line.strip().split(",") for line in file], dtype=np.float64)
         rate = float(np.median(rows[:, names.index("Hz")]))
-        readings = rows[:, [names.index(name) for name in NAMES]].reshape(len(rows), -1, 3)
+        readings = rows[:, [names.index(name) for name in NODE_COLUMNS]].reshape(len(rows), -1, 3)
         times = np.arange(len(rows)) / rate
         module = Tactile(sensor("gtac"), times, readings * TO_TAXEL_FRAME)
         yield Recording(path.stem, {"finger1": module})

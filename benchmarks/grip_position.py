@@ -8,7 +8,7 @@ and of 1 s that begins 0.5 s after it.
     python benchmarks/grip_position.py [--scales 1.5 2 3] [--n 6] [--seed 3] [--gain 1]
 
 `--gain` multiplies the change of the scale: 1.8 is what the twin's own hand needs
-(`holdfast.twin.gripping.SERIES_GAIN`).
+(`holdfast.twin.grasp.SERIES_GAIN`).
 """
 
 import argparse
@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from holdfast.devices.hands.ros.kinds import HAND_KINDS
-from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.hands.ros.parameters import Parameters
+from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.uri import parse
 from holdfast.grip import FingerCommand, GripCommand, LoopState
-from holdfast.ros.hand_messages import JointStates
-from holdfast.twin.contact import LOAD
+from holdfast.ros.topic_messages import JointStates
+from holdfast.twin.contact import TIP_LOAD
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS
 from holdfast.twin.simulation import Simulation
@@ -103,7 +103,7 @@ def forces(trial: Trial, scale: float) -> tuple[np.ndarray, np.ndarray] | None:
             begun = simulation.held_for >= BEGIN
             hand.send(GripCommand(0.0, LoopState.REACT if begun else LoopState.IDLE, fingers))
             if not begun or simulation.held_for >= SETTLED:
-                (after if begun else before).append(world.contact.tips[:, LOAD].copy())
+                (after if begun else before).append(world.contact.tips[:, TIP_LOAD].copy())
     return np.mean(before, axis=0), np.mean(after, axis=0)
 
 

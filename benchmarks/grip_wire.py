@@ -27,8 +27,8 @@ from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.hand_messages import FLOATS, JOINT_STATE, hand_definition, joint_message
-from holdfast.twin.contact import LOAD, SLIP
+from holdfast.ros.topic_messages import FLOAT_ARRAY, JOINT_STATE, joint_message, topic_definition
+from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
@@ -79,7 +79,7 @@ class TrialTwin(DrivenTwin):
         arrival = super().read(timeout)
         if arrival is not None and self.simulation is not None and self._begun_at is not None:
             tips = self.simulation.world.contact.tips
-            speed = np.where(tips[:, LOAD] > CONTACT_FORCE, tips[:, SLIP], 0.0).max()
+            speed = np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0).max()
             due = self._begun_at + (self.simulation.n_samples - 1) / RATE
             loaded = self.simulation.held_for >= self._trial.load.start
             self.slips.append((due, float(speed), bool(loaded)))
@@ -92,7 +92,7 @@ class Listener:
 
     def __init__(self, topic: str, kind: str) -> None:
         self.messages: list[tuple[float, dict]] = []
-        definition = hand_definition(kind)
+        definition = topic_definition(kind)
         self._node = dds.Node(DOMAIN)
         self._reader = self._node.reader(topic, definition)
         self._decode = MessageDecoder(definition, ros2=True)
@@ -144,7 +144,7 @@ def sample_to_command(trial: Trial, output) -> np.ndarray:
 
     Commands of V5 have the time of their sample as their stamp.
     """
-    definition, stop = hand_definition(JOINT_STATE), Event()
+    definition, stop = topic_definition(JOINT_STATE), Event()
     write, encode = dds.Node(DOMAIN).writer(V5_STATES, definition), MessageEncoder(definition)
     values = np.full(16, EFFORT)
     names = [f"joint_{k}.0" for k in range(16)]
@@ -180,7 +180,7 @@ def reaction(trial: Trial, output) -> float | None:
         0 if it rose before the slip, infinite if never; None if nothing slipped or the loop had
         not begun.
     """
-    listener = Listener("/allegro_hand_position_effort_controller/efforts", FLOATS)
+    listener = Listener("/allegro_hand_position_effort_controller/efforts", FLOAT_ARRAY)
     twin = TrialTwin(trial)
     serve(twin, PLEXUS, output)
     listener.close()

@@ -27,7 +27,7 @@ import numpy as np
 
 from holdfast.io import save_recording
 from holdfast.recordings import Recording
-from holdfast.synthetic import RATE, synthetic_recording
+from holdfast.synthetic import SYNTHETIC_RATE, synthetic_recording
 
 FINGERS = ("thumb", "index", "middle", "ring")
 TIMEOUT = 120.0
@@ -90,7 +90,9 @@ def _recording(n: int) -> Recording:
     for name, module in grasp.modules.items():
         times = -(-n // module.n_samples)
         readings = np.tile(module.readings, (times, 1, 1))[:n]
-        modules[name] = replace(module, times=np.arange(n) / RATE, readings=readings, labels=())
+        modules[name] = replace(
+            module, times=np.arange(n) / SYNTHETIC_RATE, readings=readings, labels=()
+        )
     return Recording("long", modules)
 
 

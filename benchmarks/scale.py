@@ -25,7 +25,7 @@ from holdfast.io import load_dataset, save_recording
 from holdfast.metrics import Decisions, FingerDecisions, score_recording, summarise_results
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording, Tactile
-from holdfast.synthetic import RATE, synthetic_recording
+from holdfast.synthetic import SYNTHETIC_RATE, synthetic_recording
 from holdfast.training import Setting, evaluate, train
 
 FINGERS = ("thumb", "index", "middle", "ring")
@@ -67,12 +67,14 @@ def repeated(module: Tactile, number: int, length: int) -> Tactile:
     readings = np.resize(module.readings, (length, *module.readings.shape[1:]))
     readings += np.roll(noise(length, module.readings.shape[1]), 997 * number, axis=0)
     labels = [
-        Label(label.start + start, min(label.end + start, length / RATE), label.state)
-        for start in np.arange(0, length, n) / RATE
+        Label(label.start + start, min(label.end + start, length / SYNTHETIC_RATE), label.state)
+        for start in np.arange(0, length, n) / SYNTHETIC_RATE
         for label in module.labels
-        if label.start + start < length / RATE
+        if label.start + start < length / SYNTHETIC_RATE
     ]
-    return Tactile(module.sensor, np.arange(length) / RATE, readings, labels=tuple(labels))
+    return Tactile(
+        module.sensor, np.arange(length) / SYNTHETIC_RATE, readings, labels=tuple(labels)
+    )
 
 
 @lru_cache
@@ -120,7 +122,7 @@ def summarise_only(n_samples: int, length: int) -> dict[str, object]:
 
     All recordings have the results of one, each received anew.
     """
-    times = np.arange(length) / RATE
+    times = np.arange(length) / SYNTHETIC_RATE
     labels = np.select([times % 11.5 < 2, times % 11.5 < 8], [1, 3], 2)
     generator = np.random.default_rng(0)
     fingers = {}

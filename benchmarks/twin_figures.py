@@ -403,7 +403,7 @@ def objects(arguments: argparse.Namespace) -> None:
 
 def held(name: str) -> np.ndarray:
     """Return a picture of the object five seconds after the lock."""
-    from holdfast.twin.render import Camera, render
+    from holdfast.twin.render import Camera, Renderer
 
     taken = []
     locked = [0]
@@ -414,7 +414,8 @@ def held(name: str) -> np.ndarray:
             forces = np.column_stack([world.bodies[:-1, :3], world.contact.contact_force])
             model, data = world.hand.model, world.hand.data
             model.vis.global_.fovy = FIELD_OF_VIEW
-            taken.append(render(model, data, *TILE, Camera(*CAMERA), forces))
+            with Renderer(model, *TILE, Camera(*CAMERA)) as renderer:
+                taken.append(renderer.picture(data, forces))
             raise _PictureTakenError
 
     try:

@@ -1,9 +1,11 @@
+import logging
 import os
 import signal
 import socket
 import subprocess
 import sys
 import time
+import warnings
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -280,13 +282,13 @@ class TestCluster:
     @pytest.mark.parametrize("address", ["missing", "127.0.0.1:1", "spark://127.0.0.1:1"])
     def test_no_scheduler_at_the_address(self, monkeypatch, address):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
         with pytest.raises(EngineError, match=rf"^no Dask scheduler answers at {address}: start"):
             list(Engine.parse(f"dask:{address}").map_ordered(power, [(1, 1)]))
 
     def test_another_server_at_the_address(self, monkeypatch):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
         with socket.create_server(("127.0.0.1", 0)) as silent:
             engine = Engine.parse("dask:{}:{}".format(*silent.getsockname()))
             with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):
@@ -296,3 +298,31 @@ class TestCluster:
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(MissingExtra, match=r"needs the package distributed.*cluster"):
             list(Engine.parse("dask:127.0.0.1:1").map_ordered(power, [(1, 1)]))
+
+
+class TestNothingGlobalStays:
+    def test_the_filter_of_warnings_is_there_while_pools_run_only(self):
+        before = list(warnings.filters)
+        first, second = (Engine(2).map_ordered(abs, [(-1,), (-2,)]) for _ in range(2))
+        assert [next(first), next(second)] == [1, 1]
+        (added,) = [one for one in warnings.filters if one not in before]
+        assert added[1].match("A worker stopped while some jobs were given to the executor")
+        assert list(first) == [2]
+        assert added in warnings.filters  # the second pool still runs
+        assert list(second) == [2]
+        assert warnings.filters == before
+
+    def test_filters_that_the_program_reset_meanwhile_stay_so(self):
+        with warnings.catch_warnings():
+            calls = Engine(2).map_ordered(abs, [(-1,), (-2,)])
+            next(calls)
+            warnings.resetwarnings()
+            assert list(calls) == [2]
+            assert warnings.filters == []
+
+    def test_the_log_of_dask_has_its_level_again(self):
+        logger = logging.getLogger("distributed.client")
+        before = logger.level
+        with cluster_module._silent_log():
+            assert logger.level == logging.CRITICAL
+        assert logger.level == before

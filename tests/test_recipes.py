@@ -12,7 +12,7 @@ import pytest
 
 import holdfast
 from holdfast.contact import ContactState
-from holdfast.io import save_recording
+from holdfast.io import load_recording, save_recording
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 
@@ -53,15 +53,20 @@ class Copy:
             text = text.replace(before, after)
         (self.folder / name).write_text(text)
 
-    def run(self, *arguments):
-        """Run Python with the copy, and return its output."""
+    def delete_kernels(self):
+        """Delete the compiled kernels, as CONTRIBUTING says after a change of one."""
+        for kernel in self.folder.rglob("*.nb[ic]"):
+            kernel.unlink()
+
+    def run(self, *arguments, exit_code=0):
+        """Run Python with the copy, and return its output, or its errors if it is to fail."""
         environment = {**os.environ, "PYTHONPATH": str(self.folder)}
         command = [sys.executable, *map(str, arguments)]
         ended = subprocess.run(
-            command, capture_output=True, text=True, env=environment, check=False, timeout=240
+            command, capture_output=True, text=True, env=environment, check=False, timeout=540
         )
-        assert ended.returncode == 0, ended.stderr
-        return ended.stdout
+        assert ended.returncode == exit_code, ended.stderr
+        return ended.stderr if exit_code else ended.stdout
 
     def _check(self, name):
         assert name in self._named, f"the recipe does not name {name}, but {self._named}"
@@ -242,8 +247,8 @@ def test_add_a_grip_law(copy_of):
     copy.add("holdfast/grip/laws/double.py", "name", LAW)
     copy.change(
         "holdfast/grip/laws/__init__.py",
-        ("from holdfast.grip.laws.fixed", "from holdfast.grip.laws.double import Double\n"
-         "from holdfast.grip.laws.fixed"),
+        ("from holdfast.grip.laws.friction_margin", "from holdfast.grip.laws.double import Double\n"
+         "from holdfast.grip.laws.friction_margin"),
         ('    "fixed": Fixed,\n', '    "fixed": Fixed,\n    "double": Double,\n'),
     )  # fmt: skip
     program = (
@@ -251,6 +256,138 @@ def test_add_a_grip_law(copy_of):
         "print(law_named('double').wishes([Touch('thumb')], 0.0, 0.01)[0][0])"
     )
     assert copy.run("-c", program) == "2.0\n"
+
+
+SHEAR = """    if kind == OF_SHEAR:
+        # |F_tip - (F_tip . z) z| of the newest sample.
+        return math.hypot(history[f, 1, newest], history[f, 2, newest])
+"""
+RANGE = """    if kind == OF_RANGE:
+        # max F_a - min F_a over the window.
+        least = most = history[f, 0, newest]
+        for place in range(newest + 1 - window, newest):
+            least = min(least, history[f, 0, place])
+            most = max(most, history[f, 0, place])
+        return float(most - least)
+"""
+
+CHECK_FEATURES = """
+import sys
+import numpy as np
+from holdfast import Detector, Model, detect, fingertip_force, load_recording
+from holdfast.features.stream import extract
+
+model, recording = Model.load(sys.argv[1]), load_recording(sys.argv[2])
+model.save(sys.argv[3])
+assert Model.load(sys.argv[3]).digest == model.digest
+names = [str(spec) for spec in model.finger("thumb").features]
+assert names == ["F_a", "shear", "range[14]"], names
+
+# The values of the kernel are those of NumPy.
+plan = model.plan(model.fingers_of({n: m.sensor for n, m in recording.modules.items()}), 150.0)
+features = extract(plan, recording)
+for finger, module in recording.modules.items():
+    force = fingertip_force(module.readings, module.sensor, model.tare, module.times)
+    amplitude = np.linalg.norm(force, axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(amplitude, 14)
+    shear, extent = np.hypot(force[13:, 0], force[13:, 1]), np.ptp(windows, axis=1)
+    rows = features[finger].features[13:]
+    known = np.isfinite(rows).all(axis=1)
+    assert known.sum() > 100
+    np.testing.assert_allclose(rows[known, 1], shear[known], atol=1e-9)
+    np.testing.assert_allclose(rows[known, 2], extent[known], atol=1e-9)
+
+# A detector that is fed sample by sample gives the same bits as the whole recording.
+batch, detector = detect(model, recording), Detector(model, rate=recording.rate)
+for k, time in enumerate(recording.modules["thumb"].times):
+    live = detector.update({n: m.readings[k] for n, m in recording.modules.items()}, time)
+    for finger, trace in batch.fingers.items():
+        assert repr(live.fingers[finger]) == repr(trace.estimate(k)), (finger, k)
+print(np.isfinite(batch.fingers["thumb"].stable_probability).sum())
+"""
+
+
+@pytest.mark.timeout(600)  # it compiles all kernels
+def test_add_a_feature(copy_of, tmp_path):
+    copy = copy_of("Add a feature")
+    copy.change(
+        "holdfast/features/specs.py",
+        ('"sigma_xyz", "change")\n"""Kinds that are computed by',
+         '"sigma_xyz", "change", "shear", "range")\n"""Kinds that are computed by'),
+        ('"sigma", "sigma_xyz", "change")', '"sigma", "sigma_xyz", "change", "range")'),
+    )  # fmt: skip
+    copy.change(
+        "holdfast/features/kernel.py",
+        ("OF_SIGMA_XYZ, OF_CHANGE =", "OF_SIGMA_XYZ, OF_CHANGE, OF_SHEAR, OF_RANGE ="),
+        ('"sigma_xyz", "change")', '"sigma_xyz", "change", "shear", "range")'),
+        ("    # m or sigma of F_a: equations 1 and 2.\n",
+         f"{SHEAR}{RANGE}    # m or sigma of F_a: equations 1 and 2.\n"),
+    )  # fmt: skip
+    copy.delete_kernels()
+    data, model = labelled_recordings(tmp_path / "data"), tmp_path / "model.json"
+    copy.run(
+        *VERB, "train", data, "-o", model, "--features", "F_a,shear,range", "--trials", "0",
+        "--jobs", "1",
+    )  # fmt: skip
+    recording, again = data / "grasp-0.mcap", tmp_path / "again.json"
+    assert int(copy.run("-c", CHECK_FEATURES, model, recording, again)) > 100
+    assert again.read_bytes() == model.read_bytes()
+
+
+IMPORTER = '''
+"""Import of taps: a line of JSON for each sample, with its time and the taxels of a fingertip."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.files import read_input
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is such a file."""
+    return path.suffix == ".taps"
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the file."""
+    return [path]
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Read the recording of a file."""
+    try:
+        rows = [json.loads(line) for line in read_input(path, 1 << 20).splitlines()]
+        times = np.array([row["t"] for row in rows], dtype=np.float64)
+        readings = np.array([row["taxels"] for row in rows])
+        yield Recording(path.stem, {"index": Tactile(sensor("uskin-4x4"), times, readings)})
+    except (KeyError, TypeError, ValueError) as cause:
+        raise RecordingError(f"{path} is no file of taps: {cause}") from cause
+'''
+
+
+def test_add_a_file_format(copy_of, tmp_path):
+    copy = copy_of("Add a file format to import")
+    copy.add("holdfast/io/importers/finger_taps.py", "format", IMPORTER)
+    copy.change(
+        "holdfast/io/importers/__init__.py",
+        ("FORMATS = {\n", 'FORMATS = {\n    "finger-taps": "lines of JSON",\n'),
+    )
+    rows = [{"t": k / 100, "taxels": [[k, 0, 1000 + k]] * 16} for k in range(50)]
+    file, out = tmp_path / "tap.taps", tmp_path / "out"
+    file.write_text("\n".join(map(json.dumps, rows)))
+    copy.run(*VERB, "import", file, out, "--suffix", "mcap")
+    module = load_recording(out / "tap.mcap").modules["index"]
+    assert module.times.tolist() == [row["t"] for row in rows]
+    assert module.readings.tolist() == [row["taxels"] for row in rows]
+    file.write_text('{"t": 1}')
+    broken = copy.run(*VERB, "import", file, out, "--format", "finger-taps", exit_code=2)
+    assert broken == f"holdfast: {file} is no file of taps: 'taxels'\n"
 
 
 def test_a_file_that_the_recipe_does_not_name_is_noticed(copy_of):

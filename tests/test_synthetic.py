@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.features import fingertip_force, haar_features
-from holdfast.synthetic import RATE, synthetic_recording
+from holdfast.synthetic import SYNTHETIC_RATE, synthetic_recording
 
 
 def state_rows(module, state):
@@ -28,7 +28,7 @@ def test_it_is_what_a_curved_uskin_gives():
     module = synthetic_recording("a", 0).modules["thumb"]
     assert module.sensor.name == "uskin-curved"
     assert module.readings.dtype == np.uint16
-    assert module.rate == pytest.approx(RATE)
+    assert module.rate == pytest.approx(SYNTHETIC_RATE)
     assert module.label_states.all()  # every sample has a label
     assert {label.state for label in module.labels} == set(ContactState) - {ContactState.UNKNOWN}
 

@@ -117,7 +117,7 @@ def _greeting(connection: socket.socket) -> bytes:
 def attack_client(rounds: int) -> Result:
     """Open and read a source of each server; only documented errors may be raised."""
     result = Result("hostile XELA servers", limit=LIMIT)
-    before, client.OPEN_TIMEOUT = client.OPEN_TIMEOUT, 0.5
+    before, client.XELA_OPEN_TIMEOUT = client.XELA_OPEN_TIMEOUT, 0.5
     cases = [
         *((HEADLESS[name], b"") for name in HEADLESS),
         *((None, one) for one in SPOKEN.values()),
@@ -128,7 +128,7 @@ def attack_client(rounds: int) -> Result:
                 with speaking(answer, data) as port:
                     result.timed(_reading(port), HoldfastError)
     finally:
-        client.OPEN_TIMEOUT = before
+        client.XELA_OPEN_TIMEOUT = before
     return result
 
 

@@ -1,5 +1,6 @@
 """Calls on a Dask cluster: few at a time, repeated if a worker dies, of one version of holdfast."""
 
+import logging
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
@@ -19,7 +20,7 @@ K = TypeVar("K", bound=Hashable)
 Arguments = tuple[object, ...]
 Call = tuple[K, Arguments]
 
-CONNECT_TIMEOUT = 10.0
+SCHEDULER_TIMEOUT = 10.0
 """Time within which a scheduler must answer [s]."""
 
 NO_WORKER_TIMEOUT = 30.0
@@ -147,22 +148,32 @@ def _client(scheduler: str) -> Iterator["Client"]:
     except ImportError as missing:
         raise MissingExtra("distributed", "cluster") from missing
     large = {"distributed.admin.large-graph-warning-threshold": "1GB"}
-    with config.set(large), _connect(scheduler) as client:
+    with config.set(large), _silent_log(), _connect(scheduler) as client:
         yield client
+
+
+@contextmanager
+def _silent_log() -> Iterator[None]:
+    """Silence the log of the client of Dask: our errors say the same in one line."""
+    logger = logging.getLogger("distributed.client")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 def _connect(scheduler: str) -> "Client":
     from asyncio import run, wait_for
     from concurrent.futures import ThreadPoolExecutor
-    from logging import CRITICAL, getLogger
 
     from distributed import Client
 
-    getLogger("distributed.client").setLevel(CRITICAL)  # our errors say the same in one line
     try:
         with ThreadPoolExecutor(1) as thread:  # the calling thread may have an event loop
-            thread.submit(run, wait_for(_connect_once(scheduler), CONNECT_TIMEOUT)).result()
-        return Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
+            thread.submit(run, wait_for(_connect_once(scheduler), SCHEDULER_TIMEOUT)).result()
+        return Client(scheduler, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as cause:  # a server of any other kind may answer there
         raise EngineError(
             f"no Dask scheduler answers at {scheduler}: start one with `dask scheduler` "

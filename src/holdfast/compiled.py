@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.cpu import CPUTargetOptions
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -17,6 +18,11 @@ compiled_inside = numba.njit(cache=True, error_model="numpy", forceinline=True)
 """Compile a step into the loops that call it: a call costs as much as the step."""
 inlined = numba.njit(error_model="numpy", inline="always")
 """Inline a step that receives all arrays: passing them costs as much as the step."""
+
+
+COUNTS_ARE_OPTIONAL = hasattr(CPUTargetOptions, "_nrt")
+"""Whether numba has its option for reference counts, which is not public. Without it, steps give
+the same, and take half as long again."""
 
 
 def compiled_step(function: Function) -> Function:
@@ -34,6 +40,6 @@ def compiled_view(function: Function) -> Function:
 
 
 def _compile(function: Function, *, counts: bool) -> Function:
-    options: dict[str, Any] = {"_nrt": counts}  # numba's annotations lack it
+    options: dict[str, Any] = {"_nrt": counts} if COUNTS_ARE_OPTIONAL else {}
     compile_it: Any = numba.njit(cache=True, error_model="numpy", **options)
     return cast("Function", compile_it(function))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, NamedTuple, Self, TypeVar, cast
 
 from holdfast.children import SAFE_PATH_VARIABLE, safe_path
@@ -26,6 +26,9 @@ MAX_RETRIES = 2
 
 PARENT_CHECK_INTERVAL = 1.0
 """Time between two checks of a process whether the process that started it still runs [s]."""
+
+
+LOKY_WARNING = "A worker stopped while some jobs were given"
 
 
 class Engine(NamedTuple):
@@ -151,8 +154,6 @@ def _in_processes(
     from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    # loky replaces a worker whose memory grew, with a warning. No result is lost.
-    warnings.filterwarnings("ignore", "A worker stopped while some jobs were given")
     rest, started = iter(calls), dict[K, Arguments]()
     ended = False
     while started or not ended:
@@ -160,11 +161,41 @@ def _in_processes(
             yield name, _call_alone(function, name, started.pop(name))
         call_named = delayed(_call_in_worker)
         tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
-        with suppress(TerminatedWorkerError):
+        with suppress(TerminatedWorkerError), _WITHOUT_WARNING:
             for name, result in _start(n_jobs, tasks):
                 del started[name]
                 yield name, result
             ended = True
+
+
+class _WarningFilter:
+    """Filter that ignores the warning of loky about a worker that it replaces.
+
+    loky replaces a worker whose memory grew; no result is lost. The filter is there while any
+    pool runs. Several pools may run at a time and end in any order, so that restoring a list of
+    filters, as `warnings.catch_warnings` does, would lose filters that were added meanwhile.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._n_users = 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._n_users += 1
+            if self._n_users == 1:
+                warnings.filterwarnings("ignore", LOKY_WARNING)
+                self._filter = warnings.filters[0]
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._n_users -= 1
+            if not self._n_users:
+                with suppress(ValueError):  # the program has reset the filters
+                    cast(list[object], warnings.filters).remove(self._filter)
+
+
+_WITHOUT_WARNING = _WarningFilter()
 
 
 def _start(n_jobs: int, tasks: Iterable[object]) -> Iterator[Any]:

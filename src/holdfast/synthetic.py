@@ -14,13 +14,13 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
 
-RATE = 150.0
-NOISE = 0.9
+SYNTHETIC_RATE = 150.0
+READING_NOISE = 0.9
 """Standard deviation of a reading, from the data sheet of the uSkin [count]."""
-BASELINE = (32768.0, 32768.0, 36000.0)
+READING_BASELINE = (32768.0, 32768.0, 36000.0)
 """Readings without contact [count]."""
 
-FREE, CLOSING, HOLD, SHAKE, RELEASE = 1.5, 0.8, 3.0, 1.2, 0.5
+FREE_TIME, CLOSING_TIME, HELD_TIME, SHAKEN_TIME, RELEASED_TIME = 1.5, 0.8, 3.0, 1.2, 0.5
 """Duration of each part of the schedule [s]."""
 
 
@@ -51,8 +51,10 @@ def synthetic_recording(
 
 def _finger(generator: np.random.Generator, grip: float) -> Tactile:
     tip = sensor("uskin-curved")
-    ends = np.cumsum([FREE, CLOSING, HOLD, SHAKE, HOLD, RELEASE, FREE])
-    times = np.arange(round(ends[-1] * RATE)) / RATE
+    ends = np.cumsum(
+        [FREE_TIME, CLOSING_TIME, HELD_TIME, SHAKEN_TIME, HELD_TIME, RELEASED_TIME, FREE_TIME]
+    )
+    times = np.arange(round(ends[-1] * SYNTHETIC_RATE)) / SYNTHETIC_RATE
     force = _force(generator, times, ends, grip * generator.uniform(0.7, 1.3))
     readings = _readings(generator, tip, force)
     return Tactile(tip, times, readings, labels=_labels(ends))
@@ -60,8 +62,8 @@ def _finger(generator: np.random.Generator, grip: float) -> Tactile:
 
 def _force(generator: np.random.Generator, times: Array, ends: Array, grip: float) -> Array:
     """Return (n, 3) force on the fingertip [count]: grip, constant shear and shaking."""
-    closing = _ramp((times - ends[0]) / CLOSING)
-    release = _ramp((times - ends[4]) / RELEASE)
+    closing = _ramp((times - ends[0]) / CLOSING_TIME)
+    release = _ramp((times - ends[4]) / RELEASED_TIME)
     level = grip * (closing - release)
     shaken = (times >= ends[2]) & (times < ends[3])
     frequencies = generator.uniform(4.0, 30.0, size=(6, 1))
@@ -79,8 +81,8 @@ def _readings(generator: np.random.Generator, tip: Sensor, force: Array) -> Arra
     share = np.exp(-0.5 * (distance / 6e-3) ** 2)
     share /= share.sum()
     in_taxels = np.einsum("tji,nj->nti", tip.rotations, force) * share[:, None]
-    rest = np.array(BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
-    noise = generator.normal(0.0, NOISE, size=in_taxels.shape)
+    rest = np.array(READING_BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
+    noise = generator.normal(0.0, READING_NOISE, size=in_taxels.shape)
     counts: Array = np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
     return counts
 

@@ -7,7 +7,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.io import load_dataset, save_recording
-from holdfast.labelling.server.api import list_recordings
+from holdfast.labelling.server.documents import list_recordings
 from holdfast.labelling.server.workspace import Workspace
 from holdfast.synthetic import synthetic_recording
 

@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
 from holdfast.classifiers import Adapted, LinearClassifier, OnnxClassifier
-from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, linear_prior, log_odds
+from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, linear_prior, log_odds
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples

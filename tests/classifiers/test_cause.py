@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 
-from holdfast.classifiers.cause import CAUSES, CauseClassifier, add_scores, fit_causes
+from holdfast.classifiers.cause import ALL_CAUSES, CauseClassifier, add_scores, fit_causes
 from holdfast.contact import UNSTABLE, Cause
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError
@@ -39,10 +39,10 @@ def test_the_largest_sum_of_scores_wins():
     rows = np.array([[0.0, 1.0], [5.0, 9.0]])
     standardised = (rows - made.mean) / made.scale
     wanted = (standardised @ np.array(made.coefficients).T + made.intercepts).cumsum(axis=0)
-    scores = np.zeros(len(CAUSES))
+    scores = np.zeros(len(ALL_CAUSES))
     for row, sums in zip(rows, wanted, strict=True):
         code = add_scores(row, made.weights(), scores)
-        assert CAUSES[code - 1] is made.causes[int(sums.argmax())]
+        assert ALL_CAUSES[code - 1] is made.causes[int(sums.argmax())]
         assert scores[made.codes() - 1] == pytest.approx(sums)
     assert np.isneginf(np.delete(scores, made.codes() - 1)).all()
 

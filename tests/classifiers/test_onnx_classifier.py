@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from holdfast.classifiers import LinearClassifier
 from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE, OnnxClassifier
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.detector import Detector, detect
@@ -86,6 +87,44 @@ def test_a_saved_and_loaded_model_is_the_same(fitted, tmp_path):
         "threshold": 0.4,
     }  # fmt: skip
     model.save(tmp_path / "other.json")  # the same ONNX file serves both
+
+
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+LINEAR = LinearClassifier((0.0, 0.0), (1.0, 1.0), (1.0, 1.0), 0.0)
+
+
+def test_a_model_that_is_replaced_leaves_no_onnx_file(tmp_path):
+    path, again = tmp_path / "m.json", OnnxClassifier.of(b"another", 2, 0.5)
+    hand_model(UNREAD).save(path)
+    with pytest.raises(OutputError):
+        hand_model(LINEAR).save(path)
+    assert names_in(tmp_path) == sorted([UNREAD.file, "m.json"])
+    hand_model(again).save(path, force=True)
+    assert names_in(tmp_path) == sorted([again.file, "m.json"])
+    hand_model(again).save(path, force=True)
+    assert names_in(tmp_path) == sorted([again.file, "m.json"])
+    hand_model(LINEAR).save(path, force=True)
+    assert names_in(tmp_path) == ["m.json"]
+
+
+@pytest.mark.parametrize("name", ["other.json", "other.model"])
+def test_the_onnx_file_of_another_model_stays(tmp_path, name):
+    path = tmp_path / "m.model"
+    hand_model(UNREAD).save(path)
+    hand_model(UNREAD).save(tmp_path / name)
+    hand_model(LINEAR).save(path, force=True)
+    assert names_in(tmp_path) == sorted([UNREAD.file, "m.model", name])
+
+
+def test_only_files_that_are_named_by_a_digest_are_deleted(tmp_path):
+    own = tmp_path / "own.onnx"
+    own.write_bytes(b"made by hand")
+    (tmp_path / "m.json").write_text('{"file": "own.onnx"}')
+    hand_model(LINEAR).save(tmp_path / "m.json", force=True)
+    assert own.exists()
 
 
 def test_an_update_gives_what_the_whole_recording_gives(fitted):

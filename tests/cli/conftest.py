@@ -14,4 +14,4 @@ def terminal_width(monkeypatch):
 @pytest.fixture(autouse=True)
 def no_progress_messages(monkeypatch):
     """Print no line of progress on stderr, even where a machine takes minutes."""
-    monkeypatch.setattr(progress, "MESSAGE_INTERVAL", math.inf)
+    monkeypatch.setattr(progress, "PROGRESS_INTERVAL", math.inf)

@@ -20,8 +20,8 @@ SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 def small(monkeypatch):
     """Simulate one mug per case, in this process."""
     whole = simulate_verb.simulate_grasps
-    monkeypatch.setattr(verb, "OBJECTS", "mug")
-    monkeypatch.setattr(verb, "N_REPEATS", 1)
+    monkeypatch.setattr(verb, "DEMO_OBJECTS", "mug")
+    monkeypatch.setattr(verb, "N_DEMO_REPEATS", 1)
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
         simulate_verb,

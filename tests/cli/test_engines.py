@@ -63,7 +63,7 @@ def contents(folder):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_no_scheduler_at_the_address(capsys, monkeypatch, folder, verb):
-    monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
     before = sorted(folder.iterdir())
     assert main([verb, *VERBS[verb], "--engine", "dask:tcp://127.0.0.1:1"]) == 2
     out, err = capsys.readouterr()

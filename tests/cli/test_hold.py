@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 from holdfast.cli import main
+from holdfast.cli.app import spread_groups
 from holdfast.cli.grip_options import GripSettings
 from holdfast.cli.hold import hold
 from holdfast.cli.serve import serve
@@ -68,9 +69,9 @@ def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monke
 
 @pytest.mark.parametrize("verb", [hold, serve])
 def test_the_limits_are_those_of_the_trials(verb):
-    given = signature(verb).parameters
+    given = signature(spread_groups(verb)).parameters
     names = ("max_scale", "min_scale", "max_force", "on_fault")
-    settings = GripSettings(**{name: given[name].default for name in names})
+    settings = GripSettings("", **{name: given[name].default for name in names})
     assert settings.limits() == LIMITS == Limits()
     shown = {name: get_args(given[name].annotation)[1].show_default for name in names[:2]}
     assert shown == {"max_scale": str(LIMITS.max_scale), "min_scale": str(LIMITS.min_scale)}
@@ -97,7 +98,7 @@ def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, me
 def test_a_hand_that_does_not_answer_is_one_line(grasp, capsys, monkeypatch):
     pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    monkeypatch.setattr(ros_hand, "OPEN_TIMEOUT", 0.1)
+    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.1)
     hand = "ros2:v4?domain=229"
     words = ["hold", "builtin:twin", str(grasp), "--hand", hand, "--armed", "--confirm", hand]
     assert main(words) == 2

@@ -176,7 +176,7 @@ def test_it_repeats_until_it_is_interrupted(path, ending):
 
 
 def test_the_number_of_clients_is_printed(capsys, path, monkeypatch):
-    monkeypatch.setattr(verb, "POLL_INTERVAL", 0.02)
+    monkeypatch.setattr(verb, "END_POLL_INTERVAL", 0.02)
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
     _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)
@@ -186,8 +186,8 @@ def test_the_number_of_clients_is_printed(capsys, path, monkeypatch):
 
 def test_a_terminal_shows_the_rate(capsys, path, monkeypatch):
     monkeypatch.setattr(verb.sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setattr(verb, "REFRESH_INTERVAL", 0.1)
-    monkeypatch.setattr(verb, "POLL_INTERVAL", 0.02)
+    monkeypatch.setattr(verb, "PLAY_REFRESH_INTERVAL", 0.1)
+    monkeypatch.setattr(verb, "END_POLL_INTERVAL", 0.02)
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
     _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)

@@ -13,7 +13,7 @@ from holdfast.cli import main
 from holdfast.cli import serve as verb
 from holdfast.cli.serve import open_browser
 from holdfast.devices.hands import Claim
-from holdfast.devices.hands.log_file import LogFile
+from holdfast.devices.hands.local import LogFile
 from holdfast.errors import HandError
 from holdfast.io import load_recording, save_recording
 from holdfast.live.loop import watchdog

@@ -132,7 +132,7 @@ class TestFailures:
     def test_are_kept_and_repeated_a_limited_number_of_times(self, capsys, out, weak):
         code, printed, _ = run(capsys, out, *ONE, "--json")
         assert code == 0
-        assert weak == list(range(verb.ATTEMPTS))
+        assert weak == list(range(verb.GRASP_ATTEMPTS))
         assert names(out) == list(self.FAILED)
         assert json.loads(printed)["failed"] == [
             name.removesuffix(".parquet") for name in names(out)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import pytest
 
 from holdfast import files
+from holdfast.classifiers import RECIPES
 from holdfast.cli import main
 from holdfast.io import labels_path, load_dataset, load_recording, save_labels, save_recording
 from holdfast.model import Debounce, Model
@@ -375,3 +376,9 @@ def test_labels_of_a_rule_that_hide_others_are_reported(capsys, data, model):
         labels_path(path).unlink()
     assert code == 0
     assert err.startswith("labels of a rule outrank the labels that came with 1 of 3 recordings")
+
+
+def test_the_classifiers_are_listed(capsys):
+    assert main(["train", "--classifier", "list"]) == 0
+    out, err = capsys.readouterr()
+    assert (out.split(), err) == (list(RECIPES), "")

@@ -1,6 +1,6 @@
 import pytest
 
-from holdfast.detector.fast_step import estimate_code, split_code
+from holdfast.detector.decision_rule import estimate_code, split_code
 
 
 @pytest.mark.parametrize("decision", [(0, 1, 0, 0), (2, 0, 8191, 6), (3, 4, 255, 0)])

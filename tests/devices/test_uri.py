@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from holdfast.devices.sources import SCHEMES, open_source
-from holdfast.devices.sources.replay import Replay
+from holdfast.devices.sources.replay import ReplaySource
 from holdfast.devices.uri import is_uri, parse
 
 KNOWN = "there are xela:, twin:, ros2:, ros1:, serial:"
@@ -118,13 +118,13 @@ def test_an_existing_file_is_no_uri(tmp_path, monkeypatch):
     assert is_uri("twin:a.parquet")
     Path("twin:a.parquet").touch()
     assert not is_uri("twin:a.parquet")
-    assert isinstance(open_source("twin:a.parquet"), Replay)
+    assert isinstance(open_source("twin:a.parquet"), ReplaySource)
 
 
 @pytest.mark.parametrize("text", ["a.parquet", "/a/b.mcap", r"C:\a.parquet", "C:/a.mcap", "TWIN:"])
 def test_everything_else_is_a_file(text):
     assert not is_uri(text)
-    assert isinstance(open_source(text), Replay)
+    assert isinstance(open_source(text), ReplaySource)
 
 
 def test_speed_and_loop_are_for_the_replay_and_the_twin(tmp_path):

@@ -27,7 +27,7 @@ SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 def short_demo(monkeypatch):
     """The demo with short grasps, in this process."""
     whole = simulate_verb.simulate_grasps
-    monkeypatch.setattr(demo, "OBJECTS", "mug")
+    monkeypatch.setattr(demo, "DEMO_OBJECTS", "mug")
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
         simulate_verb,

@@ -11,9 +11,16 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from holdfast.contact import ContactState
-from holdfast.live.publishers.ros2_publisher import DEFINITIONS, Ros2Publisher
-from holdfast.live.publishers.ros_publisher import DIAGNOSTICS, diagnostics_of
-from holdfast.ros.definitions import NUMBER_CODES, parse_definition
+from holdfast.live.publishers.ros_publisher import Ros2Publisher, diagnostics_of
+from holdfast.ros.definitions import NUMBER_CODES
+from holdfast.ros.topic_messages import (
+    DIAGNOSTICS,
+    FLOAT64,
+    STRING,
+    VECTOR,
+    WRENCH,
+    topic_definition,
+)
 from live.estimates import estimate
 
 FOLDER = Path(__file__).parents[2] / "examples" / "ros2"
@@ -48,7 +55,8 @@ def message_class(kind, definition):
 
 
 KINDS = {
-    kind: message_class(kind, parse_definition(kind, text)) for kind, text in DEFINITIONS.items()
+    kind: message_class(kind, topic_definition(kind))
+    for kind in (STRING, FLOAT64, VECTOR, WRENCH, DIAGNOSTICS)
 }
 
 
@@ -104,7 +112,7 @@ class Recorded:
 @pytest.fixture
 def example(monkeypatch):
     """A function that imports an example with stand-ins for the packages of ROS."""
-    status = parse_definition(DIAGNOSTICS, DEFINITIONS[DIAGNOSTICS])
+    status = topic_definition(DIAGNOSTICS)
     status = message_class("diagnostic_msgs/DiagnosticStatus", status)
     status.OK = b"\0"
     packages = {}

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from holdfast.grip.balance import balanced
+from holdfast.grip.laws.stability import balanced
 
 grasps = st.integers(2, 5).flatmap(
     lambda n: st.tuples(

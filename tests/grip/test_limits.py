@@ -23,16 +23,6 @@ def test_limits_that_contradict_are_refused(given, message):
         Limits(**given)
 
 
-def test_a_target_stays_below_the_ceiling():
-    """A target of 10 N with a ceiling of 10 N would be a fault at the first reaction."""
-    limits = Limits(max_scale=1.5, max_force=10.0)
-    limits.check_target(6.0)
-    with pytest.raises(ValueError, match=r"10 times max_scale 1\.5 is 15, above max_force 10"):
-        limits.check_target(10.0)
-    with pytest.raises(ValueError, match="target force: a finite number above 0 expected"):
-        limits.check_target(0.0)
-
-
 def test_the_highest_scale_respects_the_highest_force():
     assert Limits(max_scale=2.0).highest_scale(100.0) == 2.0
     assert Limits(max_scale=2.0, max_force=3.0).highest_scale(2.0) == 1.5

@@ -7,7 +7,7 @@ import msgspec
 
 from holdfast.contact import ContactEstimate, ContactState, Fault, HandEstimate, Reason
 from holdfast.grip import Limits
-from holdfast.live.loop.documents import GripDocument, GripEntry, GripFinger
+from holdfast.live.documents import GripDocument, GripEntry, GripFinger
 
 UNITS = {"thumb": "N", "index/1": "count"}
 

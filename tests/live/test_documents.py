@@ -12,11 +12,16 @@ import pytest
 from msgspec.structs import fields
 
 import holdfast
-from holdfast.cli.detect_output import EstimateChunk, json_lines
+from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactEstimate
 from holdfast.grip import FingerCommand, Limits
-from holdfast.live.documents import FingerDocument, document_type, finger_document
-from holdfast.live.loop.documents import GripFinger, GripLimits
+from holdfast.live.documents import (
+    FingerDocument,
+    GripFinger,
+    GripLimits,
+    document_type,
+    finger_document,
+)
 from holdfast.live.publishers.ros_publisher import NOT_IN_DIAGNOSTICS, diagnostics_of
 from live import estimates
 
@@ -26,7 +31,7 @@ NEW_FIELD = "    cause: Cause | None = None\n"
 PROGRAM = """
 import json, sys
 import holdfast
-from holdfast.cli.detect_output import EstimateChunk, json_lines
+from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.live.documents import finger_document
 from holdfast.live.publishers.ros_publisher import diagnostics_of

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState, Fault
-from holdfast.live.arrival_detector import ArrivalDetector
-from holdfast.live.rate import RateMonitor
+from holdfast.live.arrival_detector import ArrivalDetector, RateMonitor
 
 from . import build
 

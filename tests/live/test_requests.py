@@ -3,7 +3,7 @@ from threading import Thread
 
 import pytest
 
-from holdfast.live.requests import RequestQueue
+from holdfast.live.session import RequestQueue
 
 
 def fail():

@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from holdfast.ros.definitions import MAX_FIELDS, Field, field_paths, parse_definition
+from holdfast.ros.definitions import MAX_FIELDS, MessageField, field_paths, parse_definition
 
 
 def nested(n_fields, depth):
@@ -21,9 +21,9 @@ def test_definitions():
     definition = parse_definition("p/msg/A", text)
     assert definition.name == "p/A"
     assert definition.fields == (
-        Field("header", "std_msgs/Header"),
-        Field("some", "int8", 0),
-        Field("name", "string"),
+        MessageField("header", "std_msgs/Header"),
+        MessageField("some", "int8", 0),
+        MessageField("name", "string"),
     )
 
 

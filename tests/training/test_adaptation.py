@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers import LinearClassifier, Samples
-from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS
+from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
 from holdfast.training.adaptation import Adaptation, choose_adaptation, choose_nearest
 from holdfast.training.training_samples import FingerSamples
 

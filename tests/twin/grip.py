@@ -48,7 +48,7 @@ class Grip:
     def step(self, force: npt.ArrayLike = (0.0, 0.0, 0.0), spin: bool = True) -> None:
         """One step with gravity and an outside force through the centre of mass [N]."""
         touch(self.state, self.constants, self.bodies, self.dt)
-        push = self.state.object_force + np.asarray(force) - [0, 0, GRAVITY * self.mass]
+        push = self.state.wrench[:3] + np.asarray(force) - [0, 0, GRAVITY * self.mass]
         body = self.object_body
         body[12:15] += push / self.mass * self.dt
         if spin:
@@ -59,7 +59,7 @@ class Grip:
         rotation = self.object_body[3:12].reshape(3, 3)
         inertia = rotation @ np.diag(self.item.inertia) @ rotation.T
         spin = self.object_body[15:18]
-        return np.linalg.solve(inertia, self.state.object_torque - np.cross(spin, inertia @ spin))
+        return np.linalg.solve(inertia, self.state.wrench[3:] - np.cross(spin, inertia @ spin))
 
     def _move(self) -> None:
         for body in self.bodies:

@@ -88,12 +88,12 @@ def test_nodes_add_up_and_momentum_is_kept(seed: int, name: str) -> None:
             np.testing.assert_allclose(forces.sum(axis=0), state.tip_force[tip], atol=1e-9)
             arms = curved_fingertip().nodes @ bodies[tip, 3:12].reshape(3, 3).T
             torque = np.cross(arms, forces).sum(axis=0)
-            np.testing.assert_allclose(torque, state.tip_torque[tip], atol=1e-9)
-        np.testing.assert_allclose(state.contact_force.sum(axis=0), state.object_force, atol=1e-9)
+            np.testing.assert_allclose(torque, state.tips[:, 3:6][tip], atol=1e-9)
+        np.testing.assert_allclose(state.contact_force.sum(axis=0), state.wrench[:3], atol=1e-9)
         about = np.array([0.3, -0.2, 0.5])
-        total = np.cross(bodies[-1, :3] - about, state.object_force) + state.object_torque
+        total = np.cross(bodies[-1, :3] - about, state.wrench[:3]) + state.wrench[3:]
         total += np.cross(bodies[:-1, :3] - about, state.tip_force).sum(axis=0)
-        total += state.tip_torque.sum(axis=0)
+        total += state.tips[:, 3:6].sum(axis=0)
         np.testing.assert_allclose(total, 0, atol=1e-9)
 
     shaken(grip, seed, 20, check)
@@ -148,9 +148,9 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
         np.testing.assert_allclose(there.state.node_forces, here.state.node_forces, atol=1e-9)
         for one, other in (
             (there.state.tip_force, here.state.tip_force),
-            (there.state.tip_torque, here.state.tip_torque),
-            (there.state.object_force, here.state.object_force),
-            (there.state.object_torque, here.state.object_torque),
+            (there.state.tips[:, 3:6], here.state.tips[:, 3:6]),
+            (there.state.wrench[:3], here.state.wrench[:3]),
+            (there.state.wrench[3:], here.state.wrench[3:]),
         ):
             np.testing.assert_allclose(one, other @ turn.T, atol=1e-9)
         np.testing.assert_allclose(there.state.slip_speed, here.state.slip_speed, atol=1e-9)
@@ -202,7 +202,7 @@ def test_held_at_rest_without_creep(name: str) -> None:
     assert max(slip) < 1e-6
     assert np.linalg.norm(grip.object_body[:3] - before) / (2000 * grip.dt) < 1e-6
     weight = [0.0, 0.0, GRAVITY * grip.mass]
-    np.testing.assert_allclose(grip.state.object_force, weight, atol=1e-3)
+    np.testing.assert_allclose(grip.state.wrench[:3], weight, atol=1e-3)
 
 
 def test_a_push_within_friction_springs_back() -> None:

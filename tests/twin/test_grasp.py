@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.twin.grasp import MIDDLE_PLACE, PATH_GAPS, closing_path, object_pose
 from holdfast.twin.grasp import _aims as aims
-from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, HandModel
+from holdfast.twin.hand import FINGERS, JOINTS, HandModel
 from holdfast.twin.objects import OTHER_OBJECTS, distance_to, load_objects, object_named
 
 pytestmark = pytest.mark.slow
@@ -36,32 +36,20 @@ def test_every_object_can_be_grasped(name, table, miss):
     assert np.abs(np.diff(path.joints, axis=1)).max() < 0.35  # no jump to another solution
 
 
-@pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("name", OBJECTS)
-def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name, side):
+def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name):
     item = replace(object_named(name), texture_amplitude=0.0)
-    place, turn = object_pose(item, side)
+    place, turn = object_pose(item)
     c, s = np.cos(turn), np.sin(turn)
-    mirror = 1 if side == "right" else -1
     for finger in FINGERS:
         push, points = aims(item, finger)
-        world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] * [1, mirror, 1] - place
+        world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] - place
         own = world @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
         far = distance_to(item, own)
         touch = np.abs(PATH_GAPS).argmin()
         assert far[touch] == pytest.approx(0.0, abs=3e-4)
         assert (np.diff(far[:touch]) < 0).all()
         assert push @ push == pytest.approx(1.0)
-
-
-def test_the_left_hand_does_what_the_right_one_does(can):
-    left = closing_path(object_named("can"), "left")
-    np.testing.assert_allclose(left.targets(np.zeros(4)), MIRRORED * can.targets(np.zeros(4)))
-
-
-def test_another_side_is_refused():
-    with pytest.raises(ValueError, match="side 'right' or 'left' expected, 'both' given"):
-        closing_path(object_named("can"), "both")
 
 
 def test_targets_go_along_the_path(can):

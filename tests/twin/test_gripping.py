@@ -2,8 +2,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.twin.grasp import closing_path
-from holdfast.twin.gripping import Pressing
+from holdfast.twin.grasp import Pressing, closing_path
 from holdfast.twin.hand import JOINTS
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.objects import object_named

@@ -1,18 +1,18 @@
-"""The hand: geometry and masses of the vendor's tables, mirror, motion, forces, gravity."""
+"""The hand: geometry and masses of the vendor's tables, motion, forces, gravity."""
 
 import numpy as np
 import pytest
 
-from holdfast.twin.contact import N_BODY
 from holdfast.twin.hand import (
     FINGERS,
     JOINTS,
-    MIRRORED,
     MOUNTS,
     N_JOINTS,
     TIMESTEP,
     TIP_MASS,
     HandModel,
+    apply_forces,
+    fill_bodies,
     hand_xml,
 )
 from holdfast.twin.mujoco_import import mujoco
@@ -27,23 +27,11 @@ VENDOR_TIPS = {
 """Of the vendor's URDF in the palm at the zero pose [m]."""
 REACH = {"thumb": 0.0423, "index": 0.0267, "middle": 0.0267, "ring": 0.0267}
 RUBBER_TIP = 0.0168
-LEFT = {  # of the vendor's URDF of the left hand: place of the joint in its parent, axis
-    0: ((0.0, -0.0435, -0.001542), (0, 0, 1)),
-    8: ((0.0, 0.0435, -0.001542), (0, 0, 1)),
-    12: ((-0.0182, -0.019333, -0.045987), (1, 0, 0)),
-    13: ((-0.027, -0.005, 0.0399), (0, 0, -1)),
-    14: ((0.0, 0.0, 0.0177), (0, 1, 0)),
-}
-
-
-@pytest.fixture(params=["right", "left"])
-def side(request):
-    return request.param
 
 
 @pytest.fixture
-def hand(side):
-    return HandModel.build(object_named("can"), side)
+def hand():
+    return HandModel.build(object_named("can"))
 
 
 def moving(hand, seed=0):
@@ -54,8 +42,8 @@ def moving(hand, seed=0):
     hand.data.qpos[N_JOINTS:] = [0.1, -0.05, 0.2, *rotation(draw)]
     hand.data.qvel[:] = draw.normal(size=hand.model.nv)
     mujoco.mj_forward(hand.model, hand.data)
-    bodies = np.full((5, N_BODY), np.nan)
-    hand.bodies(bodies)
+    bodies = np.full((5, 18), np.nan)
+    fill_bodies(hand.arrays, bodies)
     return bodies
 
 
@@ -68,12 +56,12 @@ def in_palm(hand, point):
     return hand.data.body("palm").xmat.reshape(3, 3).T @ point
 
 
-def test_fingertips_at_the_zero_pose_are_where_the_vendor_says(hand, side):
+def test_fingertips_at_the_zero_pose_are_where_the_vendor_says(hand):
     mujoco.mj_kinematics(hand.model, hand.data)
     for body, finger in zip(hand.tips, FINGERS, strict=True):
         turn = hand.data.xmat[body].reshape(3, 3)
         tip = hand.data.xpos[body] + turn @ [0, 0, REACH[finger]]
-        expected = np.array(VENDOR_TIPS[finger]) * [1, 1 if side == "right" else -1, 1]
+        expected = VENDOR_TIPS[finger]
         np.testing.assert_allclose(in_palm(hand, tip), expected, atol=1e-4)
 
 
@@ -90,32 +78,12 @@ def test_masses_lie_within_the_boxes_they_belong_to(hand):
     np.testing.assert_allclose(sorted(palm.inertia), sorted(expected), rtol=1e-6)
 
 
-def test_the_left_hand_has_the_vendors_places_and_axes():
-    model = HandModel.build(object_named("can"), "left").model
-    for number, (place, axis) in LEFT.items():
-        joint = model.joint(f"joint_{number}")
-        np.testing.assert_allclose(joint.axis, axis, atol=1e-12)
-        np.testing.assert_allclose(model.body(joint.bodyid[0]).pos, place, atol=1e-9)
-
-
-def test_the_left_hand_is_the_mirror_image_of_the_right():
-    right, left = (HandModel.build(object_named("can"), side) for side in ("right", "left"))
-    joints = np.random.default_rng(1).uniform(*right.limits().T)
-    right.data.qpos[:N_JOINTS], left.data.qpos[:N_JOINTS] = joints, joints * MIRRORED
-    for hand in (right, left):
-        mujoco.mj_forward(hand.model, hand.data)
-    np.testing.assert_allclose(left.data.xipos, right.data.xipos * [1, -1, 1], atol=1e-12)
-    both = left.data.qfrc_bias[:N_JOINTS], right.data.qfrc_bias[:N_JOINTS]
-    np.testing.assert_allclose(both[0], both[1] * MIRRORED, atol=1e-12)
-    np.testing.assert_allclose(left.limits(), right.limits())
-
-
-def test_the_index_finger_is_on_top_and_the_fingers_point_away_from_the_palm(hand, side):
+def test_the_index_finger_is_on_top_and_the_fingers_point_away_from_the_palm(hand):
     mujoco.mj_kinematics(hand.model, hand.data)
     heights = [hand.data.body(f"link_{JOINTS[f] + 3}.0").xpos[2] for f in FINGERS[1:]]
     assert heights == sorted(heights, reverse=True)
     ahead = hand.data.body("link_7.0").xpos[1]
-    assert ahead < -0.09 if side == "right" else ahead > 0.09
+    assert ahead < -0.09
 
 
 def test_joints_are_numbered_as_the_driver_does_and_keep_the_vendors_limits(hand):
@@ -154,7 +122,7 @@ def test_velocities_are_the_rates_of_places(hand):
     after, step = np.zeros_like(before), 1e-6
     mujoco.mj_integratePos(hand.model, hand.data.qpos, hand.data.qvel, step)
     mujoco.mj_kinematics(hand.model, hand.data)
-    hand.bodies(after)
+    fill_bodies(hand.arrays, after)
     np.testing.assert_allclose((after - before)[:, :3] / step, before[:, 12:15], atol=1e-5)
 
 
@@ -171,7 +139,7 @@ def test_applied_forces_do_what_mujoco_computes(hand):
     bodies = moving(hand)
     draw = np.random.default_rng(2)
     tips, item = draw.normal(size=(4, 6)), draw.normal(size=6)
-    hand.apply(tips, item, bodies)
+    apply_forces(hand.arrays, tips, item, bodies)
     expected = np.zeros(hand.model.nv)
     for body, wrench, row in zip(
         [*hand.tips, hand.object_body], [*tips, item], bodies, strict=True
@@ -196,8 +164,8 @@ def test_the_object_weighs_what_the_table_says_and_falls_freely(name):
     assert hand.data.qvel[N_JOINTS + 3 :] == pytest.approx(np.zeros(3), abs=1e-9)
 
 
-def test_energy_is_conserved_without_friction(side):
-    model = mujoco.MjModel.from_xml_string(hand_xml(side))
+def test_energy_is_conserved_without_friction():
+    model = mujoco.MjModel.from_xml_string(hand_xml())
     model.dof_damping[:] = model.dof_frictionloss[:] = 0.0
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 1e-4
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
@@ -224,8 +192,3 @@ def test_the_steps_fit_the_samples_of_the_sensor():
     assert model.nu == 0
     assert model.nq == N_JOINTS
     assert 1 / (150 * model.opt.timestep) == pytest.approx(7.0, abs=1e-12)
-
-
-def test_another_side_is_refused():
-    with pytest.raises(ValueError, match=r"^side 'right' or 'left' expected, 'top' given$"):
-        hand_xml("top")

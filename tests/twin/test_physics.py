@@ -7,7 +7,7 @@ from holdfast.twin import physics
 from holdfast.twin.contact import touch
 from holdfast.twin.control import STEPS_PER_CONTROL, control, draw_controller
 from holdfast.twin.grasp import closing_path
-from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel, apply_forces, fill_bodies
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import object_named
 from holdfast.twin.operator import (
@@ -21,7 +21,6 @@ from holdfast.twin.operator import (
 )
 from holdfast.twin.physics import (
     Action,
-    Steps,
     addresses_work,
     advance_of,
     advance_sample,
@@ -32,7 +31,6 @@ from holdfast.twin.world import World
 
 ITEM = object_named("can")
 PATH = closing_path(ITEM)
-STEPS = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
 PUSHED = np.array([0.0, 0, -1, 0.01, 0, 0.02, 0.006, 700, 4])
 
 
@@ -55,7 +53,7 @@ def step_from_python(made, tick, target, given):
     """Advance by one step, as the equations say; return the error of the set-points."""
     data, error = made.hand.data, 0.0
     mujoco.mj_step1(made.hand.model, data)
-    made.hand.bodies(made.bodies)
+    fill_bodies(made.hand.arrays, made.bodies)
     touch(made.contact, made.constants, made.bodies, TIMESTEP)
     body, rms = made.bodies[-1], given.rms
     elapsed = given.elapsed + tick % SUBSTEPS * TIMESTEP
@@ -71,7 +69,7 @@ def step_from_python(made, tick, target, given):
     total = outside + made.contact.wrench
     pull = np.array([*given.pull, 0, 0, 0])
     made.outside[:] = outside + pull
-    made.hand.apply(made.contact.tips, total + pull, made.bodies)
+    apply_forces(made.hand.arrays, made.contact.tips, total + pull, made.bodies)
     if tick % STEPS_PER_CONTROL == 0:
         number, period = tick // STEPS_PER_CONTROL, STEPS_PER_CONTROL * TIMESTEP
         error = np.abs(made.controller.errors[number]).max()
@@ -98,11 +96,7 @@ def test_a_sample_is_its_steps_called_from_python(words):
     for sample in range(60):
         target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))  # closes until it presses
         given = [action(one, **words) for one in (compiled, plain)]
-        error = advance_sample(
-            engine, STEPS, compiled.hand.arrays, compiled.contact, compiled.constants,
-            compiled.controller, sample * SUBSTEPS, target, given[0], compiled.bodies,
-            compiled._wrenches,
-        )  # fmt: skip
+        error = advance_sample(engine, compiled._physics, sample * SUBSTEPS, target, given[0])
         ticks = range(sample * SUBSTEPS, (sample + 1) * SUBSTEPS)
         worst.append(max(step_from_python(plain, tick, target, given[1]) for tick in ticks))
         assert error == worst[-1]
@@ -122,10 +116,8 @@ def test_worlds_beside_each_other_do_not_share_anything():
     first, second = made_world(), made_world()
     target = PATH.targets(np.full(4, 0.01))
     for one in (first, second, second, first):
-        advance_sample(
-            engine_of(one.hand.model, one.hand.data), STEPS, one.hand.arrays, one.contact,
-            one.constants, one.controller, 0, target, action(one), one.bodies, one._wrenches,
-        )  # fmt: skip
+        engine = engine_of(one.hand.model, one.hand.data)
+        advance_sample(engine, one._physics, 0, target, action(one))
     np.testing.assert_array_equal(first.hand.data.qpos, second.hand.data.qpos)
     assert first.hand.data.qpos is not second.hand.data.qpos
 
@@ -144,14 +136,11 @@ def stepped(world, n_samples=60):
     worst = 0.0
     for sample in range(n_samples):
         target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))
-        error = world._advance(
-            STEPS, world.hand.arrays, world.contact, world.constants, world.controller,
-            sample * SUBSTEPS, target, action(world, **pushed), world.bodies, world._wrenches,
-        )  # fmt: skip
+        error = world._advance(world._physics, sample * SUBSTEPS, target, action(world, **pushed))
         worst = max(worst, error)
     data = world.hand.data
     state = [data.qpos, data.qvel, data.xfrc_applied, data.qfrc_applied, world.bodies]
-    return [array.tobytes() for array in (*state, *world.contact, *world._wrenches)], worst
+    return [array.tobytes() for array in (*state, *world.contact, *world._physics.wrenches)], worst
 
 
 def test_the_addresses_work_here(unchecked):

@@ -13,7 +13,7 @@ from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import MIN_TOUCH_LOAD
 from holdfast.twin.simulation import Grasp, simulate
-from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 
 pytestmark = pytest.mark.slow
 

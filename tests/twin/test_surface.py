@@ -61,7 +61,7 @@ def test_elements_are_even_and_cover_walls_crown_and_tip() -> None:
 def test_area_and_its_moments_do_not_depend_on_the_elements(
     pitch: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(surface, "PITCH", pitch)
+    monkeypatch.setattr(surface, "NODE_PITCH", pitch)
     other = curved_fingertip.__wrapped__()
     assert len(other.nodes) != len(SKIN.nodes)
     assert other.areas.sum() == pytest.approx(SKIN.areas.sum(), rel=0.005)

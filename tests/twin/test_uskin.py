@@ -9,8 +9,8 @@ from holdfast.features import fingertip_force
 from holdfast.io import import_recordings
 from holdfast.sensors import sensor
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin.fingertip import Uskin, UskinParameters, taxel_shares, with_server_effects
-from holdfast.twin.uskin.readout import saturated
+from holdfast.twin.uskin import Uskin, UskinParameters, taxel_shares, with_server_effects
+from holdfast.twin.uskin_readout import saturated
 
 TIP = sensor("uskin-curved")
 SKIN = curved_fingertip()

@@ -94,7 +94,7 @@ def test_closed_fingers_press_and_hold_it_alone():
     height = made.bodies[-1, 2]
     run(made, 1.5, hold=0.0, depth=-0.02)
     assert height - made.bodies[-1, 2] < 0.01
-    force = made.contact.object_force
+    force = made.contact.wrench[:3]
     np.testing.assert_allclose(force, [0, 0, GRAVITY * 0.24], atol=0.1)
     assert not made.outside.any()
     pressed = made.loads.copy()

@@ -1,6 +1,6 @@
 import pytest
 
-from holdfast.web.origin import is_local, refusal
+from holdfast.web.connections import is_local, refusal
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1", "[::1]", "localhost"])

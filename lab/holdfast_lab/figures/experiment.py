@@ -21,8 +21,8 @@ from holdfast.plots.style import (
     style_axes,
 )
 from holdfast.plots.time_series import (
-    Codes,
     FingerSeries,
+    StateCodes,
     component_handles,
     draw_components,
     draw_curve,
@@ -77,7 +77,9 @@ def draw_features(series: FingerSeries) -> Figure:
 
 
 def draw_experiment(
-    series: FingerSeries, predicted: Mapping[str, Codes], span: tuple[float, float] | None = None
+    series: FingerSeries,
+    predicted: Mapping[str, StateCodes],
+    span: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw F_a, sigma, the label and predicted states.
 
@@ -105,7 +107,7 @@ def draw_experiment(
     return figure
 
 
-def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, Codes]) -> None:
+def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, StateCodes]) -> None:
     """Draw a coloured strip for each list of states, with its name and accuracy beside it."""
     names = []
     for row, (name, codes) in enumerate(strips.items()):
@@ -120,7 +122,7 @@ def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, Codes]) 
     axes.set_ylim(len(strips) - 0.5, -0.5)
 
 
-def _accuracy(labels: Codes, codes: Codes) -> str:
+def _accuracy(labels: StateCodes, codes: StateCodes) -> str:
     known = (labels != UNKNOWN) & (codes != UNKNOWN)
     if not known.any():
         return "no label"
@@ -140,7 +142,7 @@ def _finish(figure: Figure, rows: Sequence[Axes], series: FingerSeries) -> None:
     add_legend(figure, phase_handles(series), "outside lower center")
 
 
-def _state_handles(strips: Iterable[Codes]) -> list[Artist]:
+def _state_handles(strips: Iterable[StateCodes]) -> list[Artist]:
     present = {int(code) for codes in strips for code in np.unique(codes)}
     return [
         Patch(facecolor=colour, label=STATE_TITLES[state])

@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-PACKAGES = (
+REPORTED_PACKAGES = (
     "holdfast", "numpy", "scipy", "scikit-learn", "numba", "optuna", "mujoco", "msgspec",
     "matplotlib", "torch",
 )  # fmt: skip
@@ -16,7 +16,10 @@ GIB = 2**30
 
 def versions() -> dict[str, str | None]:
     """Return the versions of Python and of the packages; None if one is not installed."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+    return {
+        "python": platform.python_version(),
+        **{name: _version(name) for name in REPORTED_PACKAGES},
+    }
 
 
 def machine() -> dict[str, Any]:

@@ -173,7 +173,8 @@ the pooled values of a few recordings say little. No value here is the accuracy 
     ),
 )  # fmt: skip
 
-LIMITS = """These results come from recordings of a simulated hand. The simulation was not tuned to
+LIMITS_TEXT = """\
+These results come from recordings of a simulated hand. The simulation was not tuned to
 make the results better. It cannot show:
 
 - how good a method is on a given real hand: tremor, stiffness of the operator, texture and
@@ -213,7 +214,7 @@ def report_sections(
                 tables = [_with_twin_note(table, outline) for table in tables]
             sections.append(Section(outline.title, join_lines(outline.text), tables, figures))
     if twin:
-        sections.append(Section("What the twin cannot show", join_lines(LIMITS)))
+        sections.append(Section("What the twin cannot show", join_lines(LIMITS_TEXT)))
     return sections
 
 

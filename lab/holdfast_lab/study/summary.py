@@ -14,7 +14,7 @@ STRONGEST = {
 """Keys of the comparison with the strongest baseline that the summary reports."""
 EVENTS = {"on": "unseen objects", "threshold": "own, held 0.1 s", "a glitch is": "an event"}
 """Keys of the events that the summary reports."""
-METHODS = ("holdfast", "LogReg (the paper)", "Linear SVM (the paper)")
+SUMMARY_METHODS = ("holdfast", "LogReg (the paper)", "Linear SVM (the paper)")
 
 
 def summary_text(tables: Iterable[ResultTable]) -> str:
@@ -58,7 +58,7 @@ def _strongest(rows: list[Row]) -> Iterator[str]:
 def _events(rows: list[Row]) -> Iterator[str]:
     parts = [
         f"{method} {_value(missed)} % (with {_value(false)} false alarms per minute)"
-        for method in METHODS
+        for method in SUMMARY_METHODS
         for missed in _select(rows, EVENTS | {"method": method, "figure": "missed at 100 ms [%]"})
         for false in _select(rows, EVENTS | {"method": method, "figure": "false alarms per minute"})
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from holdfast.contact import CONTACT_FORCE
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import LOAD, SLIP
+from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.world import World
 from holdfast_lab.trial.run import RunningTrial, least_force_at
@@ -89,7 +89,7 @@ def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
         tips = running.simulation.world.contact.tips
         yield Instant(
             time=held_for - trial.load.start,
-            force=float(tips[:, LOAD].sum()),
+            force=float(tips[:, TIP_LOAD].sum()),
             least=least_force_at(trial, held_for),
             slip_speed=float(_speeds(tips).max()),
             state=command.state.value,
@@ -100,4 +100,4 @@ def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
 
 def _speeds(tips: Array) -> Array:
     """Return the slip speed of each fingertip, 0 without contact [m/s]."""
-    return np.where(tips[:, LOAD] > CONTACT_FORCE, tips[:, SLIP], 0.0)
+    return np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0)

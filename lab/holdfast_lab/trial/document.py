@@ -13,7 +13,7 @@ from holdfast_lab.trial.run import LIMITS, TrialResult
 from holdfast_lab.trial.summary import Summary, compare, summarize
 from holdfast_lab.trial.trials import GRIP_MULTIPLE
 
-OWN, BASELINE = "holdfast", "fixed"
+OWN, BASELINE_LAW = "holdfast", "fixed"
 """The law of holdfast, and the hand without control; each other law is compared with both."""
 GOALS = {
     "dropped": 5.0,
@@ -23,11 +23,11 @@ GOALS = {
     "false_reactions_per_minute": 1.0,
 }
 """Largest values that the law of holdfast should reach, by the field of `trial.json`."""
-Results = Mapping[str, Sequence[TrialResult]]
+TrialResults = Mapping[str, Sequence[TrialResult]]
 """Results of the trials by law."""
 
 
-def document_of(plan: TrialPlan, results: Results, example: int | None) -> dict[str, Any]:
+def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> dict[str, Any]:
     """Return the numbers of `trial.json`; the field names are part of the contract.
 
     Args:
@@ -43,7 +43,7 @@ def document_of(plan: TrialPlan, results: Results, example: int | None) -> dict[
         "by_fingers": {str(n): _summaries(results, _of("n_fingers", n)) for n in (3, 4)},
         "paired": {
             other: {law: compare(results[law], results[other]) for law in results if law != other}
-            for other in (BASELINE, OWN)
+            for other in (BASELINE_LAW, OWN)
             if other in results
         },
         "example": None if example is None else _example(results, example),
@@ -58,18 +58,18 @@ def document_of(plan: TrialPlan, results: Results, example: int | None) -> dict[
     }
 
 
-def example_of(results: Results) -> int | None:
+def example_of(results: TrialResults) -> int | None:
     """Return the number of the first trial that the baseline loses and the own law holds.
 
     Returns:
         The number; None if there is no such trial, or one of the two laws was not run.
     """
-    pairs = zip(results.get(BASELINE, ()), results.get(OWN, ()), strict=False)
+    pairs = zip(results.get(BASELINE_LAW, ()), results.get(OWN, ()), strict=False)
     saved = (one.number for lost, one in pairs if lost.held and lost.dropped and _is_saved(one))
     return next(saved, None)
 
 
-def trials_csv(results: Results) -> str:
+def trials_csv(results: TrialResults) -> str:
     """Return a line for each trial with each law; `inf` is infinite, an empty field unknown."""
     names = list(TrialResult.__struct_fields__)
     rows = [
@@ -87,7 +87,7 @@ def _is_saved(result: TrialResult) -> bool:
 
 
 def _summaries(
-    results: Results, chosen: Callable[[TrialResult], bool] = lambda _: True
+    results: TrialResults, chosen: Callable[[TrialResult], bool] = lambda _: True
 ) -> dict[str, Summary]:
     """Return the numbers of each law over the trials that are chosen."""
     return {law: summarize([one for one in each if chosen(one)]) for law, each in results.items()}
@@ -98,11 +98,11 @@ def _of(field: str, value: object) -> Callable[[TrialResult], bool]:
     return lambda one: bool(getattr(one, field) == value)
 
 
-def _example(results: Results, number: int) -> dict[str, Any]:
+def _example(results: TrialResults, number: int) -> dict[str, Any]:
     one = next(one for one in results[OWN] if one.number == number)
     return {
         "number": number, "object": one.object, "kind": one.kind, "n_fingers": one.n_fingers,
-        "lost_by": BASELINE, "held_by": OWN,
+        "lost_by": BASELINE_LAW, "held_by": OWN,
     }  # fmt: skip
 
 

@@ -12,9 +12,9 @@ from holdfast_lab.report.folder import ReportKind, check_output_folder, write_re
 from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import (
-    BASELINE,
+    BASELINE_LAW,
     OWN,
-    Results,
+    TrialResults,
     document_of,
     example_of,
     trials_csv,
@@ -25,7 +25,7 @@ from holdfast_lab.trial.trials import draw_trial
 
 COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))
 """What the folder of a comparison holds."""
-TITLE = "Grip laws against each other on the twin"
+TRIAL_TITLE = "Grip laws against each other on the twin"
 
 
 def run_trials(
@@ -70,12 +70,19 @@ def run_trials(
     sections = report_sections(document, results, example)
     others = {"trials.csv": trials_csv(results).encode()}
     write_report(
-        out, COMPARISON, TITLE, _facts(document), sections, document, others=others, force=force
+        out,
+        COMPARISON,
+        TRIAL_TITLE,
+        _facts(document),
+        sections,
+        document,
+        others=others,
+        force=force,
     )
     return document
 
 
-def _results(plan: TrialPlan, runner: TaskRunner) -> Results:
+def _results(plan: TrialPlan, runner: TaskRunner) -> TrialResults:
     """Return the results of all trials, by law and in the order of the trials."""
     tasks = {law: [plan.trial_task(number, law) for number in range(plan.n)] for law in plan.laws}
     by_number = (task for same in zip(*tasks.values(), strict=True) for task in same)
@@ -85,7 +92,7 @@ def _results(plan: TrialPlan, runner: TaskRunner) -> Results:
 
 def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
     """Return courses and film of a trial; the film is made in this process."""
-    laws = (BASELINE, OWN)
+    laws = (BASELINE_LAW, OWN)
     tasks = {law: plan.course_task(number, law) for law in laws}
     done = runner.run(list(tasks.values()))
     courses = {law: done[task.name] for law, task in tasks.items()}
@@ -101,8 +108,8 @@ def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
 def _describe(plan: TrialPlan, number: int, courses: Mapping[str, TrialCourse]) -> str:
     """Return a sentence on a trial."""
     trial = draw_trial(number, plan.seed)
-    lost_at = courses[BASELINE].lost_at
-    when = "" if lost_at is None else f"; {BASELINE} loses it {lost_at:.2f} s later"
+    lost_at = courses[BASELINE_LAW].lost_at
+    when = "" if lost_at is None else f"; {BASELINE_LAW} loses it {lost_at:.2f} s later"
     return (
         f"Trial {number}: {trial.grasp.object}, {trial.n_fingers} fingers, load "
         f"{trial.load.kind.value}{when}."

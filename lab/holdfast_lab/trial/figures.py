@@ -1,32 +1,217 @@
-"""Figures of a comparison of laws."""
+"""Figures of a comparison of laws: distributions, force against drops, force over time."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
+from holdfast.plots.style import (
+    COLOURS,
+    FAINT,
+    FONT_SIZE,
+    GREY,
+    INK,
+    SeriesStyle,
+    add_labels,
+    add_legend,
+    add_title,
+    legend_handles,
+    panels,
+    series_styles,
+)
 from holdfast.sensors.types import Array
 from holdfast_lab.figures.dots import IntervalEstimate, draw_groups
-from holdfast_lab.figures.trials import (
-    Distribution,
-    ForceCourse,
-    TradeOff,
-    draw_courses,
-    draw_distributions,
-    draw_trade_offs,
-)
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import GOALS, Results
+from holdfast_lab.trial.document import GOALS, TrialResults
 from holdfast_lab.trial.run import TrialResult
 from holdfast_lab.trial.summary import Summary, reaction_time
 
 
-def distribution_figure(results: Results) -> ReportFigure:
+class Distribution(NamedTuple):
+    """Values of each series, of which some may be infinite.
+
+    Attributes:
+        values: by series, (n,) values of at least 0; an infinite one is above every value.
+        floor: value at the left end of the axis, which is marked 0; lower ones are drawn there.
+        limit: value at the right end.
+        goal: value to mark by a dotted line; None for none.
+    """
+
+    values: Mapping[str, Array]
+    floor: float
+    limit: float
+    goal: float | None = None
+
+
+def draw_distributions(groups: Mapping[str, Distribution]) -> Figure:
+    """Draw which share of all values is at most x, as steps over a logarithmic x.
+
+    A curve that ends below 100 % has values beyond the right end, or infinite ones.
+
+    Args:
+        groups: by label of a panel's x axis, with its unit.
+    """
+    figure, grid = panels(len(groups), 2, 2.6, sharey=True)
+    styles = series_styles(name for group in groups.values() for name in group.values)
+    for axes, (x, group) in zip(grid, groups.items(), strict=True):
+        _prepare_axis(axes, group)
+        for name, values in group.values.items():
+            _draw_steps(axes, values, group, styles[name])
+        add_labels(axes, x)
+    if grid:
+        grid[0].set_ylim(-2, 102)
+        add_labels(grid[0], y="share of trials [%]")
+    handles = legend_handles(styles, [group.values for group in groups.values()])
+    for handle in handles:
+        handle.set_marker("")
+    add_legend(figure, handles, per_row=6)
+    return figure
+
+
+class TradeOff(NamedTuple):
+    """Two values of a series, with their intervals."""
+
+    x: IntervalEstimate
+    y: IntervalEstimate
+
+
+def draw_trade_offs(
+    groups: Mapping[str, Mapping[str, TradeOff]], x: str, y: str, goal: tuple[float, float]
+) -> Figure:
+    """Draw one value against another for each series, with both intervals.
+
+    Args:
+        groups: by title of a panel: by series, its two values.
+        x: label of the x axes.
+        y: label of the y axes.
+        goal: largest x and y of the area that is shaded.
+    """
+    figure, grid = panels(len(groups), 2, 2.8, sharey=True)
+    for axes in grid[1:]:
+        axes.sharex(grid[0])
+    styles = series_styles(name for group in groups.values() for name in group)
+    for axes, (title, group) in zip(grid, groups.items(), strict=True):
+        axes.grid(color=FAINT, linewidth=0.5)
+        axes.fill_between([0, goal[0]], 0, goal[1], color=COLOURS[2], alpha=0.15, linewidth=0)
+        for name, values in group.items():
+            _draw_cross(axes, values, styles[name])
+        axes.set_ylim(-3, 103)
+        axes.set_xlim(left=0.9)
+        add_title(axes, title)
+        add_labels(axes, x)
+    if grid:
+        add_labels(grid[0], y=y)
+        grid[0].set_xlim(right=max(axes.get_xlim()[1] for axes in grid))
+    add_legend(figure, legend_handles(styles, groups.values(), lines=False), per_row=6)
+    return figure
+
+
+def draw_courses(courses: Mapping[str, TrialCourse]) -> Figure:
+    """Draw force and slip speed over time, one column for each series.
+
+    Args:
+        courses: by title of a column.
+    """
+    figure, grid = panels(2 * len(courses), len(courses), 1.7)
+    upper, lower = grid[: len(courses)], grid[len(courses) :]
+    for place, (title, course) in enumerate(courses.items()):
+        add_title(upper[place], title)
+        _draw_force(upper[place], course)
+        _draw_slip(lower[place], course)
+    for row in (upper, lower):
+        _share_limits(row)
+    if courses:
+        add_labels(upper[0], y="normal force, sum [N]")
+        add_labels(lower[0], y="slip speed [mm/s]")
+        add_legend(figure, upper[0].get_legend_handles_labels()[0])
+    return figure
+
+
+def _prepare_axis(axes: Axes, group: Distribution) -> None:
+    axes.set_xscale("log")
+    axes.set_xlim(group.floor * 0.9, group.limit)
+    axes.grid(color=FAINT, linewidth=0.5)
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(
+        FuncFormatter(lambda value, _: "0" if value <= group.floor * 1.01 else f"{value:g}")
+    )
+    if group.goal is not None:
+        axes.axvline(group.goal, color=GREY, linewidth=0.9, linestyle=":")
+
+
+def _draw_steps(axes: Axes, values: Array, group: Distribution, style: SeriesStyle) -> None:
+    if not len(values):
+        return
+    finite = np.sort(np.maximum(values[np.isfinite(values)], group.floor))
+    shares = 100 * np.arange(len(finite) + 1) / len(values)
+    x = np.concatenate([[group.floor * 0.9], finite, [group.limit]])
+    axes.step(
+        x, [*shares, shares[-1]], where="post", color=style.color, linestyle=style.linestyle,
+        linewidth=1.2,
+    )  # fmt: skip
+
+
+def _draw_cross(axes: Axes, values: TradeOff, style: SeriesStyle) -> None:
+    x, y = values
+    if x.value is None or y.value is None:
+        return
+    if x.low is not None and x.high is not None:
+        axes.hlines(y.value, x.low, x.high, color=style.color, linewidth=1.1)
+    if y.low is not None and y.high is not None:
+        axes.vlines(x.value, y.low, y.high, color=style.color, linewidth=1.1)
+    axes.plot(x.value, y.value, color=style.color, marker=style.marker, markersize=5, linestyle="")
+
+
+def _draw_force(axes: Axes, course: TrialCourse) -> None:
+    axes.grid(color=FAINT, linewidth=0.5)
+    axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
+    axes.plot(
+        course.times, course.force, color=COLOURS[0], linewidth=1.1, label="force of the hand"
+    )
+    axes.plot(
+        course.times, course.least, color=INK, linewidth=0.9, linestyle="--", label="least force"
+    )
+    _mark_loss(axes, course)
+
+
+def _draw_slip(axes: Axes, course: TrialCourse) -> None:
+    axes.grid(color=FAINT, linewidth=0.5)
+    axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
+    axes.plot(course.times, 1e3 * np.array(course.slip_speed), color=COLOURS[1], linewidth=0.9)
+    _mark_loss(axes, course)
+    add_labels(axes, "time since the load began [s]")
+
+
+def _mark_loss(axes: Axes, course: TrialCourse) -> None:
+    if course.lost_at is not None:
+        axes.axvline(course.lost_at, color=COLOURS[1], linewidth=1.0)
+        axes.annotate(
+            "lost", (course.lost_at, 0.97), xycoords=("data", "axes fraction"), xytext=(3, 0),
+            textcoords="offset points", va="top", fontsize=FONT_SIZE, color=COLOURS[1],
+        )  # fmt: skip
+
+
+def _share_limits(row: Sequence[Axes]) -> None:
+    """Give all axes of a row the same limits, so that they can be compared."""
+    if not row:
+        return
+    right = max(axes.get_xlim()[1] for axes in row)
+    left = min(axes.get_xlim()[0] for axes in row)
+    top = max(axes.get_ylim()[1] for axes in row)
+    for axes in row:
+        axes.set(xlim=(left, right), ylim=(0, top))
+
+
+def distribution_figure(results: TrialResults) -> ReportFigure:
     """Return the distributions of slip and reaction time."""
-    slips = {law: _held(each, lambda one: 1e3 * one.slip) for law, each in results.items()}
+    slips = {law: _held(trials, lambda trial: 1e3 * trial.slip) for law, trials in results.items()}
     times = {
-        law: _held(each, lambda one: 1e3 * reaction_time(one)) for law, each in results.items()
+        law: _held(trials, lambda trial: 1e3 * reaction_time(trial))
+        for law, trials in results.items()
     }
     groups = {
         "slip distance [mm]": Distribution(slips, 0.01, 30.0, 1e3 * GOALS["slip_median"]),
@@ -84,18 +269,11 @@ def course_figure(courses: Mapping[str, TrialCourse], what: str) -> ReportFigure
         courses: by law.
         what: description of the trial.
     """
-    drawn = {
-        law: ForceCourse(
-            np.array(course.times), np.array(course.force), np.array(course.least),
-            np.array(course.slip_speed), course.lost_at,
-        )
-        for law, course in courses.items()
-    }  # fmt: skip
     return ReportFigure(
         "course",
         f"Force over time of one trial. {what} The dashed line is the least force that Coulomb "
         "friction needs at that instant.",
-        draw_courses(drawn),
+        draw_courses(courses),
     )
 
 

@@ -14,14 +14,14 @@ from holdfast.twin.render import SAMPLES_PER_PICTURE, Picture, Renderer, save_vi
 from holdfast_lab.trial.course import Instant, follow
 from holdfast_lab.trial.trials import Trial
 
-WIDTH, HEIGHT = 360, 270
+FILM_WIDTH, HEIGHT = 360, 270
 """Size of the picture of one law [pixels]."""
 BELOW = 66
 """Height of the text below it [pixels]."""
-GAP = 8
+FILM_GAP = 8
 """Space between the two pictures [pixels]."""
-FONT_SIZE = 16
-BACKGROUND, INK, ALARM = "#ffffff", "#1c1f23", "#b03a00"
+FILM_FONT_SIZE = 16
+BACKGROUND, FILM_INK, ALARM = "#ffffff", "#1c1f23", "#b03a00"
 
 
 class Shot(NamedTuple):
@@ -67,7 +67,7 @@ def _shots(trial: Trial, law: str, model: str) -> list[Shot]:
         for number, instant in enumerate(follow(trial, law, model)):
             if number % SAMPLES_PER_PICTURE == 0 and instant.world is not None:
                 world = instant.world
-                renderer = renderer or Renderer(world.hand.model, WIDTH, HEIGHT)
+                renderer = renderer or Renderer(world.hand.model, FILM_WIDTH, HEIGHT)
                 arrows = np.column_stack([world.bodies[:-1, :3], world.contact.contact_force])
                 shots.append(Shot(renderer.picture(world.hand.data, arrows), instant))
     finally:
@@ -77,16 +77,16 @@ def _shots(trial: Trial, law: str, model: str) -> list[Shot]:
 
 
 def _beside(pictures: Sequence[Picture]) -> Picture:
-    gap = np.full((len(pictures[0]), GAP, 3), 255, dtype=np.uint8)
+    gap = np.full((len(pictures[0]), FILM_GAP, 3), 255, dtype=np.uint8)
     return np.concatenate([pictures[0], gap, *pictures[1:]], axis=1)
 
 
 def _framed(law: str, shot: Shot) -> Picture:
     """Return a picture with the text below it."""
-    image = Image.new("RGB", (WIDTH, HEIGHT + BELOW), BACKGROUND)
+    image = Image.new("RGB", (FILM_WIDTH, HEIGHT + BELOW), BACKGROUND)
     image.paste(Image.fromarray(shot.picture))
     draw = ImageDraw.Draw(image)
-    font = ImageFont.load_default(FONT_SIZE)
+    font = ImageFont.load_default(FILM_FONT_SIZE)
     for line, (text, colour) in enumerate(captions(law, shot.instant)):
         draw.text((6, HEIGHT + 4 + 20 * line), text, fill=colour, font=font)
     return np.asarray(image)
@@ -102,11 +102,11 @@ def captions(law: str, instant: Instant) -> list[tuple[str, str]]:
     """
     state = "object lost" if instant.is_lost else instant.state
     when = f"{abs(instant.time):.1f} s {'before' if instant.time < 0 else 'after'} the load"
-    last = (when, INK)
+    last = (when, FILM_INK)
     if instant.slip_speed > SLIP_SPEED and not instant.is_lost:
         last = (f"{when}, slips {1e3 * instant.slip_speed:.0f} mm/s", ALARM)
     return [
-        (f"{law}: {state}", ALARM if instant.is_lost else INK),
-        (f"force {instant.force:.1f} N, least {instant.least:.1f} N", INK),
+        (f"{law}: {state}", ALARM if instant.is_lost else FILM_INK),
+        (f"force {instant.force:.1f} N, least {instant.least:.1f} N", FILM_INK),
         last,
     ]

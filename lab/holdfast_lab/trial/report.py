@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section, join_lines
 from holdfast_lab.report.result_tables import number_text
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import BASELINE, GOALS, OWN, Results
+from holdfast_lab.trial.document import BASELINE_LAW, GOALS, OWN, TrialResults
 from holdfast_lab.trial.figures import (
     course_figure,
     distribution_figure,
@@ -15,7 +15,7 @@ from holdfast_lab.trial.figures import (
 )
 from holdfast_lab.trial.summary import Summary
 from holdfast_lab.trial.tables import (
-    NUMBERS,
+    NUMBER_COLUMNS,
     LawColumn,
     fingers_table,
     kinds_table,
@@ -79,7 +79,7 @@ class Example(NamedTuple):
 
 
 def report_sections(
-    document: Mapping[str, Any], results: Results, example: Example | None
+    document: Mapping[str, Any], results: TrialResults, example: Example | None
 ) -> list[Section]:
     """Return the sections of the report; the summary is the first.
 
@@ -123,15 +123,17 @@ def summary_text(document: Mapping[str, Any]) -> str:
 
 def _main(document: Mapping[str, Any], law: str) -> str:
     row = document["laws"][law]
-    parts = [f"{law} dropped {_text(row, NUMBERS[0])} % of the objects"]
-    if BASELINE in document["laws"] and law != BASELINE:
-        parts.append(f"a grip of fixed force {_text(document['laws'][BASELINE], NUMBERS[0])} %")
+    parts = [f"{law} dropped {_text(row, NUMBER_COLUMNS[0])} % of the objects"]
+    if BASELINE_LAW in document["laws"] and law != BASELINE_LAW:
+        parts.append(
+            f"a grip of fixed force {_text(document['laws'][BASELINE_LAW], NUMBER_COLUMNS[0])} %"
+        )
     return f"On {row['n']} trials of the twin, {', '.join(parts)}."
 
 
 def _goals(row: Summary, law: str, unseen: Summary) -> Iterator[str]:
     """Yield a sentence for each number that has a goal."""
-    for column in NUMBERS:
+    for column in NUMBER_COLUMNS:
         if column.field not in GOALS:
             continue
         value, goal = row[column.field]["value"], GOALS[column.field]
@@ -162,7 +164,9 @@ def _text(row: Summary, column: LawColumn) -> str:
 
 def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
     """Return text, tables and figures of the section of the example."""
-    rule = f"It is chosen by a rule: the first of the set that {BASELINE} loses and {OWN} holds."
+    rule = (
+        f"It is chosen by a rule: the first of the set that {BASELINE_LAW} loses and {OWN} holds."
+    )
     if example is None:
         return (
             f"{NO_FILM.format(reason='no trial is such, or one of the laws was not run')} {rule}",
@@ -173,7 +177,8 @@ def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
     if not example.film:
         return f"{example.what} {rule}\n\n{NO_FILM.format(reason=example.reason)}", [], figures
     caption = (
-        f"The same trial with {BASELINE} (left) and {OWN} (right), in real time. {example.what} "
+        f"The same trial with {BASELINE_LAW} (left) and {OWN} (right), in real time. "
+        f"{example.what} "
         "Arrows: forces of the fingertips on the object."
     )
     return f"{example.what} {rule}", [], [ReportFilm("film", caption, example.film), *figures]

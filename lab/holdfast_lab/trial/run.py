@@ -15,7 +15,7 @@ from holdfast.grip.limits import Limits
 from holdfast.model import Model
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT, NEWTONS_PER_SHEAR_COUNT
-from holdfast.twin.contact import LOAD, SLIP
+from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
@@ -195,13 +195,13 @@ class _TrialLog:
         if command.state is not LoopState.IDLE and math.isnan(self._began_at):
             self._began_at = held_for
         tips = simulation.world.contact.tips
-        speeds = np.where(tips[:, LOAD] > CONTACT_FORCE, tips[:, SLIP], 0.0)
+        speeds = np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0)
         if held_for >= self._trial.load.start:
             self._slid += np.where(speeds > SLIP_SPEED, speeds, 0.0) / RATE
         elif command.state is not LoopState.IDLE:
             self._add_quiet(held_for, command, slides=bool(speeds.max() > SLIP_SPEED))
         least = least_force_at(self._trial, held_for)
-        self._rows.append((held_for, float(tips[:, LOAD].sum()), least, float(speeds.max())))
+        self._rows.append((held_for, float(tips[:, TIP_LOAD].sum()), least, float(speeds.max())))
         self._scales.append(scales)
 
     def _add_quiet(self, held_for: float, command: GripCommand, *, slides: bool) -> None:

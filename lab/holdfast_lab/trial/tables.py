@@ -29,7 +29,7 @@ class LawColumn(NamedTuple):
     n_field: str = ""
 
 
-NUMBERS = (
+NUMBER_COLUMNS = (
     LawColumn("dropped [%]", "dropped"),
     LawColumn("slip [mm]", "slip_median", 1e3, 2, "n"),
     LawColumn("reaction [ms]", "reaction_median", 1e3, 0, "n_slipped"),
@@ -48,7 +48,7 @@ DIFFERENCES = (
     LawColumn("false reactions per minute", "false_reactions_per_minute"),
 )
 """Paired differences of a law to another."""
-SHORT = NUMBERS[:4]
+SHORT = NUMBER_COLUMNS[:4]
 """Numbers in tables of parts of the trials."""
 
 
@@ -73,7 +73,7 @@ def laws_table(document: Mapping[str, Any]) -> ResultTable:
         "laws",
         "Laws of grip force on the same trials",
         "Medians of slip and reaction; a drop counts as infinite in both.",
-        _rows(document["laws"], NUMBERS),
+        _rows(document["laws"], NUMBER_COLUMNS),
     )
 
 
@@ -84,7 +84,7 @@ def objects_table(document: Mapping[str, Any]) -> ResultTable:
         "objects",
         "By set of objects",
         "The model builtin:twin was trained on the six, and on none of the six others.",
-        _rows_of_parts(parts, "objects", NUMBERS),
+        _rows_of_parts(parts, "objects", NUMBER_COLUMNS),
         "objects",
     )
 
@@ -115,7 +115,7 @@ def fingers_table(document: Mapping[str, Any]) -> ResultTable:
 def _table(name: str, title: str, note: str, rows: Iterator[Row], *lines: str) -> ResultTable:
     return ResultTable(
         name, title, note, list(rows), (*lines, "law"),
-        digits_of={column.head: column.digits for column in (*NUMBERS, *DIFFERENCES)},
+        digits_of={column.head: column.digits for column in (*NUMBER_COLUMNS, *DIFFERENCES)},
         counted="trials", has_paper=False,
     )  # fmt: skip
 

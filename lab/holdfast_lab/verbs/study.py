@@ -8,10 +8,18 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, TareOption
+from holdfast.cli.options import (
+    EngineOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    SeedOption,
+    TareOption,
+)
 from holdfast.cli.simulate import plan_grasps, simulate_grasps
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
+from holdfast_lab.verbs import OutOption, QuickOption
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
@@ -78,33 +86,26 @@ def study(
     data: Annotated[
         Path | None, typer.Argument(help="A folder of labelled recordings; or give --twin.")
     ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for the results of the study.")
-    ] = Path("study"),
+    out: OutOption = Path("study"),
     twin: Annotated[
         bool, typer.Option("--twin", help="First simulate recordings with the physical twin.")
     ] = False,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Run a smaller study that takes a few minutes.")
-    ] = False,
+    quick: QuickOption = False,
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     seed: SeedOption = 0,
     tare: TareOption = "0.5",
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Overwrite a study; recordings and finished tasks are kept."),
-    ] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Repeat the experiments of the paper, and run further ones.
 
     Write OUT/report.html, every table as CSV, JSON, LaTeX and Markdown, every figure as SVG and
     PNG, and study.json. Finished tasks are kept in OUT/work and simulated recordings in OUT/data,
-    so the same command continues a study that was stopped. Of real recordings, imported or your
-    own, the study compares builtin:any, as it ships and adapted, with every method trained on the
-    other recordings. With recordings of the twin, the real ones are read from HOLDFAST_DATA, or
-    from ../shared/data, if they exist.
+    also with --force, so the same command continues a study that was stopped. Of real recordings,
+    imported or your own, the study compares builtin:any, as it ships and adapted, with every
+    method trained on the other recordings. With recordings of the twin, the real ones are read
+    from HOLDFAST_DATA, or from ../shared/data, if they exist.
 
     Example:
       holdfast study --twin --quick --out quick/

@@ -1,37 +1,40 @@
 """`holdfast trial`: grip laws against each other on the twin."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, start_engine
+from holdfast.cli.options import (
+    EngineOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    SeedOption,
+    start_engine,
+)
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
+from holdfast_lab.verbs import OutOption, QuickOption
 
 N_TRIALS, N_QUICK_TRIALS = 240, 60
 """Number of trials; 60 have every object with every kind of load once."""
 
 
 def trial(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    out: OutOption,
     laws: Annotated[
         str, typer.Option("--laws", help="Laws to compare, separated by commas; all by default.")
     ] = "",
     model: Annotated[str, typer.Option("--model", help="Model of the detector.")] = "builtin:any",
-    quick: Annotated[
-        bool, typer.Option("--quick", help=f"{N_QUICK_TRIALS} trials instead of {N_TRIALS}.")
-    ] = False,
+    quick: QuickOption = False,
     n: Annotated[
         int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS))
     ] = None,
     seed: SeedOption = 0,
     jobs: JobsOption = -1,
     engine: EngineOption = "loky",
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite a comparison; finished trials are kept.")
-    ] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare laws of grip force on the twin, all on the same trials.
@@ -39,9 +42,9 @@ def trial(
     In each trial the hand of the twin grips an object lightly, and then a load comes: added
     weight, a pull, friction that drops, a shake, or a fast transport. Objects, loads and grips
     follow from the seed. Write OUT/report.html with a film of one trial, trial.json, trials.csv,
-    and each table and figure. Finished trials are kept in OUT/work, so the same command continues
-    a comparison that was stopped, and one more law runs only its own trials. docs/grip.md
-    describes the trials and the numbers.
+    and each table and figure. Finished trials are kept in OUT/work, also with --force, so the same
+    command continues a comparison that was stopped, and one more law runs only its own trials.
+    There are 240 trials, or 60 with --quick. docs/grip.md describes the trials and the numbers.
 
     Example:
       holdfast trial --out trials --quick

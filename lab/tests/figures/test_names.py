@@ -17,7 +17,8 @@ from holdfast.synthetic import synthetic_recording
 from holdfast_lab.figures.curves import draw_reliability
 from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast_lab.figures.experiment import draw_experiment, draw_forces
-from holdfast_lab.figures.trials import ForceCourse, draw_courses
+from holdfast_lab.trial.course import TrialCourse
+from holdfast_lab.trial.figures import draw_courses
 from plots.test_evaluation import example_decisions
 
 pytestmark = pytest.mark.slow
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.slow
 NAME = r"$\bad{$"
 """As a formula, it is an error."""
 ESTIMATES = {NAME: IntervalEstimate(1.0, 0.5, 1.5), "other": IntervalEstimate(2.0)}
-COURSE = ForceCourse(np.arange(3.0), np.ones(3), np.ones(3), np.zeros(3))
+COURSE = TrialCourse([0.0, 1.0, 2.0], [1.0] * 3, [1.0] * 3, [0.0] * 3)
 
 
 def recording():

@@ -5,7 +5,7 @@ from holdfast.errors import OutputError
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.simulation import Grasp
 from holdfast_lab.trial.course import FALL_TIME, LEAD_TIME, TrialCourse, follow
-from holdfast_lab.trial.film import GAP, HEIGHT, WIDTH, captions, film
+from holdfast_lab.trial.film import FILM_GAP, FILM_WIDTH, HEIGHT, captions, film
 from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial
 
@@ -51,10 +51,10 @@ def test_a_film_has_both_sides(tmp_path):
     path = tmp_path / "film.webp"
     path.write_bytes(data)
     with Image.open(path) as opened:
-        assert opened.size[0] == 2 * WIDTH + GAP and opened.size[1] > HEIGHT
+        assert opened.size[0] == 2 * FILM_WIDTH + FILM_GAP and opened.size[1] > HEIGHT
         assert opened.n_frames > 10
         picture = np.asarray(opened.convert("RGB")).astype(int)
-    left, right = picture[:HEIGHT, :WIDTH], picture[:HEIGHT, WIDTH + GAP :]
+    left, right = picture[:HEIGHT, :FILM_WIDTH], picture[:HEIGHT, FILM_WIDTH + FILM_GAP :]
     assert left.std() > 10  # not empty
     assert np.abs(left - right).mean() < 5  # the same law on both sides
     assert len(data) < 2_000_000

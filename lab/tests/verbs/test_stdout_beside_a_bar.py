@@ -18,8 +18,7 @@ from cli.terminal.test_status_line import WELL, Still
 from holdfast.cli import main
 from holdfast.cli.terminal import progress
 from holdfast.cli.terminal.console import print_line, print_message
-from holdfast.cli.terminal.progress import ProgressBar
-from holdfast.cli.terminal.status_line import StatusLine
+from holdfast.cli.terminal.progress import ProgressBar, StatusLine
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
@@ -236,7 +235,7 @@ def test_no_display_of_rich_takes_stdout():
                 options = {word.arg: ast.unparse(word.value) for word in node.keywords}
                 displays.append((path.name, options.get("redirect_stdout")))
     assert sorted(displays) == [
-        ("demo_replay.py", "False"), ("progress.py", "False"), ("status_line.py", "False"),
+        ("demo.py", "False"), ("progress.py", "False"), ("progress.py", "False"),
     ]  # fmt: skip
 
 

@@ -87,11 +87,13 @@ def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
 
 
 def test_the_table_of_real_recordings_fits_a_terminal(capsys):
-    from holdfast_lab.study.comparison.real_counts import CALLED_STABLE, MEAN_AUC, MISSED
+    from holdfast_lab.study.comparison.real_counts import CALLED_STABLE, MEAN_AUC, MISSED_SLIPS
 
     assert {MEAN_AUC, CALLED_STABLE} == set(verb.PRINTED_COLUMNS["real"])
     keys = {"method": "FFT band energy (Fernandez 2014)", "trained on": "the others"}
-    rows = [Row({**keys, "figure": figure}, 0.5) for figure in (MEAN_AUC, CALLED_STABLE, MISSED)]
+    rows = [
+        Row({**keys, "figure": figure}, 0.5) for figure in (MEAN_AUC, CALLED_STABLE, MISSED_SLIPS)
+    ]
     table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={MEAN_AUC: 2})
     verb._print_result_table(table)
     printed = capsys.readouterr().out.splitlines()
@@ -179,7 +181,7 @@ class TestBadInput:
             "unknown engine 'spark'; there are loky and dask:ADDRESS"
         )
         pytest.importorskip("distributed")
-        monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.3)
+        monkeypatch.setattr(cluster, "SCHEDULER_TIMEOUT", 0.3)
         err = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
         assert err.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
         assert not (tmp_path / "out").exists()

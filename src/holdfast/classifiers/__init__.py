@@ -1,6 +1,5 @@
 """Classifiers, and the recipes that fit them, by name; one file for each."""
 
-from holdfast.classifiers.adapted import Adapted
 from holdfast.classifiers.fitting import (
     Classifier,
     ModelClassifier,
@@ -10,10 +9,9 @@ from holdfast.classifiers.fitting import (
     Samples,
 )
 from holdfast.classifiers.linear import LinearClassifier
-from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.classifiers.logreg import Adapted, LogisticRegression
 from holdfast.classifiers.onnx_classifier import OnnxClassifier
 from holdfast.classifiers.svm import LinearSVM
-from holdfast.classifiers.threshold import Threshold
 
 RECIPES: dict[str, ModelRecipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
 
@@ -28,7 +26,6 @@ __all__ = [
     "Parameters",
     "Recipe",
     "Samples",
-    "Threshold",
     "recipe",
 ]
 

@@ -13,7 +13,7 @@ from holdfast.contact import Cause
 from holdfast.errors import ModelError
 from holdfast.sensors.types import Array
 
-CAUSES = tuple(Cause)
+ALL_CAUSES = tuple(Cause)
 """Causes in the order of their codes, which begin at 1; 0 is no cause."""
 
 
@@ -62,7 +62,7 @@ class CauseClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def codes(self) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
         """Return the codes of its causes."""
-        return np.array([CAUSES.index(cause) + 1 for cause in self.causes])
+        return np.array([ALL_CAUSES.index(cause) + 1 for cause in self.causes])
 
     def weights(self) -> Array:
         """Return (n causes in all, n_features + 1) the weights of the raw features.
@@ -70,7 +70,7 @@ class CauseClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         The first column is the intercept; it is -infinity for causes that it does not know.
         """
         folded = np.array(self.coefficients) / np.array(self.scale)
-        found = np.zeros((len(CAUSES), self.n_features + 1))
+        found = np.zeros((len(ALL_CAUSES), self.n_features + 1))
         found[:, 0] = -math.inf
         rows = self.codes() - 1
         found[rows, 0] = np.array(self.intercepts) - folded @ np.array(self.mean)

@@ -1,12 +1,15 @@
-"""Logistic regression."""
+"""Logistic regression, from nothing or as an adaptation of another linear classifier."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
 from holdfast.classifiers.fitting import (
+    MIN_SLOPE,
+    ModelClassifier,
     Parameters,
     Samples,
     check_classes,
@@ -14,10 +17,15 @@ from holdfast.classifiers.fitting import (
     standardise,
 )
 from holdfast.classifiers.linear import LinearClassifier
-from holdfast.classifiers.newton import fit_logistic
+from holdfast.classifiers.newton import Solution, fit_logistic
+from holdfast.errors import TrainingError
 
 if TYPE_CHECKING:
     from optuna import Trial
+
+NONE, CALIBRATION, WEIGHTS = "none", "calibration", "weights"
+CHANGES = (NONE, CALIBRATION, WEIGHTS)
+"""What is changed of the prior: nothing; intercept and slope of its log odds; or all weights."""
 
 
 @dataclass(frozen=True)
@@ -69,3 +77,102 @@ def _balanced_weights(stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
     """Return the weights n / (2 n_0) and n / (2 n_1) of the classes."""
     n, n_stable = len(stable), int(stable.sum())
     return n / (2 * (n - n_stable)), n / (2 * n_stable)
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """Logistic regression, regularised towards another classifier, not to zero.
+
+    z_i are the log odds of that classifier, the prior, at sample i. The change `calibration`
+    replaces them by a z_i + b, and minimises
+
+        ((a - 1)^2 + b^2) / 2 + C sum_i log(1 + exp(-y_i (a z_i + b)))
+
+    The change `weights` replaces the intercept and coefficients v_0 of the log odds, over
+    features standardised as in the training of the prior, and minimises
+
+        |v - v_0|^2 / 2 + C sum_i log(1 + exp(-y_i z_i(v)))
+
+    The change `none` keeps the prior. A C near 0 keeps it as well; a large C forgets it. The
+    threshold stays that of the prior: what a false alarm costs against a miss does not depend on
+    the hand.
+
+    Attributes:
+        prior: the classifier to adapt.
+    """
+
+    prior: LinearClassifier
+
+    @property
+    def name(self) -> str:
+        """Name of the recipe, with the prior: another prior is another search."""
+        return f"adapted {self.prior}"
+
+    @property
+    def reference(self) -> Parameters:
+        """Reference parameters: a cautious change of the calibration."""
+        return {"change": CALIBRATION, "C": 1e-3}
+
+    def suggest(self, trial: "Trial") -> Parameters:
+        """Draw what is changed, and C over eight decades."""
+        return {
+            "change": trial.suggest_categorical("change", CHANGES),
+            "C": trial.suggest_float("C", 1e-6, 1e2, log=True),
+        }
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+        """The classifier adapted to the samples; deterministic, the seed is not used.
+
+        Raises:
+            TrainingError: the samples have only one class.
+            ValueError: the number of features is not that of the prior, or the change is
+                unknown.
+        """
+        del seed
+        if parameters["change"] not in CHANGES:
+            raise ValueError(
+                f"unknown change {parameters['change']!r}; there are {', '.join(CHANGES)}"
+            )
+        if samples.features.shape[1] != self.prior.n_features:
+            raise ValueError(
+                f"{samples.features.shape[1]} features given, {self.prior.n_features} expected "
+                "to adapt"
+            )
+        if parameters["change"] == NONE:
+            return self.prior
+        check_classes(samples)
+        fit = _calibrated if parameters["change"] == CALIBRATION else _reweighted
+        return fit(self.prior, samples, parameters["C"])
+
+
+def _calibrated(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
+    odds = prior.slope * prior.decision(samples.features) + prior.offset
+    identity = Solution(np.array([1.0]), 0.0)
+    (slope,), shift = fit_logistic(odds[:, None], samples.stable, (1.0, 1.0), c, identity)
+    stretch = max(float(slope), MIN_SLOPE)
+    return replace(prior, slope=stretch * prior.slope, offset=stretch * prior.offset + shift)
+
+
+def _reweighted(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
+    standardised = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
+    weights, intercept = fit_logistic(standardised, samples.stable, (1.0, 1.0), c, log_odds(prior))
+    return replace(
+        prior, intercept=intercept, coefficients=tuple(weights.tolist()), slope=1.0, offset=0.0
+    )
+
+
+def linear_prior(classifier: ModelClassifier) -> LinearClassifier:
+    """Return the classifier, which must be linear to be adapted.
+
+    Raises:
+        TrainingError: it is an ONNX file.
+    """
+    if not isinstance(classifier, LinearClassifier):
+        raise TrainingError("a model with linear classifiers expected to adapt, an ONNX file given")
+    return classifier
+
+
+def log_odds(prior: LinearClassifier) -> Solution:
+    """Return weights and intercept of the log odds of a classifier, of standardised features."""
+    weights = prior.slope * np.array(prior.coefficients)
+    return Solution(weights, prior.slope * prior.intercept + prior.offset)

@@ -26,7 +26,7 @@ LAST_STEP = 1e-6
 """A step whose parts are smaller is the last: the error after it is about its square."""
 MIN_PRODUCT = 1e-100
 """Product of probabilities from which on its logarithm is taken, far above the least number."""
-ROUNDING = 1e-14
+ROUNDING_RISE = 1e-14
 """Relative rise of the objective that is rounding; a step with a larger rise is halved."""
 MIN_STEP = 1e-12
 """A step whose parts are smaller is not halved further."""
@@ -114,7 +114,7 @@ def _minimise(evaluate: Evaluate, start: Array) -> Array:
         step = _step(hessian, gradient)
         last = bool(np.abs(step).max() < LAST_STEP)
         if not last:
-            limit = objective + ROUNDING * abs(objective)
+            limit = objective + ROUNDING_RISE * abs(objective)
             objective = evaluate(weights - step, gradient, hessian)
             while objective > limit and np.abs(step).max() > MIN_STEP:
                 step /= 2

@@ -18,9 +18,9 @@ from holdfast.classifiers.fitting import (
 from holdfast.classifiers.folds import group_folds
 from holdfast.classifiers.linear import LinearClassifier
 
-N_FOLDS = 5
+SIGMOID_FOLDS = 5
 """Folds, by group, whose held-out decision values the sigmoid is fitted to."""
-MAX_ITERATIONS = 2000
+MAX_PASSES = 2000
 """Passes of the solver over the samples. On 80,000 samples of the twin, 1,000 passes reach the
 minimum of the objective within 0.04 % for every C of the search; more change no decision."""
 
@@ -81,10 +81,10 @@ def _fit(
     from sklearn.svm import LinearSVC
 
     estimator = LinearSVC(
-        loss="hinge", dual=True, random_state=seed, max_iter=MAX_ITERATIONS, **parameters
+        loss="hinge", dual=True, random_state=seed, max_iter=MAX_PASSES, **parameters
     )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # see MAX_ITERATIONS
+        warnings.simplefilter("ignore", ConvergenceWarning)  # see MAX_PASSES
         estimator.fit(features, stable)
     return estimator.coef_[0], float(estimator.intercept_[0])
 
@@ -94,7 +94,7 @@ def _values_out_of_fold(
 ) -> npt.NDArray[np.float64] | None:
     """Compute decision values out of fold by group; None if a fold lacks a class."""
     features, stable, groups = samples
-    held = group_folds(groups, N_FOLDS)
+    held = group_folds(groups, SIGMOID_FOLDS)
     if len(held) < 2 or any(samples.take(~rows).one_class for rows in held):
         return None
     values = np.empty(len(stable))

@@ -9,10 +9,11 @@ import keyword
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.main import get_command
@@ -115,7 +116,7 @@ def _app(words: list[str]) -> typer.Typer:
     for name, summary in VERBS.items():
         if name in words:
             verb = load_verb(name)
-            app.command(name, help=_help(verb))(verb)
+            app.command(name, help=_help(verb))(spread_groups(verb))
         else:
             app.command(name, help=summary)(_placeholder)
     return app
@@ -161,6 +162,55 @@ def _load_entry_point(name: str) -> Callable[..., None]:
         f"{name} needs the laboratory: clone the repository of holdfast, and run `uv run holdfast "
         f"{name}` there, or `pip install ./lab`"
     )
+
+
+def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
+    """Return a function with the options of a verb, and those of its groups one by one.
+
+    A group is a parameter whose type is a dataclass; the fields are its options. The default of
+    the parameter, or else those of the fields, are the defaults of the options.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass
+        ... class Range:
+        ...     start: float
+        ...     end: float = 1.0
+        >>> def length(name: str, part: Range) -> None:
+        ...     print(name, part.end - part.start)
+        >>> spread = spread_groups(length)
+        >>> inspect.signature(spread)
+        <Signature (*, name: str, start: float, end: float = 1.0)>
+        >>> spread(name="grip", start=0.25, end=1.0)
+        grip 0.75
+    """
+    parameters: list[inspect.Parameter] = []
+    groups: dict[str, Callable[..., object]] = {}
+    for name, parameter in inspect.signature(verb, eval_str=True).parameters.items():
+        group = parameter.annotation
+        if isinstance(group, type) and is_dataclass(group):
+            groups[name] = group
+            parameters += _group_options(parameter)
+        else:
+            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+
+    def run(**values: Any) -> None:  # noqa: ANN401
+        for name, group in groups.items():
+            values[name] = group(
+                *[values.pop(option) for option in inspect.signature(group).parameters]
+            )
+        verb(**values)
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {option.name: option.annotation for option in parameters}
+    return run
+
+
+def _group_options(group: inspect.Parameter) -> Iterator[inspect.Parameter]:
+    """Yield the options of a group as parameters."""
+    for name, option in inspect.signature(group.annotation, eval_str=True).parameters.items():
+        default = option.default if group.default is group.empty else getattr(group.default, name)
+        yield option.replace(kind=inspect.Parameter.KEYWORD_ONLY, default=default)
 
 
 def _root(

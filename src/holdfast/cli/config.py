@@ -59,12 +59,13 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def defaults(self) -> dict[str, dict[str, str]]:
         """Return the default value of each argument and option, by verb."""
-        found: dict[str, str] = {"source": HAND}
+        defaults: dict[str, str] = {"source": HAND}
         if self.model is not None:
-            found["model"] = self.model
+            defaults["model"] = self.model
         if self.ignore:
-            found["ignore"] = ",".join(f"{f}:{k}" for f, own in self.ignore.items() for k in own)
-        return dict.fromkeys(CONFIGURED_VERBS, found)
+            taxels = (f"{finger}:{k}" for finger, ks in self.ignore.items() for k in ks)
+            defaults["ignore"] = ",".join(taxels)
+        return dict.fromkeys(CONFIGURED_VERBS, defaults)
 
     def _parameters(self, scheme: str) -> dict[str, str | None]:
         fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items()) or None
@@ -72,14 +73,14 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return shared if scheme == "serial" else {**shared, "values": self.values}
 
 
-def find_config(given: Path | None = None) -> Path | None:
-    """Return the configuration file: the given one, HOLDFAST_CONFIG, or holdfast.toml here.
+def find_config(option: Path | None = None) -> Path | None:
+    """Return the configuration file: that of `--config`, HOLDFAST_CONFIG, or holdfast.toml here.
 
     Raises:
-        ValueError: the given file does not exist.
+        ValueError: the file of the option or the variable does not exist.
     """
     variable = os.environ.get(CONFIG_VARIABLE)
-    for path, where in ((given, "--config"), (variable and Path(variable), CONFIG_VARIABLE)):
+    for path, where in ((option, "--config"), (variable and Path(variable), CONFIG_VARIABLE)):
         if path:
             if not path.is_file():
                 raise ValueError(f"{where}: there is no file {path}")

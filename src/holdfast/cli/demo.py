@@ -1,47 +1,83 @@
 """`holdfast demo`: the whole chain, from simulation to replay, on simulated data."""
 
-import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from holdfast.cli.options import JsonOption
-from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
+from holdfast.cli.options import (
+    BrowserOption,
+    ForceOption,
+    JsonOption,
+    SeedOption,
+    SpeedOption,
+    check_speed,
+)
+from holdfast.cli.terminal.console import (
+    format_number,
+    print_json,
+    print_line,
+    print_lines,
+    print_message,
+)
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
-    from holdfast.metrics import Metrics
+    from rich.table import Table
+
+    from holdfast.contact import ContactEstimate, ContactEvent, HandEstimate
+    from holdfast.devices.sources import Source
+    from holdfast.metrics import InstabilityEvent, Metrics
     from holdfast.model import Model
     from holdfast.recordings import Recording
     from holdfast.training import Trained
 
 DEMO_MODEL = "builtin:twin"
 """The model of the demo: the best one that ships for the sensor of the simulated hand."""
-OBJECTS, CASES, N_REPEATS = "mug,carton", "1,2", 1
+DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS = "mug,carton", "1,2", 1
 """Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
+MIN_DURATION = 0.15
+"""Minimum time that a new state must last to be printed [s]."""
+SCREEN_INTERVAL = 0.1
+"""Time between two updates of the table on the terminal [s]."""
+BAR_WIDTH = 10
+TERMINAL_COLOURS = {
+    "UNKNOWN": "dim",
+    "NO_CONTACT": "white",
+    "UNSTABLE": "bold red",
+    "STABLE": "green",
+}
+STATES = {
+    "UNKNOWN": "no samples yet, or a fault",
+    "NO_CONTACT": "nothing touches",
+    "UNSTABLE": "false alarm",
+    "STABLE": "the hand holds the object",
+}
+"""Words for a state that no true event explains."""
+CAUSES = {
+    "closing": "the hand closes on the object",
+    "disturbance": "pulled or pushed",
+    "slip": "pulled or pushed, and slips",
+    "glitch": "a jerk of the controller",
+    "released": "the hand opens",
+    "lost": "the object is lost",
+}
+"""Words for the causes of labels."""
+CAUSE_TOLERANCE = 0.25
+"""Maximum time between a change of state and its cause [s]."""
 
 
 def demo(
     out: Annotated[
         Path, typer.Argument(help="Folder for the results; it is created if missing.")
     ] = Path("holdfast-demo"),
-    speed: Annotated[
-        float, typer.Option(help="Speed of the replay: 1 is real time, 0 as fast as possible.")
-    ] = 1.0,
-    seed: Annotated[int, typer.Option(help="Seed of the recordings.")] = 0,
-    browser: Annotated[
-        bool | None,
-        typer.Option(
-            "--browser/--no-browser",
-            help="Replay on a web page, or in the terminal.",
-            show_default="page if a browser can be opened",
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
+    speed: SpeedOption = 1.0,
+    seed: SeedOption = 0,
+    browser: BrowserOption = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate grasps, detect and train on them, and replay one.
@@ -61,8 +97,7 @@ def demo(
     from holdfast.model import Model
     from holdfast.training import evaluate
 
-    if not (math.isfinite(speed) and speed >= 0):
-        raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
+    check_speed("twin:", speed)
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
@@ -97,8 +132,10 @@ def _simulate(folder: Path, seed: int, force: bool) -> "Sequence[Recording]":
     from holdfast.io import load_dataset
     from holdfast.twin.objects import OTHER_OBJECTS
 
-    grasps = plan_grasps(OBJECTS, CASES, N_REPEATS, "reference", seed, table=OTHER_OBJECTS)
-    names = OBJECTS.replace(",", " and ")
+    grasps = plan_grasps(
+        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
+    )
+    names = DEMO_OBJECTS.replace(",", " and ")
     print_message(f"1/4  simulating {len(grasps)} grasps: {names}, Allegro hand, uSkin fingertips")
     simulate_grasps(grasps, folder, jobs=-1, force=force, report=_report_grasp)
     return load_dataset(folder)
@@ -139,8 +176,6 @@ def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, 
     if page:
         _replay_on_page(model, path, out, speed)
         return 0
-    from holdfast.cli.demo_replay import TrueEvents, replay
-
     return replay(model, path, speed, TrueEvents.of(model, recording))
 
 
@@ -170,20 +205,18 @@ def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None
 def _print_results(metrics: "Metrics", trained: "Trained", n: int) -> None:
     hand = metrics.events.hand
     missed, delay = hand.missed["0.1"], hand.delay_median
+    false_alarms = format_number(hand.false_alarms_per_minute, 1)
+    accuracies = (metrics.pooled.accuracy, trained.cross_validation.pooled.accuracy)
+    shipped, trained_here = (format_number(accuracy, 1) for accuracy in accuracies)
     detected = "-" if missed is None else f"{100 - missed:.0f} %"
     print_line()
     print_line(f"{DEMO_MODEL} on {n} grasps of objects that it was not trained on:")
     print_line(f"  {hand.n_events} disturbances of a held object, {detected} detected within 0.1 s")
     print_line(f"  median delay {'-' if delay is None else f'{1000 * delay:.0f} ms'}")
-    print_line(f"  {_text(hand.false_alarms_per_minute)} false alarms per minute of quiet hold")
-    print_line(f"  {_text(metrics.pooled.accuracy)} % of all samples are classified as labelled")
-    own = trained.cross_validation.pooled.accuracy
+    print_line(f"  {false_alarms} false alarms per minute of quiet hold")
+    print_line(f"  {shipped} % of all samples are classified as labelled")
     print_line("a model of the paper's features, trained here, each grasp left out once:")
-    print_line(f"  {_text(own)} % of all samples are classified as labelled")
-
-
-def _text(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"
+    print_line(f"  {trained_here} % of all samples are classified as labelled")
 
 
 def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
@@ -197,3 +230,146 @@ def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
         ("import --help", "your own recordings"),
     ):
         print_lines((f"  # {purpose}", f"  holdfast {command}"))
+
+
+class TrueEvents(NamedTuple):
+    """What happens in a recording, by its truth.
+
+    Attributes:
+        causes: (start [s], end [s], words) of each time in which a finger is not stable.
+        events: onsets of instability of the hand, with the alarms of a model.
+    """
+
+    causes: "Sequence[tuple[float, float, str]]" = ()
+    events: "Sequence[InstabilityEvent]" = ()
+
+    @classmethod
+    def of(cls, model: "Model", recording: "Recording") -> "TrueEvents":
+        """Return the true events of a recording; none if its truth is not known."""
+        from holdfast.metrics import match_decisions
+        from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
+        from holdfast.training import compute_decisions
+
+        labels = labels_by_truth(recording, LabelRule(margin=0.0))
+        causes = sorted(
+            (label.start, label.end, CAUSES[label.cause])
+            for finger_labels in labels.values()
+            for label in finger_labels
+            if label.cause is not None
+        )
+        hand = compute_decisions(model, recording).hand
+        return cls(causes, match_decisions(hand).events if causes and hand else ())
+
+    def words(self, change: "ContactEvent") -> str:
+        """Return what happens when the state of the hand changes."""
+        if change.state != "UNSTABLE":
+            return STATES[change.state]
+        for start, end, words in self.causes:
+            if start - CAUSE_TOLERANCE <= change.time < end + CAUSE_TOLERANCE:
+                return words + self._delay(change.time)
+        return STATES[change.state]
+
+    def _delay(self, instant: float) -> str:
+        for event in self.events:
+            if event.onset - CAUSE_TOLERANCE <= instant <= event.end and event.alarm is not None:
+                delay = round(1000 * event.delay)
+                return f"; detected after {delay} ms" if delay > 0 else "; detected at once"
+        return ""
+
+
+def replay(model: "Model", path: Path, speed: float, true_events: TrueEvents) -> int:
+    """Play a recording sample by sample through a detector, and print the states.
+
+    Each change of the hand's state that lasted is one line. On a terminal, a table of the
+    fingers follows below.
+
+    Args:
+        model: the model to use.
+        path: path of the recording.
+        speed: 1 is real time, 0 as fast as possible.
+        true_events: of the recording, for the lines.
+
+    Returns:
+        Number of estimates.
+    """
+    from holdfast.devices.sources import open_source
+
+    with open_source(str(path), speed=speed) as source:
+        if speed and sys.stderr.isatty():
+            return _show_table(model, source, true_events)
+        estimates = print_changes(model, source, true_events, print_message)
+        return sum(1 for _ in estimates)
+
+
+def print_changes(
+    model: "Model", source: "Source", true_events: TrueEvents, write: Callable[[str], None]
+) -> "Iterator[HandEstimate]":
+    """Yield the estimates of a source, and write a line for each change that lasted."""
+    from holdfast.contact import StateChanges
+    from holdfast.detector import HAND
+    from holdfast.live.stream_detector import StreamDetector
+
+    write(f"     {'time':>8}   {'hand':10}  what happens, by the truth of the simulation")
+    changes = StateChanges([HAND], MIN_DURATION)
+    for estimate in StreamDetector(model, source):
+        for change in changes.update([estimate.state], estimate.time):
+            words = true_events.words(change)
+            write(f"     {change.time:6.2f} s   {change.state:10}  {words}")
+        yield estimate
+
+
+def _show_table(model: "Model", source: "Source", true_events: TrueEvents) -> int:
+    from rich.console import Console
+    from rich.live import Live
+
+    updated_at, n_updates = 0.0, 0
+    console = Console(stderr=True, highlight=False)
+    with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False) as screen:
+        for estimate in print_changes(model, source, true_events, console.print):
+            n_updates += 1
+            if time.monotonic() - updated_at > SCREEN_INTERVAL:
+                updated_at = time.monotonic()
+                screen.update(finger_table(estimate), refresh=True)
+    return n_updates
+
+
+def finger_table(estimate: "HandEstimate") -> "Table":
+    """Return a table of the fingers, at most 80 columns wide."""
+    from rich.table import Table
+
+    title = f"{estimate.time:.1f} s   hand {_coloured(estimate.state)}"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for heading, width in (("finger", 8), ("state", 18), ("stable", 6), ("", BAR_WIDTH)):
+        table.add_column(heading, width=width)
+    table.add_column("instability", width=11, justify="right")
+    table.add_column(r"force \[counts]", width=14, justify="right")
+    for name, finger in estimate.fingers.items():
+        table.add_row(name, *_cells(finger))
+    return table
+
+
+def _cells(finger: "ContactEstimate") -> tuple[str, ...]:
+    probability = finger.stable_probability
+    known = finger.state != "UNKNOWN"
+    amplitude = sum(value * value for value in finger.force) ** 0.5
+    return (
+        _coloured(finger.state) + (f" {finger.reason}" if finger.reason else ""),
+        _number(probability, 2) if known else "-",
+        "#" * round(BAR_WIDTH * probability) if known else "",
+        _number(finger.instability, 1),
+        _number(amplitude, 0),
+    )
+
+
+def _number(value: float, digits: int) -> str:
+    """Return a number without a sign on zero; a dash if it is not finite.
+
+    Example:
+        >>> _number(-0.001, 1), _number(float("nan"), 1), _number(12.34, 1)
+        ('0.0', '-', '12.3')
+    """
+    return "-" if value - value != 0 else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _coloured(state: str) -> str:
+    return f"[{TERMINAL_COLOURS[state]}]{state:10}[/]"

@@ -36,7 +36,7 @@ EXTRA_PURPOSES = {
     "hdf5": "import of HDF5 recordings",
 }
 """Purpose of each extra."""
-CONNECT_TIMEOUT = 0.3
+PROBE_TIMEOUT = 0.3
 """Time in which a server must accept a connection [s]."""
 
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
@@ -70,7 +70,7 @@ def _report(context: typer.Context) -> dict[str, Any]:
         if hasattr(os, "sched_getaffinity")
         else os.cpu_count(),
         "packages": packages.pop("", {}),
-        "extras": {extra: _extra(extra, found) for extra, found in sorted(packages.items())},
+        "extras": {extra: _extra(extra, versions) for extra, versions in sorted(packages.items())},
         "kernels": _kernels(),
         "data": _data(),
         "config": _config(context.obj),
@@ -80,13 +80,13 @@ def _report(context: typer.Context) -> dict[str, Any]:
 
 def _packages() -> dict[str, dict[str, str | None]]:
     """Return the version of each required package, by extra ("" without one); None if missing."""
-    found: dict[str, dict[str, str | None]] = {}
+    versions: dict[str, dict[str, str | None]] = {}
     for requirement in metadata.requires("holdfast") or []:
         match = _REQUIREMENT.match(requirement)
         if match is not None and match["package"] != "holdfast":
-            group = found.setdefault(match["extra"] or "", {})
+            group = versions.setdefault(match["extra"] or "", {})
             group[match["package"]] = _version(match["package"])
-    return found
+    return versions
 
 
 def _version(package: str) -> str | None:
@@ -126,11 +126,11 @@ def _kernels() -> dict[str, Any]:
 
 
 def _data() -> dict[str, Any]:
-    given = os.environ.get("HOLDFAST_DATA")
-    return {"path": given, "found": given is not None and Path(given).is_dir()}
+    path = os.environ.get("HOLDFAST_DATA")
+    return {"path": path, "found": path is not None and Path(path).is_dir()}
 
 
-def _config(given: "Config | None") -> dict[str, Any]:
+def _config(config: "Config | None") -> dict[str, Any]:
     """Return the path, content and error of the configuration file."""
     import msgspec
 
@@ -139,10 +139,10 @@ def _config(given: "Config | None") -> dict[str, Any]:
     path, error = None, None
     try:
         path = find_config()
-        given = given or (None if path is None else load_config(path))
+        config = config or (None if path is None else load_config(path))
     except ValueError as cause:
         error = str(cause)
-    content = {} if given is None else msgspec.to_builtins(given)
+    content = {} if config is None else msgspec.to_builtins(config)
     return {
         "path": None if path is None else str(path),
         "content": {key: value for key, value in content.items() if value},
@@ -204,7 +204,7 @@ def _xela() -> str:
 
     addresses = places(parse("xela://auto")[1])
     for address in addresses:
-        with suppress(OSError), socket.create_connection(address, CONNECT_TIMEOUT):
+        with suppress(OSError), socket.create_connection(address, PROBE_TIMEOUT):
             return f"a server listens at {address}"
     return f"no server listens at {' or '.join(map(str, addresses))}"
 

@@ -7,16 +7,15 @@ import typer
 
 from holdfast.cli.options import (
     EngineOption,
-    ForcePlotOption,
     JobsOption,
     JsonOption,
     ModelArgument,
-    PlotOption,
-    check_plot,
-    save_plot,
+    PlotOptions,
+    SeedOption,
     start_engine,
 )
 from holdfast.cli.terminal.console import (
+    format_number,
     print_json,
     print_line,
     print_message,
@@ -27,7 +26,10 @@ from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
+    from holdfast.training.evaluation import Evaluation
 
 PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
 AUC_NOTE = (
@@ -40,11 +42,11 @@ AUC_NOTE = (
 def evaluate(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
-    seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
+    *,
+    seed: SeedOption = 0,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
-    plot: PlotOption = None,
-    force: ForcePlotOption = False,
+    figure: PlotOptions,
     as_json: JsonOption = False,
 ) -> None:
     """Evaluate a model on labelled recordings.
@@ -69,30 +71,32 @@ def evaluate(
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.training.verdict import no_verdict
 
-    if plot is not None:
-        check_plot(plot, force)
+    figure.check()
     loaded = Model.load(model)
-    used = start_engine(engine, jobs)
-    recordings = load_dataset(used.path(data))
-    found = evaluate_recordings(
-        loaded, recordings, seed, used, progress=progress, keep=plot is not None
+    started = start_engine(engine, jobs)
+    recordings = load_dataset(started.path(data))
+    evaluation = evaluate_recordings(
+        loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
     )
-    metrics = found.metrics
+    metrics = evaluation.metrics
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
-    warn_about_training(found.trained_on, len(recordings))
-    if plot is not None:
-        from holdfast.plots.evaluation import draw_evaluation
-
-        save_plot(draw_evaluation(metrics, found.decisions), plot, force)
+    warn_about_training(evaluation.trained_on, len(recordings))
+    figure.save(lambda: _draw(evaluation))
     if as_json:
-        document = {"trained_on": found.trained_on, "verdict": found.verdict}
+        document = {"trained_on": evaluation.trained_on, "verdict": evaluation.verdict}
         print_json({**msgspec.to_builtins(metrics), **document})
         return
-    print_verdict(found.verdict or no_verdict(len(found.trained_on), len(recordings)))
+    print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), len(recordings)))
     print_metrics(metrics)
     print_line()
     print_line(f"{model} on {len(recordings)} recordings")
+
+
+def _draw(evaluation: "Evaluation") -> "Figure":
+    from holdfast.plots.evaluation import draw_evaluation
+
+    return draw_evaluation(evaluation.metrics, evaluation.decisions)
 
 
 def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
@@ -126,7 +130,7 @@ def print_metrics(metrics: "Metrics") -> None:
     print_table(
         ("", "events", "missed in 0.05 s %", "0.1 s %", "0.2 s %", "median delay s", "p95 s",
          "false alarms/min"),
-        [_event_row(name, one) for name, one in events],
+        [_event_row(name, finger) for name, finger in events],
     )  # fmt: skip
     if metrics.intervals is not None:
         _print_intervals(metrics.intervals)
@@ -136,29 +140,29 @@ def print_metrics(metrics: "Metrics") -> None:
 
 def _onsets(metrics: "Metrics") -> str:
     """Return where the onsets of the events come from."""
-    found = metrics.events.hand.onsets
-    return "by truth or labels" if found == "mixed" else f"by the {found}"
+    origin = metrics.events.hand.onsets
+    return "by truth or labels" if origin == "mixed" else f"by the {origin}"
 
 
 def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
-    percents = (_format(getattr(metrics, field), 1) for field in PERCENT_FIELDS)
-    aucs = (_format(metrics.auc_contact, 3), _format(metrics.auc, 3))
+    percents = (format_number(getattr(metrics, field), 1) for field in PERCENT_FIELDS)
+    aucs = (format_number(metrics.auc_contact, 3), format_number(metrics.auc, 3))
     return name, str(metrics.n), *percents, *aucs
 
 
 def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:
-    missed = (_format(share, 1) for share in metrics.missed.values())
+    missed = (format_number(share, 1) for share in metrics.missed.values())
     delays = (
-        _format(delay, 3) if delay is not None or not metrics.n_events else "never"
+        format_number(delay, 3) if delay is not None or not metrics.n_events else "never"
         for delay in (metrics.delay_median, metrics.delay_p95)
     )
-    false_alarms = _format(metrics.false_alarms_per_minute, 1)
+    false_alarms = format_number(metrics.false_alarms_per_minute, 1)
     return name, str(metrics.n_events), *missed, *delays, false_alarms
 
 
 def _print_intervals(intervals: "Intervals") -> None:
     parts = [
-        f"{name} {_format(low, digits)} to {_format(high, digits)}"
+        f"{name} {format_number(low, digits)} to {format_number(high, digits)}"
         for name, field, digits in (
             ("accuracy", "accuracy", 1),
             ("FDR", "fdr", 1),
@@ -172,7 +176,3 @@ def _print_intervals(intervals: "Intervals") -> None:
     of = f"{intervals.n_recordings} recordings{groups}"
     print_line()
     print_paragraph(f"{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
-
-
-def _format(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"

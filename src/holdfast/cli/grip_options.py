@@ -3,8 +3,9 @@
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,49 +30,10 @@ class FaultAction(StrEnum):
 
 TWIN = "twin:"
 
-HandOption = Annotated[
-    str,
-    typer.Option(
-        "--hand",
-        help="URI of the hand: twin:, ros2:KIND?..., ros1:KIND?..., log:PATH or "
-        "call:MODULE:FUNCTION.",
-    ),
-]
-LawOption = Annotated[str, typer.Option("--law", help="Law of grip force.")]
-ArmedOption = Annotated[
-    bool, typer.Option("--armed", help="Send commands; without it, this is a dry run.")
-]
-ConfirmOption = Annotated[
-    str, typer.Option("--confirm", help="URI of the hand again, with --armed.")
-]
-MaxScaleOption = Annotated[
-    float | None,
-    typer.Option("--max-scale", help="Largest multiple of the first force.", show_default="3.0"),
-]
-MinScaleOption = Annotated[
-    float | None,
-    typer.Option("--min-scale", help="Smallest multiple of the first force.", show_default="0.8"),
-]
-MaxForceOption = Annotated[
-    float | None,
-    typer.Option(
-        "--max-force",
-        help="Largest normal force of a finger [unit of the readings, or N with --newtons].",
-        show_default="no limit",
-    ),
-]
-FaultOption = Annotated[
-    FaultAction,
-    typer.Option("--on-fault", help="What the hand does in a fault, or when it is stopped."),
-]
-NewtonsOption = Annotated[
-    float | None,
-    typer.Option("--newtons", help="Calibration: newtons for each unit of the readings."),
-]
 
-
-class GripSettings(NamedTuple):
-    """Values of the options above.
+@dataclass(frozen=True)
+class GripSettings:
+    """Group of options: control of the grip force of a hand.
 
     Attributes:
         hand: URI of the hand; empty if none is controlled.
@@ -79,15 +41,39 @@ class GripSettings(NamedTuple):
         min_scale: lowest force scale; None for the default of `Limits`.
     """
 
-    hand: str = ""
-    law: str = "holdfast"
-    armed: bool = False
-    confirm: str = ""
-    max_scale: float | None = None
-    min_scale: float | None = None
-    max_force: float | None = None
-    on_fault: FaultAction = FaultAction.HOLD
-    newtons: float | None = None
+    hand: Annotated[
+        str,
+        typer.Option(
+            help="URI of the hand: twin:, ros2:KIND?..., ros1:KIND?..., log:PATH or "
+            "call:MODULE:FUNCTION."
+        ),
+    ]
+    law: Annotated[str, typer.Option(help="Law of grip force.")] = "holdfast"
+    armed: Annotated[
+        bool, typer.Option("--armed", help="Send commands; without it, this is a dry run.")
+    ] = False
+    confirm: Annotated[str, typer.Option(help="URI of the hand again, with --armed.")] = ""
+    max_scale: Annotated[
+        float | None,
+        typer.Option(help="Largest multiple of the first force.", show_default="3.0"),
+    ] = None
+    min_scale: Annotated[
+        float | None,
+        typer.Option(help="Smallest multiple of the first force.", show_default="0.8"),
+    ] = None
+    max_force: Annotated[
+        float | None,
+        typer.Option(
+            help="Largest normal force of a finger [unit of the readings, or N with --newtons].",
+            show_default="no limit",
+        ),
+    ] = None
+    on_fault: Annotated[
+        FaultAction, typer.Option(help="What the hand does in a fault, or when it is stopped.")
+    ] = FaultAction.HOLD
+    newtons: Annotated[
+        float | None, typer.Option(help="Calibration: newtons for each unit of the readings.")
+    ] = None
 
     def check(self) -> None:
         """Check the values before anything is opened.
@@ -100,7 +86,7 @@ class GripSettings(NamedTuple):
 
         self.limits()
         law_named(self.law)
-        if not self.hand and self != GripSettings():
+        if not self.hand and self != NO_HAND:
             raise ValueError("--armed, --law and the limits are for a hand: give --hand URI too")
 
     def limits(self) -> "Limits":
@@ -112,8 +98,11 @@ class GripSettings(NamedTuple):
         from holdfast.grip import Limits
 
         scales = {"min_scale": self.min_scale, "max_scale": self.max_scale}
-        given = {name: scale for name, scale in scales.items() if scale is not None}
-        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **given)
+        wanted = {name: scale for name, scale in scales.items() if scale is not None}
+        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **wanted)
+
+
+NO_HAND = GripSettings(hand="")
 
 
 def find_source_and_hand(

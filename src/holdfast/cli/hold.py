@@ -10,33 +10,24 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.grip_options import (
-    ArmedOption,
-    ConfirmOption,
-    FaultAction,
-    FaultOption,
     GripSettings,
-    HandOption,
-    LawOption,
-    MaxForceOption,
-    MaxScaleOption,
-    MinScaleOption,
-    NewtonsOption,
     check_armed,
     connect_hand,
     find_source_and_hand,
     open_loop,
 )
 from holdfast.cli.options import (
+    DetectorOptions,
     IgnoreOption,
+    JsonOption,
     ModelArgument,
-    RatePolicy,
+    SecondsOption,
     SourceArgument,
     SpeedOption,
-    create_stream_detector,
-    load_model,
+    check_seconds,
 )
 from holdfast.cli.terminal.console import print_line, print_message
-from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source
@@ -51,24 +42,14 @@ if TYPE_CHECKING:
 def hold(
     model: ModelArgument,
     source: SourceArgument,
-    hand: HandOption,
-    law: LawOption = "holdfast",
-    armed: ArmedOption = False,
-    confirm: ConfirmOption = "",
-    max_scale: MaxScaleOption = None,
-    min_scale: MinScaleOption = None,
-    max_force: MaxForceOption = None,
-    on_fault: FaultOption = FaultAction.HOLD,
-    newtons: NewtonsOption = None,
+    settings: GripSettings,
     record: Annotated[
         Path | None, typer.Option("--record", help="Record samples and the log to NAME.mcap.")
     ] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop after this time [s].")] = None,
+    seconds: SecondsOption = None,
     speed: SpeedOption = 1.0,
     ignore: IgnoreOption = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print each new command as a line of JSON.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Control the grip force of a hand by the estimates of a source.
 
@@ -79,7 +60,7 @@ def hold(
     Hands on topics of ROS 2 (no ROS needed): ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop and
     ros2:gripper. Of ROS 1 (with rospy): ros1:positions, ros1:efforts, ros1:envelop and
     ros1:gripper. Another program closes the hand; the loop takes over when the grip begins.
-    docs/grip.md has their topics and parameters.
+    docs/grip.md has their topics and parameters. With --json, each new command is a line of JSON.
 
     No command was ever tried on a real hand: read docs/grip.md first.
 
@@ -92,26 +73,23 @@ def hold(
     """
     from holdfast.live.session import Session
 
-    settings = GripSettings(
-        hand, law, armed, confirm, max_scale, min_scale, max_force, on_fault, newtons
-    )
     settings.check()
-    if seconds is not None and not seconds > 0:
-        raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
-    loaded = load_model(model, None, None)
-    opened, commanded = find_source_and_hand(source, hand, speed=speed)
+    check_seconds(seconds)
+    options = DetectorOptions(ignore=ignore)
+    loaded = options.load_model(model)
+    opened, commanded = find_source_and_hand(source, settings.hand, speed=speed)
     check_armed(settings)
     with ExitStack() as stack:
         stop = stack.enter_context(handle_stop_signals())
         watchdog = connect_hand(stack, settings, commanded)
         stack.enter_context(opened)
-        stream = create_stream_detector(loaded, opened, RatePolicy.RESAMPLE, ignore)
+        stream = options.create_stream(loaded, opened)
         log = _new_log(stack, record, opened, as_json=as_json)
         session = stack.enter_context(Session(stream))  # ends after the loop, which reads it
         loop = stack.enter_context(open_loop(settings, commanded, stream, watchdog, log.event))
         stop.graceful = True
         _run(loop, session, log, seconds, stop)
-    _report(loop, hand, armed=armed)
+    _report(loop, settings)
 
 
 class _Log:
@@ -195,9 +173,9 @@ def _run_directly(
     runner.process(stream.finish())
 
 
-def _report(loop: "GripLoop", hand: str, *, armed: bool) -> None:
-    state = loop.controller.state
-    if not armed:
+def _report(loop: "GripLoop", settings: GripSettings) -> None:
+    hand, state = settings.hand, loop.controller.state
+    if not settings.armed:
         print_message(f"dry run: nothing was sent to {hand}; the loop ended in {state}")
         return
     print_message(

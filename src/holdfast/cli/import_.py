@@ -6,12 +6,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from holdfast.cli.options import (
     EngineOption,
+    ForceOption,
     JobsOption,
     JsonOption,
     check_shared,
@@ -37,31 +38,13 @@ class RecordingFormat(StrEnum):
 
 
 @dataclass(frozen=True)
-class _Imported:
-    """Summary of an imported recording."""
+class FormatOptions:
+    """Group of options: formats of the input and of the recordings."""
 
-    name: str
-    path: Path
-    modules: dict[str, int]
-    duration: float
-    n_labels: int
-    complete: bool
-    findings: "tuple[Finding, ...]"
-
-    @property
-    def n_samples(self) -> int:
-        return sum(self.modules.values())
-
-
-def import_(
-    path: Annotated[Path, typer.Argument(help="File or folder to import.")],
-    out: Annotated[
-        Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
-    ],
     data_format: Annotated[
         str | None,
         typer.Option("--format", help="Format of the input; detected from the content by default."),
-    ] = None,
+    ] = None
     sensor: Annotated[
         list[str] | None,
         typer.Option(
@@ -70,7 +53,7 @@ def import_(
             help="Sensor of a CSV file: a name of `holdfast sensors` or a file; MODULE=NAME for "
             "one module. May be repeated.",
         ),
-    ] = None,
+    ] = None
     columns: Annotated[
         str | None,
         typer.Option(
@@ -78,30 +61,59 @@ def import_(
             "PATTERN is like F{axis}{taxel}.",
             show_default="guessed from the header",
         ),
-    ] = None,
+    ] = None
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
-    ] = False,
-    engine: EngineOption = "loky",
-    jobs: JobsOption = 1,
+    ] = False
     suffix: Annotated[
         RecordingFormat | None,
         typer.Option(
             help="Format of the recordings to write.",
             show_default="parquet; mcap without the extra parquet",
         ),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite recordings of the same name.")
-    ] = False,
+    ] = None
+
+    def task(self, out: Path, *, force: bool) -> "_ImportTask":
+        """Return how each part of the input is imported.
+
+        Raises:
+            ValueError: a module has two sensors, or a sensor is unknown or not valid.
+        """
+        suffix = self.suffix
+        if suffix is None:
+            suffix = RecordingFormat.PARQUET if is_installed("pyarrow") else RecordingFormat.MCAP
+        sensors = _sensors(self.sensor or ())
+        labels = not self.no_labels
+        return _ImportTask(self.data_format, sensors, self.columns, labels, suffix, force, out)
+
+
+class _Imported(NamedTuple):
+    """An imported recording: its facts as JSON values, and its findings."""
+
+    document: dict[str, Any]
+    findings: "tuple[Finding, ...]"
+
+    @property
+    def file_name(self) -> str:
+        return str(self.document["path"].name)
+
+
+def import_(
+    path: Annotated[Path, typer.Argument(help="File or folder to import.")],
+    out: Annotated[
+        Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
+    ],
+    options: FormatOptions,
+    engine: EngineOption = "loky",
+    jobs: JobsOption = 1,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     r"""Import recordings from other formats.
 
-    Formats: uskin-pick-move, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv (see
-    docs/formats.md), and recordings of holdfast itself. From an .mcap file that was cut off,
-    everything up to the cut is recovered. Write OUT/NAME.parquet for each recording. If one of
-    them fails, none is written.
+    Formats: those of docs/formats.md, and recordings of holdfast itself. From an .mcap file that
+    was cut off, everything up to the cut is recovered. Write OUT/NAME.parquet for each recording.
+    If one of them fails, none is written.
 
     A CSV file of any other logger needs its sensor. Its columns are guessed from the header; the
     guess is shown first, as the text of --columns, which corrects it
@@ -118,20 +130,19 @@ def import_(
     """
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
-    used = start_engine(engine, jobs)
-    if suffix is None:
-        suffix = RecordingFormat.PARQUET if is_installed("pyarrow") else RecordingFormat.MCAP
-    task = _ImportTask(
-        data_format, _sensors(sensor or ()), columns, not no_labels, suffix, force, used.path(out)
-    )
-    parts, task = _parts(used.path(path), task)
+    started = start_engine(engine, jobs)
+    parts, task = _parts(started.path(path), options.task(started.path(out), force=force))
     with _staging_folder(task.out) as folder:
-        found = used.map_ordered(_import_part, ((part,) for part in parts), shared=(task, folder))
-        imported = list(_collect(progress(found, "importing", len(parts)), folder, used))
-        for one in imported:
-            (folder / one.path.name).replace(one.path)
-    imported = [replace(one, path=out / one.path.name) for one in imported]
-    _print(imported, out, as_json)
+        results = started.map_ordered(
+            _import_part, ((part,) for part in parts), shared=(task, folder)
+        )
+        results = progress(results, "importing", len(parts))
+        imported = list(_collect(results, folder, started))
+        for recording in imported:
+            (folder / recording.file_name).replace(task.out / recording.file_name)
+    for recording in imported:
+        recording.document["path"] = out / recording.file_name
+    _print([recording.document for recording in imported], out, as_json)
     _report_findings(imported)
 
 
@@ -176,7 +187,7 @@ def _import_part(
 
 
 def _collect(
-    found: "Iterable[tuple[list[_Imported], dict[str, str]]]", folder: Path, engine: "Engine"
+    results: "Iterable[tuple[list[_Imported], dict[str, str]]]", folder: Path, engine: "Engine"
 ) -> Iterator[_Imported]:
     """Yield the imported recordings; print each message once.
 
@@ -186,15 +197,15 @@ def _collect(
     """
     names: set[str] = set()
     printed: set[str] = set()
-    for recordings, messages in found:
+    for recordings, messages in results:
         for key, text in messages.items():
             if key not in printed:
                 print_message(text)
         printed |= messages.keys()
         for recording in recordings:
-            check_shared(folder / recording.path.name, engine)
-            _check_new(recording.name, recording.path.name in names)
-            names.add(recording.path.name)
+            check_shared(folder / recording.file_name, engine)
+            _check_new(recording.document["name"], recording.file_name in names)
+            names.add(recording.file_name)
             yield recording
 
 
@@ -222,14 +233,14 @@ def _recordings(
     )
 
 
-def _sensors(given: Sequence[str]) -> "dict[str, Sensor]":
+def _sensors(texts: Sequence[str]) -> "dict[str, Sensor]":
     """Return the sensors of `--sensor` by module; `"*"` is that of all others.
 
     Raises:
         ValueError: a module has two sensors, or a sensor is unknown or not valid.
     """
     sensors: dict[str, Sensor] = {}
-    for text in given:
+    for text in texts:
         module, equals, name = text.rpartition("=")
         if (key := module if equals else "*") in sensors:
             raise ValueError(f"--sensor: two sensors given for {module or 'all modules'}")
@@ -290,67 +301,56 @@ def _write(recording: "Recording", folder: Path, task: _ImportTask) -> _Imported
     refuse_overwrite(task.out / file_name, force=task.force)
     _check_new(recording.name, (folder / file_name).exists())
     save_recording(recording, folder / file_name)
-    return _Imported(
-        recording.name,
-        task.out / file_name,
-        {name: module.n_samples for name, module in recording.modules.items()},
-        recording.duration,
-        sum(len(module.labels) for module in recording.modules.values()),
-        recording.complete,
-        tuple(findings_of(recording)),
-    )
+    document = {
+        "name": recording.name,
+        "path": task.out / file_name,
+        "modules": {name: module.n_samples for name, module in recording.modules.items()},
+        "n_samples": sum(module.n_samples for module in recording.modules.values()),
+        "duration": recording.duration,
+        "n_labels": sum(len(module.labels) for module in recording.modules.values()),
+        "complete": recording.complete,
+    }
+    return _Imported(document, tuple(findings_of(recording)))
 
 
 def _report_findings(imported: Sequence[_Imported]) -> None:
     """Print each kind of finding once, for the first recording that has it."""
     by_kind: dict[str, list[tuple[str, Finding]]] = {}
-    for one in imported:
-        for kind, finding in {finding.kind: finding for finding in one.findings}.items():
-            by_kind.setdefault(kind, []).append((one.name, finding))
-    for found in by_kind.values():
-        name, finding = found[0]
+    for document, findings in imported:
+        for kind, finding in {finding.kind: finding for finding in findings}.items():
+            by_kind.setdefault(kind, []).append((document["name"], finding))
+    for recordings in by_kind.values():
+        name, finding = recordings[0]
         module = f"{finding.module}: " if finding.module else ""
-        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        more = f" (and {len(recordings) - 1} more)" if len(recordings) > 1 else ""
         print_message(f"{name}{more}: {module}{finding.text}")
 
 
-def _print(imported: list[_Imported], out: Path, as_json: bool) -> None:
-    n_modules = sum(len(one.modules) for one in imported)
-    n_samples = sum(one.n_samples for one in imported)
+def _print(recordings: list[dict[str, Any]], out: Path, as_json: bool) -> None:
+    n_modules = sum(len(recording["modules"]) for recording in recordings)
+    n_samples = sum(recording["n_samples"] for recording in recordings)
     if as_json:
         print_json(
             {
                 "out": out,
-                "n_recordings": len(imported),
+                "n_recordings": len(recordings),
                 "n_modules": n_modules,
                 "n_samples": n_samples,
-                "recordings": [_document(one) for one in imported],
+                "recordings": recordings,
             }
         )
         return
     print_table(
         ("recording", "modules", "samples", "duration [s]", "labels"),
         [
-            (one.name, len(one.modules), one.n_samples, f"{one.duration:.2f}", one.n_labels)
-            for one in imported
+            (x["name"], len(x["modules"]), x["n_samples"], f"{x['duration']:.2f}", x["n_labels"])
+            for x in recordings
         ],
     )
     print_line()
-    counts = [_count(len(imported), "recording"), _count(n_modules, "module")]
+    counts = [_count(len(recordings), "recording"), _count(n_modules, "module")]
     print_line(f"{' with '.join(counts)} and {_count(n_samples, 'sample')} in {out}")
 
 
 def _count(n: int, what: str) -> str:
     return f"{n} {what}{'' if n == 1 else 's'}"
-
-
-def _document(one: _Imported) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "path": one.path,
-        "modules": one.modules,
-        "n_samples": one.n_samples,
-        "duration": one.duration,
-        "n_labels": one.n_labels,
-        "complete": one.complete,
-    }

@@ -10,12 +10,9 @@ import typer
 
 from holdfast.cli.model_info import is_model, print_model
 from holdfast.cli.options import (
-    ForcePlotOption,
     JsonOption,
-    PlotOption,
+    PlotOptions,
     TareOption,
-    check_plot,
-    save_plot,
 )
 from holdfast.cli.terminal.console import (
     print_error,
@@ -28,6 +25,8 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from holdfast.features import Tare
     from holdfast.recordings import Label, Recording, Tactile
 
@@ -37,9 +36,9 @@ MAX_VALUE_LENGTH = 90
 
 def info(
     path: Annotated[Path, typer.Argument(help="A recording, a folder of recordings, or a model.")],
-    plot: PlotOption = None,
+    *,
+    figure: PlotOptions,
     tare: TareOption = "0.5",
-    force: ForcePlotOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show the content of a recording, a folder of them, or a model.
@@ -64,31 +63,29 @@ def info(
     """
     from holdfast.features import Tare
 
-    if is_model(path):
-        if plot is not None:
-            raise ValueError(f"--plot draws one recording; the model {path} given")
+    kind = "model" if is_model(path) else "folder" if path.is_dir() else "recording"
+    if figure.plot is not None and kind != "recording":
+        raise ValueError(f"--plot draws one recording; the {kind} {path} given")
+    if kind == "model":
         print_model(path, as_json)
-        return
-    chosen = Tare.parse(tare)
-    if path.is_dir():
-        if plot is not None:
-            raise ValueError(f"--plot draws one recording; the folder {path} given")
-        _print_folder(path, chosen, as_json)
+    elif kind == "folder":
+        _print_folder(path, Tare.parse(tare), as_json)
     else:
-        _print_file(path, plot, chosen, force, as_json)
+        _print_file(path, figure, Tare.parse(tare), as_json)
 
 
-def _print_file(path: Path, plot: Path | None, tare: "Tare", force: bool, as_json: bool) -> None:
+def _print_file(path: Path, figure: PlotOptions, tare: "Tare", as_json: bool) -> None:
     from holdfast.io import load_recording
 
-    if plot is not None:
-        check_plot(plot, force)
-    recording = load_recording(path)
-    document = _document(recording, tare, path)
-    if plot is not None:
+    def draw() -> "Figure":
         from holdfast.plots.recording import plot_recording
 
-        save_plot(plot_recording(recording, tare), plot, force)
+        return plot_recording(recording, tare)
+
+    figure.check()
+    recording = load_recording(path)
+    document = _document(recording, tare, path)
+    figure.save(draw)
     if as_json:
         print_json(document)
     else:
@@ -287,7 +284,7 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
     modules = list(document["modules"].values())
     rates = sorted(m["rate"] for m in modules if m["n_samples"])
     faults = sorted({fault for m in modules for fault in m["faults"]})
-    found = dict.fromkeys(one["kind"] for one in document["findings"])
+    findings = dict.fromkeys(finding["kind"] for finding in document["findings"])
     return (
         document["name"],
         len(modules),
@@ -295,7 +292,7 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
         f"{rates[len(rates) // 2]:.1f}",
         f"{document['duration']:.2f}",
         sum(m["gaps"] for m in modules),
-        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *found]) or "ok",
+        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *findings]) or "ok",
     )
 
 

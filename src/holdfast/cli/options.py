@@ -1,8 +1,13 @@
-"""Options that several verbs share, with the checks and conversions of their values."""
+"""Options that several verbs share, with the checks and conversions of their values.
+
+An option is declared once. A group of options is a dataclass whose fields are options; a verb
+that takes one has all its options (see `spread_groups` of `app.py`).
+"""
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,6 +30,7 @@ TOKEN_VARIABLE = "HOLDFAST_TOKEN"
 """Environment variable with the token of the pages."""
 MAX_TOKEN_LENGTH = 1024
 """Longest token that is read from a file [characters]."""
+LOCALHOST = "127.0.0.1"
 PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
@@ -65,6 +71,7 @@ SourceArgument = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what exists already.")]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
 JobsOption = Annotated[
     int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
@@ -73,38 +80,16 @@ EngineOption = Annotated[
     str,
     typer.Option("--engine", help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
 ]
-TareOption = Annotated[
-    str,
-    typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s]."),
-]
-
-RateOption = Annotated[
-    RatePolicy,
-    typer.Option(
-        "--rate",
-        help="If the rate is not within 20 % of the model's: resample the source, or refuse it.",
-    ),
-]
-DebounceOption = Annotated[
-    float | None,
-    typer.Option(
-        "--debounce",
-        help="Minimum time a new state must last before it is reported [s].",
-        show_default="as in the model",
-    ),
-]
+_TARE = typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s].")
+TareOption = Annotated[str, _TARE]
+FittingTareOption = Annotated[str | None, _TARE]
+"""Without a value, the tare is chosen to fit the recordings."""
 HysteresisOption = Annotated[
     float | None,
     typer.Option(
         "--hysteresis",
-        help="Distance from the threshold that the probability must exceed to change the state.",
-        show_default="as in the model",
-    ),
-]
-RawOption = Annotated[
-    bool,
-    typer.Option(
-        "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
+        help="Distance from the threshold that the probability must exceed to change the state; "
+        "by default that of the model.",
     ),
 ]
 IgnoreOption = Annotated[
@@ -117,32 +102,173 @@ SpeedOption = Annotated[
         "--speed", help="Speed of a recording or the twin: 1 is real time, 0 as fast as possible."
     ),
 ]
-
+SecondsOption = Annotated[float | None, typer.Option("--seconds", help="Stop after this time [s].")]
+OnceOption = Annotated[
+    bool, typer.Option("--once", help="Play a recording once, and stop at its end.")
+]
 HostOption = Annotated[str, typer.Option("--host", help="Address to listen on.")]
 PortOption = Annotated[
     int, typer.Option("--port", help="Port to listen on; 0 selects a free port.")
 ]
-TokenOption = Annotated[
-    str | None,
+BrowserOption = Annotated[
+    bool | None,
     typer.Option(
-        "--token",
-        help="Secret that clients must send; required for other hosts. Other users of this "
-        "machine can read it in the list of processes: prefer --token-file.",
+        "--browser/--no-browser",
+        help="Open the page in a browser.",
+        show_default="if a browser can be opened",
     ),
 ]
-TokenFileOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--token-file",
-        help="File with the secret in its first line; or set HOLDFAST_TOKEN instead.",
-    ),
+ModelOutput = Annotated[
+    Path, typer.Option("--output", "-o", help="The model file to write (JSON).")
 ]
-PlotOption = Annotated[
-    Path | None, typer.Option("--plot", help="Write a figure to this .svg, .png or .pdf file.")
-]
-ForcePlotOption = Annotated[
-    bool, typer.Option("--force", help="Overwrite the figure if it exists.")
-]
+
+
+@dataclass(frozen=True)
+class DetectorOptions:
+    """Group of options: how a model detects."""
+
+    rate: Annotated[
+        RatePolicy,
+        typer.Option(
+            help="If the rate is not within 20 % of the model's: resample the source, or refuse it."
+        ),
+    ] = RatePolicy.RESAMPLE
+    debounce: Annotated[
+        float | None,
+        typer.Option(
+            help="Minimum time a new state must last before it is reported [s].",
+            show_default="as in the model",
+        ),
+    ] = None
+    hysteresis: HysteresisOption = None
+    raw: Annotated[
+        bool,
+        typer.Option(
+            "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
+        ),
+    ] = False
+    ignore: IgnoreOption = ""
+
+    def load_model(self, name: str) -> "Model":
+        """Load a model, and apply `--debounce`, `--hysteresis` and `--raw`.
+
+        Args:
+            name: path of the model, or the name of a built-in one.
+
+        Raises:
+            ValueError: a source is given instead of a model; or `--raw` and another value.
+            ModelError: the model cannot be read.
+        """
+        from msgspec.structs import replace
+
+        from holdfast.devices.uri import is_uri
+        from holdfast.model import Debounce, Model
+
+        is_source = is_uri(name) and not name.startswith("builtin:")
+        if is_source or name.endswith((".parquet", ".mcap")):
+            raise ValueError(
+                f"{name} is a source; MODEL SOURCE expected, such as builtin:any {name}"
+            )
+        if self.raw and (self.debounce, self.hysteresis) != (None, None):
+            raise ValueError(
+                "--raw decides without debouncing; leave out --debounce and --hysteresis"
+            )
+        model = Model.load(name)
+        trained = Debounce() if self.raw else model.debounce
+        debounce = Debounce(
+            trained.min_duration if self.debounce is None else self.debounce,
+            trained.hysteresis if self.hysteresis is None else self.hysteresis,
+            trained.hold,
+        )
+        return replace(model, name=model.name or name, debounce=debounce)
+
+    def create_stream(self, model: "Model", source: "Source") -> "StreamDetector":
+        """Create the detector of an open source, and report fingers that the source lacks."""
+        from holdfast.live.stream_detector import StreamDetector
+
+        taxels = parse_taxels(self.ignore, source.sensors)
+        strict = self.rate is RatePolicy.STRICT
+        stream = StreamDetector(model, source, strict=strict, ignore=taxels)
+        report_missing_fingers(model, source.name, source.sensors)
+        return stream
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Group of options: address of a page, and who may open it."""
+
+    host: HostOption
+    port: PortOption
+    token: Annotated[
+        str | None,
+        typer.Option(
+            help="Secret that clients must send; required for other hosts. Other users of this "
+            "machine can read it in the list of processes: prefer --token-file."
+        ),
+    ] = None
+    token_file: Annotated[
+        Path | None,
+        typer.Option(help="File with the secret in its first line; or set HOLDFAST_TOKEN instead."),
+    ] = None
+
+    def find_token(self) -> str | None:
+        """Return the token of `--token`, `--token-file` or the environment; None without one.
+
+        Raises:
+            ValueError: both options are given, or the file cannot be read as text.
+        """
+        token, file = self.token, self.token_file
+        if token is not None and file is not None:
+            raise ValueError("--token and --token-file given; only one of them expected")
+        if file is None:
+            return os.environ.get(TOKEN_VARIABLE) if token is None else token
+        try:
+            if not file.is_file():
+                raise ValueError(f"--token-file {file}: a file expected, there is none")
+            with file.open(encoding="utf-8") as opened:
+                return opened.readline(MAX_TOKEN_LENGTH + 1).strip()
+        except OSError as cause:
+            raise ValueError(f"--token-file {file}: cannot be read: {cause.strerror}") from cause
+        except UnicodeDecodeError as cause:
+            raise ValueError(f"--token-file {file}: text expected, other bytes given") from cause
+
+
+@dataclass(frozen=True)
+class PlotOptions:
+    """Group of options: the file of a figure; `plot` is None if none is drawn."""
+
+    plot: Annotated[
+        Path | None, typer.Option(help="Write a figure to this .svg, .png or .pdf file.")
+    ] = None
+    force: ForceOption = False
+
+    def check(self) -> None:
+        """Check that the figure can be written.
+
+        Raises:
+            ValueError: the suffix is not one of `PLOT_SUFFIXES`.
+            OutputError: the file exists and `force` is not given, or its folder does not exist.
+            MissingExtra: matplotlib is not installed.
+        """
+        from holdfast.files import refuse_overwrite
+
+        if self.plot is None:
+            return
+        if self.plot.suffix.lower() not in PLOT_SUFFIXES:
+            raise ValueError(f"a plot ends in {', '.join(PLOT_SUFFIXES)}; {self.plot.name!r} given")
+        require_extras("plot")
+        refuse_overwrite(self.plot, force=self.force)
+
+    def save(self, draw: "Callable[[], Figure]") -> None:
+        """Draw and write the figure if it is wanted, and print its path on stderr."""
+        from holdfast.files import whole_file
+
+        if self.plot is None:
+            return
+        figure = draw()
+        with whole_file(self.plot, force=self.force) as part:
+            figure.savefig(part)
+        print_message(f"{self.plot} written")
 
 
 def start_engine(engine: str, jobs: int) -> "Engine":
@@ -157,9 +283,9 @@ def start_engine(engine: str, jobs: int) -> "Engine":
 
     if jobs == 0:
         raise ValueError("jobs other than 0 expected, 0 given")
-    chosen = Engine.parse(engine, jobs)
-    chosen.check()
-    return chosen
+    started = Engine.parse(engine, jobs)
+    started.check()
+    return started
 
 
 def check_shared(path: Path, engine: "Engine") -> None:
@@ -175,75 +301,6 @@ def check_shared(path: Path, engine: "Engine") -> None:
             f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
             "that all machines have at the same path"
         )
-
-
-def find_token(token: str | None, file: Path | None) -> str | None:
-    """Return the token of `--token`, `--token-file` or the environment; None without one.
-
-    Raises:
-        ValueError: both options are given, or the file cannot be read as text.
-    """
-    if token is not None and file is not None:
-        raise ValueError("--token and --token-file given; only one of them expected")
-    if file is None:
-        return os.environ.get(TOKEN_VARIABLE) if token is None else token
-    try:
-        if not file.is_file():
-            raise ValueError(f"--token-file {file}: a file expected, there is none")
-        with file.open(encoding="utf-8") as opened:
-            return opened.readline(MAX_TOKEN_LENGTH + 1).strip()
-    except OSError as cause:
-        raise ValueError(f"--token-file {file}: cannot be read: {cause.strerror}") from cause
-    except UnicodeDecodeError as cause:
-        raise ValueError(f"--token-file {file}: text expected, other bytes given") from cause
-
-
-def load_model(
-    name: str, debounce: float | None, hysteresis: float | None, *, raw: bool = False
-) -> "Model":
-    """Load a model and apply `--debounce` and `--hysteresis`, if given.
-
-    Args:
-        name: path of the model, or the name of a built-in one.
-        debounce: minimum time that a new state must last [s]; None for that of the model.
-        hysteresis: of the probability; None for that of the model.
-        raw: leave the debouncing out.
-
-    Raises:
-        ValueError: a source is given instead of a model; or `raw` and another value.
-        ModelError: the model cannot be read.
-    """
-    from msgspec.structs import replace
-
-    from holdfast.devices.uri import is_uri
-    from holdfast.model import Debounce, Model
-
-    is_source = is_uri(name) and not name.startswith("builtin:")
-    if is_source or name.endswith((".parquet", ".mcap")):
-        raise ValueError(f"{name} is a source; MODEL SOURCE expected, such as builtin:any {name}")
-
-    if raw and (debounce, hysteresis) != (None, None):
-        raise ValueError("--raw decides without debouncing; leave out --debounce and --hysteresis")
-    model = Model.load(name)
-    own = Debounce() if raw else model.debounce
-    chosen = Debounce(
-        own.min_duration if debounce is None else debounce,
-        own.hysteresis if hysteresis is None else hysteresis,
-        own.hold,
-    )
-    return replace(model, name=model.name or name, debounce=chosen)
-
-
-def create_stream_detector(
-    model: "Model", source: "Source", rate: RatePolicy, ignore: str
-) -> "StreamDetector":
-    """Create the detector of an open source, and report fingers that the source lacks."""
-    from holdfast.live.stream_detector import StreamDetector
-
-    taxels = parse_taxels(ignore, source.sensors)
-    stream = StreamDetector(model, source, strict=rate is RatePolicy.STRICT, ignore=taxels)
-    report_missing_fingers(model, source.name, source.sensors)
-    return stream
 
 
 def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, object]) -> None:
@@ -294,6 +351,16 @@ def _check_taxel(finger: str, number: int, n_taxels: int) -> None:
         )
 
 
+def check_seconds(seconds: float | None) -> None:
+    """Check the value of `--seconds`.
+
+    Raises:
+        ValueError: it is not above 0.
+    """
+    if seconds is not None and not seconds > 0:
+        raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
+
+
 def check_speed(source: str, speed: float) -> None:
     """Check that the source can be played at this speed.
 
@@ -307,28 +374,3 @@ def check_speed(source: str, speed: float) -> None:
         raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
     if speed != 1 and is_uri(source) and not source.startswith("twin:"):
         raise ValueError(f"--speed is for recordings and the twin; {source} is a device")
-
-
-def check_plot(plot: Path, force: bool) -> None:
-    """Check that a figure can be written to this path.
-
-    Raises:
-        ValueError: the suffix is not one of `PLOT_SUFFIXES`.
-        OutputError: the file exists and `force` is not given, or its folder does not exist.
-        MissingExtra: matplotlib is not installed.
-    """
-    from holdfast.files import refuse_overwrite
-
-    if plot.suffix.lower() not in PLOT_SUFFIXES:
-        raise ValueError(f"a plot ends in {', '.join(PLOT_SUFFIXES)}; {plot.name!r} given")
-    require_extras("plot")
-    refuse_overwrite(plot, force=force)
-
-
-def save_plot(figure: "Figure", plot: Path, force: bool) -> None:
-    """Write a figure, and print its path on stderr."""
-    from holdfast.files import whole_file
-
-    with whole_file(plot, force=force) as part:
-        figure.savefig(part)
-    print_message(f"{plot} written")

@@ -7,32 +7,38 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import HostOption, PortOption, SourceArgument, check_speed
+from holdfast.cli.options import (
+    LOCALHOST,
+    HostOption,
+    JsonOption,
+    OnceOption,
+    PortOption,
+    SourceArgument,
+    check_speed,
+)
 from holdfast.cli.terminal.console import print_json, print_message
-from holdfast.cli.terminal.stopping import handle_stop_signals
+from holdfast.cli.terminal.control import handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.live.publishers.xela_server import XelaServer
 
-POLL_INTERVAL = 0.2
+END_POLL_INTERVAL = 0.2
 """Time between two checks whether the server has ended [s]."""
-REFRESH_INTERVAL = 1.0
+PLAY_REFRESH_INTERVAL = 1.0
 """Time between two updates of the rate on a terminal [s]."""
 
 
 def play(
     source: SourceArgument,
     version: Annotated[str, typer.Option(help="Version of the server: 1.7 or 1.8.")] = "1.8",
-    host: HostOption = "127.0.0.1",
+    host: HostOption = LOCALHOST,
     port: PortOption = 5000,
     speed: Annotated[
         float,
         typer.Option(help="Speed: 1 is real time; at others, clients report faults of the clock."),
     ] = 1.0,
-    once: Annotated[
-        bool, typer.Option("--once", help="Wait for a client, play once, and stop.")
-    ] = False,
+    once: OnceOption = False,
     whole_hand: Annotated[
         bool | None,
         typer.Option(
@@ -48,10 +54,7 @@ def play(
             "It plays once, for the first client.",
         ),
     ] = "",
-    as_json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the address, and at the end the number of packets."),
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Send a recording or the twin as a XELA server does.
 
@@ -59,11 +62,13 @@ def play(
     times are those of the recording, shifted to now. The modules of an Allegro hand are sent as
     one sensor of 368 taxels, in which missing modules are at rest. Other modules, or all with
     --separate, are sent as sensors 1, 2, ... Readings in newtons are sent as calibrated values,
-    with counts computed from a data sheet. Stop it with Ctrl-C.
+    with counts computed from a data sheet. With --json, the address is printed as JSON, and at
+    the end the number of packets. Stop it with Ctrl-C.
 
     SOURCE is the path of a recording, or twin:?object=can&seed=1. It begins when the first client
     connects, and again for all clients when another one connects, so that each client can take
-    its tare while nothing is touched. It is repeated, unless --once is given.
+    its tare while nothing is touched. It is repeated, unless --once is given, which waits for a
+    client and plays it once.
 
     Example:
       holdfast play twin:?object=can
@@ -118,9 +123,9 @@ def _print_address(server: "XelaServer", source: str, version: str, *, as_json: 
 def _print_status(server: "XelaServer") -> None:
     """Print the number of clients until the server ends; without a terminal only its changes."""
     updated_at, n_sent, n_clients = time.monotonic(), 0, -1
-    while not server.wait(POLL_INTERVAL):
+    while not server.wait(END_POLL_INTERVAL):
         now = time.monotonic()
-        if sys.stderr.isatty() and now - updated_at >= REFRESH_INTERVAL:
+        if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
             rate = (server.n_packets - n_sent) / (now - updated_at)
             sys.stderr.write(f"\r{_clients(server.n_clients)}, {rate:.1f} packets/s \033[K")
             updated_at, n_sent = now, server.n_packets

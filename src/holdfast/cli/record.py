@@ -9,9 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import JsonOption, SpeedOption, check_speed, complete_source
+from holdfast.cli.options import (
+    ForceOption,
+    JsonOption,
+    SecondsOption,
+    SourceArgument,
+    SpeedOption,
+    check_seconds,
+    check_speed,
+)
 from holdfast.cli.terminal.console import print_json, print_line, print_message
-from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Arrival, Source
@@ -26,21 +34,11 @@ _SUFFIX = ".mcap"
 
 
 def record(
-    source: Annotated[
-        str,
-        typer.Argument(
-            help="URI such as xela://HOST:PORT or twin:, path of a recording, or hand (of "
-            "holdfast.toml).",
-            callback=complete_source,
-        ),
-    ],
+    source: SourceArgument,
     out: Annotated[
         Path, typer.Argument(help="NAME.mcap, or a folder, which is created if missing.")
     ],
-    seconds: Annotated[
-        float | None,
-        typer.Option(help="Stop after this time [s].", show_default="until q, Ctrl-C or SIGTERM"),
-    ] = None,
+    seconds: SecondsOption = None,
     speed: SpeedOption = 1.0,
     object_name: Annotated[str, typer.Option("--object", help="Name of the object.")] = "",
     case: Annotated[str, typer.Option(help="Case of the experiment.")] = "",
@@ -58,13 +56,15 @@ def record(
             "--fsync", help="Wait for the disk: a power failure loses at most the last second."
         ),
     ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Record a source; a crash loses at most the last half second.
 
     Write an MCAP file with all modules, each with its own times. The file of a process that was
-    killed can still be read (holdfast info, import). These keys set markers: c closing, l locked,
+    killed can still be read (holdfast info, import). SOURCE is a URI such as xela://HOST:PORT or
+    twin:, or the path of a recording. It is recorded for --seconds, or until q, Ctrl-C or SIGTERM.
+    These keys set markers: c closing, l locked,
     d disturbance, r released, space or 1-9 a mark; q stops. If stdin is a pipe, each line is a
     marker. Faults and notices of the source become markers too. If a device disconnects, the
     recording continues when it reconnects.
@@ -74,8 +74,7 @@ def record(
       holdfast record twin:?object=can can.mcap --seconds 10
       (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
-    if seconds is not None and not seconds > 0:
-        raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
+    check_seconds(seconds)
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
     path = _output_path(source, out, object_name, force=force)
@@ -113,8 +112,8 @@ def _record(
         OutputError: the file cannot be written.
         SourceError: no samples arrived; the file is removed.
     """
-    from holdfast.cli.terminal.keys import KEY_HELP, MarkerKeys
-    from holdfast.cli.terminal.status_line import StatusLine
+    from holdfast.cli.terminal.control import KEY_HELP, MarkerKeys
+    from holdfast.cli.terminal.progress import StatusLine
     from holdfast.errors import OutputError, SourceError
     from holdfast.live.recording_buffer import marker_text
 
@@ -238,7 +237,7 @@ def _print_result(path: Path, status: "RecorderStatus", as_json: bool) -> None:
     if as_json:
         print_json(_to_dict(path, status))
         return
-    from holdfast.cli.terminal.status_line import format_size
+    from holdfast.cli.terminal.progress import format_size
 
     print_line(
         f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import ForcePlotOption, JsonOption, PlotOption, check_plot, save_plot
+from holdfast.cli.options import JsonOption, PlotOptions
 from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from holdfast.sensors import Hand, Sensor
 
 
@@ -34,8 +36,8 @@ def sensors(
     unit: Annotated[
         str, typer.Option(help="With --template: unit of the readings, count or N.")
     ] = "count",
-    plot: PlotOption = None,
-    force: ForcePlotOption = False,
+    *,
+    figure: PlotOptions,
     as_json: JsonOption = False,
 ) -> None:
     """List the known sensors and hands, or show one of them.
@@ -58,13 +60,13 @@ def sensors(
         _print_template(template, pitch, rate, unit)
         return
     if name is None:
-        _refuse_options(plot, base)
+        _refuse_options(figure.plot, base)
         _show_all(as_json)
         return
-    found = _find(name, base)
-    if plot is not None:
-        _draw(found, plot, force)
-    _show_one(found, as_json)
+    layout = _find(name, base)
+    figure.check()
+    figure.save(lambda: _draw(layout))
+    _show_one(layout, as_json)
 
 
 def find_sensor(name: str) -> "Sensor":
@@ -116,7 +118,7 @@ def _lines(value: object) -> str:
     import json
 
     if isinstance(value, list) and isinstance(value[0], list):
-        return "[\n    " + ",\n    ".join(json.dumps(each) for each in value) + "\n  ]"
+        return "[\n    " + ",\n    ".join(json.dumps(row) for row in value) + "\n  ]"
     return json.dumps(value)
 
 
@@ -169,18 +171,18 @@ def _show_all(as_json: bool) -> None:
     )
 
 
-def _show_one(found: "Sensor | Hand", as_json: bool) -> None:
+def _show_one(layout: "Sensor | Hand", as_json: bool) -> None:
     from holdfast.sensors import Sensor
 
-    if isinstance(found, Sensor):
+    if isinstance(layout, Sensor):
         if as_json:
-            print_json(found.to_dict() | {"n_taxels": found.n_taxels})
+            print_json(layout.to_dict() | {"n_taxels": layout.n_taxels})
         else:
-            _print_sensor(found)
+            _print_sensor(layout)
     elif as_json:
-        print_json(_hand_summary(found))
+        print_json(_hand_summary(layout))
     else:
-        _print_hand(found)
+        _print_hand(layout)
 
 
 def _sensor_summary(sensor: "Sensor") -> dict[str, Any]:
@@ -255,9 +257,8 @@ def _ranges(indices: list[int]) -> str:
     return ", ".join(f"{a}-{b}" if a < b else f"{a}" for a, b in runs)
 
 
-def _draw(found: "Sensor | Hand", plot: Path, force: bool) -> None:
-    check_plot(plot, force)
+def _draw(layout: "Sensor | Hand") -> "Figure":
     from holdfast.plots.sensors import plot_hand, plot_sensor
     from holdfast.sensors import Sensor
 
-    save_plot(plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found), plot, force)
+    return plot_sensor(layout) if isinstance(layout, Sensor) else plot_hand(layout)

@@ -3,7 +3,7 @@
 import os
 import sys
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,40 +12,23 @@ from urllib.parse import quote
 import typer
 
 from holdfast.cli.grip_options import (
-    ArmedOption,
-    ConfirmOption,
-    FaultAction,
-    FaultOption,
+    NO_HAND,
     GripSettings,
-    HandOption,
-    LawOption,
-    MaxForceOption,
-    MaxScaleOption,
-    MinScaleOption,
-    NewtonsOption,
     check_armed,
     connect_hand,
     find_source_and_hand,
     open_loop,
 )
 from holdfast.cli.options import (
-    DebounceOption,
-    HostOption,
-    HysteresisOption,
-    IgnoreOption,
+    LOCALHOST,
+    DetectorOptions,
+    JsonOption,
     ModelArgument,
-    PortOption,
-    RateOption,
-    RatePolicy,
-    RawOption,
+    OnceOption,
+    ServerOptions,
     SourceArgument,
     SpeedOption,
-    TokenFileOption,
-    TokenOption,
     check_speed,
-    create_stream_detector,
-    find_token,
-    load_model,
 )
 from holdfast.cli.terminal.console import print_json, print_message
 
@@ -60,49 +43,31 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.web.guard import Guard
 
-DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
+ADDRESS = ServerOptions(LOCALHOST, port=8080)
 
 
 def serve(
     model: ModelArgument,
     source: SourceArgument,
-    host: HostOption = DEFAULT_HOST,
-    port: PortOption = DEFAULT_PORT,
-    token: TokenOption = None,
-    token_file: TokenFileOption = None,
+    *,
+    access: ServerOptions = ADDRESS,
     record_to: Annotated[
         Path, typer.Option(help="Folder for recordings that are started on the page.")
     ] = Path("recordings"),
     speed: SpeedOption = 1.0,
-    once: Annotated[
-        bool, typer.Option("--once", help="Play a recording once, and stop at its end.")
-    ] = False,
-    rate: RateOption = RatePolicy.RESAMPLE,
-    debounce: DebounceOption = None,
-    hysteresis: HysteresisOption = None,
-    raw: RawOption = False,
-    ignore: IgnoreOption = "",
-    hand: HandOption = "",
-    law: LawOption = "holdfast",
-    armed: ArmedOption = False,
-    confirm: ConfirmOption = "",
-    max_scale: MaxScaleOption = None,
-    min_scale: MinScaleOption = None,
-    max_force: MaxForceOption = None,
-    on_fault: FaultOption = FaultAction.HOLD,
-    newtons: NewtonsOption = None,
+    once: OnceOption = False,
+    options: DetectorOptions,
+    settings: GripSettings = NO_HAND,
     ros2: Annotated[bool, typer.Option("--ros2", help="Also publish on ROS 2 topics.")] = False,
     ros1: Annotated[bool, typer.Option("--ros1", help="Also publish on ROS 1 topics.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the address of the page as JSON.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Show the estimates of a source on a web page, and publish them.
 
     The page shows the state, force, sigma, probability, taxels and faults of every finger. It
     can also take the tare and record. Other programs read the WebSocket /api/v1/estimates (every
     sample) or /api/v1/live (twenty times per second), see docs/live.md. Without --host, only
-    this machine can connect. Stop it with Ctrl-C.
+    this machine can connect. With --json, the address is printed as JSON. Stop it with Ctrl-C.
 
     With --hand, it also controls the grip force of a hand, as holdfast hold does, and the page
     has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first.
@@ -117,46 +82,57 @@ def serve(
       holdfast serve model.json grasp.parquet --host 0.0.0.0 \
         --token-file secret.txt
     """
-    from holdfast.live.session import Session
     from holdfast.live.stream_detector import compile_kernels
     from holdfast.web.guard import Guard
 
-    settings = GripSettings(
-        hand, law, armed, confirm, max_scale, min_scale, max_force, on_fault, newtons
-    )
     settings.check()
-    token = find_token(token, token_file)
-    guard = Guard(host, token)
+    token = access.find_token()
+    guard = Guard(access.host, token)
     check_speed(source, speed)
-    loaded = load_model(model, debounce, hysteresis, raw=raw)
+    loaded = options.load_model(model)
     compile_kernels()
 
     def announce(url: str) -> None:
-        page = page_url(url, token)
-        if as_json:
-            print_json({"url": page, "model": loaded.name, "source": source})
-            sys.stdout.flush()
-        print_message(f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it")
+        _announce(page_url(url, token), loaded, source, as_json=as_json)
 
-    opened, commanded = _find(source, hand, speed=speed, loop=not once)
+    opened, commanded = _find(source, settings.hand, speed=speed, loop=not once)
     check_armed(settings)
-    with ExitStack() as stack:
-        watchdog = None if commanded is None else connect_hand(stack, settings, commanded)
-        stack.enter_context(opened)
-        stream = create_stream_detector(loaded, opened, rate, ignore)
-        session = stack.enter_context(Session(stream))
-        grip = None
-        if commanded is not None:
-            grip = stack.enter_context(_live_grip(settings, commanded, session, watchdog))
-        created = _create_publishers(stream, grip=grip, ros2=ros2, ros1=ros1)
-        publishers = [stack.enter_context(publisher) for publisher in created]
-        for publisher in publishers:
-            session.add_listener(publisher.put)
+    with (
+        _open_session(options, loaded, opened, settings, commanded) as (session, grip),
+        _publish(session, grip, ros2=ros2, ros1=ros1),
+    ):
         run_page(
-            loaded, session, announce,
-            host=host, port=port, guard=guard, folder=record_to, grip=grip, stay=not once,
+            loaded, session, announce, host=access.host, port=access.port,
+            guard=guard, folder=record_to, grip=grip, stay=not once,
         )  # fmt: skip
-        _report_unpublished(publishers)
+
+
+def _announce(page: str, model: "Model", source: str, *, as_json: bool) -> None:
+    if as_json:
+        print_json({"url": page, "model": model.name, "source": source})
+        sys.stdout.flush()
+    print_message(f"{page} shows the estimates of {model.name} for {source}; Ctrl-C stops it")
+
+
+@contextmanager
+def _open_session(
+    options: DetectorOptions,
+    model: "Model",
+    source: "Source",
+    settings: GripSettings,
+    hand: "HandDevice | None",
+) -> "Iterator[tuple[Session, LiveGrip | None]]":
+    """Yield the session of a source, and the loop of the hand if there is one."""
+    from holdfast.live.session import Session
+
+    with ExitStack() as stack:
+        watchdog = None if hand is None else connect_hand(stack, settings, hand)
+        stack.enter_context(source)
+        session = stack.enter_context(Session(options.create_stream(model, source)))
+        grip = None
+        if hand is not None:
+            grip = stack.enter_context(_live_grip(settings, hand, session, watchdog))
+        yield session, grip
 
 
 def _find(
@@ -185,27 +161,36 @@ def _live_grip(
         yield grip
 
 
-def _report_unpublished(publishers: "Sequence[RosPublisher]") -> None:
-    """Print how many estimates are missing on the ROS topics."""
-    for publisher in publishers:
-        if publisher.n_failed or publisher.n_dropped:
-            print_message(
-                f"{type(publisher).__name__}: ROS refused {publisher.n_failed} estimates, "
-                f"{publisher.n_dropped} were dropped because it was too slow"
-            )
+@contextmanager
+def _publish(
+    session: "Session", grip: "LiveGrip | None", *, ros2: bool, ros1: bool
+) -> "Iterator[None]":
+    """Publish the estimates of a session; at the end, print how many are missing on the topics."""
+    with ExitStack() as stack:
+        publishers = [
+            stack.enter_context(publisher)
+            for publisher in _create_publishers(session.stream, grip=grip, ros2=ros2, ros1=ros1)
+        ]
+        for publisher in publishers:
+            session.add_listener(publisher.put)
+        yield
+        for publisher in publishers:
+            if publisher.n_failed or publisher.n_dropped:
+                print_message(
+                    f"{type(publisher).__name__}: ROS refused {publisher.n_failed} estimates, "
+                    f"{publisher.n_dropped} were dropped because it was too slow"
+                )
 
 
 def _create_publishers(
     stream: "StreamDetector", *, grip: "LiveGrip | None", ros2: bool, ros1: bool
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
+    if ros2 or ros1:
+        from holdfast.live.publishers.ros_publisher import Ros1Publisher, Ros2Publisher
     if ros2:
-        from holdfast.live.publishers.ros2_publisher import Ros2Publisher
-
         yield Ros2Publisher(units, grip=grip)
     if ros1:
-        from holdfast.live.publishers.ros1_publisher import Ros1Publisher
-
         yield Ros1Publisher(units, grip=grip)
 
 
@@ -214,12 +199,12 @@ def run_page(
     session: "Session",
     announce: Callable[[str], None],
     *,
-    host: str = DEFAULT_HOST,
-    port: int = DEFAULT_PORT,
+    host: str = LOCALHOST,
+    port: int,
     guard: "Guard | None" = None,
-    folder: Path | None = None,
+    folder: Path,
     grip: "LiveGrip | None" = None,
-    stay: bool = True,
+    stay: bool,
 ) -> None:
     """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
 

@@ -1,17 +1,26 @@
 """`holdfast simulate`: recordings of the physical twin, with exact truth."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import EngineOption, JobsOption, JsonOption, check_shared, start_engine
+from holdfast.cli.options import (
+    EngineOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    SeedOption,
+    check_shared,
+    start_engine,
+)
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.errors import require_extras
-from holdfast.twin.profile import ATTEMPTS
+from holdfast.twin.profile import GRASP_ATTEMPTS
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
@@ -19,43 +28,68 @@ if TYPE_CHECKING:
     from holdfast.twin.simulation import Grasp
 
 
-def simulate(
-    out: Annotated[
-        Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
-    ],
+@dataclass(frozen=True)
+class GraspOptions:
+    """Group of options: which grasps are simulated."""
+
     objects: Annotated[
         str, typer.Option(help="Names of objects, separated by commas; by default all objects.")
-    ] = "",
+    ] = ""
     table: Annotated[
         Path | None, typer.Option(help="Your own objects: a .toml file like that of the twin.")
-    ] = None,
-    cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2",
+    ] = None
+    cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2"
     repeats: Annotated[
         int,
         typer.Option(help="Number of grasps of each object and case, or of --randomize hands."),
-    ] = 5,
+    ] = 5
     profile: Annotated[
         str,
         typer.Option(
             help="Profile of grip and disturbances: gentle, reference, vigorous, finger-gentle, ..."
         ),
-    ] = "reference",
-    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same bytes.")] = 0,
+    ] = "reference"
+    seed: SeedOption = 0
     randomize: Annotated[
         bool,
         typer.Option(
             "--randomize", help="Draw another hand, sensor, object and arm motion each time."
         ),
-    ] = False,
+    ] = False
     grasps: Annotated[
         int, typer.Option(help="Number of grasps of each --randomize hand, of other objects.")
-    ] = 1,
+    ] = 1
     server: Annotated[
         bool,
         typer.Option(
             "--server", help="Add irregular times and repeated packets, as a XELA server has."
         ),
-    ] = False,
+    ] = False
+
+    def plan(self, engine: "Engine") -> "list[Grasp]":
+        """Return the grasps of an Allegro hand.
+
+        Raises:
+            ValueError: an unknown object, case or profile, or a number out of range.
+        """
+        if self.grasps != 1:
+            raise ValueError(
+                f"--grasps is for the hands of --randomize, {self.grasps} given; --repeats "
+                "repeats grasps"
+            )
+        table = None if self.table is None else engine.path(self.table)
+        return plan_grasps(
+            self.objects, self.cases, self.repeats, self.profile, self.seed,
+            server=self.server, table=table,
+        )  # fmt: skip
+
+
+def simulate(
+    out: Annotated[
+        Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
+    ],
+    *,
+    options: GraspOptions,
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     video: Annotated[
@@ -64,9 +98,7 @@ def simulate(
             help="Write a video of the first grasp to this .gif, .png, .webp or .mp4 file."
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Simulate all grasps again, and overwrite them.")
-    ] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate recordings of grasps with the physical twin.
@@ -74,8 +106,9 @@ def simulate(
     It follows the protocol of the paper: an Allegro hand with uSkin fingertips closes on an
     object, holds it (case 1) or holds it while a person disturbs it (case 2), and releases it.
     Every recording contains the truth: forces, slip, poses and phases. Existing recordings are
-    kept, so the same command continues a run that was stopped. If the object is dropped, the
-    recording is named "...-failed1" and the grasp is repeated with weaker disturbances.
+    kept without --force, so the same command continues a run that was stopped. The same seed gives
+    the same bytes. If the object is dropped, the recording is named "...-failed1" and the grasp is
+    repeated with weaker disturbances.
 
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
@@ -91,41 +124,45 @@ def simulate(
       holdfast simulate /shared/twin --engine dask:tcp://hub:8786
     """
     require_extras("twin", "parquet")
-    from holdfast.files import refuse_overwrite
+    started = start_engine(engine, jobs)
+    if options.randomize:
+        names = simulate_hands(out, options, engine=started, force=force)
+        profile, text = "randomized", f"{len(names)} recordings of randomized hands in {out}"
+    else:
+        names = _simulate_planned(options, out, video, engine=started, force=force)
+        n_failed = len(_failed(names))
+        profile = options.profile
+        text = f"{len(names)} recordings in {out}, {n_failed} of them of failed grasps"
+    if as_json:
+        failed = _failed(names)
+        print_json({"out": out, "recordings": names, "failed": failed, "profile": profile})
+    else:
+        print_line(text)
 
-    used = start_engine(engine, jobs)
-    if randomize:
-        names = simulate_hands(out, repeats, seed, n_grasps=grasps, engine=used, force=force)
-        if as_json:
-            print_json({"out": out, "recordings": names, "failed": [], "profile": "randomized"})
-        else:
-            print_line(f"{len(names)} recordings of randomized hands in {out}")
-        return
-    if grasps != 1:
-        raise ValueError(
-            f"--grasps is for the hands of --randomize, {grasps} given; --repeats repeats grasps"
-        )
+
+def _failed(names: list[str]) -> list[str]:
+    return [name for name in names if "-failed" in name]
+
+
+def _simulate_planned(
+    options: GraspOptions, out: Path, video: Path | None, *, engine: "Engine", force: bool
+) -> list[str]:
+    """Simulate the grasps of an Allegro hand, and the video if it is wanted."""
     if video is not None:
+        from holdfast.files import refuse_overwrite
         from holdfast.twin.render import check_film
 
         check_film(video)
         refuse_overwrite(video, force=force)
-    own = None if table is None else used.path(table)
-    planned = plan_grasps(objects, cases, repeats, profile, seed, server=server, table=own)
+    planned = options.plan(engine)
     out.mkdir(parents=True, exist_ok=True)
-    names = simulate_grasps(planned, out, engine=used, force=force)
+    names = simulate_grasps(planned, out, engine=engine, force=force)
     if video is not None:
         _write_video(planned[0], video, force)
-    failed = [name for name in names if "-failed" in name]
-    if as_json:
-        print_json({"out": out, "recordings": names, "failed": failed, "profile": profile})
-        return
-    print_line(f"{len(names)} recordings in {out}, {len(failed)} of them of failed grasps")
+    return names
 
 
-def simulate_hands(
-    out: Path, n_hands: int, seed: int, *, n_grasps: int = 1, engine: "Engine", force: bool
-) -> list[str]:
+def simulate_hands(out: Path, options: GraspOptions, *, engine: "Engine", force: bool) -> list[str]:
     """Simulate randomized hands whose recordings do not exist; return the names of new ones.
 
     Raises:
@@ -134,36 +171,29 @@ def simulate_hands(
     """
     from holdfast.twin.randomized.simulation import RandomHold
 
-    _check_numbers(n_hands, seed)
+    n_grasps, seed = options.grasps, options.seed
+    _check_numbers(options.repeats, seed)
     if n_grasps < 1:
         raise ValueError(f"--grasps of at least 1 expected, {n_grasps} given")
     out.mkdir(parents=True, exist_ok=True)
-    places = [None] if n_grasps == 1 else range(1, n_grasps + 1)
-    holds = [RandomHold(number, seed, grasp=grasp) for number in range(n_hands) for grasp in places]
-    wanted: dict[str, object] = {"profile": "randomized", "seed": seed}
-    tasks = [
-        (hold, engine.path(out), force)
-        for hold in holds
-        if force or not _is_recorded(_path_of(hold.name, out), wanted)
+    numbers = [None] if n_grasps == 1 else range(1, n_grasps + 1)
+    holds = [
+        RandomHold(hand, seed, grasp=grasp) for hand in range(options.repeats) for grasp in numbers
     ]
-    if len(tasks) < len(holds):
-        print_message(f"{len(holds) - len(tasks)} of {len(holds)} recordings exist already")
-    names = []
-    with ProgressBar("simulating", len(tasks)) as bar:
-        for name in _engine_for(len(tasks), engine).map_ordered(simulate_hand, tasks):
-            check_shared(_path_of(name, out), engine)
-            names.append(name)
-            bar.advance()
-    return names
+    expected: dict[str, object] = {"profile": "randomized", "seed": seed}
+    missing = [
+        hold for hold in holds if force or not _is_recorded(_path_of(hold.name, out), expected)
+    ]
+    return _simulate_all(simulate_hand, missing, len(holds), out, engine=engine, force=force)
 
 
-def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> str:
+def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> list[str]:
     """Simulate a randomized hand; return the name of the recording."""
     from holdfast.io import save_recording
     from holdfast.twin.randomized.simulation import simulate_random
 
     save_recording(simulate_random(hold), _path_of(hold.name, out), force=force)
-    return hold.name
+    return [hold.name]
 
 
 def simulate_grasps(
@@ -185,28 +215,37 @@ def simulate_grasps(
     """
     from holdfast.parallel import Engine
 
-    engine = engine or Engine(jobs)
-    tasks = [
-        (grasp, engine.path(out), force)
-        for grasp in grasps
-        if force or not _is_finished(grasp, out)
-    ]
-    if len(tasks) < len(grasps):
-        print_message(f"{len(grasps) - len(tasks)} of {len(grasps)} recordings exist already")
+    missing = [grasp for grasp in grasps if force or not _is_finished(grasp, out)]
+    return _simulate_all(
+        simulate_grasp, missing, len(grasps), out,
+        engine=engine or Engine(jobs), force=force, report=report,
+    )  # fmt: skip
+
+
+def _simulate_all(
+    simulate_one: Callable[..., list[str]],
+    missing: "Sequence[Grasp | RandomHold]",
+    n_wanted: int,
+    out: Path,
+    *,
+    engine: "Engine",
+    force: bool,
+    report: Callable[[list[str]], None] = lambda _: None,
+) -> list[str]:
+    """Simulate what is missing, in parallel; return the names of the recordings."""
+    if len(missing) < n_wanted:
+        print_message(f"{n_wanted - len(missing)} of {n_wanted} recordings exist already")
+    if len(missing) == 1 and engine.scheduler is None:
+        engine = engine._replace(n_jobs=1)  # one task needs no other process
+    tasks = ((grasp, engine.path(out), force) for grasp in missing)
     written = []
-    with ProgressBar("simulating", len(tasks)) as bar:
-        for names in _engine_for(len(tasks), engine).map_ordered(simulate_grasp, tasks):
+    with ProgressBar("simulating", len(missing)) as bar:
+        for names in engine.map_ordered(simulate_one, tasks):
             check_shared(_path_of(names[-1], out), engine)
             written += names
             report(names)
             bar.advance()
     return written
-
-
-def _engine_for(n_tasks: int, engine: "Engine") -> "Engine":
-    """Return the engine; one task on this machine needs no other process."""
-    alone = n_tasks == 1 and engine.scheduler is None
-    return engine._replace(n_jobs=1) if alone else engine
 
 
 def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:
@@ -217,11 +256,11 @@ def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:
     from holdfast.twin.simulation import simulate as run
 
     names = []
-    for attempt in range(ATTEMPTS):
-        this = replace(grasp, attempt=attempt)
-        if not force and _has_failed(this, out):
+    for attempt in range(GRASP_ATTEMPTS):
+        trial = replace(grasp, attempt=attempt)
+        if not force and _exists(trial, _path_of(trial.failed_name, out)):
             continue
-        recording = run(this)
+        recording = run(trial)
         save_recording(recording, _path_of(recording.name, out), force=force)
         names.append(recording.name)
         if recording.metadata["case"] != "failed":
@@ -248,11 +287,11 @@ def plan_grasps(
     """
     from holdfast.twin.objects import load_objects
     from holdfast.twin.profile import profile as check_profile
-    from holdfast.twin.simulation import CASES, Grasp
+    from holdfast.twin.simulation import GRASP_CASES, Grasp
 
     names = [name.strip() for name in objects.split(",")] if objects else list(load_objects(table))
     check_profile(profile)
-    if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
+    if not {case.strip() for case in cases.split(",")} <= {str(case) for case in GRASP_CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
     _check_numbers(repeats, seed)
     chosen = sorted({int(case) for case in cases.split(",")})
@@ -282,13 +321,8 @@ def _path_of(name: str, out: Path) -> Path:
 
 def _is_finished(grasp: "Grasp", out: Path) -> bool:
     """Return whether the recording of the grasp, or of its last failed attempt, exists."""
-    last_failed = f"{grasp.name}-failed{ATTEMPTS}"
+    last_failed = f"{grasp.name}-failed{GRASP_ATTEMPTS}"
     return any(_exists(grasp, _path_of(name, out)) for name in (grasp.name, last_failed))
-
-
-def _has_failed(grasp: "Grasp", out: Path) -> bool:
-    """Return whether the recording of this failed attempt exists."""
-    return _exists(grasp, _path_of(grasp.failed_name, out))
 
 
 def _exists(grasp: "Grasp", path: Path) -> bool:
@@ -309,10 +343,10 @@ def _is_recorded(path: Path, expected: "dict[str, object]") -> bool:
     if not path.exists():
         return False
     metadata = load_recording(path, labels=False).metadata
-    found = {name: metadata.get(name) for name in expected}
-    if found != expected:
+    recorded = {name: metadata.get(name) for name in expected}
+    if recorded != expected:
         raise OutputError(
-            f"{path} has {_list(found)}; {_list(expected)} given: choose another folder, "
+            f"{path} has {_list(recorded)}; {_list(expected)} given: choose another folder, "
             "or overwrite it with --force"
         )
     return True
@@ -327,7 +361,7 @@ def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
 
     With another seed, other attempts fail.
     """
-    failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(ATTEMPTS)]
+    failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(GRASP_ATTEMPTS)]
     for name in (grasp.name, *failed):
         if name not in names:
             _path_of(name, out).unlink(missing_ok=True)

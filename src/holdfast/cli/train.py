@@ -1,18 +1,31 @@
 """`holdfast train`: a model from labelled recordings, with cross-validated metrics."""
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, start_engine
-from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.options import (
+    EngineOption,
+    FittingTareOption,
+    ForceOption,
+    HysteresisOption,
+    JobsOption,
+    JsonOption,
+    ModelOutput,
+    SeedOption,
+    start_engine,
+)
+from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
+    from holdfast.io import Dataset
     from holdfast.model import Model
-    from holdfast.training import Setting
+    from holdfast.parallel import Engine
+    from holdfast.training import Setting, Trained
 
 LEFT_OUT = {
     "recording": "one recording at a time",
@@ -22,19 +35,33 @@ LEFT_OUT = {
 }
 
 
-def train(
-    data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
-    model: Annotated[Path, typer.Option("--output", "-o", help="The model file to write (JSON).")],
+def _list_classifiers(name: str | None) -> str | None:
+    if name == "list":
+        from holdfast.classifiers import RECIPES
+
+        print_lines(RECIPES)
+        raise typer.Exit
+    return name
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """Group of options: all but three fields of `Setting`; None for what is not given."""
+
     classifier: Annotated[
         str | None,
         typer.Option(
-            help="logreg (logistic regression) or svm (linear SVM).", show_default="logreg"
+            help="Name of the way of fitting, such as logreg (logistic regression) or svm (linear "
+            "SVM); list prints all names.",
+            show_default="logreg",
+            callback=_list_classifiers,
+            is_eager=True,
         ),
-    ] = None,
+    ] = None
     window: Annotated[
         int | None,
         typer.Option(help="N_w: even number of samples in the Haar window.", show_default="14"),
-    ] = None,
+    ] = None
     features: Annotated[
         str | None,
         typer.Option(
@@ -42,32 +69,26 @@ def train(
             "for relative features, which fit any sensor, unit and rate.",
             show_default="F_a,F_x,F_y,F_z,sigma",
         ),
-    ] = None,
-    tare: Annotated[
-        str | None,
-        typer.Option(
-            help="Tare: seconds from the start, first, none, or START:END [s].",
-            show_default="0.5; first with --features any; or as --init",
-        ),
-    ] = None,
+    ] = None
+    tare: FittingTareOption = None
     split: Annotated[
         str,
         typer.Option(
             help="Unit to leave out in cross-validation: recording, object, time or random."
         ),
-    ] = "recording",
+    ] = "recording"
     trials: Annotated[
         int,
         typer.Option(help="Trials of the parameter search; 0 uses the reference parameters."),
-    ] = 30,
+    ] = 30
     objective: Annotated[
         str | None,
         typer.Option(
             help="Loss that the search minimises: error (share of wrong decisions) or log_loss.",
             show_default="log_loss; error for svm",
         ),
-    ] = None,
-    seed: SeedOption = 0,
+    ] = None
+    seed: SeedOption = 0
     shared: Annotated[
         bool | None,
         typer.Option(
@@ -75,29 +96,56 @@ def train(
             help="Train one classifier for all fingers, or one for each.",
             show_default="--shared with --features any",
         ),
-    ] = None,
+    ] = None
     contact_threshold: Annotated[
         float | None,
         typer.Option(
             help="F_a below this value is no contact, in the unit of the readings.",
             show_default="from the tare",
         ),
-    ] = None,
+    ] = None
     hold: Annotated[
         float | None,
+        typer.Option(help="Time for which UNSTABLE is kept after the last unstable sample [s]."),
+    ] = None
+    hysteresis: HysteresisOption = None
+    max_samples: Annotated[
+        int,
         typer.Option(
-            help="Time for which UNSTABLE is kept after the last unstable sample [s].",
-            show_default="0.1, or as --init",
+            help="Maximum number of samples per finger; of more, every n-th sample is used."
         ),
-    ] = None,
-    hysteresis: Annotated[
-        float | None,
-        typer.Option(
-            help="Distance from the threshold that the probability must exceed to change the "
-            "state.",
-            show_default="0.1, 0 with --features any, or as --init",
-        ),
-    ] = None,
+    ] = 200_000
+
+    def setting(self, init: str | None) -> "Setting":
+        """Return the setting of a training.
+
+        Args:
+            init: model to adapt, which has its own classifier, window and features.
+
+        Raises:
+            ValueError: an option is not valid, or contradicts `init`.
+            ModelError: the model to adapt cannot be read, or does not fit the options.
+        """
+        from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
+        from holdfast.training import Setting
+        from holdfast.training.setting import DEFAULT_HOLD, DEFAULT_HYSTERESIS
+
+        chosen = {name: value for name, value in asdict(self).items() if value is not None}
+        if "tare" in chosen:
+            chosen["tare"] = Tare.parse(chosen["tare"])
+        if init is not None:
+            return Setting.adapting(_model_to_adapt(init, chosen), **chosen)
+        names = chosen.get("features", ",".join(DEPLOYED_FEATURES))
+        chosen["features"] = parse_features(names, chosen.get("window", Setting.window))
+        relative = all(spec.seconds for spec in chosen["features"])
+        steady = {"hold": DEFAULT_HOLD, "hysteresis": 0.0 if relative else DEFAULT_HYSTERESIS}
+        return Setting(**(steady | chosen))
+
+
+def train(
+    data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
+    model: ModelOutput,
+    options: TrainingOptions,
     init: Annotated[
         str | None,
         typer.Option(help="Model to adapt, with its features: a file, or builtin:any."),
@@ -105,15 +153,9 @@ def train(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue a search that was stopped.")
     ] = False,
-    max_samples: Annotated[
-        int,
-        typer.Option(
-            help="Maximum number of samples per finger; of more, every n-th sample is used."
-        ),
-    ] = 200_000,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Train a model from labelled recordings.
@@ -122,6 +164,10 @@ def train(
     trained without it. The random split repeats the protocol of the paper. Its metrics are
     optimistic, because neighbouring samples are nearly equal.
 
+    By default the model has a tare of 0.5 s, a hold of 0.1 s and a hysteresis of 0.1; with
+    --features any, the tare is the first sample and the hysteresis 0; with --init, they are
+    those of the model to adapt.
+
     Example:
       holdfast train recordings/ -o model.json
       holdfast train recordings/ -o model.json --split object --classifier svm
@@ -129,46 +175,48 @@ def train(
       holdfast train recordings/ -o model.json --init builtin:any
       holdfast train recordings/ -o model.json --engine dask:tcp://hub:8786
     """
-    from holdfast.cli.evaluate import print_metrics, print_verdict
+    require_extras("train")
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
-
-    require_extras("train")
     from holdfast.labelling.review.findings import report_hidden_labels
-    from holdfast.training import train as fit
-    from holdfast.training.verdict import no_verdict
 
-    setting = _setting(
-        init,
-        {"classifier": classifier, "window": window, "features": features},
-        tare=tare,
-        split=split,
-        trials=trials,
-        objective=objective,
-        seed=seed,
-        shared=shared,
-        contact_threshold=contact_threshold,
-        hold=hold,
-        hysteresis=hysteresis,
-        max_samples=max_samples,
-    )
+    setting = options.setting(init)
     refuse_overwrite(model, force=force)
-    used = start_engine(engine, jobs)
-    if resume and used.scheduler is not None:
+    started = start_engine(engine, jobs)
+    if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
-    recordings = load_dataset(used.path(data))
+    recordings = load_dataset(started.path(data))
     report_hidden_labels(recordings.paths, print_message)
     journal = _search_journal(model, resume=resume, force=force)
+    trained = _fit(recordings, setting, journal, started)
+    trained.model.save(model, force=force)
+    journal.unlink(missing_ok=True)
+    _print(trained, model, len(recordings), as_json=as_json)
+
+
+def _fit(recordings: "Dataset", setting: "Setting", journal: Path, engine: "Engine") -> "Trained":
+    """Train a model; after Ctrl-C, print how to continue."""
+    from holdfast.training import train as fit
+
     try:
-        trained = fit(
-            recordings, setting, journal=journal, warn=print_message, progress=progress, engine=used
+        return fit(
+            recordings,
+            setting,
+            journal=journal,
+            warn=print_message,
+            progress=progress,
+            engine=engine,
         )
     except KeyboardInterrupt:
         if journal.exists():
             print_message(f"the trials so far are in {journal}: continue with --resume")
         raise
-    trained.model.save(model, force=force)
-    journal.unlink(missing_ok=True)
+
+
+def _print(trained: "Trained", model: Path, n_recordings: int, *, as_json: bool) -> None:
+    from holdfast.cli.evaluate import print_metrics, print_verdict
+    from holdfast.training.verdict import no_verdict
+
     if as_json:
         print_json(
             {
@@ -180,57 +228,27 @@ def train(
         )
         return
     print_verdict(
-        trained.verdict or no_verdict(len(trained.known), len(recordings), "the model of --init")
+        trained.verdict or no_verdict(len(trained.known), n_recordings, "the model of --init")
     )
     print_metrics(trained.cross_validation)
     print_line()
     print_line(
-        f"{model}: trained on {len(recordings)} recordings; "
+        f"{model}: trained on {n_recordings} recordings; "
         f"cross-validation leaves out {LEFT_OUT[trained.split]}"
     )
 
 
-def _setting(
-    init: str | None,
-    features: dict[str, Any],
-    **options: Any,  # noqa: ANN401
-) -> "Setting":
-    """Return the training setting; options that are None were not given.
-
-    Args:
-        init: model to adapt, which has its own classifier, window and features.
-        features: classifier, window and features.
-        options: all other fields of `Setting`.
-    """
-    from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
-    from holdfast.training import Setting
-    from holdfast.training.setting import DEFAULT_HOLD, DEFAULT_HYSTERESIS
-
-    given, chosen = (
-        {name: value for name, value in group.items() if value is not None}
-        for group in (features, options)
-    )
-    if "tare" in chosen:
-        chosen["tare"] = Tare.parse(chosen["tare"])
-    if init is not None:
-        return Setting.adapting(_model_to_adapt(init, given), **chosen)
-    names = given.get("features", ",".join(DEPLOYED_FEATURES))
-    given["features"] = parse_features(names, given.get("window", Setting.window))
-    relative = all(spec.seconds for spec in given["features"])
-    steady = {"hold": DEFAULT_HOLD, "hysteresis": 0.0 if relative else DEFAULT_HYSTERESIS}
-    return Setting(**given, **(steady | chosen))
-
-
-def _model_to_adapt(init: str, given: dict[str, Any]) -> "Model":
+def _model_to_adapt(init: str, chosen: dict[str, Any]) -> "Model":
     """Load the model of `--init`; its name is the text of the option."""
     from msgspec.structs import replace
 
     from holdfast.model import Model
 
-    if given:
+    refused = [name for name in ("classifier", "window", "features") if name in chosen]
+    if refused:
         raise ValueError(
             "--init uses the classifier, window and features of its model; leave out "
-            + " and ".join(f"--{name}" for name in given)
+            + " and ".join(f"--{name}" for name in refused)
         )
     return replace(Model.load(init), name=init)
 

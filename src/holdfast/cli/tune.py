@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.evaluate import print_verdict, warn_about_training
-from holdfast.cli.options import JsonOption, ModelArgument
-from holdfast.cli.terminal.console import print_json, print_line, print_table
+from holdfast.cli.options import ForceOption, JsonOption, ModelArgument, ModelOutput
+from holdfast.cli.terminal.console import format_number, print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 def tune(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
-    out: Annotated[Path, typer.Option("--output", "-o", help="The model file to write (JSON).")],
+    out: ModelOutput,
     false_alarms: Annotated[
         float,
         typer.Option(
             "--false-alarms", help="Maximum number of false alarms per minute of stable hold."
         ),
     ],
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Choose the threshold for a wanted rate of false alarms.
@@ -55,8 +55,8 @@ def tune(
     recordings = load_dataset(data)
     trained_on: list[str] = []
 
-    def with_progress(given: "Iterable[Recording]") -> "Iterator[Recording]":
-        for recording in progress(given, "deciding", len(recordings)):
+    def with_progress(items: "Iterable[Recording]") -> "Iterator[Recording]":
+        for recording in progress(items, "deciding", len(recordings)):
             if was_trained_on(loaded, recording):
                 trained_on.append(recording.name)
             yield recording
@@ -105,9 +105,9 @@ def _print_points(tuned: "Tuned") -> None:
 
 def _cells(point: "ThresholdMetrics") -> tuple[str, ...]:
     events = point.events
-    missed = ("-" if share is None else f"{share:.1f}" for share in events.missed.values())
-    late = "never" if events.n_events else "-"
-    delay = late if events.delay_median is None else f"{events.delay_median:.3f}"
+    missed = (format_number(share, 1) for share in events.missed.values())
+    never = events.delay_median is None and events.n_events
+    delay = "never" if never else format_number(events.delay_median, 3)
     return (
         f"{point.threshold:.4g}", f"{point.stable:.1f}", f"{point.false_alarms:.2f}", *missed, delay
     )  # fmt: skip

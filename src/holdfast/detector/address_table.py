@@ -43,7 +43,7 @@ pointer: Any = intrinsic(_cast)
 """Pointer to an address."""
 
 
-class Field(NamedTuple):
+class TupleField(NamedTuple):
     """Field of a named tuple: its name, and its kind if it is an array or a number."""
 
     name: str
@@ -51,7 +51,7 @@ class Field(NamedTuple):
     kind: ArrayKind | None
 
 
-def fields_of(definition: type) -> list[Field]:
+def fields_of(definition: type) -> list[TupleField]:
     """Return the fields of a named tuple.
 
     Raises:
@@ -62,7 +62,7 @@ def fields_of(definition: type) -> list[Field]:
         kind = NUMBERS.get(hint) or next(iter(getattr(hint, "__metadata__", ())), None)
         if not (isinstance(kind, ArrayKind) or hasattr(hint, "_fields")):
             raise TypeError(f"{definition.__name__}.{name}: an array or a number expected, {hint}")
-        fields.append(Field(name, hint, kind))
+        fields.append(TupleField(name, hint, kind))
     return fields
 
 

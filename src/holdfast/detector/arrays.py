@@ -35,6 +35,8 @@ from holdfast.features.arrays import Floats2, Floats3, Integers1, Integers2
     CODES_WIDTH,
 ) = range(6)
 NO_EXCESS, TOUCH, DRIFT = range(3)
+NO_SLIP_RULE = -1.0
+"""Probability of a slip of a finger without a slip rule."""
 
 # DecisionMemory.values.
 (
@@ -47,7 +49,7 @@ NO_EXCESS, TOUCH, DRIFT = range(3)
     PEAK,  # largest load so far, slowly forgotten [unit of the readings]
     SHAKEN_AT,  # when sigma was last much larger than that of noise [s]
     SLIP_LOG_ODDS,  # smoothed log odds of a slip; NaN before the first
-    SLIP_PROBABILITY,  # NaN without an estimate or a slip rule
+    SLIP_PROBABILITY,  # NaN without an estimate, NO_SLIP_RULE without a rule
     LAST_SLIP,  # time of the last sample over the threshold of a slip [s]
     DECIDED_WIDTH,
 ) = range(14)  # fmt: skip
@@ -59,7 +61,7 @@ NO_EXCESS, TOUCH, DRIFT = range(3)
     REPORT_PROBABILITY,
     REPORT_SIGMA,
     REPORT_FORCE, _, _,  # F_tip, in three components
-    REPORT_SLIP,  # probability of a slip
+    REPORT_SLIP,  # probability of a slip; NO_SLIP_RULE without a rule
     REPORT_WIDTH,
 ) = range(9)  # fmt: skip
 

@@ -8,28 +8,8 @@ import math
 
 from holdfast.compiled import compiled_step, inlined
 from holdfast.contact import STABLE, UNSTABLE
-from holdfast.detector.arrays import (
-    AMPLITUDE_LIMIT,
-    AMPLITUDE_TO_NOISE_LIMIT,
-    DRIFT,
-    EXCESS,
-    NO_EXCESS,
-    PEAK,
-    REST,
-    RESTLESS_AT,
-    SHAKEN_AT,
-    SMOOTHED,
-    TOUCH,
-)
-from holdfast.features.arrays import (
-    AMPLITUDE,
-    LOAD,
-    MEAN,
-    MOVED_AT,
-    NOISE_NOW,
-    PEAK_LOAD,
-    SIGMA,
-)
+from holdfast.detector import arrays as rule_at
+from holdfast.features import arrays as at
 from holdfast.features.motion import LOAD_DECAY_SECONDS, RELEASED_SHARE
 from holdfast.sensors.types import Array, Integers
 
@@ -51,9 +31,9 @@ CALM_RATIO = 3.0
 def contact_threshold(noise: float, limits: Array) -> float:
     """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
     # F_a without contact: an absolute value, or a multiple of the noise of a component.
-    if math.isnan(limits[AMPLITUDE_LIMIT]):
-        return float(limits[AMPLITUDE_TO_NOISE_LIMIT] * noise)
-    return float(limits[AMPLITUDE_LIMIT])
+    if math.isnan(limits[rule_at.AMPLITUDE_LIMIT]):
+        return float(limits[rule_at.AMPLITUDE_TO_NOISE_LIMIT] * noise)
+    return float(limits[rule_at.AMPLITUDE_LIMIT])
 
 
 @compiled_step
@@ -67,9 +47,9 @@ def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
         time: of the sample [s].
     """
     # No contact: 0.2 s without motion, and load < limit noise, or a small share of the peak.
-    at_rest = time - motion[MOVED_AT] > REST_SECONDS
-    threshold = limit * motion[NOISE_NOW]
-    return bool(at_rest and _is_unloaded(motion[LOAD], motion[PEAK_LOAD], threshold, latest))
+    at_rest = time - motion[at.MOVED_AT] > REST_SECONDS
+    threshold = limit * motion[at.NOISE_NOW]
+    return bool(at_rest and _is_unloaded(motion[at.LOAD], motion[at.PEAK_LOAD], threshold, latest))
 
 
 @inlined
@@ -88,8 +68,8 @@ def is_empty(load: float, decided: Array, threshold: float, latest: int, time: f
     if not threshold > 0.0:
         return False
     # The share of the peak counts only after 0.2 s in which sigma was that of noise.
-    at_rest = time - decided[SHAKEN_AT] > REST_SECONDS
-    peak = decided[PEAK] if at_rest else 0.0
+    at_rest = time - decided[rule_at.SHAKEN_AT] > REST_SECONDS
+    peak = decided[rule_at.PEAK] if at_rest else 0.0
     return bool(_is_unloaded(load, peak, threshold, latest))
 
 
@@ -122,15 +102,17 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
     """
     # load = |F_tip - rest|, peak(k) = max(load(k), (1 - T / tau) peak(k-1)).
     x, y, z = (
-        values[0] - decided[REST],
-        values[1] - decided[REST + 1],
-        values[2] - decided[REST + 2],
+        values[0] - decided[rule_at.REST],
+        values[1] - decided[rule_at.REST + 1],
+        values[2] - decided[rule_at.REST + 2],
     )
     load = math.sqrt(x * x + y * y + z * z)
-    decided[PEAK] = max(load, (1.0 - min(1.0, period / LOAD_DECAY_SECONDS)) * decided[PEAK])
+    decided[rule_at.PEAK] = max(
+        load, (1.0 - min(1.0, period / LOAD_DECAY_SECONDS)) * decided[rule_at.PEAK]
+    )
     # Shaken: sigma > 3 sigma_n, the sigma of noise alone.
-    if not (quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet):
-        decided[SHAKEN_AT] = time
+    if not (quiet > 0.0 and values[at.SIGMA] <= CALM_RATIO * quiet):
+        decided[rule_at.SHAKEN_AT] = time
     return load
 
 
@@ -140,7 +122,7 @@ def follow(values: Array, decided: Array, period: float) -> None:
     # rest(k) = rest(k-1) + (T / tau) (F_tip(k) - rest(k-1)).
     share = min(1.0, period / FOLLOW_SECONDS)
     for axis in range(3):
-        decided[REST + axis] += share * (values[axis] - decided[REST + axis])
+        decided[rule_at.REST + axis] += share * (values[axis] - decided[rule_at.REST + axis])
 
 
 @compiled_step
@@ -170,21 +152,23 @@ def has_drifted(
     """
     # mean = sqrt(2) m is the mean of F_a over the window (equation 1); s(k) = s(k-1) +
     # (T / tau) (F_a(k) - s(k-1)). Calm: sigma <= 3 sigma_n and |mean - s| <= threshold / 2.
-    amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
-    if math.isnan(decided[SMOOTHED]):
-        decided[SMOOTHED], decided[RESTLESS_AT] = amplitude, time
-    away = abs(mean - decided[SMOOTHED])
-    jumped = abs(amplitude - decided[SMOOTHED]) > 0.5 * threshold
-    decided[SMOOTHED] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SMOOTHED])
-    calm = quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
+    amplitude, mean = values[at.AMPLITUDE], math.sqrt(2.0) * values[at.MEAN]
+    if math.isnan(decided[rule_at.SMOOTHED]):
+        decided[rule_at.SMOOTHED], decided[rule_at.RESTLESS_AT] = amplitude, time
+    away = abs(mean - decided[rule_at.SMOOTHED])
+    jumped = abs(amplitude - decided[rule_at.SMOOTHED]) > 0.5 * threshold
+    decided[rule_at.SMOOTHED] += min(1.0, period / DRIFT_SECONDS) * (
+        amplitude - decided[rule_at.SMOOTHED]
+    )
+    calm = quiet > 0.0 and values[at.SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
     if not calm:
-        decided[RESTLESS_AT] = time
+        decided[rule_at.RESTLESS_AT] = time
     # A drift comes over the threshold after 1 s of calm and without a jump; a touch does not.
     if load < threshold:
-        codes[EXCESS] = NO_EXCESS
+        codes[rule_at.EXCESS] = rule_at.NO_EXCESS
     elif not calm:
-        codes[EXCESS] = TOUCH
-    elif codes[EXCESS] == NO_EXCESS:
-        long = time - decided[RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
-        codes[EXCESS] = DRIFT if long and not jumped else TOUCH
-    return bool(codes[EXCESS] == DRIFT)
+        codes[rule_at.EXCESS] = rule_at.TOUCH
+    elif codes[rule_at.EXCESS] == rule_at.NO_EXCESS:
+        long = time - decided[rule_at.RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
+        codes[rule_at.EXCESS] = rule_at.DRIFT if long and not jumped else rule_at.TOUCH
+    return bool(codes[rule_at.EXCESS] == rule_at.DRIFT)

@@ -2,41 +2,26 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.cause import CAUSES, add_scores
+from holdfast.classifiers.cause import ALL_CAUSES, add_scores
 from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
 from holdfast.classifiers.slip import probability_of, smooth
 from holdfast.compiled import compiled_step, inlined
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Cause, hand_state, is_held
-from holdfast.detector.arrays import (
-    CANDIDATE,
-    CANDIDATE_SINCE,
-    CAUSE,
-    CODES_WIDTH,
-    DECIDED_WIDTH,
-    LAST_SLIP,
-    LAST_UNSTABLE,
-    LOAD_LIMIT,
-    PEAK,
-    PROBABILITY,
-    REST,
-    SHAKEN_AT,
-    SLIP_GAIN,
-    SLIP_HOLD,
-    SLIP_LIMITS_WIDTH,
-    SLIP_LOG_ODDS,
-    SLIP_PROBABILITY,
-    SLIP_THRESHOLD,
-    SLIPS,
-    STATE,
-    THRESHOLD,
-    DecisionMemory,
-    DecisionRule,
+from holdfast.contact import (
+    NO_CONTACT,
+    STABLE,
+    UNKNOWN,
+    UNSTABLE,
+    Cause,
+    hand_state,
+    is_held,
 )
+from holdfast.detector import arrays as rule_at
+from holdfast.detector.arrays import DecisionMemory, DecisionRule
 from holdfast.detector.contact_rule import (
     contact_threshold,
     follow,
@@ -45,60 +30,81 @@ from holdfast.detector.contact_rule import (
     is_empty,
     update_load,
 )
+from holdfast.features import arrays as at
 from holdfast.features import kernel
-from holdfast.features.arrays import (
-    AMPLITUDE,
-    FAULT,
-    FAULTS,
-    NOISE,
-    READY,
-    REASON,
-    SIGMA_WINDOW,
-    TAXELS,
-    VALUES_WIDTH,
-    Layout,
-    Memory,
-    Output,
-)
+from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import TARE_DRIFT
-from holdfast.features.stream import StreamPlan
+from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import ANY_FINGER, FingerModel, Model
 from holdfast.sensors.types import Array, Flags, Integers
 
 _hand_state = compiled_step(hand_state)
 _is_held = compiled_step(is_held)
-SLIP_CODE = CAUSES.index(Cause.SLIP) + 1
+SLIP_CODE = ALL_CAUSES.index(Cause.SLIP) + 1
 """Code of the cause slip."""
+CodeT = TypeVar("CodeT", int, Integers)
 
 
 class TraceRows(NamedTuple):
     """Rows that `run` fills, one for each instant."""
 
-    state: npt.NDArray[np.int8]  # (n, n_fingers)
-    reason: npt.NDArray[np.int8]
-    faults: npt.NDArray[np.int16]
-    taxels: Integers  # bits of faulty taxels
-    probability: Array
-    values: Array  # (n, n_fingers, VALUES_WIDTH), as in Output
-    cause: npt.NDArray[np.int8]  # codes of the causes
-    slip: Array  # probability of a slip
+    report: Array  # (n, n_fingers, REPORT_WIDTH), by `fill_report`
+    taxels: Integers  # (n, n_fingers) bits of faulty taxels
     hand: npt.NDArray[np.int8]  # (n,)
 
     @classmethod
     def empty(cls, n: int, n_fingers: int) -> Self:
         """Return rows for n instants."""
-        shape = (n, n_fingers)
         return cls(
-            state=np.zeros(shape, dtype=np.int8),
-            reason=np.zeros(shape, dtype=np.int8),
-            faults=np.zeros(shape, dtype=np.int16),
-            taxels=np.zeros(shape, dtype=np.int64),
-            probability=np.zeros(shape),
-            values=np.zeros((*shape, VALUES_WIDTH)),
-            cause=np.zeros(shape, dtype=np.int8),
-            slip=np.zeros(shape),
+            report=np.zeros((n, n_fingers, rule_at.REPORT_WIDTH)),
+            taxels=np.zeros((n, n_fingers), dtype=np.int64),
             hand=np.zeros(n, dtype=np.int8),
         )
+
+
+def estimate_code(state: CodeT, reason: CodeT, faults: CodeT, cause: CodeT) -> CodeT:
+    """Return state, reason, faults and cause as one number; `split_code` is the inverse."""
+    code: CodeT = state + 4 * (reason + 8 * (faults + 2**16 * cause))
+    return code
+
+
+def split_code(code: CodeT) -> tuple[CodeT, CodeT, CodeT, CodeT]:
+    """Return state, reason, faults and cause.
+
+    Example:
+        >>> split_code(estimate_code(2, 0, 5, 3))
+        (2, 0, 5, 3)
+    """
+    return code % 4, code // 4 % 8, code // 32 % 2**16, code // 2**21
+
+
+_estimate_code = compiled_step(estimate_code)
+
+
+@compiled_step
+def reported_cause(codes: Integers) -> int:
+    """Return the code of the cause: slip while the finger slides, else that while unstable."""
+    if codes[rule_at.SLIPS]:
+        return SLIP_CODE
+    return int(codes[rule_at.CAUSE]) if codes[rule_at.STATE] == UNSTABLE else 0
+
+
+@inlined
+def fill_report(
+    memory: Memory, output: Output, decision: DecisionMemory, report: Array, f: int
+) -> None:
+    """Fill the row of a finger: all of its estimate but the faulty taxels."""
+    state, status = decision.codes[f, rule_at.STATE], output.status[f]
+    cause = reported_cause(decision.codes[f])
+    report[f, rule_at.REPORT_TIME] = memory.levels[f, at.LAST_TIME]
+    report[f, rule_at.REPORT_CODE] = _estimate_code(
+        state, status[at.REASON], status[at.FAULTS], cause
+    )
+    report[f, rule_at.REPORT_PROBABILITY] = decision.values[f, rule_at.PROBABILITY]
+    report[f, rule_at.REPORT_SLIP] = decision.values[f, rule_at.SLIP_PROBABILITY]
+    report[f, rule_at.REPORT_SIGMA] = output.values[f, at.SIGMA]
+    for axis in range(3):
+        report[f, rule_at.REPORT_FORCE + axis] = output.values[f, at.FORCE + axis]
 
 
 def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
@@ -123,9 +129,9 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     return DecisionRule(
         weights=weights,
         n_weights=np.array([_n_weights(part) for part in parts]),
-        n_slip_weights=np.array([len(part.features) + 1 for part in parts]),
         causes=_cause_weights(parts, width),
         slips=slips,
+        n_slip_weights=np.array([len(part.features) + 1 for part in parts]),
         slip_limits=slip_limits,
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
@@ -145,7 +151,7 @@ def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
     """Return (n_fingers, n_causes, width); a finger without causes has the scores 0."""
     if all(part.causes is None for part in parts):
         return np.zeros((len(parts), 0, width))
-    weights = np.zeros((len(parts), len(CAUSES), width))
+    weights = np.zeros((len(parts), len(ALL_CAUSES), width))
     for row, part in zip(weights, parts, strict=True):
         if part.causes is not None:
             row[:, : part.causes.n_features + 1] = part.causes.weights()
@@ -158,7 +164,7 @@ def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
 def _slip_rules(parts: Sequence[FingerModel], width: int, rate: float) -> tuple[Array, Array]:
     """Return the weights and the limits of the slip rules; NaN without a rule."""
     weights = np.zeros((len(parts), width))
-    limits = np.full((len(parts), SLIP_LIMITS_WIDTH), np.nan)
+    limits = np.full((len(parts), rule_at.SLIP_LIMITS_WIDTH), np.nan)
     for row, limit, part in zip(weights, limits, parts, strict=True):
         if part.slip is not None:
             rule = part.slip
@@ -167,13 +173,53 @@ def _slip_rules(parts: Sequence[FingerModel], width: int, rate: float) -> tuple[
     return weights, limits
 
 
-def new_decision_memory(n_fingers: int, n_causes: int = 0) -> DecisionMemory:
-    """Return the memory before the first sample."""
-    values = np.full((n_fingers, DECIDED_WIDTH), np.nan)
-    values[:, REST : PEAK + 1] = 0.0
-    values[:, SHAKEN_AT] = -np.inf
+class ProbabilityFeeder:
+    """Feeder of a decision rule with probabilities, sample by sample.
+
+    It computes the features once more, gives them to the classifier, and writes the log odds of
+    its probability as the offset of a linear classifier without weights. This is slower than the
+    compiled rule: an update takes as long as the classifier.
+
+    Args:
+        parts: models of the fingers of the stream, in its order.
+        stream: before its first sample.
+        rule: of the detector; its offsets are changed.
+    """
+
+    def __init__(
+        self, parts: Sequence[FingerModel], stream: FeatureStream, rule: DecisionRule
+    ) -> None:
+        self._stream, self._rule = FeatureStream(stream.plan), rule
+        self._stream.memory.baseline[:] = stream.memory.baseline  # a tare by interval
+        self._classifiers = {
+            place: part.classifier
+            for place, part in enumerate(parts)
+            if not isinstance(part.classifier, LinearClassifier)
+        }
+
+    def update(self, readings: Array, present: Flags, time: float) -> None:
+        """Write the log odds of one sample; the arguments are those of `decision_rule.step`."""
+        layout, memory, output = self._stream.layout, self._stream.memory, self._stream.output
+        kernel.advance(layout, memory, output, readings, present, time)
+        for place, classifier in self._classifiers.items():
+            if present[place] and output.status[place, at.REASON] == at.READY:
+                features = output.features[place, None, : classifier.n_features]
+                probability = classifier.probability(features)[0]
+                with np.errstate(divide="ignore"):
+                    self._rule.weights[place, 0] = np.log(probability / (1.0 - probability))
+
+
+def new_decision_memory(
+    n_fingers: int, n_causes: int = 0, has_slip_rule: Flags | None = None
+) -> DecisionMemory:
+    """Return the memory before the first sample; of fingers without slip rules by default."""
+    values = np.full((n_fingers, rule_at.DECIDED_WIDTH), np.nan)
+    values[:, rule_at.REST : rule_at.PEAK + 1] = 0.0
+    values[:, rule_at.SHAKEN_AT] = -np.inf
+    has_none = slice(None) if has_slip_rule is None else ~has_slip_rule
+    values[has_none, rule_at.SLIP_PROBABILITY] = rule_at.NO_SLIP_RULE
     return DecisionMemory(
-        codes=np.full((n_fingers, CODES_WIDTH), UNKNOWN, dtype=np.int64),
+        codes=np.full((n_fingers, rule_at.CODES_WIDTH), UNKNOWN, dtype=np.int64),
         values=values,
         scores=np.zeros((n_fingers, n_causes)),
     )
@@ -205,9 +251,9 @@ def step(
     kernel.advance(layout, memory, output, readings, present, time)
     for f in range(len(present)):
         unloaded = False
-        if present[f] and output.status[f, REASON] == READY:
+        if present[f] and output.status[f, at.REASON] == at.READY:
             unloaded = _find_contact(layout, memory, output, rule, decision, f, time)
-        if output.status[f, REASON] != READY:
+        if output.status[f, at.REASON] != at.READY:
             _decide_unready(output, rule, decision, f, present[f], time, layout.period)
         elif present[f]:
             _decide(output, rule, decision, f, unloaded, time, layout.period)
@@ -217,7 +263,7 @@ def step(
 @compiled_step
 def hand_code(decision: DecisionMemory, rule: DecisionRule) -> int:
     """Return the code of the hand's state."""
-    return int(_hand_state(decision.codes[:, STATE], rule.n_model_fingers))
+    return int(_hand_state(decision.codes[:, rule_at.STATE], rule.n_model_fingers))
 
 
 @inlined
@@ -232,18 +278,20 @@ def _find_contact(
 ) -> bool:
     """Return whether a finger with features is without contact. Report a drift of its tare."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    if not math.isnan(limits[LOAD_LIMIT]):
+    if not math.isnan(limits[rule_at.LOAD_LIMIT]):
         # By the load of relative features: load < limit noise, at rest.
-        return is_at_rest(memory.motion[f], limits[LOAD_LIMIT], codes[CANDIDATE], time)
+        return is_at_rest(
+            memory.motion[f], limits[rule_at.LOAD_LIMIT], codes[rule_at.CANDIDATE], time
+        )
     # By F_a: load < threshold; a drift of the tare is a fault.
-    noise, values = memory.levels[f, NOISE], output.values[f]
+    noise, values = memory.levels[f, at.NOISE], output.values[f]
     threshold = contact_threshold(noise, limits)
-    quiet = kernel.noise_sigma(noise, layout.windows[f, SIGMA_WINDOW])
+    quiet = kernel.noise_sigma(noise, layout.windows[f, at.SIGMA_WINDOW])
     load = update_load(values, decided, quiet, time, layout.period)
     if has_drifted(load, values, codes, decided, threshold, quiet, time, layout.period):
-        output.status[f, REASON] = FAULT
-        output.status[f, FAULTS] = TARE_DRIFT
-    return is_empty(load, decided, threshold, codes[CANDIDATE], time)
+        output.status[f, at.REASON] = at.FAULT
+        output.status[f, at.FAULTS] = TARE_DRIFT
+    return is_empty(load, decided, threshold, codes[rule_at.CANDIDATE], time)
 
 
 @inlined
@@ -261,16 +309,16 @@ def _decide_unready(
     A fault that leaves a force is reported when it has lasted; the probability is kept until then.
     """
     codes, decided = decision.codes[f], decision.values[f]
-    if output.status[f, REASON] != FAULT or math.isnan(output.values[f, AMPLITUDE]):
-        codes[STATE] = codes[CANDIDATE] = UNKNOWN
+    if output.status[f, at.REASON] != at.FAULT or math.isnan(output.values[f, at.AMPLITUDE]):
+        codes[rule_at.STATE] = codes[rule_at.CANDIDATE] = UNKNOWN
     elif is_present:
         debounce(codes, decided, UNKNOWN, rule.min_duration, time, period)
-    if codes[STATE] == UNKNOWN:
-        decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
+    if codes[rule_at.STATE] == UNKNOWN:
+        decided[rule_at.PROBABILITY] = decided[rule_at.LAST_UNSTABLE] = math.nan
         _forget_cause(codes, decision.scores, f)
         end_slip(codes, decided, math.nan)
     else:
-        output.status[f, REASON] = READY
+        output.status[f, at.REASON] = at.READY
 
 
 @inlined
@@ -285,31 +333,36 @@ def _decide(
 ) -> None:
     """Decide the state of a finger from its features, and report it when it has lasted."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    by_load = not math.isnan(limits[LOAD_LIMIT])
+    by_load = not math.isnan(limits[rule_at.LOAD_LIMIT])
     state = NO_CONTACT
-    decided[PROBABILITY] = 0.0
+    decided[rule_at.PROBABILITY] = 0.0
     if by_load or not unloaded:
         # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
-        decided[PROBABILITY] = linear_probability(output.features[f], weights)
+        decided[rule_at.PROBABILITY] = linear_probability(output.features[f], weights)
     if not unloaded:
         state = classify_contact(
-            decided[PROBABILITY], limits[THRESHOLD], rule.hysteresis, codes[STATE]
+            decided[rule_at.PROBABILITY],
+            limits[rule_at.THRESHOLD],
+            rule.hysteresis,
+            codes[rule_at.STATE],
         )
         if state == UNSTABLE and rule.causes.shape[1] > 0:
             # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
-            codes[CAUSE] = add_scores(output.features[f], rule.causes[f], decision.scores[f])
+            codes[rule_at.CAUSE] = add_scores(
+                output.features[f], rule.causes[f], decision.scores[f]
+            )
         state = hold_unstable(state, decided, rule.hold, time, period)
     elif not by_load:
         follow(output.values[f], decided, period)
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
-    if not math.isnan(rule.slip_limits[f, SLIP_THRESHOLD]):
-        if unloaded:
-            end_slip(codes, decided, 0.0)
-        else:
-            value = log_odds(output.features[f], rule.slips[f, : rule.n_slip_weights[f]])
-            decide_slip(codes, decided, rule.slip_limits[f], value, time, period)
+    if unloaded:
+        end_slip(codes, decided, 0.0)
+    elif decided[rule_at.SLIP_PROBABILITY] != rule_at.NO_SLIP_RULE:
+        # z = w . Phi + w_0, by the weights of the slip rule.
+        value = log_odds(output.features[f], rule.slips[f, : rule.n_slip_weights[f]])
+        decide_slip(codes, decided, rule.slip_limits[f], value, time, period)
     debounce(codes, decided, state, rule.min_duration, time, period)
 
 
@@ -319,36 +372,31 @@ def decide_slip(
 ) -> None:
     """Decide whether a finger slides, from the log odds of its last sample."""
     # s(k) = s(k-1) + gain (z(k) - s(k-1)), p = 1 / (1 + exp(-s)).
-    decided[SLIP_LOG_ODDS] = smooth(decided[SLIP_LOG_ODDS], value, limits[SLIP_GAIN])
-    decided[SLIP_PROBABILITY] = probability_of(decided[SLIP_LOG_ODDS])
+    smoothed = smooth(decided[rule_at.SLIP_LOG_ODDS], value, limits[rule_at.SLIP_GAIN])
+    probability = probability_of(smoothed)
+    decided[rule_at.SLIP_LOG_ODDS], decided[rule_at.SLIP_PROBABILITY] = smoothed, probability
     # It slides while p >= threshold, and until t - t_last reaches the hold time.
-    if decided[SLIP_PROBABILITY] >= limits[SLIP_THRESHOLD]:
-        decided[LAST_SLIP] = time
-        codes[SLIPS] = 1
+    if probability >= limits[rule_at.SLIP_THRESHOLD]:
+        decided[rule_at.LAST_SLIP] = time
+        codes[rule_at.SLIPS] = 1
     else:
-        codes[SLIPS] = int(_is_held(time, decided[LAST_SLIP], limits[SLIP_HOLD], period))
+        hold = limits[rule_at.SLIP_HOLD]
+        codes[rule_at.SLIPS] = int(_is_held(time, decided[rule_at.LAST_SLIP], hold, period))
 
 
 @compiled_step
 def end_slip(codes: Integers, decided: Array, probability: float) -> None:
     """Report no slip, with a probability of 0 without contact or NaN without an estimate."""
-    codes[SLIPS] = 0
-    decided[SLIP_LOG_ODDS] = decided[LAST_SLIP] = math.nan
-    decided[SLIP_PROBABILITY] = probability
-
-
-@compiled_step
-def reported_cause(codes: Integers) -> int:
-    """Return the code of the cause: slip while the finger slides, else that while unstable."""
-    if codes[SLIPS]:
-        return SLIP_CODE
-    return int(codes[CAUSE]) if codes[STATE] == UNSTABLE else 0
+    if decided[rule_at.SLIP_PROBABILITY] != rule_at.NO_SLIP_RULE:
+        codes[rule_at.SLIPS] = 0
+        decided[rule_at.SLIP_LOG_ODDS] = decided[rule_at.LAST_SLIP] = math.nan
+        decided[rule_at.SLIP_PROBABILITY] = probability
 
 
 @compiled_step
 def _forget_cause(codes: Integers, scores: Array, finger: int) -> None:
     """Reset the cause of a finger that is not unstable."""
-    codes[CAUSE] = 0
+    codes[rule_at.CAUSE] = 0
     for place in range(scores.shape[1]):
         scores[finger, place] = 0.0
 
@@ -383,16 +431,8 @@ def run(
             layout, memory, output, rule, decision, readings[k], present[k], times[k]
         )
         for f in range(len(decision.codes)):
-            state = decision.codes[f, STATE]
-            rows.state[k, f] = state
-            rows.reason[k, f] = output.status[f, REASON]
-            rows.faults[k, f] = output.status[f, FAULTS]
-            rows.taxels[k, f] = output.status[f, TAXELS]
-            rows.probability[k, f] = decision.values[f, PROBABILITY]
-            rows.cause[k, f] = reported_cause(decision.codes[f])
-            rows.slip[k, f] = decision.values[f, SLIP_PROBABILITY]
-            for column in range(VALUES_WIDTH):
-                rows.values[k, f, column] = output.values[f, column]
+            fill_report(memory, output, decision, rows.report[k], f)
+            rows.taxels[k, f] = output.status[f, at.TAXELS]
 
 
 @compiled_step
@@ -411,8 +451,8 @@ def hold_unstable(state: int, decided: Array, hold: float, time: float, period: 
     """Return UNSTABLE while it is held, else the state."""
     # UNSTABLE until t - t_unstable reaches the hold time.
     if state == UNSTABLE:
-        decided[LAST_UNSTABLE] = time
-    elif _is_held(time, decided[LAST_UNSTABLE], hold, period):
+        decided[rule_at.LAST_UNSTABLE] = time
+    elif _is_held(time, decided[rule_at.LAST_UNSTABLE], hold, period):
         return UNSTABLE
     return state
 
@@ -423,9 +463,9 @@ def debounce(
 ) -> None:
     """Report the state if it has lasted long enough, or if the reported state is UNKNOWN."""
     # Reported once t - t_since + T / 2 >= min_duration: half a period allows for rounding.
-    if state != codes[CANDIDATE]:
-        codes[CANDIDATE] = state
-        decided[CANDIDATE_SINCE] = time
-    lasted = time - decided[CANDIDATE_SINCE] + 0.5 * period
-    if codes[STATE] == UNKNOWN or lasted >= min_duration:
-        codes[STATE] = state
+    if state != codes[rule_at.CANDIDATE]:
+        codes[rule_at.CANDIDATE] = state
+        decided[rule_at.CANDIDATE_SINCE] = time
+    lasted = time - decided[rule_at.CANDIDATE_SINCE] + 0.5 * period
+    if codes[rule_at.STATE] == UNKNOWN or lasted >= min_duration:
+        codes[rule_at.STATE] = state

@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import repeat
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.cause import CAUSES
+from holdfast.classifiers.cause import ALL_CAUSES
 from holdfast.contact import (
     Cause,
     ContactEstimate,
@@ -18,23 +17,60 @@ from holdfast.contact import (
     faults_of,
     taxels_of,
 )
-from holdfast.detector.decision_rule import TraceRows
-from holdfast.detector.fast_step import split_code
-from holdfast.features.arrays import SIGMA
-from holdfast.sensors.types import Array
+from holdfast.detector.arrays import (
+    NO_SLIP_RULE,
+    REPORT_CODE,
+    REPORT_FORCE,
+    REPORT_PROBABILITY,
+    REPORT_SIGMA,
+    REPORT_SLIP,
+)
+from holdfast.detector.decision_rule import TraceRows, estimate_code, split_code
+from holdfast.sensors.types import Array, Integers
 
-STATES = tuple(ContactState)
-REASONS = tuple(Reason)
-CAUSES_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
+STATE_BY_CODE = tuple(ContactState)
+REASON_BY_CODE = tuple(Reason)
+CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *ALL_CAUSES)
 
 
 Decision = tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]
 
 
-def decision_of(code: float) -> Decision:
-    """Return state, reason, faults and cause of a code that the kernel reports."""
-    state, reason, faults, cause = split_code(int(code))
-    return STATES[state], REASONS[reason], faults_of(faults), CAUSES_BY_CODE[cause]
+class DecisionCache(dict[float, Decision]):
+    """State, reason, faults and cause by the code that the kernel reports, of the codes so far."""
+
+    def __missing__(self, code: float) -> Decision:
+        state, reason, faults, cause = split_code(int(code))
+        self[code] = (
+            STATE_BY_CODE[state], REASON_BY_CODE[reason], faults_of(faults), CAUSE_BY_CODE[cause]
+        )  # fmt: skip
+        return self[code]
+
+
+_DECISIONS = DecisionCache()
+Name = TypeVar("Name", str, int)
+
+
+def estimates_of(
+    names: Iterable[Name], report: Iterable[Sequence[float]], taxel_masks: Integers
+) -> dict[Name, ContactEstimate]:
+    """Return the estimates of rows of a report, see `decision_rule.fill_report`.
+
+    Args:
+        names: of the rows: fingers, or numbers of samples.
+        report: rows of `REPORT_WIDTH` numbers.
+        taxel_masks: bits of the faulty taxels of each row.
+    """
+    estimates: dict[Name, ContactEstimate] = {}
+    known = _DECISIONS
+    for name, (time, code, probability, sigma, x, y, z, slip) in zip(names, report, strict=False):
+        state, reason, faults, cause = known[code]
+        taxels = taxels_of(int(taxel_masks[len(estimates)])) if faults else ()
+        estimates[name] = ContactEstimate(
+            time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
+            None if slip == NO_SLIP_RULE else slip,
+        )  # fmt: skip
+    return estimates
 
 
 class FingerTrace(NamedTuple):
@@ -49,7 +85,8 @@ class FingerTrace(NamedTuple):
         force: (n, 3) F_tip in the fingertip frame [unit of the readings].
         faults: (n,) bits in the order of `Fault`.
         faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
-        cause: (n,) codes of the causes while UNSTABLE: 1 is the first of `Cause`; 0 for none.
+        cause: (n,) codes of the causes while UNSTABLE, or while it slides: 1 is the first of
+            `Cause`; 0 for none.
         slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
     """
 
@@ -60,7 +97,7 @@ class FingerTrace(NamedTuple):
     instability: Array
     force: Array
     faults: npt.NDArray[np.int16]
-    faulty_taxels: npt.NDArray[np.int64]
+    faulty_taxels: Integers
     cause: npt.NDArray[np.int8]
     slip_probability: Array | None = None
 
@@ -73,27 +110,16 @@ class FingerTrace(NamedTuple):
 
     def estimates(self, rows: slice = slice(None)) -> list[ContactEstimate]:
         """Return the estimates of these samples."""
-        return list(
-            map(
-                ContactEstimate,
-                self.times[rows].tolist(),
-                [STATES[code] for code in self.state[rows].tolist()],
-                [REASONS[code] for code in self.reason[rows].tolist()],
-                self.stable_probability[rows].tolist(),
-                self.instability[rows].tolist(),
-                map(tuple, self.force[rows].tolist()),
-                map(faults_of, self.faults[rows].tolist()),
-                map(taxels_of, self.faulty_taxels[rows].tolist()),
-                [CAUSES_BY_CODE[code] for code in self.cause[rows].tolist()],
-                self._slips(rows),
-            )
-        )
-
-    def _slips(self, rows: slice) -> Iterable[float | None]:
-        if self.slip_probability is None:
-            return repeat(None)
-        slips: list[float] = self.slip_probability[rows].tolist()
-        return slips
+        fields = (self.state, self.reason, self.faults, self.cause)
+        codes = estimate_code(*(field[rows].astype(np.int64) for field in fields))
+        slips = self.slip_probability
+        if slips is None:
+            slips = np.full(len(self), NO_SLIP_RULE)
+        columns = (self.times, self.stable_probability, self.instability, *self.force.T, slips)
+        times, *numbers = (column[rows] for column in columns)
+        report = np.column_stack([times, codes, *numbers]).tolist()
+        numbered = estimates_of(range(len(report)), report, self.faulty_taxels[rows])
+        return list(numbered.values())
 
 
 @dataclass(frozen=True)
@@ -117,8 +143,6 @@ def detection_of(
     name: str,
     fingers: Sequence[str],
     chunks: Sequence[tuple[Array, npt.NDArray[np.bool_], TraceRows]],
-    *,
-    has_slips: bool = False,
 ) -> Detection:
     """Join the chunks that the compiled rule filled.
 
@@ -126,7 +150,6 @@ def detection_of(
         name: of the recording.
         fingers: in the order of the columns.
         chunks: times, present fingers and rows of each chunk.
-        has_slips: whether the model has a slip rule.
     """
     if not chunks:
         return Detection(name, {}, np.empty(0), np.empty(0, dtype=np.int8))
@@ -137,16 +160,22 @@ def detection_of(
     for place, finger in enumerate(fingers):
         own = present[:, place]
         if own.any():
-            found[finger] = FingerTrace(
-                times[own],
-                rows.state[own, place],
-                rows.reason[own, place],
-                rows.probability[own, place],
-                rows.values[own, place, SIGMA],
-                rows.values[own, place, :3],
-                rows.faults[own, place],
-                rows.taxels[own, place],
-                rows.cause[own, place],
-                rows.slip[own, place] if has_slips else None,
-            )
+            found[finger] = _trace_of(times[own], rows.report[own, place], rows.taxels[own, place])
     return Detection(name, found, times, rows.hand)
+
+
+def _trace_of(times: Array, report: Array, taxels: Integers) -> FingerTrace:
+    state, reason, faults, cause = split_code(report[:, REPORT_CODE].astype(np.int64))
+    slips = report[:, REPORT_SLIP].copy()
+    return FingerTrace(
+        times,
+        state.astype(np.int8),
+        reason.astype(np.int8),
+        report[:, REPORT_PROBABILITY].copy(),
+        report[:, REPORT_SIGMA].copy(),
+        report[:, REPORT_FORCE : REPORT_FORCE + 3].copy(),
+        faults.astype(np.int16),
+        taxels,
+        cause.astype(np.int8),
+        None if (slips == NO_SLIP_RULE).any() else slips,
+    )

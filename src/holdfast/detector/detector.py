@@ -17,30 +17,23 @@ from numpy import ndarray
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.contact import (
-    ContactEstimate,
     ContactEvent,
     ContactState,
     HandEstimate,
     StateChanges,
-    taxels_of,
 )
 from holdfast.detector.address_table import table_of
-from holdfast.detector.arrays import REPORT_WIDTH, THRESHOLD
-from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
-from holdfast.detector.detection import (
-    STATES,
-    Decision,
-    Detection,
-    decision_of,
-    detection_of,
+from holdfast.detector.arrays import REPORT_CODE, REPORT_WIDTH, SLIP_THRESHOLD, THRESHOLD
+from holdfast.detector.decision_rule import (
+    ProbabilityFeeder,
+    TraceRows,
+    new_decision_memory,
+    rule_of,
+    run,
+    split_code,
 )
-from holdfast.detector.fast_step import (
-    CHANGED,
-    UNREADABLE,
-    StepArrays,
-    compiled_fast_step,
-)
-from holdfast.detector.probabilities import ProbabilityFeeder
+from holdfast.detector.detection import STATE_BY_CODE, Detection, detection_of, estimates_of
+from holdfast.detector.fast_step import CHANGED, UNREADABLE, StepArrays, compiled_fast_step
 from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS
@@ -127,7 +120,6 @@ class Detector:
     def _start(self, model: Model, stream: FeatureStream) -> None:
         self._rule = rule_of(model, stream.plan)
         self._parts = [model.finger(name) for name in stream.plan.fingers]
-        self._has_slips = any(part.slip is not None for part in self._parts)
         n_fingers = len(stream.plan.fingers)
         self._names = (*stream.plan.fingers, HAND)
         self._readings = np.zeros((len(stream.layout.rotations), 3))
@@ -141,7 +133,6 @@ class Detector:
         }
         self._take = itemgetter(*stream.plan.fingers)  # a tuple, unless the finger is single
         self._step = compiled_fast_step()
-        self._decisions: dict[float, Decision] = {}  # of the codes so far
         self._use(stream)
 
     def _use(self, stream: FeatureStream) -> None:
@@ -152,13 +143,15 @@ class Detector:
         if not all(isinstance(part.classifier, LinearClassifier) for part in self._parts):
             self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
             self._n_together = -1  # `update` takes the plain way
-        self._decision = new_decision_memory(*self._rule.causes.shape[:2])
+        self._decision = new_decision_memory(
+            *self._rule.causes.shape[:2], np.isfinite(self._rule.slip_limits[:, SLIP_THRESHOLD])
+        )
         arrays = StepArrays(
             stream.layout, stream.memory, stream.output, self._rule, self._decision,
             self._readings, self._present, self._report, KNOWN_TYPES,
         )  # fmt: skip
         self._table, self._arrays = table_of(arrays)
-        self._status = stream.output.status
+        self._taxel_masks = stream.output.status[:, TAXELS]
         self._changes = StateChanges(self._names)
         self._states: States = tuple(self._changes.states)
         self._transitions: deque[tuple[float, States, States]] = deque(maxlen=MAX_EVENTS)
@@ -264,12 +257,13 @@ class Detector:
         for times, present, readings in stream.samples_of(recording):
             rows = TraceRows.empty(len(times), present.shape[1])
             self._run_chunk(readings, present, times, rows)
-            codes = np.column_stack([rows.state, rows.hand])
+            states, *_ = split_code(rows.report[:, :, REPORT_CODE].astype(np.int64))
+            codes = np.column_stack([states, rows.hand])
             self._events += self._changes.update_chunk(times, codes)
             self._last_time = float(times[-1])
             chunks.append((times, present, rows))
         self._states = tuple(self._changes.states)
-        return detection_of(recording.name, stream.plan.fingers, chunks, has_slips=self._has_slips)
+        return detection_of(recording.name, stream.plan.fingers, chunks)
 
     def _run_chunk(self, readings: Array, present: Flags, times: Array, rows: TraceRows) -> None:
         """Fill the rows of a chunk; sample by sample, if a classifier is not compiled."""
@@ -326,17 +320,8 @@ class Detector:
 
     def _estimate(self, time: float, code: int) -> HandEstimate:
         """Return the estimate that the kernel reported, and note its changes of state."""
-        fingers, known, has_slips = {}, self._decisions, self._has_slips
-        for name, (at, number, probability, sigma, x, y, z, slip) in zip(
-            self._slots, self._read_report(), strict=False
-        ):
-            state, reason, faults, cause = known.get(number) or self._decode(number)
-            taxels = self._faulty_taxels(name) if faults else ()
-            fingers[name] = ContactEstimate(
-                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
-                slip if has_slips else None,
-            )  # fmt: skip
-        hand = STATES[code % CHANGED]
+        fingers = estimates_of(self._slots, self._read_report(), self._taxel_masks)
+        hand = STATE_BY_CODE[code % CHANGED]
         if code >= CHANGED:
             states = (*[finger.state for finger in fingers.values()], hand)
             self._transitions.append((time, self._states, states))
@@ -349,13 +334,6 @@ class Detector:
             self._changes.states = list(before)
             self._events += self._changes.update(after, time)
         self._transitions.clear()
-
-    def _decode(self, number: float) -> Decision:
-        self._decisions[number] = decision_of(number)
-        return self._decisions[number]
-
-    def _faulty_taxels(self, finger: str) -> tuple[int, ...]:
-        return taxels_of(int(self._status[self._slots[finger][0], TAXELS]))
 
 
 def detect(model: Model, recording: Recording) -> Detection:

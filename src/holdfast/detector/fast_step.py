@@ -5,56 +5,16 @@ from typing import Any, NamedTuple
 
 from holdfast.compiled import compiled_step
 from holdfast.detector.address_table import kept_by, reader_of
-from holdfast.detector.arrays import (
-    PROBABILITY,
-    REPORT_CODE,
-    REPORT_FORCE,
-    REPORT_PROBABILITY,
-    REPORT_SIGMA,
-    REPORT_SLIP,
-    REPORT_TIME,
-    SLIP_PROBABILITY,
-    STATE,
-    DecisionMemory,
-    DecisionRule,
-)
-from holdfast.detector.decision_rule import hand_code, reported_cause, step
+from holdfast.detector.arrays import REPORT_CODE, STATE, DecisionMemory, DecisionRule
+from holdfast.detector.decision_rule import fill_report, hand_code, step
 from holdfast.detector.sample_arrays import copy_samples
-from holdfast.features.arrays import (
-    FAULTS,
-    FORCE,
-    LAST_TIME,
-    REASON,
-    SIGMA,
-    Flags1,
-    Floats2,
-    Integers1,
-    Layout,
-    Memory,
-    Output,
-)
+from holdfast.features.arrays import Flags1, Floats2, Integers1, Layout, Memory, Output
 from holdfast.sensors.types import Integers
 
 CHANGED = 4
 """Is added to the state of the hand if any state has changed."""
 UNREADABLE = -1
 """Is returned instead of a state if a sample is in a form that `fast_step` cannot read."""
-
-
-@compiled_step
-def estimate_code(state: int, reason: int, faults: int, cause: int) -> int:
-    """Return state, reason, faults and cause as one number; `split_code` is the inverse."""
-    return state + 4 * (reason + 8 * (faults + 2**16 * cause))
-
-
-def split_code(code: int) -> tuple[int, int, int, int]:
-    """Return state, reason, faults and cause.
-
-    Example:
-        >>> split_code(estimate_code(2, 0, 5, 3))
-        (2, 0, 5, 3)
-    """
-    return code % 4, code // 4 % 8, code // 32 % 2**16, code // 2**21
 
 
 class StepArrays(NamedTuple):
@@ -67,7 +27,7 @@ class StepArrays(NamedTuple):
     decision: DecisionMemory
     readings: Floats2  # (n_taxels, 3) of all fingers
     present: Flags1  # (n_fingers,)
-    report: Floats2  # (n_fingers, REPORT_WIDTH)
+    report: Floats2  # (n_fingers, REPORT_WIDTH), by `fill_report`
     known_types: Integers1  # of holdfast.detector.sample_arrays
 
 
@@ -100,16 +60,8 @@ def fast_step(table: Integers, time: float, samples: int) -> int:
     hand = step(layout, memory, output, rule, decision, readings, present, time)
     changed = hand != before
     for f in range(len(present)):
-        state, status = decision.codes[f, STATE], output.status[f]
-        changed |= report[f, REPORT_CODE] != state
-        cause = reported_cause(decision.codes[f])
-        report[f, REPORT_TIME] = memory.levels[f, LAST_TIME]
-        report[f, REPORT_CODE] = estimate_code(state, status[REASON], status[FAULTS], cause)
-        report[f, REPORT_PROBABILITY] = decision.values[f, PROBABILITY]
-        report[f, REPORT_SLIP] = decision.values[f, SLIP_PROBABILITY]
-        report[f, REPORT_SIGMA] = output.values[f, SIGMA]
-        for axis in range(3):
-            report[f, REPORT_FORCE + axis] = output.values[f, FORCE + axis]
+        changed |= report[f, REPORT_CODE] != decision.codes[f, STATE]
+        fill_report(memory, output, decision, report, f)
     return hand + CHANGED * changed
 
 

@@ -23,11 +23,13 @@ from holdfast.sensors.types import Array, Integers
 WORD = 8
 """Length of a field [bytes]."""
 # Fields of an object, in words. Interpreters differ in the length of their headers.
-HEADER = object.__basicsize__ // WORD
-TYPE = HEADER - 1
+OBJECT_HEADER = object.__basicsize__ // WORD
+TYPE = OBJECT_HEADER - 1
 FIRST_ITEM = tuple.__basicsize__ // WORD
-DATA, N_AXES, SHAPE, STRIDES, DTYPE = (HEADER + place for place in (0, 1, 2, 3, 5))  # of an array
-OBJECT_WORDS = HEADER + 6
+DATA, N_AXES, SHAPE, STRIDES, DTYPE = (
+    OBJECT_HEADER + place for place in (0, 1, 2, 3, 5)
+)  # of an array
+OBJECT_WORDS = OBJECT_HEADER + 6
 
 TUPLE, ARRAY, COUNTS, FLOATS = range(4)
 

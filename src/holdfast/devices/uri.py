@@ -169,9 +169,9 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
         ['thumb', 'index', 'middle', 'ring']
     """
     if not is_uri(text):
-        from holdfast.devices.sources.replay import Replay
+        from holdfast.devices.sources.replay import ReplaySource
 
-        return Replay(text, speed=speed, loop=loop)
+        return ReplaySource(text, speed=speed, loop=loop)
     scheme, address = parse(text)
     if scheme == "twin":
         require_extras("twin", "parquet")

@@ -109,17 +109,6 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     VALUES_WIDTH,
 ) = range(7)  # fmt: skip
 
-# Kinds of features, in the order of holdfast.features.specs.KINDS.
-FIRST_WINDOWED = 4  # the kinds before it need one sample: they are the channels of the history
-SIGMA_XYZ, CHANGE = 6, 7
-FIRST_RELATIVE = 8  # the kinds from it on look back by a lag in seconds
-
-# Rows of Memory.relative: kinds from FIRST_RELATIVE on.
-(
-    FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL,
-    PRESSURE_SHIFT, MOMENT_CHANGE, LOAD_TO_NOISE, N_RELATIVE,
-) = range(8)  # fmt: skip
-
 # Rows of Memory.track.
 (
     _, _, _,  # F_tip
@@ -191,7 +180,7 @@ class Memory(NamedTuple):
     reference: Floats2  # (n_taxels, 3) taxel forces at the least normal force since the start
     track: Floats3  # (n_fingers, TRACK_WIDTH, longest lag + 1), a ring
     motion: Floats2  # (n_fingers, MOTION_WIDTH)
-    relative: Floats3  # (n_fingers, N_RELATIVE, n_lags) relative features of the last sample
+    relative: Floats3  # (n_fingers, n_kinds, n_lags) relative features of the last sample
     blocks: Floats3  # (n_fingers, longest, n_channels * n_levels * 3) sums of blocks, a ring
 
 

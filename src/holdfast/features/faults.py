@@ -12,30 +12,8 @@ import math
 import numpy as np
 
 from holdfast.compiled import compiled_step, inlined
-from holdfast.features.arrays import (
-    CHANGED_AT,
-    FAULTY_TAXELS,
-    FIRST_POWER,
-    FIRST_TIME,
-    HIGH_LIMIT,
-    LAST_CHANGE,
-    LONGEST_REST,
-    LONGEST_STILL,
-    LOW_LIMIT,
-    MAX_AMPLITUDE,
-    N_CHANGED,
-    N_CHANGES,
-    N_PULLED,
-    N_SEEN,
-    N_UNCHANGED,
-    N_USED,
-    NOISE,
-    ROUNDING_NOISE,
-    SECOND_POWER,
-    TAXEL_FAULTS,
-    Layout,
-    Memory,
-)
+from holdfast.features import arrays as at
+from holdfast.features.arrays import Layout, Memory
 from holdfast.sensors.types import Array, Flags, Integers
 
 # Bits of holdfast.contact.Fault.
@@ -135,17 +113,17 @@ def track_changes(
     """Count a valid sample of a finger, and compare it with the one before."""
     counts = memory.counts
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    if counts[f, N_SEEN] == 0:
-        memory.levels[f, FIRST_TIME] = time
+    if counts[f, at.N_SEEN] == 0:
+        memory.levels[f, at.FIRST_TIME] = time
     elif _differ(readings, memory.previous, first, last):
         if not is_stuck(counts, f, layout.period):
             _update_rest(counts, f, layout.period)
-        counts[f, N_UNCHANGED] = 0
-        counts[f, N_CHANGES] += 1
+        counts[f, at.N_UNCHANGED] = 0
+        counts[f, at.N_CHANGES] += 1
         _find_taxel_faults(layout, memory, readings, f, after_gap)
     else:
-        counts[f, N_UNCHANGED] += 1
-    counts[f, N_SEEN] += 1
+        counts[f, at.N_UNCHANGED] += 1
+    counts[f, at.N_SEEN] += 1
 
 
 @compiled_step
@@ -157,21 +135,21 @@ def is_stuck(counts: Integers, f: int, period: float) -> bool:
     """
     # Stuck: more than half of the steps before the rest changed a reading, 0.5 s of changes at
     # least, and the rest lasts max(0.5 s, 10 times the longest rest before).
-    n_steps = counts[f, N_SEEN] - 1 - counts[f, N_UNCHANGED]
-    changed_often = 2 * counts[f, N_CHANGES] > n_steps
+    n_steps = counts[f, at.N_SEEN] - 1 - counts[f, at.N_UNCHANGED]
+    changed_often = 2 * counts[f, at.N_CHANGES] > n_steps
     long = STUCK_SECONDS / period
-    rested = STILL_RATIO * counts[f, LONGEST_REST]
-    still = counts[f, N_UNCHANGED] >= max(long, rested)
-    return bool(changed_often and still and counts[f, N_CHANGES] >= long)
+    rested = STILL_RATIO * counts[f, at.LONGEST_REST]
+    still = counts[f, at.N_UNCHANGED] >= max(long, rested)
+    return bool(changed_often and still and counts[f, at.N_CHANGES] >= long)
 
 
 @compiled_step
 def _update_rest(counts: Integers, f: int, period: float) -> None:
     """Note that a finger rested, if its readings did not change for long."""
-    n = counts[f, N_UNCHANGED]
+    n = counts[f, at.N_UNCHANGED]
     # longest = max(longest, n), of rests of 0.5 s or more.
-    if n >= STUCK_SECONDS / period and n > counts[f, LONGEST_REST]:
-        counts[f, LONGEST_REST] = n
+    if n >= STUCK_SECONDS / period and n > counts[f, at.LONGEST_REST]:
+        counts[f, at.LONGEST_REST] = n
 
 
 @compiled_step
@@ -186,9 +164,9 @@ def is_pulled(counts: Integers, levels: Array, f: int, normal: float, period: fl
         period: of the samples [s].
     """
     # Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s.
-    limit = max(20.0 * levels[f, NOISE], 0.1 * levels[f, MAX_AMPLITUDE])
-    counts[f, N_PULLED] = counts[f, N_PULLED] + 1 if normal < -limit else 0
-    return bool(counts[f, N_PULLED] * period >= LOADED_SECONDS)
+    limit = max(20.0 * levels[f, at.NOISE], 0.1 * levels[f, at.MAX_AMPLITUDE])
+    counts[f, at.N_PULLED] = counts[f, at.N_PULLED] + 1 if normal < -limit else 0
+    return bool(counts[f, at.N_PULLED] * period >= LOADED_SECONDS)
 
 
 @compiled_step
@@ -205,62 +183,42 @@ def _find_taxel_faults(
     layout: Layout, memory: Memory, readings: Array, f: int, after_gap: bool
 ) -> None:
     """Find the faulty taxels of a finger at a sample that changed a reading."""
-    first, last, period = layout.offsets[f], layout.offsets[f + 1], layout.period
     taxels, constants, counts = memory.taxels, layout.constants, memory.counts
-    n_changes, long = counts[f, N_CHANGES], STUCK_SECONDS / period
-    # s = T / tau: the weight of a sample in a first order mean.
-    share = min(1.0, period / NOISE_SMOOTHING)
-    any_still, alone, loudest = _update_taxels(
-        readings, memory.previous, taxels, first, last, n_changes, counts[f, N_SEEN], long, share
-    )
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    any_still, alone, loudest = _update_taxels(layout, memory, readings, f)
     if after_gap:
         _reset_noise(taxels, first, last)
-    counts[f, TAXEL_FAULTS] = counts[f, FAULTY_TAXELS] = 0
+    counts[f, at.TAXEL_FAULTS] = counts[f, at.FAULTY_TAXELS] = 0
     if any_still:
-        low, high, ignored = constants[f, LOW_LIMIT], constants[f, HIGH_LIMIT], layout.ignored
+        low, high, ignored = constants[f, at.LOW_LIMIT], constants[f, at.HIGH_LIMIT], layout.ignored
         at_limit = taxels_outside(readings, ignored, first, last, low, high)
-        counts[f, TAXEL_FAULTS], counts[f, FAULTY_TAXELS] = _still_taxels(
-            readings, taxels, ignored, first, last, n_changes, period, at_limit
+        counts[f, at.TAXEL_FAULTS], counts[f, at.FAULTY_TAXELS] = _still_taxels(
+            layout, memory, readings, f, at_limit
         )
-    if alone and constants[f, N_USED] >= MIN_TAXELS:
-        quiet = constants[f, ROUNDING_NOISE]
+    if alone and constants[f, at.N_USED] >= MIN_TAXELS:
+        quiet = constants[f, at.ROUNDING_NOISE]
         # Noise of a reading: noise of F / sqrt(n_used), where the step is not known.
         if math.isnan(quiet):  # its share in the noise of the finger
-            quiet = memory.levels[f, NOISE] / math.sqrt(constants[f, N_USED])
+            quiet = memory.levels[f, at.NOISE] / math.sqrt(constants[f, at.N_USED])
         if _is_noisy(taxels, loudest, quiet):
-            counts[f, TAXEL_FAULTS] |= NOISY
-            counts[f, FAULTY_TAXELS] |= bit_of(loudest - first)
+            counts[f, at.TAXEL_FAULTS] |= NOISY
+            counts[f, at.FAULTY_TAXELS] |= bit_of(loudest - first)
 
 
-@compiled_step
+@inlined
 def _update_taxels(
-    readings: Array,
-    previous: Array,
-    taxels: Array,
-    first: int,
-    last: int,
-    n_changes: int,
-    n_seen: int,
-    long: float,
-    share: float,
+    layout: Layout, memory: Memory, readings: Array, f: int
 ) -> tuple[bool, bool, int]:
-    """Update the memory of each taxel with a sample that changed a reading.
-
-    Args:
-        readings: of this sample.
-        previous: of the last sample.
-        taxels: memory of all taxels; is changed.
-        first: first taxel of the finger.
-        last: one past its last taxel.
-        n_changes: number of samples that changed the finger, with this one.
-        n_seen: number of samples before this one.
-        long: number of them without a change after which a taxel may be faulty.
-        share: weight of this sample in the smoothed values.
+    """Update the memory of each taxel of a finger with a sample that changed a reading.
 
     Returns:
         Whether any taxel did not change for so long, whether one taxel has most of the second
         differences, and that taxel.
     """
+    taxels, previous, n_changes = memory.taxels, memory.previous, memory.counts[f, at.N_CHANGES]
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    # s = T / tau: the weight of a sample in a first order mean.
+    long, share = STUCK_SECONDS / layout.period, min(1.0, layout.period / NOISE_SMOOTHING)
     any_still = False
     total = largest = 0.0
     loudest = first
@@ -272,47 +230,58 @@ def _update_taxels(
         z = readings[i, 2] - previous[i, 2]
         square = x * x + y * y + z * z
         power, power_2 = (
-            (1.0 - share) * taxels[i, FIRST_POWER],
-            (1.0 - share) * taxels[i, SECOND_POWER],
+            (1.0 - share) * taxels[i, at.FIRST_POWER],
+            (1.0 - share) * taxels[i, at.SECOND_POWER],
         )
         if square > 0.0:
-            still = n_changes - taxels[i, CHANGED_AT] - 1.0
-            if (still + 1.0) * share > 1.0:  # jumps follow faster
-                _reset_change(taxels, i)
-            if taxels[i, N_CHANGED] == 0.0:
-                taxels[i, LONGEST_STILL] = n_seen - 1.0
-            elif still > taxels[i, LONGEST_STILL]:
-                _update_longest(taxels, i, still, long)
+            second = _second_square(layout.period, memory, f, i, x, y, z)
             if _has_reading(readings, i) and _has_reading(previous, i):
-                dx = x - taxels[i, LAST_CHANGE]
-                dy = y - taxels[i, LAST_CHANGE + 1]
-                dz = z - taxels[i, LAST_CHANGE + 2]
                 power += share * square
-                power_2 += share * (dx * dx + dy * dy + dz * dz)
-                taxels[i, LAST_CHANGE] = x
-                taxels[i, LAST_CHANGE + 1] = y
-                taxels[i, LAST_CHANGE + 2] = z
+                power_2 += share * second
             else:
                 _reset_change(taxels, i)
-            taxels[i, N_CHANGED] += 1.0
-            taxels[i, CHANGED_AT] = n_changes
-        elif n_changes - taxels[i, CHANGED_AT] >= long:
+        elif n_changes - taxels[i, at.CHANGED_AT] >= long:
             # still: n_changes - n(last change) >= 0.5 s of changes.
             any_still = True
-        taxels[i, FIRST_POWER], taxels[i, SECOND_POWER] = power, power_2
+        taxels[i, at.FIRST_POWER], taxels[i, at.SECOND_POWER] = power, power_2
         total += power_2
         if power_2 > largest:
             largest, loudest = power_2, int(np.int64(i))
     return any_still, largest >= LONE_SHARE * total, loudest
 
 
+@inlined
+def _second_square(
+    period: float, memory: Memory, f: int, i: int, x: float, y: float, z: float
+) -> float:
+    """Note the change (x, y, z) of taxel i. Return the square of its second difference."""
+    taxels, n_changes = memory.taxels, memory.counts[f, at.N_CHANGES]
+    still = n_changes - taxels[i, at.CHANGED_AT] - 1.0
+    if (still + 1.0) * min(1.0, period / NOISE_SMOOTHING) > 1.0:  # jumps follow faster
+        _reset_change(taxels, i)
+    if taxels[i, at.N_CHANGED] == 0.0:
+        taxels[i, at.LONGEST_STILL] = memory.counts[f, at.N_SEEN] - 1.0
+    elif still > taxels[i, at.LONGEST_STILL]:
+        _update_longest(taxels, i, still, STUCK_SECONDS / period)
+    # |D2|^2, with D2 = D1 - D1 of the last change.
+    dx = x - taxels[i, at.LAST_CHANGE]
+    dy = y - taxels[i, at.LAST_CHANGE + 1]
+    dz = z - taxels[i, at.LAST_CHANGE + 2]
+    taxels[i, at.LAST_CHANGE] = x
+    taxels[i, at.LAST_CHANGE + 1] = y
+    taxels[i, at.LAST_CHANGE + 2] = z
+    taxels[i, at.N_CHANGED] += 1.0
+    taxels[i, at.CHANGED_AT] = n_changes
+    return float(dx * dx + dy * dy + dz * dz)
+
+
 @compiled_step
 def _update_longest(taxels: Array, i: int, still: float, long: float) -> None:
     """Update the longest time without a change, unless it was by a fault."""
     # longest = still, unless still >= max(0.5 s, 10 (longest + 1)): that was a fault.
-    few = taxels[i, N_CHANGED] < MIN_CHANGES
-    if few or still < max(long, STILL_RATIO * (taxels[i, LONGEST_STILL] + 1.0)):
-        taxels[i, LONGEST_STILL] = still
+    few = taxels[i, at.N_CHANGED] < MIN_CHANGES
+    if few or still < max(long, STILL_RATIO * (taxels[i, at.LONGEST_STILL] + 1.0)):
+        taxels[i, at.LONGEST_STILL] = still
 
 
 @compiled_step
@@ -323,7 +292,7 @@ def _has_reading(readings: Array, i: int) -> bool:
 
 @compiled_step
 def _reset_change(taxels: Array, i: int) -> None:
-    taxels[i, LAST_CHANGE] = taxels[i, LAST_CHANGE + 1] = taxels[i, LAST_CHANGE + 2] = 0.0
+    taxels[i, at.LAST_CHANGE] = taxels[i, at.LAST_CHANGE + 1] = taxels[i, at.LAST_CHANGE + 2] = 0.0
 
 
 @compiled_step
@@ -331,7 +300,7 @@ def _reset_noise(taxels: Array, first: int, last: int) -> None:
     """Reset the noise of the taxels after a gap, over which a change is no noise."""
     for i in range(first, last):
         _reset_change(taxels, i)
-        taxels[i, FIRST_POWER] = taxels[i, SECOND_POWER] = 0.0
+        taxels[i, at.FIRST_POWER] = taxels[i, at.SECOND_POWER] = 0.0
 
 
 @compiled_step
@@ -345,40 +314,31 @@ def _is_noisy(taxels: Array, i: int, quiet: float) -> bool:
     """
     # Noisy: P2 > 2.5 P1 (white noise has 3 P1), and P2 > 6 (100 noise)^2: D2 of white noise
     # of a reading has the variance 6 noise^2.
-    white = taxels[i, SECOND_POWER] > WHITE_RATIO * taxels[i, FIRST_POWER]
-    return bool(white and taxels[i, SECOND_POWER] > 6.0 * (LOUD_RATIO * quiet) ** 2)
+    white = taxels[i, at.SECOND_POWER] > WHITE_RATIO * taxels[i, at.FIRST_POWER]
+    return bool(white and taxels[i, at.SECOND_POWER] > 6.0 * (LOUD_RATIO * quiet) ** 2)
 
 
-@compiled_step
+@inlined
 def _still_taxels(
-    readings: Array,
-    taxels: Array,
-    ignored: Flags,
-    first: int,
-    last: int,
-    n_changes: int,
-    period: float,
-    at_limit: int,
+    layout: Layout, memory: Memory, readings: Array, f: int, at_limit: int
 ) -> tuple[int, int]:
     """Return the faults DEAD and STUCK, and the bits of their taxels, if the others move.
 
     Args:
+        layout: of the stream.
+        memory: of the stream.
         readings: of this sample.
-        taxels: memory of all taxels.
-        ignored: taxels that are not tested.
-        first: first taxel of the finger.
-        last: one past its last taxel.
-        n_changes: number of samples that changed the finger.
-        period: of the samples [s].
+        f: the finger.
         at_limit: bits of the taxels at a limit of their range: they are saturated, not stuck.
     """
+    taxels, n_changes, period = memory.taxels, memory.counts[f, at.N_CHANGES], layout.period
+    first, last = layout.offsets[f], layout.offsets[f + 1]
     faults = bits = 0
-    others = _longest_still_of_moving(readings, taxels, ignored, first, last, n_changes, period)
-    if others < 0.0:
-        return 0, 0
-    for i in range(first, last):
-        changed, still = taxels[i, N_CHANGED], n_changes - taxels[i, CHANGED_AT]
-        if ignored[i] or not _is_still(taxels, i, n_changes, period):
+    others = _longest_still_of_moving(layout, memory, readings, f)
+    # Fewer than none if too few move: no taxel is tested then.
+    for i in range(first, last if others >= 0.0 else first):
+        changed, still = taxels[i, at.N_CHANGED], n_changes - taxels[i, at.CHANGED_AT]
+        if layout.ignored[i] or not _is_still(taxels, i, n_changes, period):
             continue
         if not _has_reading(readings, i):
             continue  # zeros: nothing touches a sensor with a dead band
@@ -395,33 +355,26 @@ def _still_taxels(
     return faults, bits
 
 
-@compiled_step
-def _longest_still_of_moving(
-    readings: Array,
-    taxels: Array,
-    ignored: Flags,
-    first: int,
-    last: int,
-    n_changes: int,
-    period: float,
-) -> float:
+@inlined
+def _longest_still_of_moving(layout: Layout, memory: Memory, readings: Array, f: int) -> float:
     """Return for how many samples a moving taxel stood still at most; -1 if too few move.
 
     A taxel that was ever still for long does not count as moving, because the noise of such a
     sensor is less than a step of its readings: it is still while nothing moves it.
     """
+    taxels, n_changes, period = memory.taxels, memory.counts[f, at.N_CHANGES], layout.period
     n_live, n_moving, longest, long = 0, 0, 0.0, STUCK_SECONDS / period
-    for i in range(first, last):
-        changed, changed_at = taxels[i, N_CHANGED], taxels[i, CHANGED_AT]
+    for i in range(layout.offsets[f], layout.offsets[f + 1]):
+        changed, changed_at = taxels[i, at.N_CHANGED], taxels[i, at.CHANGED_AT]
         silent = changed == 0.0 and not _has_reading(readings, i)
-        if ignored[i] or silent or _is_still(taxels, i, n_changes, period):
+        if layout.ignored[i] or silent or _is_still(taxels, i, n_changes, period):
             continue
         n_live += 1
         # Moving: changed in the last 0.25 s and in more than half of the samples.
         often = 2.0 * (n_changes - changed_at) < long and 2.0 * changed > changed_at
-        if often and taxels[i, LONGEST_STILL] < long:
+        if often and taxels[i, at.LONGEST_STILL] < long:
             n_moving += 1
-            longest = max(longest, taxels[i, LONGEST_STILL])
+            longest = max(longest, taxels[i, at.LONGEST_STILL])
     # At least 80 % of the live taxels move.
     return longest if n_moving > 0 and n_moving >= MOVING_SHARE * n_live else -1.0
 
@@ -430,10 +383,10 @@ def _longest_still_of_moving(
 def _is_still(taxels: Array, i: int, n_changes: int, period: float) -> bool:
     """Return whether a taxel does not change for far longer than ever before."""
     # Still: 2 s at first; later max(0.5 s, 10 (longest + 1 sample)).
-    still = n_changes - taxels[i, CHANGED_AT]
-    if taxels[i, N_CHANGED] < MIN_CHANGES:
+    still = n_changes - taxels[i, at.CHANGED_AT]
+    if taxels[i, at.N_CHANGED] < MIN_CHANGES:
         return bool(still >= DEAD_SECONDS / period)
-    least = STILL_RATIO * (taxels[i, LONGEST_STILL] + 1.0)
+    least = STILL_RATIO * (taxels[i, at.LONGEST_STILL] + 1.0)
     return bool(still >= max(STUCK_SECONDS / period, least))
 
 

@@ -10,53 +10,8 @@ import math
 import numpy as np
 
 from holdfast.compiled import compiled_step, inlined
-from holdfast.features.arrays import (
-    AFTER_GAP,
-    AMPLITUDE,
-    CHANGE,
-    FAULT,
-    FAULTS,
-    FAULTY_TAXELS,
-    FIRST_RELATIVE,
-    FIRST_TIME,
-    FIRST_WINDOWED,
-    GAP,
-    HIGH_LIMIT,
-    HISTORY_END,
-    KIND,
-    LAST_TIME,
-    LOW_LIMIT,
-    MAX_AMPLITUDE,
-    MEAN,
-    MIN_NOISE,
-    N_PULLED,
-    N_SEEN,
-    N_STEPS,
-    N_STRETCH,
-    N_TARED,
-    N_UNCHANGED,
-    NOISE,
-    READY,
-    READY_WINDOW,
-    REASON,
-    SAME_AS,
-    SCOPE,
-    SIGMA,
-    SIGMA_WINDOW,
-    SIGMA_XYZ,
-    SQUARED_STEPS,
-    TARE,
-    TARE_SECONDS,
-    TAXEL_FAULTS,
-    TAXELS,
-    TRANSFORM,
-    VALUES_WIDTH,
-    WARM_UP,
-    WINDOW,
-    Layout,
-    Memory,
-    Output,
-)
+from holdfast.features import arrays as at
+from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import (
     NOT_FINITE,
     OUT_OF_RANGE,
@@ -74,8 +29,17 @@ from holdfast.features.faults import (
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
 from holdfast.features.motion import update_motion
+from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
 from holdfast.sensors.types import Array, Flags, Integers
+
+# Codes of features: positions in the lists of holdfast.features.specs.
+FIRST_RELATIVE = len(VALUE_KINDS)
+OF_M, OF_SIGMA, OF_SIGMA_XYZ, OF_CHANGE = map(
+    FEATURE_KINDS.index, ("m", "sigma", "sigma_xyz", "change")
+)
+NO_TRANSFORM, LOG = map(TRANSFORMS.index, ("none", "log"))
+OF_HAND = SCOPES.index("hand")
 
 GAP_LIMIT_PERIODS = 3.0003
 """A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
@@ -103,28 +67,28 @@ def advance(
     for f in range(len(present)):
         # A gap: t - t_last > 3 T, with the period T.
         # False while LAST_TIME is NaN.
-        if time - memory.levels[f, LAST_TIME] > GAP_LIMIT_PERIODS * layout.period:
-            counts[f, N_STRETCH] = counts[f, N_UNCHANGED] = counts[f, N_PULLED] = 0
+        if time - memory.levels[f, at.LAST_TIME] > GAP_LIMIT_PERIODS * layout.period:
+            counts[f, at.N_STRETCH] = counts[f, at.N_UNCHANGED] = counts[f, at.N_PULLED] = 0
             _clear(memory.own, f)
             memory.relative[f] = math.nan
-            counts[f, AFTER_GAP] = 1
-            status[f, REASON], status[f, FAULTS], status[f, TAXELS] = GAP, 0, 0
+            counts[f, at.AFTER_GAP] = 1
+            status[f, at.REASON], status[f, at.FAULTS], status[f, at.TAXELS] = at.GAP, 0, 0
             _clear(output.values, f)
         if present[f]:
-            status[f, REASON], status[f, FAULTS], status[f, TAXELS] = _process(
+            status[f, at.REASON], status[f, at.FAULTS], status[f, at.TAXELS] = _process(
                 layout, memory, output.values, readings, time, f
             )
     for f in range(len(present)):
         if present[f]:
             _compute_own(layout, memory, output, f)
     for f in range(len(present)):
-        if status[f, REASON] != READY:
+        if status[f, at.REASON] != at.READY:
             _clear(output.features, f)
         elif present[f]:
             # Phi = [F_a, F_x, F_y, F_z, m, sigma], or what the model asks for.
             total = _fill_features(layout, memory, output, f)
             if math.isnan(total):  # the noise is not known yet
-                status[f, REASON] = TARE
+                status[f, at.REASON] = at.TARE
 
 
 @inlined
@@ -139,27 +103,27 @@ def _process(
         layout.ignored,
     )
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    low, high = constants[f, LOW_LIMIT], constants[f, HIGH_LIMIT]
-    for column in range(VALUES_WIDTH):
+    low, high = constants[f, at.LOW_LIMIT], constants[f, at.HIGH_LIMIT]
+    for column in range(at.VALUES_WIDTH):
         values[f, column] = math.nan
-    after_gap = time - levels[f, LAST_TIME] > GAP_LIMIT_PERIODS * layout.period
-    levels[f, LAST_TIME] = time
+    after_gap = time - levels[f, at.LAST_TIME] > GAP_LIMIT_PERIODS * layout.period
+    levels[f, at.LAST_TIME] = time
     total, least, most = scan_readings(readings, ignored, first, last)
     if not math.isfinite(total):
-        counts[f, N_STRETCH] = 0
+        counts[f, at.N_STRETCH] = 0
         bits = taxels_outside(readings, ignored, first, last, -math.inf, math.inf)
-        return FAULT, NOT_FINITE, bits
+        return at.FAULT, NOT_FINITE, bits
     # Valid: low <= every reading <= high.
     if least < low or most > high:
-        counts[f, N_STRETCH] = 0
+        counts[f, at.N_STRETCH] = 0
         low, high = np.nextafter(low, -math.inf), np.nextafter(high, math.inf)
-        return FAULT, OUT_OF_RANGE, taxels_outside(readings, ignored, first, last, low, high)
+        return at.FAULT, OUT_OF_RANGE, taxels_outside(readings, ignored, first, last, low, high)
     track_changes(layout, memory, readings, f, time, after_gap)
     # Half a period of tolerance: the rounding of times moves no sample.
-    elapsed = time - levels[f, FIRST_TIME] + 0.5 * layout.period
+    elapsed = time - levels[f, at.FIRST_TIME] + 0.5 * layout.period
     if not _update_tare(layout, memory, readings, f, elapsed):
-        return TARE, 0, 0
-    faults, bits = counts[f, TAXEL_FAULTS], counts[f, FAULTY_TAXELS]
+        return at.TARE, 0, 0
+    faults, bits = counts[f, at.TAXEL_FAULTS], counts[f, at.FAULTY_TAXELS]
     # Saturated: a reading at low or at high.
     if least <= low or most >= high:
         faults |= SATURATED
@@ -172,15 +136,15 @@ def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapse
     """Add a sample to the noise and to the tare. Return whether the tare is complete."""
     counts, kind, seconds = memory.counts, layout.tare_kind, layout.tare_seconds
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    if math.isnan(memory.levels[f, NOISE]):
+    if math.isnan(memory.levels[f, at.NOISE]):
         # noise = sqrt(sum |F(k) - F(k-1)|^2 / (6 n)), over the first n steps.
-        complete = elapsed >= (seconds if kind == TARE_SECONDS else NOISE_SECONDS)
+        complete = elapsed >= (seconds if kind == at.TARE_SECONDS else NOISE_SECONDS)
         _measure_noise(layout, memory, readings, f, complete)
     copy_readings(readings, memory.previous, first, last)
-    if counts[f, N_TARED] < 0:
+    if counts[f, at.N_TARED] < 0:
         return True
     # b_i = mean of f_i over the samples with t - t_first < tare_seconds.
-    running = elapsed < seconds or counts[f, N_TARED] == 0  # one sample at least
+    running = elapsed < seconds or counts[f, at.N_TARED] == 0  # one sample at least
     return bool(update_baseline(readings, memory.baseline, counts, f, first, last, kind, running))
 
 
@@ -193,14 +157,14 @@ def _measure_noise(layout: Layout, memory: Memory, readings: Array, f: int, comp
     levels = memory.levels
     if complete:
         # noise = max(sqrt(sum |step|^2 / (6 n)), noise of the rounding).
-        measured = math.sqrt(levels[f, SQUARED_STEPS] / (6.0 * max(levels[f, N_STEPS], 1.0)))
-        levels[f, NOISE] = max(measured, layout.constants[f, MIN_NOISE])
-    elif memory.counts[f, N_SEEN] > 1:
+        measured = math.sqrt(levels[f, at.SQUARED_STEPS] / (6.0 * max(levels[f, at.N_STEPS], 1.0)))
+        levels[f, at.NOISE] = max(measured, layout.constants[f, at.MIN_NOISE])
+    elif memory.counts[f, at.N_SEEN] > 1:
         first, last = layout.offsets[f], layout.offsets[f + 1]
         # step = sum_i R_i (f_i(k) - f_i(k-1)).
         x, y, z, _ = sum_taxels(readings, memory.previous, layout.rotations, first, last)
-        levels[f, SQUARED_STEPS] += x * x + y * y + z * z
-        levels[f, N_STEPS] += 1.0
+        levels[f, at.SQUARED_STEPS] += x * x + y * y + z * z
+        levels[f, at.N_STEPS] += 1.0
 
 
 @inlined
@@ -215,26 +179,26 @@ def _process_force(
     _append(memory.history, counts, values, f, x, y, z)
     _append_blocks(memory.history, memory.blocks, counts, f, layout.n_levels)
     if len(layout.lags):
-        update_motion(layout, memory, readings, f, levels[f, LAST_TIME])
+        update_motion(layout, memory, readings, f, levels[f, at.LAST_TIME])
     if is_stuck(counts, f, layout.period):
         faults |= STUCK
     if faults & SERIOUS:
-        counts[f, N_STRETCH] = counts[f, N_PULLED] = 0
-        return FAULT, faults, bits
+        counts[f, at.N_STRETCH] = counts[f, at.N_PULLED] = 0
+        return at.FAULT, faults, bits
     # max over k of F_a(k).
-    levels[f, MAX_AMPLITUDE] = max(levels[f, MAX_AMPLITUDE], values[f, AMPLITUDE])
+    levels[f, at.MAX_AMPLITUDE] = max(levels[f, at.MAX_AMPLITUDE], values[f, at.AMPLITUDE])
     # m and sigma over the reported window: equations 1 and 2 of the paper.
-    if counts[f, N_STRETCH] >= windows[f, SIGMA_WINDOW]:
-        found = _moments(memory.blocks, counts, f, 0, windows[f, SIGMA_WINDOW])
-        values[f, MEAN], values[f, SIGMA] = found
-    if layout.tare_kind == TARE_SECONDS and is_pulled(counts, levels, f, normal, layout.period):
+    if counts[f, at.N_STRETCH] >= windows[f, at.SIGMA_WINDOW]:
+        found = _moments(memory.blocks, counts, f, 0, windows[f, at.SIGMA_WINDOW])
+        values[f, at.MEAN], values[f, at.SIGMA] = found
+    if layout.tare_kind == at.TARE_SECONDS and is_pulled(counts, levels, f, normal, layout.period):
         faults |= TARE_LOADED
     if faults:
-        return FAULT, faults, bits
-    if counts[f, N_STRETCH] < windows[f, READY_WINDOW]:
-        return GAP if counts[f, AFTER_GAP] else WARM_UP, 0, 0
-    counts[f, AFTER_GAP] = 0
-    return READY, 0, 0
+        return at.FAULT, faults, bits
+    if counts[f, at.N_STRETCH] < windows[f, at.READY_WINDOW]:
+        return at.GAP if counts[f, at.AFTER_GAP] else at.WARM_UP, 0, 0
+    counts[f, at.AFTER_GAP] = 0
+    return at.READY, 0, 0
 
 
 @compiled_step
@@ -245,21 +209,21 @@ def _append(
     # F_a = |F_tip|. A ring of `length` values, each written twice: every window is contiguous.
     amplitude = math.sqrt(x * x + y * y + z * z)
     length = history.shape[2] // 2
-    place = counts[f, N_STRETCH] % length
-    counts[f, N_STRETCH] += 1
-    counts[f, HISTORY_END] = place + length + 1
+    place = counts[f, at.N_STRETCH] % length
+    counts[f, at.N_STRETCH] += 1
+    counts[f, at.HISTORY_END] = place + length + 1
     history[f, 0, place] = history[f, 0, place + length] = amplitude
     history[f, 1, place] = history[f, 1, place + length] = x
     history[f, 2, place] = history[f, 2, place + length] = y
     history[f, 3, place] = history[f, 3, place + length] = z
     values[f, 0], values[f, 1], values[f, 2] = x, y, z
-    values[f, AMPLITUDE] = amplitude
+    values[f, at.AMPLITUDE] = amplitude
 
 
 @compiled_step
 def _append_blocks(history: Array, blocks: Array, counts: Integers, f: int, n_levels: int) -> None:
     """Append the blocks of pairs that end with the newest value, of each channel that needs it."""
-    end, width = counts[f, HISTORY_END], N_SUMS * n_levels
+    end, width = counts[f, at.HISTORY_END], N_SUMS * n_levels
     for channel in range(blocks.shape[2] // width):
         # The pair (x_0, x_1) = (x(k-1), x(k)): P = x_0 + x_1, D = x_0 - x_1, S = 0 (haar.py).
         older, newer = history[f, channel, end - 2], history[f, channel, end - 1]
@@ -269,26 +233,27 @@ def _append_blocks(history: Array, blocks: Array, counts: Integers, f: int, n_le
 @inlined
 def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     """Compute the features of a finger by itself; NaN where its stretch is too short."""
-    specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
+    specs, floors, reported = layout.specs, layout.floors, layout.windows[f, at.SIGMA_WINDOW]
     history, counts, levels, own = memory.history, memory.counts, memory.levels, memory.own
     for place in range(specs.shape[1]):
-        kind, window = specs[f, place, KIND], specs[f, place, WINDOW]
+        kind, window = specs[f, place, at.KIND], specs[f, place, at.WINDOW]
         if kind < 0:
             own[f, place] = 0.0  # padding
-        elif specs[f, place, SAME_AS] < place:
-            own[f, place] = own[f, specs[f, place, SAME_AS]]
+        elif specs[f, place, at.SAME_AS] < place:
+            own[f, place] = own[f, specs[f, place, at.SAME_AS]]
         elif kind >= FIRST_RELATIVE:
             own[f, place] = memory.relative[f, kind - FIRST_RELATIVE, window]
-        elif counts[f, N_STRETCH] < max(window, 1):
+        elif counts[f, at.N_STRETCH] < max(window, 1):
             own[f, place] = math.nan
         else:
-            if window == reported and kind < SIGMA_XYZ:
-                # m or sigma, which are computed already.
-                value = output.values[f, MEAN + kind - FIRST_WINDOWED]
+            if window == reported and kind == OF_M:
+                value = output.values[f, at.MEAN]  # is computed already
+            elif window == reported and kind == OF_SIGMA:
+                value = output.values[f, at.SIGMA]
             else:
                 value = _feature(kind, window, history, memory.blocks, counts, layout.n_levels, f)
-            noise, floor = levels[f, NOISE], floors[f, place]
-            own[f, place] = _transform(value, specs[f, place, TRANSFORM], window, noise, floor)
+            noise, floor = levels[f, at.NOISE], floors[f, place]
+            own[f, place] = _transform(value, specs[f, place, at.TRANSFORM], window, noise, floor)
 
 
 @inlined
@@ -298,7 +263,7 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
     total = 0.0
     for place in range(layout.specs.shape[1]):
         value = own[f, place]
-        if layout.specs[f, place, SCOPE] == 1:
+        if layout.specs[f, place, at.SCOPE] == OF_HAND:
             for other in range(len(own)):
                 rival = own[other, place]
                 if not layout.alike:
@@ -314,36 +279,40 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
 @compiled_step
 def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other: int) -> float:
     """Return a feature of finger f for another finger; NaN where its stretch is too short."""
-    kind, window = layout.specs[f, place, KIND], layout.specs[f, place, WINDOW]
+    kind, window = layout.specs[f, place, at.KIND], layout.specs[f, place, at.WINDOW]
     if kind >= FIRST_RELATIVE:
         return float(memory.relative[other, kind - FIRST_RELATIVE, window])
-    if memory.counts[other, N_STRETCH] < max(window, 1):
+    if memory.counts[other, at.N_STRETCH] < max(window, 1):
         return math.nan
     value = _feature(
         kind, window, memory.history, memory.blocks, memory.counts, layout.n_levels, other
     )
-    transform, floor = layout.specs[f, place, TRANSFORM], layout.floors[f, place]
-    return float(_transform(value, transform, window, memory.levels[other, NOISE], floor))
+    transform, floor = layout.specs[f, place, at.TRANSFORM], layout.floors[f, place]
+    return float(_transform(value, transform, window, memory.levels[other, at.NOISE], floor))
 
 
 @compiled_step
 def _feature(
     kind: int, window: int, history: Array, blocks: Array, counts: Integers, n_levels: int, f: int
 ) -> float:
-    if kind < FIRST_WINDOWED:
+    """Return a value of a finger whose stretch is long enough for it."""
+    newest = counts[f, at.HISTORY_END] - 1
+    if kind < at.N_CHANNELS:
         # F_a, F_x, F_y or F_z of the newest sample.
-        return float(history[f, kind, counts[f, HISTORY_END] - 1])
-    if kind < SIGMA_XYZ:
-        # m or sigma of F_a: equations 1 and 2.
-        return _moments(blocks, counts, f, 0, window)[kind - FIRST_WINDOWED]
+        return float(history[f, kind, newest])
+    # m or sigma of F_a: equations 1 and 2.
+    if kind == OF_M:
+        return _moments(blocks, counts, f, 0, window)[0]
+    if kind == OF_SIGMA:
+        return _moments(blocks, counts, f, 0, window)[1]
     # change = |F_tip(k) - F_tip(k - N_w + 1)|.
     # sigma_xyz = sqrt(sigma(F_x)^2 + sigma(F_y)^2 + sigma(F_z)^2).
-    total, newest = 0.0, counts[f, HISTORY_END] - 1
+    total = 0.0
     for axis in range(1, 4):
-        if kind == CHANGE:
+        if kind == OF_CHANGE:
             value = history[f, axis, newest] - history[f, axis, newest + 1 - window]
             total += value * value
-        else:
+        elif kind == OF_SIGMA_XYZ:
             row, first = newest - blocks.shape[1], N_SUMS * n_levels * axis
             total += newest_variance(blocks[f], row, first, window)[1]
     return math.sqrt(total)
@@ -354,16 +323,16 @@ def _moments(
     blocks: Array, counts: Integers, f: int, first: int, window: int
 ) -> tuple[float, float]:
     """Return m and sigma of the last `window` values; the stretch must have as many."""
-    return newest_moments(blocks[f], counts[f, HISTORY_END] - 1 - blocks.shape[1], first, window)
+    return newest_moments(blocks[f], counts[f, at.HISTORY_END] - 1 - blocks.shape[1], first, window)
 
 
 @compiled_step
 def _transform(value: float, transform: int, window: int, noise: float, floor: float) -> float:
     # none: v. log: log(sqrt(v^2 + floor^2)).
     # noise: log(max(v, sigma_n / 1000) / sigma_n), with sigma_n = `noise_sigma`.
-    if transform == 0:
+    if transform == NO_TRANSFORM:
         return float(value)
-    if transform == 1:
+    if transform == LOG:
         return math.log(math.sqrt(value * value + floor * floor))
     expected = noise_sigma(noise, window)
     return math.log(max(value, 1e-3 * expected) / expected)

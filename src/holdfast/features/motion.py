@@ -9,39 +9,16 @@ import math
 import numpy as np
 
 from holdfast.compiled import compiled_step, inlined
-from holdfast.features.arrays import (
-    BLOCK_SQUARES,
-    BLOCK_START,
-    BLOCK_STEPS,
-    BLOCK_TAXEL_SQUARES,
-    FORCE_CHANGE,
-    LEAST_NOISE,
-    LEAST_NORMAL,
-    LEAST_TAXEL_NOISE,
-    LOAD,
-    LOAD_TO_NOISE,
-    MIN_NOISE,
-    MOMENT_CHANGE,
-    MOVED_AT,
-    N_STRETCH,
-    N_UNCHANGED,
-    N_USED,
-    NOISE_NOW,
-    PEAK_LOAD,
-    PEAK_TAXEL_LOAD,
-    PRESSURE_SHIFT,
-    REFERENCE,
-    RESIDUAL,
-    SHEAR_CHANGE,
-    SHEAR_RESIDUAL,
-    TAXEL_LOAD,
-    TAXEL_NOISE_NOW,
-    TRACK_MOMENT,
-    TRACK_PRESSURE,
-    Layout,
-    Memory,
-)
+from holdfast.features import arrays as at
+from holdfast.features.arrays import Layout, Memory
+from holdfast.features.specs import RELATIVE_KINDS
 from holdfast.sensors.types import Array, Integers
+
+# Rows of Memory.relative.
+(
+    FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL,
+    PRESSURE_SHIFT, MOMENT_CHANGE, LOAD_TO_NOISE,
+) = range(len(RELATIVE_KINDS))  # fmt: skip
 
 LOAD_DECAY_SECONDS = 5.0
 """Time constant with which the largest load so far is forgotten [s]."""
@@ -77,7 +54,7 @@ def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time:
         f: the finger.
         time: of the sample [s].
     """
-    n, length = memory.counts[f, N_STRETCH], len(memory.taxel_forces)
+    n, length = memory.counts[f, at.N_STRETCH], len(memory.taxel_forces)
     now = (n - 1) % length
     _append_sample(layout, memory, readings, f, now, n > 1)
     _update_noise(layout, memory.motion, memory.counts, f, time)
@@ -135,20 +112,22 @@ def _append_sample(
         dx, dy, dz = fx - track[f, 0, before], fy - track[f, 1, before], fz - track[f, 2, before]
         step = dx * dx + dy * dy + dz * dz
     track[f, 0, now], track[f, 1, now], track[f, 2, now] = fx, fy, fz
-    track[f, TRACK_PRESSURE, now] = cx / weight
-    track[f, TRACK_PRESSURE + 1, now] = cy / weight
-    track[f, TRACK_PRESSURE + 2, now] = cz / weight
-    track[f, TRACK_MOMENT, now] = moment
+    track[f, at.TRACK_PRESSURE, now] = cx / weight
+    track[f, at.TRACK_PRESSURE + 1, now] = cy / weight
+    track[f, at.TRACK_PRESSURE + 2, now] = cz / weight
+    track[f, at.TRACK_MOMENT, now] = moment
     # Sums over the block: squares of steps of F and of all g_i. Repeated samples do not count.
     motion = memory.motion
-    motion[f, TAXEL_LOAD] = math.sqrt(squares)
-    if memory.counts[f, N_UNCHANGED] == 0 and has_previous:
-        motion[f, BLOCK_SQUARES] += step
-        motion[f, BLOCK_TAXEL_SQUARES] += moved
-        motion[f, BLOCK_STEPS] += 1.0
+    motion[f, at.TAXEL_LOAD] = math.sqrt(squares)
+    if memory.counts[f, at.N_UNCHANGED] == 0 and has_previous:
+        motion[f, at.BLOCK_SQUARES] += step
+        motion[f, at.BLOCK_TAXEL_SQUARES] += moved
+        motion[f, at.BLOCK_STEPS] += 1.0
     elif not has_previous:
-        motion[f, BLOCK_SQUARES] = motion[f, BLOCK_TAXEL_SQUARES] = motion[f, BLOCK_STEPS] = 0.0
-        motion[f, BLOCK_START] = math.nan
+        motion[f, at.BLOCK_SQUARES] = motion[f, at.BLOCK_TAXEL_SQUARES] = motion[
+            f, at.BLOCK_STEPS
+        ] = 0.0
+        motion[f, at.BLOCK_START] = math.nan
 
 
 @inlined
@@ -163,23 +142,25 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
     x, y, z = track[f, 0, now], track[f, 1, now], track[f, 2, now]
     # The reference: F and g_i at the least F . n so far.
     normal = x * nx + y * ny + z * nz
-    if normal < motion[f, LEAST_NORMAL]:
-        motion[f, LEAST_NORMAL] = normal
-        motion[f, REFERENCE], motion[f, REFERENCE + 1], motion[f, REFERENCE + 2] = x, y, z
+    if normal < motion[f, at.LEAST_NORMAL]:
+        motion[f, at.LEAST_NORMAL] = normal
+        motion[f, at.REFERENCE], motion[f, at.REFERENCE + 1], motion[f, at.REFERENCE + 2] = x, y, z
         for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
             for axis in range(3):
                 memory.reference[i, axis] = memory.taxel_forces[now, i, axis]
-        motion[f, TAXEL_LOAD] = 0.0
+        motion[f, at.TAXEL_LOAD] = 0.0
     x, y, z = (
-        x - motion[f, REFERENCE],
-        y - motion[f, REFERENCE + 1],
-        z - motion[f, REFERENCE + 2],
+        x - motion[f, at.REFERENCE],
+        y - motion[f, at.REFERENCE + 1],
+        z - motion[f, at.REFERENCE + 2],
     )
     # load = |F - F_ref|, peak(k) = max(load(k), exp(-T / tau) peak(k-1)); the same for taxels.
     keep = math.exp(-layout.period / LOAD_DECAY_SECONDS)
-    motion[f, LOAD] = math.sqrt(x * x + y * y + z * z)
-    motion[f, PEAK_LOAD] = max(motion[f, LOAD], keep * motion[f, PEAK_LOAD])
-    motion[f, PEAK_TAXEL_LOAD] = max(motion[f, TAXEL_LOAD], keep * motion[f, PEAK_TAXEL_LOAD])
+    motion[f, at.LOAD] = math.sqrt(x * x + y * y + z * z)
+    motion[f, at.PEAK_LOAD] = max(motion[f, at.LOAD], keep * motion[f, at.PEAK_LOAD])
+    motion[f, at.PEAK_TAXEL_LOAD] = max(
+        motion[f, at.TAXEL_LOAD], keep * motion[f, at.PEAK_TAXEL_LOAD]
+    )
 
 
 @inlined
@@ -187,40 +168,42 @@ def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: flo
     """Note the time if the force moves: by much more than its noise, and more than an echo."""
     track, motion, length = memory.track, memory.motion, memory.track.shape[2]
     # |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
-    back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, N_STRETCH] - 1, length - 1)
+    back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, at.N_STRETCH] - 1, length - 1)
     then = (now - back) % length
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
-    least = max(MOVED_TO_NOISE * motion[f, NOISE_NOW], RELEASED_SHARE * motion[f, PEAK_LOAD])
+    least = max(MOVED_TO_NOISE * motion[f, at.NOISE_NOW], RELEASED_SHARE * motion[f, at.PEAK_LOAD])
     if x * x + y * y + z * z > least * least:
-        motion[f, MOVED_AT] = time
+        motion[f, at.MOVED_AT] = time
 
 
 @inlined
 def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time: float) -> None:
     """Update the noise: the least mean square step over blocks, halved, and its root."""
-    if math.isnan(motion[f, BLOCK_START]):
-        motion[f, BLOCK_START] = time
+    if math.isnan(motion[f, at.BLOCK_START]):
+        motion[f, at.BLOCK_START] = time
     # Three components, each with at least the noise of rounding.
-    floor = math.sqrt(3.0) * layout.constants[f, MIN_NOISE]
-    steps = motion[f, BLOCK_STEPS]
+    floor = math.sqrt(3.0) * layout.constants[f, at.MIN_NOISE]
+    steps = motion[f, at.BLOCK_STEPS]
     if steps == 0.0:
-        if math.isinf(motion[f, LEAST_NOISE]):
-            motion[f, NOISE_NOW] = motion[f, TAXEL_NOISE_NOW] = floor
+        if math.isinf(motion[f, at.LEAST_NOISE]):
+            motion[f, at.NOISE_NOW] = motion[f, at.TAXEL_NOISE_NOW] = floor
         return
     # noise = sqrt(sum |F(k) - F(k-1)|^2 / (2 n)) over a block of n steps; the same for taxels.
-    force = max(math.sqrt(motion[f, BLOCK_SQUARES] / (2.0 * steps)), floor)
-    taxels = max(math.sqrt(motion[f, BLOCK_TAXEL_SQUARES] / (2.0 * steps)), floor)
-    if time - motion[f, BLOCK_START] >= NOISE_BLOCK_SECONDS and steps >= MIN_BLOCK_STEPS:
+    force = max(math.sqrt(motion[f, at.BLOCK_SQUARES] / (2.0 * steps)), floor)
+    taxels = max(math.sqrt(motion[f, at.BLOCK_TAXEL_SQUARES] / (2.0 * steps)), floor)
+    if time - motion[f, at.BLOCK_START] >= NOISE_BLOCK_SECONDS and steps >= MIN_BLOCK_STEPS:
         # The least over the blocks that are complete.
-        motion[f, LEAST_NOISE] = min(motion[f, LEAST_NOISE], force)
-        motion[f, LEAST_TAXEL_NOISE] = min(motion[f, LEAST_TAXEL_NOISE], taxels)
-        motion[f, BLOCK_SQUARES] = motion[f, BLOCK_TAXEL_SQUARES] = motion[f, BLOCK_STEPS] = 0.0
-        motion[f, BLOCK_START] = time
-    known = not math.isinf(motion[f, LEAST_NOISE])
-    motion[f, NOISE_NOW] = motion[f, LEAST_NOISE] if known else force
-    motion[f, TAXEL_NOISE_NOW] = motion[f, LEAST_TAXEL_NOISE] if known else taxels
+        motion[f, at.LEAST_NOISE] = min(motion[f, at.LEAST_NOISE], force)
+        motion[f, at.LEAST_TAXEL_NOISE] = min(motion[f, at.LEAST_TAXEL_NOISE], taxels)
+        motion[f, at.BLOCK_SQUARES] = motion[f, at.BLOCK_TAXEL_SQUARES] = motion[
+            f, at.BLOCK_STEPS
+        ] = 0.0
+        motion[f, at.BLOCK_START] = time
+    known = not math.isinf(motion[f, at.LEAST_NOISE])
+    motion[f, at.NOISE_NOW] = motion[f, at.LEAST_NOISE] if known else force
+    motion[f, at.TAXEL_NOISE_NOW] = motion[f, at.LEAST_TAXEL_NOISE] if known else taxels
 
 
 @inlined
@@ -228,10 +211,10 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     """Fill the relative features over one lag."""
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
-    noise, taxel_noise = motion[f, NOISE_NOW], motion[f, TAXEL_NOISE_NOW]
+    noise, taxel_noise = motion[f, at.NOISE_NOW], motion[f, at.TAXEL_NOISE_NOW]
     # L = peak + 100 noise.
-    load = motion[f, PEAK_LOAD] + NOISE_WEIGHT * noise
-    taxel_load = motion[f, PEAK_TAXEL_LOAD] + NOISE_WEIGHT * taxel_noise
+    load = motion[f, at.PEAK_LOAD] + NOISE_WEIGHT * noise
+    taxel_load = motion[f, at.PEAK_TAXEL_LOAD] + NOISE_WEIGHT * taxel_noise
     # v = |dF| and |dF - (dF . n) n|, over L.
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
@@ -242,7 +225,7 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     shear = square - across * across
     out[f, SHEAR_CHANGE, lag] = _relative(shear, TWO_AXES * noise * noise, load)
     # v = sqrt(sum |dg_i - mean dg|^2), whole and across the normal, over the taxels' L.
-    n_used = layout.constants[f, N_USED]
+    n_used = layout.constants[f, at.N_USED]
     moved, pressed = _residual(layout, memory, f, now, then, x / n_used, y / n_used, z / n_used)
     echo = taxel_noise * taxel_noise
     out[f, RESIDUAL, lag] = _relative(moved, echo, taxel_load)
@@ -250,11 +233,11 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     # log(|dc| + PRESSURE_FLOOR).
     shift = 0.0
     for axis in range(3):
-        delta = track[f, TRACK_PRESSURE + axis, now] - track[f, TRACK_PRESSURE + axis, then]
+        delta = track[f, at.TRACK_PRESSURE + axis, now] - track[f, at.TRACK_PRESSURE + axis, then]
         shift += delta * delta
     out[f, PRESSURE_SHIFT, lag] = math.log(math.sqrt(shift) + PRESSURE_FLOOR)
     # v = |d moment|, over L.
-    turned = track[f, TRACK_MOMENT, now] - track[f, TRACK_MOMENT, then]
+    turned = track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then]
     out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
     # log(L / noise).
     out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)

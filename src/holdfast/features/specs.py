@@ -1,7 +1,7 @@
 """Feature specifications: the input of a classifier as data that a model file can hold."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
@@ -10,22 +10,34 @@ import numpy.typing as npt
 from holdfast.features.arrays import SPECS_WIDTH
 from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, check_window
 
-RELATIVE_KINDS = (
+VALUE_KINDS = (*FEATURE_NAMES, "sigma_xyz", "change")
+"""Kinds that are computed by `features.kernel` from the force."""
+WINDOWED = ("m", "sigma", "sigma_xyz", "change")
+"""Those of them that are computed over a window; the others need one sample."""
+OF_COMPONENTS = ("sigma_xyz",)
+"""Those of them that need Haar windows of the components of the force, too."""
+UNNAMED = ("sigma_xyz", "change")
+"""Those of them that `parse_features` does not accept by name: `holdfast` has them."""
+
+CHANGE_KINDS = (
     "force_change",
     "shear_change",
     "residual",
     "shear_residual",
     "pressure_shift",
     "moment_change",
-    "load_to_noise",
 )
+RELATIVE_KINDS = (*CHANGE_KINDS, "load_to_noise")
 """Kinds that look back by a lag in seconds, relative to the load; see `features.motion`."""
-KINDS = (*FEATURE_NAMES, "sigma_xyz", "change", *RELATIVE_KINDS)
+
+FEATURE_KINDS = (*VALUE_KINDS, *RELATIVE_KINDS)
+"""All kinds. The code of a kind is its position."""
 TRANSFORMS = ("none", "log", "noise", "relative")
 SCOPES = ("finger", "hand")
-
-WINDOWED = ("m", "sigma", "sigma_xyz", "change")
-"""Kinds that are computed over a window; the others need one sample."""
+if TYPE_CHECKING:
+    Kind = str
+else:
+    Kind = Literal[FEATURE_KINDS]  # msgspec refuses other kinds in a model file
 
 MAX_LAG_SECONDS = 2.0
 """Longest lag of a relative feature [s]."""
@@ -59,23 +71,7 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ValueError: the fields contradict each other.
     """
 
-    kind: Literal[
-        "F_a",
-        "F_x",
-        "F_y",
-        "F_z",
-        "m",
-        "sigma",
-        "sigma_xyz",
-        "change",
-        "force_change",
-        "shear_change",
-        "residual",
-        "shear_residual",
-        "pressure_shift",
-        "moment_change",
-        "load_to_noise",
-    ]
+    kind: Kind
     window: int = 0
     transform: Literal["none", "log", "noise", "relative"] = "none"
     scope: Literal["finger", "hand"] = "finger"
@@ -113,7 +109,7 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"a floor of at least 0 expected, {self.floor} given")
 
     def __str__(self) -> str:
-        text = f"{self.kind}[{self.window}]" if self.window else str(self.kind)
+        text = f"{self.kind}[{self.window}]" if self.window else self.kind
         text = f"{text}[{self.seconds:g} s]" if self.seconds else text
         text = text if self.transform == "none" else f"{self.transform}({text})"
         return text if self.scope == "finger" else f"hand {text}"
@@ -143,8 +139,8 @@ ANY_LAGS = (0.017, 0.067, 0.133, 0.267, 0.533)
 
 ANY_FEATURES = (
     *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)  # type: ignore[arg-type]
-        for kind in RELATIVE_KINDS[:-1]
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in CHANGE_KINDS
         for seconds in ANY_LAGS
     ),
     FeatureSpec("load_to_noise", transform="relative", seconds=ANY_LAGS[0]),
@@ -162,9 +158,10 @@ def parse_features(
     """Return the specifications of named features.
 
     Args:
-        names: names from `FEATURE_NAMES`, as a list or separated by commas. `F_tip` stands for
-            F_x, F_y, F_z. `holdfast` alone stands for the project's own features, which have
-            their own windows; `any` alone for the relative features of any hand.
+        names: names from `VALUE_KINDS` without those in `UNNAMED`, as a list or separated by
+            commas. `F_tip` stands for F_x, F_y, F_z. `holdfast` alone stands for the project's
+            own features, which have their own windows; `any` alone for the relative features of
+            any hand.
         window: N_w, number of samples.
 
     Raises:
@@ -180,16 +177,16 @@ def parse_features(
     wanted: list[str] = []
     for name in (name.strip() for name in given):
         wanted += ["F_x", "F_y", "F_z"] if name == "F_tip" else [name]
-    if unknown := [name for name in wanted if name not in FEATURE_NAMES]:
-        known = ", ".join(FEATURE_NAMES)
+    known = [kind for kind in VALUE_KINDS if kind not in UNNAMED]
+    if unknown := [name for name in wanted if name not in known]:
         raise ValueError(
-            f"unknown feature {unknown[0]!r}; there are {known}, F_tip for F_x, F_y and F_z, and "
-            "holdfast or any alone for the project's own features"
+            f"unknown feature {unknown[0]!r}; there are {', '.join(known)}, F_tip for F_x, F_y "
+            "and F_z, and holdfast or any alone for the project's own features"
         )
     if len(set(wanted)) < len(wanted):
         raise ValueError(f"a feature is given twice in {','.join(wanted)}")
     check_window(window)
-    return tuple(FeatureSpec(n, window if n in WINDOWED else 0) for n in wanted)  # type: ignore[arg-type]
+    return tuple(FeatureSpec(n, window if n in WINDOWED else 0) for n in wanted)
 
 
 def spec_codes(
@@ -210,7 +207,7 @@ def spec_codes(
     own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
     for row, spec, alike in zip(codes, specs, own, strict=False):
         row[:] = (
-            KINDS.index(spec.kind),
+            FEATURE_KINDS.index(spec.kind),
             lags.index(spec.seconds) if spec.seconds else spec.window,
             TRANSFORMS.index(spec.transform),
             SCOPES.index(spec.scope),

@@ -9,53 +9,27 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from holdfast.compiled import compiled_step
+from holdfast.features import arrays as at
 from holdfast.features import kernel
-from holdfast.features.arrays import (
-    AMPLITUDE,
-    BLOCK_START,
-    CHANGED_AT,
-    COUNTS_WIDTH,
-    FIRST_TIME,
-    KIND,
-    LAST_TIME,
-    LEAST_NOISE,
-    LEAST_TAXEL_NOISE,
-    LEVELS_WIDTH,
-    LONGEST_WINDOW,
-    MOTION_WIDTH,
-    MOVED_AT,
-    N_CHANNELS,
-    N_RELATIVE,
-    N_TARED,
-    NOISE,
-    REASON,
-    SIGMA_XYZ,
-    STATUS_WIDTH,
-    TARE,
-    TARE_FIRST,
-    TARE_INTERVAL,
-    TARE_NONE,
-    TARE_SECONDS,
-    TAXELS_WIDTH,
-    TRACK_WIDTH,
-    VALUES_WIDTH,
-    WARM_UP,
-    Layout,
-    Memory,
-    Output,
-)
+from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.haar import N_SUMS, n_levels
-from holdfast.features.specs import FeatureSpec, spec_codes
+from holdfast.features.specs import (
+    FEATURE_KINDS,
+    OF_COMPONENTS,
+    RELATIVE_KINDS,
+    FeatureSpec,
+    spec_codes,
+)
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
 TARE_KINDS = {
-    "seconds": TARE_SECONDS,
-    "first": TARE_FIRST,
-    "none": TARE_NONE,
-    "interval": TARE_INTERVAL,
+    "seconds": at.TARE_SECONDS,
+    "first": at.TARE_FIRST,
+    "none": at.TARE_NONE,
+    "interval": at.TARE_INTERVAL,
 }
 COUNT_NOISE = float(1 / np.sqrt(12))
 """Standard deviation of rounding to whole counts: the least noise of a reading [count]."""
@@ -155,7 +129,7 @@ class FeatureStream:
 
     def baselines(self) -> dict[str, Array]:
         """Return (n_taxels, 3) the tare of each finger that has it [unit of the readings]."""
-        complete = self.memory.counts[:, N_TARED] < 0
+        complete = self.memory.counts[:, at.N_TARED] < 0
         return {
             finger: self.memory.baseline[taxels].copy()
             for (finger, taxels), done in zip(self.slices.items(), complete, strict=True)
@@ -258,7 +232,7 @@ def _extract(
     for k in range(len(times)):
         kernel.advance(layout, memory, output, readings[k], present[k], times[k])
         for f in range(features.shape[1]):
-            amplitude[k, f] = output.values[f, AMPLITUDE]
+            amplitude[k, f] = output.values[f, at.AMPLITUDE]
             for place in range(features.shape[2]):
                 features[k, f, place] = output.features[f, place]
 
@@ -328,41 +302,42 @@ def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
 
 def _memory(layout: Layout) -> Memory:
     n_fingers, n_taxels = len(layout.windows), len(layout.rotations)
-    longest = int(layout.windows[:, LONGEST_WINDOW].max())
-    levels = np.zeros((n_fingers, LEVELS_WIDTH))
-    levels[:, [FIRST_TIME, LAST_TIME, NOISE]] = np.nan
+    longest = int(layout.windows[:, at.LONGEST_WINDOW].max())
+    levels = np.zeros((n_fingers, at.LEVELS_WIDTH))
+    levels[:, [at.FIRST_TIME, at.LAST_TIME, at.NOISE]] = np.nan
     length = int(layout.lags.max()) + 1 if len(layout.lags) else 1
-    motion = np.zeros((n_fingers, MOTION_WIDTH))
-    motion[:, [LEAST_NOISE, LEAST_TAXEL_NOISE]] = np.inf
-    motion[:, BLOCK_START] = np.nan
-    motion[:, MOVED_AT] = -np.inf
-    n_channels = N_CHANNELS if (layout.specs[:, :, KIND] == SIGMA_XYZ).any() else 1
-    taxels = np.zeros((n_taxels, TAXELS_WIDTH))
-    taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
+    motion = np.zeros((n_fingers, at.MOTION_WIDTH))
+    motion[:, [at.LEAST_NOISE, at.LEAST_TAXEL_NOISE]] = np.inf
+    motion[:, at.BLOCK_START] = np.nan
+    motion[:, at.MOVED_AT] = -np.inf
+    of_components = [FEATURE_KINDS.index(kind) for kind in OF_COMPONENTS]
+    n_channels = at.N_CHANNELS if np.isin(layout.specs[:, :, at.KIND], of_components).any() else 1
+    taxels = np.zeros((n_taxels, at.TAXELS_WIDTH))
+    taxels[layout.ignored, at.CHANGED_AT] = np.inf  # never long ago
     return Memory(
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
         taxels=taxels,
-        history=np.zeros((n_fingers, N_CHANNELS, 2 * longest)),
-        counts=np.zeros((n_fingers, COUNTS_WIDTH), dtype=np.int64),
+        history=np.zeros((n_fingers, at.N_CHANNELS, 2 * longest)),
+        counts=np.zeros((n_fingers, at.COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
         taxel_forces=np.zeros((length, n_taxels, 3)),
         reference=np.zeros((n_taxels, 3)),
-        track=np.zeros((n_fingers, TRACK_WIDTH, length)),
+        track=np.zeros((n_fingers, at.TRACK_WIDTH, length)),
         motion=motion,
-        relative=np.full((n_fingers, N_RELATIVE, len(layout.lags)), np.nan),
+        relative=np.full((n_fingers, len(RELATIVE_KINDS), len(layout.lags)), np.nan),
         blocks=np.zeros((n_fingers, longest, n_channels * layout.n_levels * N_SUMS)),
     )
 
 
 def _output(layout: Layout) -> Output:
     n_fingers = len(layout.windows)
-    status = np.zeros((n_fingers, STATUS_WIDTH), dtype=np.int64)
-    status[:, REASON] = TARE if layout.tare_kind == TARE_SECONDS else WARM_UP
+    status = np.zeros((n_fingers, at.STATUS_WIDTH), dtype=np.int64)
+    status[:, at.REASON] = at.TARE if layout.tare_kind == at.TARE_SECONDS else at.WARM_UP
     return Output(
         features=np.full((n_fingers, layout.specs.shape[1]), np.nan),
-        values=np.full((n_fingers, VALUES_WIDTH), np.nan),
+        values=np.full((n_fingers, at.VALUES_WIDTH), np.nan),
         status=status,
     )
 

@@ -63,23 +63,6 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if self.on_fault not in ("hold", "open"):
             raise ValueError(f"on_fault: hold or open expected, {self.on_fault!r} given")
 
-    def check_target(self, force: float) -> None:
-        """Check that a normal force can be a target: it and its rise stay below `max_force`.
-
-        Args:
-            force: the force of a finger when the grip begins [unit of `max_force`].
-
-        Raises:
-            ValueError: the target is not above 0, or the highest scale of it exceeds the limit.
-        """
-        _check("target force", force, above=0.0)
-        if self.max_force is not None and force * self.max_scale > self.max_force:
-            raise ValueError(
-                f"a target of {force:g} times max_scale {self.max_scale:g} is "
-                f"{force * self.max_scale:g}, above max_force {self.max_force:g}: lower the "
-                "target or max_scale"
-            )
-
     def highest_scale(self, force: float) -> float:
         """Return the highest scale of a finger that begins with a normal force.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.errors import MissingExtra, RecordingError
+from holdfast.errors import RecordingError, require_extras
 from holdfast.io.bag_storage import BagConnection, BagStorage
 from holdfast.io.bag_storage.folder import METADATA, open_folder
 from holdfast.io.bag_storage.mcap import open_mcap
@@ -124,19 +124,6 @@ def find_bags(path: Path) -> list[Path]:
     return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural_order)
 
 
-def check_rosbags() -> None:
-    """Check that the package rosbags is installed.
-
-    Raises:
-        MissingExtra: it is not.
-    """
-    try:
-        import rosbags.rosbag1
-        import rosbags.rosbag2  # noqa: F401
-    except ImportError as cause:
-        raise MissingExtra("rosbags", "bags") from cause
-
-
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
     """Open a bag for reading; errors of libraries inside the block become `RecordingError`.
@@ -145,7 +132,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
         RecordingError: the bag cannot be read, is cut or damaged.
         MissingExtra: rosbags is not installed.
     """
-    check_rosbags()
+    require_extras("bags")
     ros2 = path.suffix != ".bag" or path.is_dir()
     try:
         budget = ReadBudget(path)
@@ -177,7 +164,7 @@ def read_poses(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
             in different frames.
         MissingExtra: rosbags is not installed.
     """
-    check_rosbags()
+    require_extras("bags")
     bags = find_bags(path)
     if len(bags) != 1:
         raise RecordingError(

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,16 +11,23 @@ import numpy.typing as npt
 from holdfast.contact import ContactState, Fault, HandEstimate, Reason, StateChanges, with_faults
 from holdfast.detector import Detector
 from holdfast.detector.detector import check_thresholds
-from holdfast.devices.sources import Arrival
+from holdfast.devices.sources.base import Arrival, ModuleSamples
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
-from holdfast.live.rate import RateMonitor, measure_rate
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
 from holdfast.sensors import Sensor
 
+MAX_RATE_CHANGE = 0.2
+"""A rate that differs by more than this from that at the start has changed."""
+RATE_CHECK_INTERVAL = 0.3
+"""Time over which the rate is measured again [s]; longer for rates below 33 Hz."""
+MIN_STEPS = 10
+"""Number of steps that this time has at the rate of the start."""
+PAUSE_PERIODS = 10.0
+"""A longer step between samples is a pause, and not part of the rate [sample periods]."""
 RATE_MEASUREMENT_TIME = 0.5
 """Length of the first part of a stream, from which its rate is measured [s]."""
 MAX_BUFFERED_ARRIVALS = 4096
@@ -30,7 +37,80 @@ The clock of a device may stand still, so the time alone does not limit it."""
 MIN_SILENCE_TIMEOUT = 0.1
 """Minimum time without samples after which a source counts as silent [s]."""
 
-Samples = Mapping[str, npt.NDArray[Any]]
+
+def measure_rate(arrivals: list[Arrival], fingers: Iterable[str]) -> float | None:
+    """Return the median rate of the fingers, from steps without gaps [Hz]; None without steps."""
+    rates = []
+    for name in fingers:
+        steps = np.diff([arrival.time for arrival in arrivals if name in arrival.samples])
+        if len(steps):
+            rates.append(1 / steps[steps <= GAP_PERIODS * np.median(steps)].mean())
+    return float(np.median(rates)) if rates else None
+
+
+class RateMonitor:
+    """Comparison of the rates of the fingers with the rate at the start.
+
+    The detector counts samples, and takes them to be a period of the first rate apart.
+
+    Args:
+        rate: rate at the start [Hz].
+        fingers: names of the fingers.
+
+    Attributes:
+        changed: fingers whose rate has changed.
+    """
+
+    def __init__(self, rate: float, fingers: Iterable[str]) -> None:
+        self._rate = rate
+        self._interval = max(RATE_CHECK_INTERVAL, MIN_STEPS / rate)
+        self._longest_step = PAUSE_PERIODS / rate
+        self._windows = {name: _Window() for name in fingers}
+        self.changed: set[str] = set()
+
+    def update(self, samples: Mapping[str, object], time: float) -> list[str]:
+        """Update the rates of the fingers with a sample at a time [s]; return new notices."""
+        notices: list[str] = []
+        for name in samples:
+            rate = self._windows[name].update(time, self._interval, self._longest_step)
+            if rate is not None:
+                notices += self._compare(name, rate)
+        return notices
+
+    def _compare(self, name: str, rate: float) -> list[str]:
+        if abs(rate / self._rate - 1) <= MAX_RATE_CHANGE:
+            self.changed.discard(name)
+            return []
+        before = bool(self.changed)
+        self.changed.add(name)
+        text = (
+            f"{name} sends {rate:.3g} samples per second, {self._rate:.3g} at the start: "
+            "open the source again"
+        )
+        return [] if before else [text]
+
+
+class _Window:
+    """Number and length of the steps between the samples of a finger."""
+
+    __slots__ = ("_last", "_length", "_n")
+
+    def __init__(self) -> None:
+        self._last = np.nan
+        self._length, self._n = 0.0, 0
+
+    def update(self, time: float, interval: float, longest: float) -> float | None:
+        """Return the rate if the window is as long as `interval` [s], and begin a new one."""
+        step, self._last = time - self._last, time
+        if not step <= longest:  # a pause, or the first sample
+            return None
+        self._length += step
+        self._n += 1
+        if self._length < interval:
+            return None
+        rate = self._n / self._length
+        self._length, self._n = 0.0, 0
+        return rate
 
 
 class StreamEstimate(NamedTuple):
@@ -196,7 +276,7 @@ class ArrivalDetector:
     def _own_thresholds(self) -> dict[str, float]:
         return {name: self.model.finger(name).classifier.threshold for name in self.fingers}
 
-    def subtract_tare(self, samples: Samples) -> dict[str, npt.NDArray[np.float64]]:
+    def subtract_tare(self, samples: ModuleSamples) -> dict[str, npt.NDArray[np.float64]]:
         """Return (n_taxels, 3) minus the tare, for the fingers whose tare is complete."""
         baselines = {} if self._detector is None else self._detector.baselines()
         return {
@@ -256,7 +336,7 @@ class ArrivalDetector:
         changes = self._changes.update(states, estimate.time)
         return [change.finger for change in changes if change.state is ContactState.UNKNOWN]
 
-    def _watch(self, monitor: RateMonitor, samples: Samples, instant: float) -> None:
+    def _watch(self, monitor: RateMonitor, samples: ModuleSamples, instant: float) -> None:
         """Report a change of the rate of fingers as a fault and a notice."""
         self.notices += monitor.update(samples, instant)
         for name in monitor.changed & samples.keys():
@@ -272,7 +352,9 @@ class ArrivalDetector:
             estimate = with_faults(estimate, gap, n_fingers, Reason.GAP)
         return estimate
 
-    def _at_model_rate(self, instant: float, samples: Samples) -> Iterator[tuple[float, Samples]]:
+    def _at_model_rate(
+        self, instant: float, samples: ModuleSamples
+    ) -> Iterator[tuple[float, ModuleSamples]]:
         """Yield the samples unchanged, or resampled to the model's rate."""
         if not self.resampled:
             if samples:

@@ -17,8 +17,8 @@ from holdfast.contact import (
 )
 from holdfast.detector import HAND, Detector
 from holdfast.devices.sources import Arrival, Source
-from holdfast.devices.sources.base import DeviceSource
-from holdfast.live.arrival_detector import ArrivalDetector, Samples, StreamEstimate
+from holdfast.devices.sources.base import DeviceSource, ModuleSamples
+from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
 from holdfast.model import Model
 from holdfast.sensors import sensor
 
@@ -197,7 +197,7 @@ class StreamDetector:
         """
         self._detector.restart_tare()
 
-    def subtract_tare(self, samples: Samples) -> dict[str, npt.NDArray[np.float64]]:
+    def subtract_tare(self, samples: ModuleSamples) -> dict[str, npt.NDArray[np.float64]]:
         """Return (n_taxels, 3) minus the tare, for the fingers whose tare is complete."""
         return self._detector.subtract_tare(samples)
 

@@ -92,7 +92,7 @@ def _draw_recordings(
     left: Axes, right: Axes, metrics: Metrics, styles: Mapping[str, SeriesStyle]
 ) -> None:
     """Draw a row for each recording, the best on top, and a dot for each finger."""
-    ordered = sorted(metrics.recordings, key=lambda each: _mean(each.fingers, "accuracy"))
+    ordered = sorted(metrics.recordings, key=lambda recording: _mean(recording.fingers, "accuracy"))
     _draw_dots(left, metrics, ordered, "accuracy", styles)
     _draw_dots(right, metrics, ordered, "auc_contact", styles)
     right.axvline(0.5, color=GREY, linewidth=0.8, linestyle=":")
@@ -108,7 +108,8 @@ def _draw_recordings(
     )
     left.set_ylim(-0.7, max(len(ordered), 1) - 0.3)
     if len(ordered) <= MAX_NAMED_RECORDINGS:
-        left.set_yticks(range(len(ordered)), [literal(_shortened(each.name)) for each in ordered])
+        names = [literal(_shortened(recording.name)) for recording in ordered]
+        left.set_yticks(range(len(ordered)), names)
     else:
         left.set_yticks([])
         add_labels(left, y=f"{len(ordered)} recordings, by accuracy")
@@ -123,7 +124,7 @@ def _draw_dots(
 ) -> None:
     """Draw one metric of each recording and finger, and a line at its value of all samples."""
     for name, (color, marker, _) in styles.items():
-        rows = [(k, each.fingers.get(name)) for k, each in enumerate(ordered)]
+        rows = [(k, recording.fingers.get(name)) for k, recording in enumerate(ordered)]
         dots = [(getattr(m, field), k) for k, m in rows if m and getattr(m, field) is not None]
         x, y = np.array(dots).reshape(-1, 2).T
         axes.scatter(x, y, s=20, alpha=0.85, linewidths=0, color=color, marker=marker)

@@ -19,7 +19,7 @@ from holdfast.plots.style import COMPONENT_COLOURS, FONT_SIZE, INK, PHASE_COLOUR
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array
 
-Codes = npt.NDArray[np.integer[Any]]
+StateCodes = npt.NDArray[np.integer[Any]]
 
 LOG_SCALE_RATIO = 15.0
 """Sigma has a logarithmic axis if its maximum is this many times its median."""
@@ -52,10 +52,10 @@ class FingerSeries(NamedTuple):
     amplitude: Array
     mean: Array
     sigma: Array
-    labels: Codes
+    labels: StateCodes
     phases: npt.NDArray[np.str_]
     unit: str = "count"
-    gaps: Codes = np.empty(0, dtype=np.int64)
+    gaps: StateCodes = np.empty(0, dtype=np.int64)
     slip: tuple[Array, Array] | None = None
 
     @property
@@ -130,13 +130,13 @@ def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Arra
     return ends.ravel(), pairs.T.ravel()
 
 
-def _first_of_each(values: Array, extremes: Array, edges: Codes) -> Codes:
+def _first_of_each(values: Array, extremes: Array, edges: StateCodes) -> StateCodes:
     """Return the position of the first sample of each stretch that equals its extreme.
 
     Without one, because the extreme is NaN, it is that of a later stretch, or the last edge.
     """
-    found = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
-    return np.append(found, len(values))[np.searchsorted(found, edges[:-1])]
+    places = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
+    return np.append(places, len(values))[np.searchsorted(places, edges[:-1])]
 
 
 def draw_curve(

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.definitions import FIELD_SIZES, NUMBER_CODES, Definition, Field
+from holdfast.ros.definitions import FIELD_SIZES, NUMBER_CODES, Definition, MessageField
 
 HEAD = b"\x00\x01\x00\x00"
 """First bytes of a CDR message: little endian, no options. Alignment counts from their end."""
@@ -67,7 +67,7 @@ class MessageDecoder:
     def _message(self, source: "_Ros1Bytes", name: str) -> dict[str, Any]:
         return {f.name: self._field(source, f) for f in self._definition.types[name]}
 
-    def _field(self, source: "_Ros1Bytes", field: Field) -> Any:  # noqa: ANN401 (any ROS type)
+    def _field(self, source: "_Ros1Bytes", field: MessageField) -> Any:  # noqa: ANN401 (any ROS type)
         if field.size is None:
             return self._value(source, field.kind)
         n = field.size or source.length()
@@ -117,7 +117,7 @@ class MessageEncoder:
         for field in self._definition.types[name]:
             self._field(data, field, message[field.name])
 
-    def _field(self, data: bytearray, field: Field, value: Any) -> None:  # noqa: ANN401
+    def _field(self, data: bytearray, field: MessageField, value: Any) -> None:  # noqa: ANN401
         if field.size is None:
             self._value(data, field.kind, value)
             return
@@ -158,7 +158,7 @@ def _point_types(definition: Definition) -> dict[str, str]:
         name: number
         for name, fields in definition.types.items()
         for number in NUMBER_CODES
-        if fields == tuple(Field(axis, number) for axis in "xyz")
+        if fields == tuple(MessageField(axis, number) for axis in "xyz")
     }
 
 

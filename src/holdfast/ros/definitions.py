@@ -70,7 +70,7 @@ _FIELD = re.compile(
 )
 
 
-class Field(NamedTuple):
+class MessageField(NamedTuple):
     """One field of a message.
 
     Attributes:
@@ -94,11 +94,11 @@ class Definition(NamedTuple):
     """
 
     name: str
-    types: Mapping[str, tuple[Field, ...]]
+    types: Mapping[str, tuple[MessageField, ...]]
     sizes: Mapping[str, int]
 
     @property
-    def fields(self) -> tuple[Field, ...]:
+    def fields(self) -> tuple[MessageField, ...]:
         """Fields of the message itself."""
         return self.types[self.name]
 
@@ -126,7 +126,7 @@ def parse_definition(name: str, text: str) -> Definition:
 
     Example:
         >>> parse_definition("pkg/Named", "string name\nfloat64[] values # [N]").fields[1]
-        Field(name='values', kind='float64', size=0)
+        MessageField(name='values', kind='float64', size=0)
     """
     if len(text) > MAX_TEXT_SIZE:
         raise ValueError(f"{name}: at most {MAX_TEXT_SIZE} characters expected, {len(text)} given")
@@ -162,7 +162,7 @@ def field_paths(definition: Definition) -> set[str]:
     return found
 
 
-def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[Field]:
+def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[MessageField]:
     for line in body.splitlines():
         code = line.split("#", maxsplit=1)[0].strip()
         if not code:
@@ -174,7 +174,9 @@ def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[Field]
             continue  # a constant
         size = int(match["size"] or 0) if match["many"] else None
         bounded = match["many"] and "<=" in match["many"]
-        yield Field(match["name"], _kind(match["kind"], block, blocks), 0 if bounded else size)
+        yield MessageField(
+            match["name"], _kind(match["kind"], block, blocks), 0 if bounded else size
+        )
 
 
 def _kind(kind: str, block: str, blocks: Mapping[str, str]) -> str:
@@ -190,7 +192,7 @@ def _kind(kind: str, block: str, blocks: Mapping[str, str]) -> str:
 
 def _measure(
     name: str,
-    types: Mapping[str, tuple[Field, ...]],
+    types: Mapping[str, tuple[MessageField, ...]],
     extents: dict[str, _Extent],
     inside: tuple[str, ...] = (),
 ) -> _Extent:

@@ -13,7 +13,7 @@ from holdfast.sensors.types import Array
 MAX_URDF_SIZE = 1 << 26
 """Maximum size of a URDF file [bytes]."""
 
-Pose = tuple[Array, Array]
+LinkPose = tuple[Array, Array]
 """Position [m] and rotation matrix."""
 Quaternion = tuple[float, float, float, float]
 """x, y, z, w."""
@@ -118,7 +118,7 @@ def _link(joint: ET.Element, end: str) -> str:
     return "" if element is None else element.get("link", "")
 
 
-def _frames(base: str, parents: Mapping[str, _Joint]) -> dict[str, Pose]:
+def _frames(base: str, parents: Mapping[str, _Joint]) -> dict[str, LinkPose]:
     """Return the pose of `base` and of each link below it in the frame of `base`.
 
     Args:
@@ -128,7 +128,7 @@ def _frames(base: str, parents: Mapping[str, _Joint]) -> dict[str, Pose]:
     below: dict[str, list[str]] = {}
     for link, joint in parents.items():
         below.setdefault(joint.parent, []).append(link)
-    frames: dict[str, Pose] = {base: (np.zeros(3), np.eye(3))}
+    frames: dict[str, LinkPose] = {base: (np.zeros(3), np.eye(3))}
     left = [base]
     while left:
         link = left.pop()
@@ -139,7 +139,7 @@ def _frames(base: str, parents: Mapping[str, _Joint]) -> dict[str, Pose]:
     return frames
 
 
-def _pose(joint: _Joint, parent: Pose) -> Pose:
+def _pose(joint: _Joint, parent: LinkPose) -> LinkPose:
     """Return the pose of the link below a joint, in the frame that the parent's pose is in."""
     position, rotation = parent
     return position + rotation @ joint.position, rotation @ joint.rotation

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.classifiers import LinearClassifier, Parameters, Samples
-from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.classifiers.folds import group_folds, time_folds
+from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.model import Model
 from holdfast.sensors.types import Array, Flags, Integers
 from holdfast.training.dataset_scan import DatasetScan

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from holdfast.classifiers.cause import CAUSES
+from holdfast.classifiers.cause import ALL_CAUSES
 from holdfast.contact import SIGNAL_FAULTS, STABLE, UNKNOWN, Cause, Fault
 from holdfast.detector import FingerTrace, detect
 from holdfast.metrics import (
@@ -32,7 +32,7 @@ from holdfast.training.dataset_scan import (
 )
 from holdfast.training.verdict import LoadedTares, verdict
 
-TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
+TARE_LOADED_BIT = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
 """Bit of the fault of a tare that was taken under load."""
 
 
@@ -54,7 +54,7 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
         ModelError: the recording has other fingers or sensors.
     """
     detection = detect(model, recording)
-    loaded = any((trace.faults & TARE_LOADED).any() for trace in detection.fingers.values())
+    loaded = any((trace.faults & TARE_LOADED_BIT).any() for trace in detection.fingers.values())
     exact = labels_by_truth(recording, LabelRule(margin=0.0))
     fingers = {
         name: FingerDecisions(
@@ -86,7 +86,7 @@ def _slip_decisions(
     return SlipDecisions(
         trace.times,
         trace.slip_probability,
-        trace.cause == CAUSES.index(Cause.SLIP) + 1,
+        trace.cause == ALL_CAUSES.index(Cause.SLIP) + 1,
         rule.hold,
         slip_truth(recording, finger, trace.times, quiet),
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
 from holdfast.classifiers import Adapted, ModelRecipe, recipe
-from holdfast.classifiers.adapted import linear_prior
+from holdfast.classifiers.logreg import linear_prior
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window

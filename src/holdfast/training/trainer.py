@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from holdfast.classifiers import Parameters, Samples
-from holdfast.classifiers.adapted import linear_prior
+from holdfast.classifiers.logreg import linear_prior
 from holdfast.metrics import (
     Decisions,
     Metrics,

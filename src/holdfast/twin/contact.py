@@ -11,7 +11,7 @@ import numpy as np
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.objects import GraspObject, solid
-from holdfast.twin.shapes import AMPLITUDE, MAX_RELIEF, probe, relief, unpacked
+from holdfast.twin.shapes import MAX_RELIEF, TEXTURE_AMPLITUDE, probe, relief, unpacked
 from holdfast.twin.skin import (
     BALL,
     BX,
@@ -20,32 +20,30 @@ from holdfast.twin.skin import (
     N_BRISTLE,
     SLIDING,
     SLIPPING,
-    Skin,
-    friction,
-    memory_after,
-    pressure,
-    tangential,
-)
-from holdfast.twin.surface import Surface
-from holdfast.twin.vectors import (
     Nine,
+    Skin,
     Three,
     add,
     apply,
     apply_transposed,
     cross,
     dot,
+    friction,
+    memory_after,
+    pressure,
     scaled,
     subtract,
+    tangential,
 )
-
-N_BODY = 18
-"""Numbers of a body in the world frame: position [m], rotation matrix (9, by rows), velocity of
-its origin [m/s] and angular velocity [rad/s]."""
+from holdfast.twin.surface import Surface
 
 # Columns of Contact.tips.
 FX, FY, FZ, TX, TY, TZ = range(6)  # force [N] and torque [N m] on the fingertip, world frame
-SLIP, SLIPPING_SHARE, LOAD = 6, 7, 8  # slip speed [m/s], slipping share of the load, load [N]
+TIP_SLIP, TIP_SLIPPING_SHARE, TIP_LOAD = (
+    6,
+    7,
+    8,
+)  # slip speed [m/s], slipping share of the load, load [N]
 N_TIP = 9
 
 NODE_STIFFNESS, PATH_LENGTH = 3, 4  # columns of Constants.nodes beside the position
@@ -95,39 +93,24 @@ class Contact(NamedTuple):
         return self.tips[:, FX : FZ + 1]
 
     @property
-    def tip_torque(self) -> Array:
-        """Torques about the origins of the fingertip frames, (n_tips, 3), world frame [N m]."""
-        return self.tips[:, TX : TZ + 1]
-
-    @property
     def contact_force(self) -> Array:
         """Force of each finger on the object in the world frame, (n_tips, 3) [N]."""
         return -self.tip_force
 
     @property
-    def object_force(self) -> Array:
-        """Force of all fingers on the object in the world frame, (3,) [N]."""
-        return self.wrench[:3]
-
-    @property
-    def object_torque(self) -> Array:
-        """Torque of all fingers about the object's centre of mass, (3,), world frame [N m]."""
-        return self.wrench[3:]
-
-    @property
     def slip_speed(self) -> Array:
         """Mean slip speed of the nodes, weighted by their load, (n_tips,) [m/s]."""
-        return self.tips[:, SLIP]
+        return self.tips[:, TIP_SLIP]
 
     @property
     def slipping_share(self) -> Array:
         """Share of the load that rests on slipping nodes, (n_tips,)."""
-        return self.tips[:, SLIPPING_SHARE]
+        return self.tips[:, TIP_SLIPPING_SHARE]
 
     @property
     def load(self) -> Array:
         """Sum of the normal forces of the nodes, (n_tips,) [N]."""
-        return self.tips[:, LOAD]
+        return self.tips[:, TIP_LOAD]
 
 
 def new_contact(surface: Surface, n_tips: int) -> Contact:
@@ -248,12 +231,12 @@ def _is_far(constants: Constants, pose: Pose) -> bool:
     """Return whether the ball that contains all nodes is clear of the object."""
     skin, solid = constants.skin, constants.solid
     x, y, z = add(apply(pose[0], (skin[BALL], skin[BALL + 1], skin[BALL + 2])), pose[1])
-    return bool(probe(solid, x, y, z)[0] > skin[BALL + 3] + MAX_RELIEF * solid[AMPLITUDE])
+    return bool(probe(solid, x, y, z)[0] > skin[BALL + 3] + MAX_RELIEF * solid[TEXTURE_AMPLITUDE])
 
 
 @compiled
 def _clear_tip(state: Contact, tip: int) -> None:
-    if state.tips[tip, LOAD] != 0.0:
+    if state.tips[tip, TIP_LOAD] != 0.0:
         state.bristles[tip] = 0.0
         state.node_forces[tip] = 0.0
         state.tips[tip] = 0.0
@@ -279,7 +262,7 @@ def _sum_nodes(
     nodes, bristles, forces = constants.nodes, state.bristles[tip], state.node_forces[tip]
     solid, skin = unpacked(constants.solid), _unpacked_skin(constants.skin)
     keep = memory_after(skin, dt)
-    reach = MAX_RELIEF * solid[AMPLITUDE]
+    reach = MAX_RELIEF * solid[TEXTURE_AMPLITUDE]
     load, slip, slipping = 0.0, 0.0, 0.0
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     clear = -1.0
@@ -317,8 +300,11 @@ def _sum_nodes(
         slip += pressed * bristle[SLIDING]
         slipping += pressed * (bristle[SLIDING] > skin[SLIPPING])
     weight = max(load, 1e-300)
-    state.tips[tip, SLIP], state.tips[tip, SLIPPING_SHARE] = slip / weight, slipping / weight
-    state.tips[tip, LOAD] = load
+    state.tips[tip, TIP_SLIP], state.tips[tip, TIP_SLIPPING_SHARE] = (
+        slip / weight,
+        slipping / weight,
+    )
+    state.tips[tip, TIP_LOAD] = load
     return force, torque
 
 

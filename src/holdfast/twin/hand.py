@@ -46,9 +46,6 @@ TIP_MASS = 0.0266
 """Mass of the skin [kg], from XELA; it replaces a rubber tip of 16.8 g."""
 TIP_RADIUS, TIP_BEGIN, TIP_END = 0.0136, 0.006, 0.022
 """Radius and ends, in the fingertip frame, of the capsule that is drawn for the skin [m]."""
-MIRRORED = np.array([-1.0, 1.0, 1.0, 1.0] * 3 + [1.0] * 4)
-"""Signs that turn joint angles of one hand into those of the other in the mirrored pose. The
-vendor's left hand spreads its fingers about the same axis as the right hand."""
 MOTOR_SIZE = (0.0106, 0.0142)
 """Radius and half length of the drawn motors [m]."""
 SHELL_COLOUR, FRAME_COLOUR = ".74 .75 .78 1", ".25 .27 .31 1"
@@ -87,26 +84,18 @@ class HandArrays(NamedTuple):
     object_body: int
 
 
-def hand_xml(side: str = "right", item: GraspObject | None = None) -> str:
-    """Return the MJCF of the hand, on its side with the palm fixed, and of the object.
+def hand_xml(item: GraspObject | None = None) -> str:
+    """Return the MJCF of the right hand, on its side with the palm fixed, and of the object.
 
-    Palm and world share the x axis. The index finger is on top. The fingers of the right hand
-    point along the world's -y, those of the left hand, its mirror image, along y. They curl
-    about a vertical axis, and gravity acts along all pads.
+    Palm and world share the x axis. The index finger is on top. The fingers point along the
+    world's -y. They curl about a vertical axis, and gravity acts along all pads.
 
     Args:
-        side: "right" or "left".
         item: object that floats before the hand; None for none.
-
-    Raises:
-        ValueError: the side is neither of the two.
     """
-    if side not in ("right", "left"):
-        raise ValueError(f"side 'right' or 'left' expected, {side!r} given")
-    rows = [_mirrored(row) if side == "left" else row for row in _table()]
-    turn = np.pi / 2 if side == "right" else -np.pi / 2
+    rows = _table()
     body = "" if item is None else object_xml(item)
-    return f"""<mujoco model="allegro {side}">
+    return f"""<mujoco model="allegro right">
   <compiler angle="radian" eulerseq="XYZ"/>
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}">
     <flag contact="disable"/>
@@ -117,16 +106,17 @@ def hand_xml(side: str = "right", item: GraspObject | None = None) -> str:
   </visual>
   <default>
     <geom contype="0" conaffinity="0" rgba="{SHELL_COLOUR}"/>
-    <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}" limited="true"/>
+    <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}"
+      limited="true"/>
   </default>
   <asset>
     <texture type="skybox" builtin="gradient" rgb1=".93 .95 .97" rgb2=".99 .99 .99" width="256"
       height="256"/>
   </asset>
   <worldbody>
-    <light pos=".5 {-0.4 * np.sign(turn)} .9" dir="-.4 {0.35 * np.sign(turn)} -.9"
+    <light pos=".5 -0.4 .9" dir="-.4 0.35 -.9"
       diffuse=".55 .55 .55"/>
-    <body name="palm" euler="{turn!r} 0 0">
+    <body name="palm" euler="{np.pi / 2!r} 0 0">
       {_box_xml(PALM_SIDES, PALM_MIDDLE, PALM_MASS)}
       {"".join(_link_xml(row, rows) for row in rows if row["parent"] == "palm_link")}
     </body>
@@ -154,9 +144,9 @@ class HandModel:
     mounts: Array = field(default_factory=lambda: MOUNTS)
 
     @classmethod
-    def build(cls, item: GraspObject, side: str = "right") -> "HandModel":
+    def build(cls, item: GraspObject) -> "HandModel":
         """Build the model of the hand before an object."""
-        model = mujoco.MjModel.from_xml_string(hand_xml(side, item))
+        model = mujoco.MjModel.from_xml_string(hand_xml(item))
         last = [model.body(f"link_{JOINTS[f] + 3}.0").id for f in FINGERS]
         return cls(model, mujoco.MjData(model), np.array(last), model.body("object").id)
 
@@ -174,26 +164,14 @@ class HandModel:
             self.model.body_rootid, self.tips, self.mounts, self.object_body,
         )  # fmt: skip
 
-    def bodies(self, out: Array) -> None:
-        """Write pose and motion of the fingertip frames and the object in the world, (5, 18)."""
-        fill_bodies(self.arrays, out)
-
-    def apply(self, tips: Array, object_wrench: Array, bodies: Array) -> None:
-        """Apply force and torque on fingertips and object in MuJoCo.
-
-        Args:
-            tips: (4, 6 or more) force [N] and torque about the frame's origin [N m] on the
-                fingertips in the world frame.
-            object_wrench: (6,) force [N] and torque about the centre of mass [N m] on the object
-                in the world frame.
-            bodies: poses as `bodies` writes them.
-        """
-        apply_forces(self.arrays, tips, object_wrench, bodies)
-
 
 @compiled
 def fill_bodies(hand: HandArrays, out: Array) -> None:
-    """Write the rows of `HandModel.bodies`."""
+    """Write pose and motion of the fingertip frames and the object in the world, (5, 18).
+
+    A row has position [m], rotation matrix (9, by rows), velocity of its origin [m/s] and angular
+    velocity [rad/s].
+    """
     for i in range(len(hand.tips)):
         b = hand.tips[i]
         for r in range(3):
@@ -224,7 +202,16 @@ def _fill_motion(cvel: Array, com: Array, row: Array) -> None:
 
 @compiled
 def apply_forces(hand: HandArrays, tips: Array, object_wrench: Array, bodies: Array) -> None:
-    """Write MuJoCo's forces on bodies, see `HandModel.apply`."""
+    """Apply force and torque on fingertips and object in MuJoCo.
+
+    Args:
+        hand: arrays of MuJoCo's state.
+        tips: (4, 6 or more) force [N] and torque about the frame's origin [N m] on the
+            fingertips in the world frame.
+        object_wrench: (6,) force [N] and torque about the centre of mass [N m] on the object in
+            the world frame.
+        bodies: poses as `fill_bodies` writes them.
+    """
     out = hand.xfrc_applied
     for i in range(len(hand.tips)):
         b = hand.tips[i]
@@ -246,24 +233,9 @@ def _table() -> Rows:
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
-def _mirrored(row: dict[str, str]) -> dict[str, str]:
-    """Return the link of the other hand: y becomes -y, and turns about x and z change sign.
-
-    The axis of `MIRRORED` joints, whose limits are symmetric, stays.
-    """
-    names = ["y", "roll", "yaw", "middle_y"]
-    if MIRRORED[_number(row)] > 0:
-        names += ["axis_x", "axis_z"]
-    return row | {name: repr(-float(row[name])) for name in names}
-
-
-def _number(row: dict[str, str]) -> int:
-    return int(row["joint"].removeprefix("joint_").removesuffix(".0"))
-
-
 def _link_xml(row: dict[str, str], rows: Rows) -> str:
     children = "".join(_link_xml(other, rows) for other in rows if other["parent"] == row["link"])
-    number = _number(row)
+    number = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
     sides = tuple(float(row[f"side_{a}"]) for a in "xyz")
     middle = tuple(float(row[f"middle_{a}"]) for a in "xyz")
     tip = "" if children else _tip_xml(number)

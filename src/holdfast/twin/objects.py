@@ -13,21 +13,21 @@ import numpy.typing as npt
 from holdfast.files import read_input
 from holdfast.sensors.types import Array, rebuilt
 from holdfast.twin.shapes import (
-    AMPLITUDE,
     AROUND_2,
     BOX,
     CAPSULE,
     CENTRE,
     CODE,
+    EXTENSION,
     HEXAGON,
     MU_KINETIC,
     MU_STATIC,
     N_OBJECT_NUMBERS,
     REVOLVED,
-    ROUNDING,
     SIDE_LENGTH,
     SIDE_OUT,
     SIDE_UP,
+    TEXTURE_AMPLITUDE,
     distances,
 )
 
@@ -36,7 +36,7 @@ BUILT_IN_OBJECTS = Path(__file__).with_name("tables") / "objects.toml"
 OTHER_OBJECTS = Path(__file__).with_name("tables") / "other_objects.toml"
 """Table of other objects, for tests with objects that no model has seen."""
 
-MAX_FILE_SIZE = 1 << 20
+MAX_TABLE_SIZE = 1 << 20
 """Maximum size of a table of objects [bytes]."""
 
 SHAPES = {
@@ -49,7 +49,7 @@ SHAPES = {
 }
 """Meaning of the sizes of each shape, in order [m]."""
 
-LIMITS = {
+COLUMN_LIMITS = {
     "size": (0.001, 0.2),
     "mass": (0.005, 2.0),
     "friction": (0.05, 2.0),
@@ -153,7 +153,7 @@ def load_objects(path: str | Path | None = None) -> dict[str, GraspObject]:
     if path is None:
         return dict(_built_in())
     try:
-        table = tomllib.loads(read_input(path, MAX_FILE_SIZE).decode())
+        table = tomllib.loads(read_input(path, MAX_TABLE_SIZE).decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as cause:
         raise ValueError(f"{path} is no TOML table of objects: {cause}") from cause
     if not table:
@@ -196,7 +196,7 @@ def make_object(name: str, row: object) -> GraspObject:
 
 def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
     """Return shape and numbers of a line of the table, by column."""
-    columns = ("shape", *LIMITS)
+    columns = ("shape", *COLUMN_LIMITS)
     if not isinstance(row, dict):
         raise ValueError(f"a line of fields expected ({', '.join(columns)})")
     if unknown := sorted(set(row) - set(columns)):
@@ -211,12 +211,12 @@ def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
         "friction": ("static", "kinetic"),
         "texture": ("amplitude", "wavelength"),
     }
-    return shape, {key: _numbers(row, key, names.get(key, ("",))) for key in LIMITS}
+    return shape, {key: _numbers(row, key, names.get(key, ("",))) for key in COLUMN_LIMITS}
 
 
 def _numbers(row: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[float, ...]:
     values = row[key] if isinstance(row[key], list) else [row[key]]
-    low, high = LIMITS[key]
+    low, high = COLUMN_LIMITS[key]
     if len(values) != len(names):
         expected = ", ".join(names) or "one number"
         raise ValueError(f"{key}: {expected} expected, {len(values)} numbers given")
@@ -268,9 +268,9 @@ def _core(shape: str, size: tuple[float, ...]) -> Array:
     core = np.zeros(N_OBJECT_NUMBERS)
     core[CODE] = shape_code(shape)
     if shape in ("sphere", "capsule"):
-        core[1], core[ROUNDING] = size[_height(shape)] - size[0], size[0]
+        core[1], core[EXTENSION] = size[_height(shape)] - size[0], size[0]
         return core
-    core[ROUNDING] = size[-1]
+    core[EXTENSION] = size[-1]
     inner = [value - size[-1] for value in size[:-1]]
     if shape == "cylinder":
         _revolve(core, size[0], size[0], *size[1:])
@@ -300,7 +300,7 @@ def solid(item: GraspObject) -> Array:
     """
     packed = _core(item.shape, item.size)
     packed[CENTRE] = -item.half_height - item.foot[2]
-    packed[AMPLITUDE : AROUND_2 + 1] = _texture(item)
+    packed[TEXTURE_AMPLITUDE : AROUND_2 + 1] = _texture(item)
     packed[MU_STATIC], packed[MU_KINETIC] = item.mu_static, item.mu_kinetic
     return packed
 
@@ -327,10 +327,27 @@ def distance_to(item: GraspObject, points: npt.ArrayLike) -> Array:
         >>> round(float(distance_to(object_named("ball"), [0.0, 0.0, 0.043])), 3)
         0.01
     """
-    given = np.asarray(points, dtype=np.float64)
-    flat = np.ascontiguousarray(given.reshape(-1, 3))
+    places = np.asarray(points, dtype=np.float64)
+    flat = np.ascontiguousarray(places.reshape(-1, 3))
     signed: Array = distances(solid(item), flat)
-    return signed.reshape(given.shape[:-1])
+    return signed.reshape(places.shape[:-1])
+
+
+def reach_of(item: GraspObject, direction: Array, height: float) -> float:
+    """Return the distance from the object's axis to its surface in a direction [m].
+
+    Args:
+        item: the object.
+        direction: (3,) horizontal unit vector in the object's frame.
+        height: height over the centre of mass [m].
+
+    Returns:
+        The distance of the last point inside, of points 0.1 mm apart; NaN without any.
+    """
+    distances = np.linspace(0.0, 0.09, 901)
+    points = distances[:, None] * direction + [0.0, 0.0, height]
+    inside = np.flatnonzero(distance_to(item, points) < 0)
+    return float(distances[inside[-1]]) if len(inside) else math.nan
 
 
 def _mass_of(core: Array) -> tuple[float, float, Array]:
@@ -354,7 +371,7 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
 
 def _extent(core: Array) -> tuple[float, float]:
     """Return half width and half height of the box around a core and its rounding [m]."""
-    code, rounding = int(core[CODE]), float(core[ROUNDING])
+    code, rounding = int(core[CODE]), float(core[EXTENSION])
     if code == CAPSULE:
         return rounding, float(core[1]) + rounding
     if code == HEXAGON:

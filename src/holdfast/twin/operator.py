@@ -150,6 +150,23 @@ def hold_wrench(
 
 
 @compiled
+def disturb_wrench(
+    body: Array,
+    origin: Array,
+    parameters: Array,
+    style: int,
+    duration: float,
+    tremor: Array,
+    rms: float,
+    elapsed: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Compute force and torque of a disturbance of any style, see `push_wrench`."""
+    if style == MOVE:
+        return move_wrench(body, origin, parameters, duration, tremor, rms, elapsed)
+    return push_wrench(body, origin, parameters, style, duration, tremor, rms, elapsed)
+
+
+@compiled
 def push_wrench(
     body: Array,
     origin: Array,

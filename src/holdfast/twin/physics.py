@@ -20,10 +20,17 @@ from numba.extending import intrinsic
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact, touch
-from holdfast.twin.control import Controller, control
-from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
+from holdfast.twin.control import STEPS_PER_CONTROL, Controller, control
+from holdfast.twin.hand import (
+    SUBSTEPS,
+    TIMESTEP,
+    HandArrays,
+    HandModel,
+    apply_forces,
+    fill_bodies,
+)
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
+from holdfast.twin.operator import disturb_wrench, hold_wrench
 
 FALLING_BODY = """<mujoco><worldbody>
   <body><freejoint/><geom size=".01"/></body>
@@ -45,20 +52,6 @@ class HalfSteps(NamedTuple):
     second_half: int
     model: int
     data: int
-
-
-class Steps(NamedTuple):
-    """Steps of a sample.
-
-    Attributes:
-        n: number of steps.
-        period: duration of a step [s], that of the model.
-        per_control: steps in a step of the controller.
-    """
-
-    n: int
-    period: float
-    per_control: int
 
 
 class Action(NamedTuple):
@@ -104,6 +97,26 @@ class Wrenches(NamedTuple):
 
     outside: Array
     total: Array
+
+
+class Physics(NamedTuple):
+    """State of hand, object and contact, which a step writes in place, and what it needs.
+
+    Attributes:
+        arrays: arrays of MuJoCo's state.
+        contact: state of the contact.
+        constants: skin and object.
+        controller: controller of the hand.
+        bodies: (5, 18) fingertip frames and object.
+        wrenches: force and torque on the object.
+    """
+
+    arrays: HandArrays
+    contact: Contact
+    constants: Constants
+    controller: Controller
+    bodies: Array
+    wrenches: Wrenches
 
 
 def advance_of(hand: HandModel) -> Callable[..., float]:
@@ -184,90 +197,45 @@ _call = cast("Callable[[int, int, int], None]", intrinsic(_declare_call))
 
 @compiled
 def advance_sample(
-    engine: HalfSteps,
-    steps: Steps,
-    arrays: HandArrays,
-    contact: Contact,
-    constants: Constants,
-    controller: Controller,
-    tick: int,
-    target: Array,
-    action: Action,
-    bodies: Array,
-    wrenches: Wrenches,
+    engine: HalfSteps, physics: Physics, tick: int, target: Array, action: Action
 ) -> float:
     """Advance the physics by one sample.
 
     Args:
         engine: model and state of MuJoCo.
-        steps: steps of the sample.
-        arrays: arrays of this state.
-        contact: state of the contact; it is written.
-        constants: skin and object.
-        controller: controller of the hand; it is written.
+        physics: everything else; it is written.
         tick: number of the first step.
         target: (16,) set-points of the joints [rad].
         action: what the operator does.
-        bodies: (5, 18) fingertip frames and object; they are written.
-        wrenches: force and torque on the object; they are written.
 
     Returns:
         The largest error of a set-point, in a glitch of the controller [rad].
     """
     worst, time = 0.0, action.time
-    for k in range(steps.n):
+    for k in range(SUBSTEPS):
         _call(engine.first_half, engine.model, engine.data)
-        error = _apply_all(
-            steps, arrays, contact, constants, controller, tick, k, target, action, time, bodies,
-            wrenches,
-        )  # fmt: skip
-        worst = max(worst, error)
+        worst = max(worst, _apply_all(physics, tick, k, target, action, time))
         _call(engine.second_half, engine.model, engine.data)
-        time += steps.period  # as MuJoCo adds it
+        time += TIMESTEP  # as MuJoCo adds it
     return worst
 
 
 def advance_sample_by_calls(
-    hand: HandModel,
-    steps: Steps,
-    arrays: HandArrays,
-    contact: Contact,
-    constants: Constants,
-    controller: Controller,
-    tick: int,
-    target: Array,
-    action: Action,
-    bodies: Array,
-    wrenches: Wrenches,
+    hand: HandModel, physics: Physics, tick: int, target: Array, action: Action
 ) -> float:
     """Advance the physics by one sample, as `advance_sample`, by MuJoCo's public functions."""
     worst, time = 0.0, action.time
-    for k in range(steps.n):
+    for k in range(SUBSTEPS):
         mujoco.mj_step1(hand.model, hand.data)
-        error = _apply_all(
-            steps, arrays, contact, constants, controller, tick, k, target, action, time, bodies,
-            wrenches,
-        )  # fmt: skip
-        worst = max(worst, error)
+        worst = max(worst, _apply_all(physics, tick, k, target, action, time))
         mujoco.mj_step2(hand.model, hand.data)
-        time += steps.period  # as MuJoCo adds it
+        time += TIMESTEP  # as MuJoCo adds it
     return worst
 
 
 @compiled
 def _apply_all(
-    steps: Steps,
-    arrays: HandArrays,
-    contact: Contact,
-    constants: Constants,
-    controller: Controller,
-    tick: int,
-    k: int,
-    target: Array,
-    action: Action,
-    time: float,
-    bodies: Array,
-    wrenches: Wrenches,
+    physics: Physics, tick: int, k: int, target: Array, action: Action, time: float
 ) -> float:
     """Apply all forces of step `k` of a sample, between MuJoCo's half steps.
 
@@ -275,19 +243,20 @@ def _apply_all(
         The largest error of a set-point, in a glitch of the controller [rad]; 0 between the
         steps of the controller.
     """
+    arrays, contact, bodies = physics.arrays, physics.contact, physics.bodies
     fill_bodies(arrays, bodies)
-    touch(contact, constants, bodies, steps.period)
-    elapsed = action.elapsed + k * steps.period
-    _operate(action, bodies[-1], contact.wrench, time, elapsed, wrenches)
-    apply_forces(arrays, contact.tips, wrenches.total, bodies)
-    if (tick + k) % steps.per_control != 0:
+    touch(contact, physics.constants, bodies, TIMESTEP)
+    elapsed = action.elapsed + k * TIMESTEP
+    _operate(action, bodies[-1], contact.wrench, time, elapsed, physics.wrenches)
+    apply_forces(arrays, contact.tips, physics.wrenches.total, bodies)
+    if (tick + k) % STEPS_PER_CONTROL != 0:
         return 0.0
-    number = (tick + k) // steps.per_control
+    number = (tick + k) // STEPS_PER_CONTROL
     control(
-        controller, number, arrays.qpos, arrays.qfrc_bias, target,
-        steps.per_control * steps.period, arrays.qfrc_applied,
+        physics.controller, number, arrays.qpos, arrays.qfrc_bias, target,
+        STEPS_PER_CONTROL * TIMESTEP, arrays.qfrc_applied,
     )  # fmt: skip
-    return _glitch(controller, number)
+    return _glitch(physics.controller, number)
 
 
 @compiled
@@ -313,20 +282,13 @@ def _operate(
         )
         for k in range(6):
             outside[k] += held[k]
-    if action.style == MOVE:
-        moved = move_wrench(
-            body, action.origin, action.parameters, action.duration, action.tremors[1],
-            action.rms, elapsed,
-        )  # fmt: skip
-        for k in range(6):
-            outside[k] += moved[k]
-    elif action.style >= 0:
-        pushed = push_wrench(
+    if action.style >= 0:
+        disturbed = disturb_wrench(
             body, action.origin, action.parameters, action.style, action.duration,
             action.tremors[1], action.rms, elapsed,
         )  # fmt: skip
         for k in range(6):
-            outside[k] += pushed[k]
+            outside[k] += disturbed[k]
     for k in range(6):
         out.total[k] = outside[k] + fingers[k]
     for k in range(3):

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-ATTEMPTS = 4
+GRASP_ATTEMPTS = 4
 """Maximum number of attempts of a grasp; later ones are disturbed less."""
 
 Span = tuple[float, float]

@@ -54,7 +54,7 @@ class Camera(NamedTuple):
 
 
 class Renderer:
-    """Renderer of many pictures of one model. Use it as a context manager, or call `close`.
+    """Renderer of pictures of one model. Use it as a context manager, or call `close`.
 
     Args:
         model: MuJoCo's model.
@@ -101,42 +101,6 @@ class Renderer:
             _draw_arrow(self._renderer.scene, row[:3], row[3:])
         picture: Picture = self._renderer.render()
         return picture
-
-
-def render(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    width: int = 640,
-    height: int = 480,
-    camera: Camera | None = None,
-    forces: Array | None = None,
-) -> Picture:
-    """Render one picture. For more than one, use a `Renderer`.
-
-    Args:
-        model: MuJoCo's model.
-        data: MuJoCo's state, with computed positions of the bodies.
-        width: width of the picture [pixels].
-        height: height of the picture [pixels].
-        camera: view of the picture; by default `Camera()`.
-        forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end at the
-            points.
-
-    Returns:
-        (height, width, 3) red, green, blue.
-
-    Raises:
-        OutputError: no back end of MuJoCo works here.
-    """
-    with Renderer(model, width, height, camera) as renderer:
-        return renderer.picture(data, forces)
-
-
-def save_picture(picture: Picture, path: str | Path) -> None:
-    """Write a picture in the format of its suffix."""
-    from PIL import Image
-
-    Image.fromarray(picture).save(path)
 
 
 def save_video(frames: Iterable[Picture], path: str | Path, fps: float) -> None:

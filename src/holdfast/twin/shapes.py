@@ -18,10 +18,10 @@ REVOLVED, BOX, HEXAGON, CAPSULE = range(4)
 # the radii and the half height, followed by normal (outward, upward) and length [m] of its side.
 CODE = 0
 SIDE_OUT, SIDE_UP, SIDE_LENGTH = 4, 5, 6
-ROUNDING = 7  # extension of the core on all sides [m]
+EXTENSION = 7  # extension of the core on all sides [m]
 CENTRE = 8  # height of the centre of mass above the middle [m]
 N_CORE = 9
-AMPLITUDE, WAVE, WAVE_2, AROUND, AROUND_2 = range(9, 14)  # [m], [rad/m], [rad/m], [1], [1]
+TEXTURE_AMPLITUDE, WAVE, WAVE_2, AROUND, AROUND_2 = range(9, 14)  # [m], [rad/m], [rad/m], [1], [1]
 MU_STATIC, MU_KINETIC = 14, 15
 N_OBJECT_NUMBERS = 16
 MAX_RELIEF = 2.5
@@ -63,13 +63,13 @@ def relief(solid: Numbers, x: float, y: float, z: float) -> float:
     The sum of three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)), where s
     is the arc about the axis, a = 2 pi / L and b = a / 0.37 (own choice).
     """
-    if solid[AMPLITUDE] == 0.0:
+    if solid[TEXTURE_AMPLITUDE] == 0.0:
         return 0.0
     angle = math.atan2(y, x)
     waves = math.sin(solid[WAVE] * z)
     waves += 0.7 * math.sin(solid[WAVE_2] * z + solid[AROUND_2] * angle + 1.0)
     waves += 0.8 * math.sin(solid[AROUND] * angle + 0.3)
-    depth: float = solid[AMPLITUDE] * waves
+    depth: float = solid[TEXTURE_AMPLITUDE] * waves
     return depth
 
 
@@ -96,7 +96,7 @@ def probe(solid: Numbers, x: float, y: float, z: float) -> tuple[float, float, f
         d, gq, gz = _meridian(solid, q, z)
         share = gq / max(q, 1e-12)
         gx, gy = x * share, y * share
-    return d - solid[ROUNDING], gx, gy, gz
+    return d - solid[EXTENSION], gx, gy, gz
 
 
 @compiled_inside

@@ -14,8 +14,7 @@ from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
-from holdfast.twin.grasp import ClosingPath, closing_path
-from holdfast.twin.gripping import Pressing
+from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.loads import Load, load_state
 from holdfast.twin.objects import GraspObject, object_named
@@ -23,15 +22,13 @@ from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import MIN_TOUCH_LOAD, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.truth_log import TruthLog
-from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
-from holdfast.twin.uskin.parameters import UskinParameters
-from holdfast.twin.uskin.readout import Counts, Readout
-from holdfast.twin.world import World
+from holdfast.twin.uskin import Uskin, with_server_effects
+from holdfast.twin.uskin_readout import Counts, Readout, UskinParameters
+from holdfast.twin.world import TruthLog, World
 
 RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
-CASES = (1, 2)
+GRASP_CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
 MAX_DURATION = 60.0
 """Time for which random numbers of the controller are drawn, longer than any grasp [s]."""
@@ -128,7 +125,7 @@ class Simulation:
         plan: Plan | None = None,
         loads: Sequence[Load] = (),
     ) -> None:
-        if grasp.case not in CASES:
+        if grasp.case not in GRASP_CASES:
             raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
         chosen = profile(grasp.profile)
         if grasp.glitch_rate is not None:
@@ -193,8 +190,8 @@ class Simulation:
             set_point_error=world.set_point_error,
         )
         self._bodies.append(world.bodies[:-1].copy())
-        one = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
-        self._taxel_forces.append(one.taxel_forces(world.contact.node_forces))
+        skin = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
+        self._taxel_forces.append(skin.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
 

@@ -10,7 +10,56 @@ from typing import NamedTuple
 
 from holdfast.compiled import compiled, compiled_inside
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC, Numbers
-from holdfast.twin.vectors import Nine, Three, add, apply, apply_transposed, dot, scaled
+
+Three = tuple[float, float, float]
+Nine = tuple[Three, Three, Three]
+
+
+@compiled
+def add(a: Three, b: Three) -> Three:
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compiled
+def subtract(a: Three, b: Three) -> Three:
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@compiled
+def cross(a: Three, b: Three) -> Three:
+    """Return the cross product a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def dot(a: Three, b: Three) -> float:
+    """Return the dot product a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def apply(m: Nine, v: Three) -> Three:
+    """Return M v, with M given by rows."""
+    return dot(m[0], v), dot(m[1], v), dot(m[2], v)
+
+
+@compiled
+def apply_transposed(m: Nine, v: Three) -> Three:
+    """Return the transpose of M times v."""
+    return (
+        m[0][0] * v[0] + m[1][0] * v[1] + m[2][0] * v[2],
+        m[0][1] * v[0] + m[1][1] * v[1] + m[2][1] * v[2],
+        m[0][2] * v[0] + m[1][2] * v[1] + m[2][2] * v[2],
+    )
+
+
+@compiled
+def scaled(v: Three, by: float) -> Three:
+    """Return a vector times a number."""
+    return v[0] * by, v[1] * by, v[2] * by
+
 
 # Columns of bristles.
 BX, BY, BZ = 0, 1, 2  # stretch of the node along the surface, fingertip frame [m]
@@ -19,7 +68,7 @@ N_BRISTLE = 4
 Bristle = tuple[float, float, float, float]
 
 # Columns of a packed skin: the fields of Skin in their order, and the ball around all nodes.
-STIFFNESS, HARDENING, DAMPING, SHEAR, ENGAGEMENT, SHEAR_TIME, STRIBECK, MEMORY, SLIPPING = range(9)
+STIFFNESS, HARDENING, VISCOUS, SHEAR, ENGAGEMENT, SHEAR_TIME, STRIBECK, MEMORY, SLIPPING = range(9)
 BALL = 9
 
 _MIN_SLIP_SPEED = 1e-12  # slower slip [m/s] is set to zero, to avoid denormal numbers
@@ -75,7 +124,7 @@ def pressure(skin: Numbers, stiffness: float, depth: float, leaving: float) -> f
         depth: depth of the node below the surface, above 0 [m].
         leaving: speed along the outward normal [m/s].
     """
-    force: float = elastic(skin, stiffness, depth) * max(1.0 - skin[DAMPING] * leaving, 0.0)
+    force: float = elastic(skin, stiffness, depth) * max(1.0 - skin[VISCOUS] * leaving, 0.0)
     return force
 
 

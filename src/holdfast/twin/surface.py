@@ -23,10 +23,10 @@ BASE = 0.0005
 """Distal coordinate where the skin begins [m]: half a pitch before the first row of taxels."""
 EDGE_MARGIN = 0.003
 """Width of the skin beyond the taxels of the outer walls [m]: half a pitch."""
-PITCH = 0.0033
+NODE_PITCH = 0.0033
 """Distance of neighbouring nodes [m]: half the taxels' pitch, about four nodes per taxel."""
-N_PARTS = 6
-"""An element is divided into N_PARTS x N_PARTS to compute its area and mean normal."""
+N_ELEMENT_PARTS = 6
+"""Parts of an element along each side, to compute its area and mean normal."""
 
 _RADIUS = 0.0135  # between the cylinder's 14 mm and the dome's 13, for lengths along the skin
 _DIGITS = 9  # nanometres: the table must not depend on the linear algebra of the machine
@@ -51,8 +51,8 @@ def curved_fingertip() -> Surface:
     """Compute the skin of a `uskin-curved` fingertip, with elements of about 10 mm^2.
 
     Rows of elements follow each other along the finger and over the tip. Every row is divided
-    into elements of about PITCH x PITCH. Nodes are rounded to a nanometre, so that they are the
-    same bits on every machine.
+    into elements of about NODE_PITCH x NODE_PITCH. Nodes are rounded to a nanometre, so that they
+    are the same bits on every machine.
 
     Returns:
         The quadrature, with read-only arrays.
@@ -92,7 +92,7 @@ def _radius() -> RBFInterpolator:
 def _edges() -> list[tuple[float, float]]:
     """Return begin and end of each row, as length along the skin from the base to the pole [m]."""
     straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
-    parts = round((straight + bent) / PITCH)
+    parts = round((straight + bent) / NODE_PITCH)
     return list(pairwise(np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()))
 
 
@@ -100,15 +100,15 @@ def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Arra
     """Return nodes and area vectors of the elements between two lengths along the skin."""
     angle = np.pi / 2 + EDGE_MARGIN / _RADIUS
     elevation = max((begin + end) / 2 - SHOULDER, 0.0) / _RADIUS
-    n = max(round(2 * angle * _RADIUS * np.cos(elevation) / PITCH), 2)
-    lengths = np.linspace(begin, end, N_PARTS + 1)
-    angles = np.linspace(-angle, angle, n * N_PARTS + 1)
+    n = max(round(2 * angle * _RADIUS * np.cos(elevation) / NODE_PITCH), 2)
+    lengths = np.linspace(begin, end, N_ELEMENT_PARTS + 1)
+    angles = np.linspace(-angle, angle, n * N_ELEMENT_PARTS + 1)
     corners = _points(radius, *np.meshgrid(lengths, angles, indexing="ij"))
     across, along = np.diff(corners, axis=1), np.diff(corners, axis=0)
     vectors = np.cross(across[:-1] + across[1:], along[:, :-1] + along[:, 1:]) / 4
-    vectors = vectors.reshape(N_PARTS, n, N_PARTS, 3).sum(axis=(0, 2))
-    middle = np.arange(n) * N_PARTS + N_PARTS // 2
-    return corners[N_PARTS // 2, middle], vectors
+    vectors = vectors.reshape(N_ELEMENT_PARTS, n, N_ELEMENT_PARTS, 3).sum(axis=(0, 2))
+    middle = np.arange(n) * N_ELEMENT_PARTS + N_ELEMENT_PARTS // 2
+    return corners[N_ELEMENT_PARTS // 2, middle], vectors
 
 
 def _points(radius: RBFInterpolator, lengths: Array, angles: Array) -> Array:

@@ -1,16 +1,27 @@
-"""Physics of a grasp, step by step: hand, object, contact, controller and operator."""
+"""Physics of a grasp, step by step: hand, object, contact, controller, operator; and its truth."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
+from holdfast.contact import Phase
+from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import LOAD, constants_of, new_contact
-from holdfast.twin.control import STEPS_PER_CONTROL, Controller
+from holdfast.twin.contact import TIP_SLIP, TIP_SLIPPING_SHARE, Contact, constants_of, new_contact
+from holdfast.twin.control import Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
-from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.hand import (
+    FINGERS,
+    GRAVITY,
+    N_JOINTS,
+    SUBSTEPS,
+    HandModel,
+    fill_bodies,
+)
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
-from holdfast.twin.physics import Action, Steps, Wrenches, advance_of
+from holdfast.twin.physics import Action, Physics, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
@@ -54,7 +65,7 @@ class ContactWorld:
     @property
     def loads(self) -> Array:
         """Load of each fingertip, (n_fingers,) [N]."""
-        return self.contact.tips[:, LOAD]
+        return self.contact.load
 
     @property
     def slip(self) -> float:
@@ -83,7 +94,6 @@ class World(ContactWorld):
         tremors: (2, 3, n, 3) tremor of the hand that holds, and of the hand or finger that
             disturbs.
         start: (4,) offset of the object's position [m] and turn [rad] at the start.
-        side: "right" or "left" hand.
     """
 
     def __init__(
@@ -94,19 +104,20 @@ class World(ContactWorld):
         controller: Controller,
         tremors: Array,
         start: Array,
-        side: str = "right",
     ) -> None:
         super().__init__(hand, item, curved_fingertip())
         self.path, self.controller, self.tremors = path, controller, tremors
         self._advance = advance_of(hand)
-        self._steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
-        self._wrenches = Wrenches(self.outside, np.zeros(6))
+        self._physics = Physics(
+            hand.arrays, self.contact, self.constants, controller, self.bodies,
+            Wrenches(self.outside, np.zeros(6)),
+        )  # fmt: skip
         self._pull = np.zeros(3)
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
         self._disturbance = -1
         self._tick = 0
-        self._place(start, side)
+        self._place(start)
 
     def set_load(self, load: LoadState) -> None:
         """Set force, friction and acceleration of the hand until they are set again.
@@ -132,11 +143,9 @@ class World(ContactWorld):
         if displacement is not None:
             target = target + displacement
         self.set_point_error = self._advance(
-            self._steps, self.hand.arrays, self.contact, self.constants,
-            self.controller, self._tick, target, self._action(command, plan, anchor),
-            self.bodies, self._wrenches,
-        )  # fmt: skip
-        self._tick += self._steps.n
+            self._physics, self._tick, target, self._action(command, plan, anchor)
+        )
+        self._tick += SUBSTEPS
         if self.bodies[-1, 2] < MIN_HEIGHT:
             self._freeze()
 
@@ -155,8 +164,8 @@ class World(ContactWorld):
             command.elapsed, self._pull,
         )  # fmt: skip
 
-    def _place(self, start: Array, side: str) -> None:
-        place, turn = object_pose(self.item, side)
+    def _place(self, start: Array) -> None:
+        place, turn = object_pose(self.item)
         model, data = self.hand.model, self.hand.data
         mujoco.mj_resetData(model, data)
         data.qpos[:N_JOINTS] = self.path.targets(np.full(len(FINGERS), OPEN_GAP))
@@ -164,8 +173,46 @@ class World(ContactWorld):
         half = 0.5 * (turn + start[3])
         data.qpos[N_JOINTS + 3 :] = (np.cos(half), 0.0, 0.0, np.sin(half))
         mujoco.mj_forward(model, data)
-        self.hand.bodies(self.bodies)
+        fill_bodies(self.hand.arrays, self.bodies)
 
     def _freeze(self) -> None:
         self.hand.data.qvel[N_JOINTS:] = 0.0
         self.hand.data.qpos[N_JOINTS + 2] = MIN_HEIGHT - 0.1
+
+
+class TruthLog:
+    """Collector of the truth of all samples.
+
+    Args:
+        fingers: names of the fingertips.
+    """
+
+    def __init__(self, fingers: Sequence[str]) -> None:
+        self._fingers = fingers
+        self._phase: list[Phase] = []
+        self._rows: dict[str, list[Array]] = {}
+        self._tips: list[Array] = []
+
+    def __len__(self) -> int:
+        return len(self._phase)
+
+    def add(self, phase: Phase, contact: Contact, **rows: Array | float) -> None:
+        """Add the state after a sample: phase, contact and other rows of the truth by name."""
+        self._phase.append(phase)
+        self._tips.append(contact.tips.copy())
+        for name, row in rows.items():
+            self._rows.setdefault(name, []).append(np.array(row))
+
+    def truth(self, times: Array) -> Truth:
+        """Return the truth of all samples, whose times are (n,) [s]."""
+        tips = np.array(self._tips)
+        fingers = {
+            finger: {
+                "contact_force": -tips[:, place, :3],
+                "slip_speed": tips[:, place, TIP_SLIP],
+                "slipping_share": tips[:, place, TIP_SLIPPING_SHARE],
+            }
+            for place, finger in enumerate(self._fingers)
+        }
+        hand = {name: np.array(rows) for name, rows in self._rows.items()}
+        return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, fingers)

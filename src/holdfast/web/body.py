@@ -10,7 +10,7 @@ from aiohttp import web
 
 BODY_TIMEOUT = 60.0
 """Time within which the body of a request must arrive [s]."""
-MAX_ERROR_LENGTH = 300
+MAX_BODY_ERROR_LENGTH = 300
 """Longest description of an error of a document [characters]."""
 
 T = TypeVar("T")
@@ -82,5 +82,5 @@ class BodyReader:
 
 def json_error(kind: Callable[..., web.HTTPException], text: str) -> web.HTTPException:
     """Return an exception whose response is `{"error": text}`, on one line."""
-    line = " ".join(text.split())[:MAX_ERROR_LENGTH]
+    line = " ".join(text.split())[:MAX_BODY_ERROR_LENGTH]
     return kind(text=msgspec.json.encode({"error": line}).decode(), content_type="application/json")

@@ -19,7 +19,7 @@ from holdfast.web.connections import (
 )
 from holdfast.web.guard import SECURITY_HEADERS, Handler
 
-POLL_INTERVAL = 0.2
+STOP_POLL_INTERVAL = 0.2
 """Time between two calls of `is_over` [s]."""
 SHUTDOWN_TIMEOUT = 1.0
 """Time that clients have to disconnect [s]."""
@@ -64,7 +64,7 @@ async def _serve(
         _stop_by_signal(stopped)
         while not stopped.is_set() and not is_over():
             with suppress(TimeoutError):
-                await asyncio.wait_for(stopped.wait(), POLL_INTERVAL)
+                await asyncio.wait_for(stopped.wait(), STOP_POLL_INTERVAL)
 
 
 @asynccontextmanager
@@ -91,7 +91,7 @@ async def listening(app: web.Application, host: str, port: int) -> AsyncIterator
         await runner.cleanup()
 
 
-class _Connection(web.RequestHandler):
+class _LimitedConnection(web.RequestHandler):
     """Connection of a client, which counts for a limit.
 
     aiohttp closes a connection whose header does not arrive within the keep-alive timeout.
@@ -160,7 +160,7 @@ async def _listen(
         raise RuntimeError("the application is not set up")
     try:
         return await asyncio.get_running_loop().create_server(
-            lambda: _Connection(application, limit), host, port, backlog=BACKLOG
+            lambda: _LimitedConnection(application, limit), host, port, backlog=BACKLOG
         )
     except (OSError, OverflowError) as cause:
         raise listen_error(host, port, cause) from cause

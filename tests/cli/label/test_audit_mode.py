@@ -40,7 +40,9 @@ def test_an_audit_is_printed(capsys, folder, audited):
 def test_an_audit_is_shown_on_the_page(capsys, folder, audited, monkeypatch):
     shown = []
     monkeypatch.setattr(
-        page_mode, "show_label_page", lambda *given: shown.append((given[0], given[-1]))
+        page_mode,
+        "show_label_page",
+        lambda paths, *_, suspects, **__: shown.append((paths, suspects)),
     )
     assert run(capsys, "--audit", folder, "--page", "--no-browser")[0] == 0
     assert shown == [([folder], [SUSPECT])]

@@ -2,8 +2,8 @@ import io
 
 import pytest
 
-from holdfast.cli.terminal import status_line
-from holdfast.cli.terminal.status_line import StatusLine, status_parts
+from holdfast.cli.terminal import progress
+from holdfast.cli.terminal.progress import StatusLine, status_parts
 from holdfast.contact import Fault
 from holdfast.live.recorder import RecorderStatus
 
@@ -61,7 +61,7 @@ def test_parts_of_the_status():
 
 def test_without_a_terminal_a_line_at_intervals(monkeypatch, capsys):
     now = [100.0]
-    monkeypatch.setattr(status_line.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     with StatusLine(Still(WELL)) as shown:
         shown.print("begun")
         for second in range(25):

@@ -11,7 +11,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.devices.hands import Claim, claim, open_hand
-from holdfast.devices.hands.scalar import ScalarGripper
+from holdfast.devices.hands.local import ScalarGripper
 from holdfast.errors import HandError
 
 CLAIM = """

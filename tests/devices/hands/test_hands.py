@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from holdfast.devices.hands import Claim, open_hand
-from holdfast.devices.hands.scalar import ScalarGripper
+from holdfast.devices.hands.local import ScalarGripper
 from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, LoopState
 

@@ -63,7 +63,7 @@ def source(uri, until, patience=5.0):
     from holdfast.devices.sources.ros import topic
     from holdfast.errors import HoldfastError
 
-    topic.OPEN_TIMEOUT = float(patience)
+    topic.TOPIC_OPEN_TIMEOUT = float(patience)
     result = {"numbers": [], "times": [], "n_lost": 0, "notices": []}
     try:
         with open_source(uri) as opened:
@@ -143,7 +143,7 @@ def read():
 
 
 def estimates():
-    from holdfast.live.publishers.ros1_publisher import Ros1Publisher
+    from holdfast.live.publishers.ros_publisher import Ros1Publisher
     from live.estimates import UNITS, FakeGrip, estimate
 
     with Ros1Publisher(UNITS, grip=FakeGrip()) as publisher:

@@ -235,7 +235,7 @@ def no_twin(folder, monkeypatch):
 
 @contextmanager
 def no_serial(folder, monkeypatch):
-    monkeypatch.setattr(holdfast.devices.sources.serial, "OPEN_TIMEOUT", 0.1)
+    monkeypatch.setattr(holdfast.devices.sources.serial, "SERIAL_OPEN_TIMEOUT", 0.1)
     board = Board(folder)
     yield open_source(f"serial://{board.path}")
     board.unplug()

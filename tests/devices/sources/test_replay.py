@@ -7,7 +7,7 @@ import pytest
 from holdfast.detector import Detector, detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources import replay as module
-from holdfast.devices.sources.replay import Replay
+from holdfast.devices.sources.replay import ReplaySource
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording, save_recording
 from holdfast.model import Model
@@ -74,7 +74,7 @@ def test_it_gives_exactly_the_content_of_the_file(tmp_path, suffix):
     recording = hand(3000)
     save_recording(recording, tmp_path / f"a.{suffix}")
     with open_source(str(tmp_path / f"a.{suffix}"), speed=0) as source:
-        assert isinstance(source, Replay)
+        assert isinstance(source, ReplaySource)
         assert source.sensors == {name: m.sensor for name, m in recording.modules.items()}
         found = put_together(source)
     for name, module_ in recording.modules.items():
@@ -97,7 +97,7 @@ def test_a_detector_fed_with_it_equals_detect(tmp_path, suffix):
     expected = detect(model, recording)
     detector = Detector.for_recording(model, recording)
     n_seen = dict.fromkeys(modules, 0)
-    with Replay(tmp_path / f"grasp.{suffix}", speed=0) as source:
+    with ReplaySource(tmp_path / f"grasp.{suffix}", speed=0) as source:
         for k, arrival in enumerate(source):
             estimate = detector.update(arrival.samples, arrival.time)
             assert arrival.time == expected.times[k]
@@ -113,7 +113,7 @@ def test_a_detector_fed_with_it_equals_detect(tmp_path, suffix):
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
 def test_it_plays_at_its_speed(path, clock, speed):
-    with Replay(path, speed=speed) as source:
+    with ReplaySource(path, speed=speed) as source:
         assert source.paced
         clock.now += 7.0  # time begins with the first read
         arrivals = list(source)
@@ -124,14 +124,14 @@ def test_it_plays_at_its_speed(path, clock, speed):
 
 
 def test_speed_0_never_sleeps(path, clock):
-    with Replay(path, speed=0) as source:
+    with ReplaySource(path, speed=0) as source:
         assert not source.paced
         assert len(list(source)) == 75
     assert clock.slept == []
 
 
 def test_a_slow_reader_gets_all_at_once(path, clock):
-    with Replay(path) as source:
+    with ReplaySource(path) as source:
         first = source.read(1.0)
         clock.now += 0.2
         missed = [source.read(0.0) for _ in range(30)]
@@ -144,7 +144,7 @@ def test_a_slow_reader_gets_all_at_once(path, clock):
 
 
 def test_a_timeout_that_is_too_short_gives_none_and_loses_nothing(path, clock):
-    with Replay(path, speed=0.1) as source:
+    with ReplaySource(path, speed=0.1) as source:
         got = [source.read(0.007) for _ in range(1200)]
         assert None in got
         assert source.ended
@@ -156,14 +156,14 @@ def test_a_timeout_that_is_too_short_gives_none_and_loses_nothing(path, clock):
 def test_time_does_not_drift(path, clock, monkeypatch):
     """Each sample is due by the beginning, not by the one before."""
     clock.sleep = lambda seconds: setattr(clock, "now", clock.now + seconds + 1e-3)
-    with Replay(path) as source:
+    with ReplaySource(path) as source:
         arrivals = list(source)
     late = [a.received - 100.0 - (a.time - 3.0) for a in arrivals]
     assert max(late) < 2e-3
 
 
 def test_it_ends(path):
-    with Replay(path, speed=0) as source:
+    with ReplaySource(path, speed=0) as source:
         for _ in range(75):
             assert not source.ended
             assert source.read(0.0) is not None
@@ -174,7 +174,7 @@ def test_it_ends(path):
 def test_markers_become_notices(tmp_path):
     markers = ((3.1, "closed"), (99.0, "over"))
     save_recording(hand(markers=markers), tmp_path / "a.mcap")
-    with Replay(tmp_path / "a.mcap", speed=0) as source:
+    with ReplaySource(tmp_path / "a.mcap", speed=0) as source:
         arrivals = list(source)
     marked = [(k, a.notices) for k, a in enumerate(arrivals) if a.notices]
     assert [notices for _, notices in marked] == [("marker: closed",), ("marker: over",)]
@@ -187,7 +187,7 @@ def test_markers_become_notices(tmp_path):
 
 @pytest.mark.parametrize("speed", [0.0, 10.0])
 def test_time_continues_in_a_loop(path, clock, speed):
-    with Replay(path, speed=speed, loop=True) as source:
+    with ReplaySource(path, speed=speed, loop=True) as source:
         got = list(itertools.islice(source, 75 * 3 + 5))
         assert not source.ended
     times = np.array([arrival.time for arrival in got]).ravel()
@@ -204,7 +204,7 @@ def test_time_continues_in_a_loop(path, clock, speed):
 
 
 def test_the_next_pass_after_a_slow_reader_is_not_faster(path, clock):
-    with Replay(path, loop=True) as source:
+    with ReplaySource(path, loop=True) as source:
         list(itertools.islice(source, 75))
         clock.now += 60.0
         first, second = itertools.islice(source, 2)
@@ -213,7 +213,7 @@ def test_the_next_pass_after_a_slow_reader_is_not_faster(path, clock):
 
 def test_metadata_are_those_of_the_recording_and_the_source(tmp_path):
     save_recording(hand(metadata={"object": "can", "source": "twin"}), tmp_path / "a.parquet")
-    with Replay(tmp_path / "a.parquet") as source:
+    with ReplaySource(tmp_path / "a.parquet") as source:
         assert source.metadata == {
             "object": "can",
             "recorded_from": "twin",
@@ -222,7 +222,7 @@ def test_metadata_are_those_of_the_recording_and_the_source(tmp_path):
 
 
 def test_metadata_without_a_source(path):
-    with Replay(path) as source:
+    with ReplaySource(path) as source:
         assert source.metadata == {"source": path}
 
 
@@ -232,7 +232,7 @@ def test_an_incomplete_recording_is_played_as_far_as_it_goes(tmp_path):
     file.write_bytes(file.read_bytes()[:-30_000])
     left = load_recording(file).modules
     assert left["thumb"].n_samples < 900
-    with Replay(file, speed=0) as source:
+    with ReplaySource(file, speed=0) as source:
         arrivals = list(source)
     assert arrivals[0].notices == (f"{file} was cut off; what could be recovered is played",)
     assert not any(arrival.notices for arrival in arrivals[1:])
@@ -248,7 +248,7 @@ def test_damage_in_its_middle_ends_it_with_a_notice(tmp_path, monkeypatch):
         raise RecordingError("a.parquet is damaged: so it is")
 
     monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", damaged)
-    with Replay("a.parquet", speed=0, loop=True) as source:
+    with ReplaySource("a.parquet", speed=0, loop=True) as source:
         arrivals = list(source)
         assert source.ended
     assert sum(len(arrival.samples) for arrival in arrivals) == 75
@@ -258,7 +258,7 @@ def test_damage_in_its_middle_ends_it_with_a_notice(tmp_path, monkeypatch):
 
 def test_a_deleted_file_ends_a_loop_with_a_notice(tmp_path):
     save_recording(hand(), tmp_path / "a.parquet")
-    with Replay(tmp_path / "a.parquet", speed=0, loop=True) as source:
+    with ReplaySource(tmp_path / "a.parquet", speed=0, loop=True) as source:
         got = list(itertools.islice(source, 75))
         (tmp_path / "a.parquet").unlink()
         got += list(source)
@@ -274,7 +274,7 @@ def test_samples_out_of_order_are_reported(monkeypatch):
     monkeypatch.setattr(
         "holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter([early, late])
     )
-    with Replay("a.parquet", speed=0) as source:
+    with ReplaySource("a.parquet", speed=0) as source:
         (refused,) = [arrival for arrival in source if arrival.n_refused]
     assert refused.notices == (f"{refused.n_refused} samples are out of order and were left out",)
 
@@ -282,7 +282,7 @@ def test_samples_out_of_order_are_reported(monkeypatch):
 @pytest.mark.parametrize("speed", [-1.0, np.nan, np.inf])
 def test_an_invalid_speed(speed):
     with pytest.raises(ValueError) as error:
-        Replay("grasp.parquet", speed=speed)
+        ReplaySource("grasp.parquet", speed=speed)
     assert str(error.value) == f"a speed of at least 0 expected, {speed} given"
 
 
@@ -311,21 +311,21 @@ def test_a_file_without_permission(path, monkeypatch):
 
     monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", refuse)
     with pytest.raises(RecordingError) as error:
-        Replay(path).open()
+        ReplaySource(path).open()
     assert str(error.value) == f"cannot read {path}: Permission denied"
 
 
 def test_a_recording_without_pieces(path, monkeypatch):
     monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter(()))
     with pytest.raises(RecordingError) as error:
-        Replay(path).open()
+        ReplaySource(path).open()
     assert str(error.value) == f"{path} has no samples; at least one expected"
 
 
 def test_the_wall_clock_is_what_counts(path):
     """Without a clock of the test's own: all of half a second, and no sooner."""
     began = time.monotonic()
-    with Replay(path) as source:
+    with ReplaySource(path) as source:
         arrivals = list(source)
     assert time.monotonic() - began >= 0.49
     assert all(one.received <= two.received for one, two in itertools.pairwise(arrivals))
@@ -333,7 +333,7 @@ def test_the_wall_clock_is_what_counts(path):
 
 @pytest.mark.parametrize("loop", [False, True])
 def test_it_starts_again_from_the_beginning(path, clock, loop):
-    with Replay(path, loop=loop) as source:
+    with ReplaySource(path, loop=loop) as source:
         source.restart()  # at its beginning, it has no effect
         before = [source.read(60.0) for _ in range(20)]
         source.restart()

@@ -30,7 +30,7 @@ def board(tmp_path):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
+    monkeypatch.setattr(module, "SERIAL_OPEN_TIMEOUT", 0.3)
     monkeypatch.setattr(base, "MIN_RETRY_DELAY", 0.02)
     monkeypatch.setattr(base, "MAX_RETRY_DELAY", 0.05)
 

@@ -13,7 +13,7 @@ import pytest
 from holdfast.cli import simulate as verb
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources import twin as module
-from holdfast.devices.sources.twin import ATTEMPTS, Twin, grasp_of, write
+from holdfast.devices.sources.twin import GRASP_ATTEMPTS, Twin, grasp_of, write
 from holdfast.devices.uri import parse
 from holdfast.io import load_recording
 from holdfast.recordings import Recording, Tactile
@@ -94,14 +94,14 @@ def test_a_grasp_that_fails_is_tried_again(quick):
 
 
 def test_a_grasp_that_always_fails_is_played(quick):
-    quick(failing={(1, attempt) for attempt in range(ATTEMPTS)})
+    quick(failing={(1, attempt) for attempt in range(GRASP_ATTEMPTS)})
     with open_source("twin:", speed=0) as source:
         arrivals = list(source)
     assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 failed attempts",)
 
 
 def test_it_makes_as_many_attempts_as_simulate():
-    assert ATTEMPTS == verb.ATTEMPTS
+    assert GRASP_ATTEMPTS == verb.GRASP_ATTEMPTS
 
 
 def test_the_next_repeats_follow(quick):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from holdfast.labelling.server.store import CAUSES, STATES
+from holdfast.labelling.server.store import CAUSE_NAMES, STATE_NAMES
 
 CALL = "async ([name, given]) => (await import('/page/format.js'))[name](...given)"
 
@@ -38,8 +38,8 @@ def test_texts(module, name, given, text):
 
 def test_states_and_causes_equal_those_of_the_service(module):
     states, causes = module.evaluate("import('/page/format.js').then((m) => [m.STATES, m.CAUSES])")
-    assert states == list(STATES)
-    assert sorted(causes) == sorted(CAUSES)
+    assert states == list(STATE_NAMES)
+    assert sorted(causes) == sorted(CAUSE_NAMES)
 
 
 def test_every_key_has_one_command(module):
@@ -53,7 +53,7 @@ def test_every_key_has_one_command(module):
 
 def test_every_cause_has_a_key_of_its_own(module):
     call = "async (causes) => causes.map((await import('/page/format.js')).causeKey)"
-    keys = module.evaluate(call, [str(cause) for cause in CAUSES])
+    keys = module.evaluate(call, [str(cause) for cause in CAUSE_NAMES])
     assert keys == ["c", "d", "s", "l", "r", "k"]
     assert not set(keys) & set("axgnpefyb")
 

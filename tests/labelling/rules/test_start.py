@@ -5,8 +5,8 @@ import pytest
 
 from holdfast.features import Tare
 from holdfast.io import import_recordings
-from holdfast.labelling.rules import signal, start
-from holdfast.labelling.rules.start import evidence_of_contact, fitting_tare
+from holdfast.labelling.rules import signal
+from holdfast.labelling.rules.forces import evidence_of_contact, fitting_tare, lowest_maximum
 from holdfast.recordings import Recording
 
 from .build import GRIP, RELEASE, clock, grasp, module, profile
@@ -87,4 +87,4 @@ def test_the_lowest_maximum_equals_that_of_scipy(n):
 
     for seed in range(20):
         values = np.random.default_rng(seed).normal(size=1 + 9 * seed)
-        assert start.lowest_maximum(values, n) == maximum_filter1d(values, n).min()
+        assert lowest_maximum(values, n) == maximum_filter1d(values, n).min()

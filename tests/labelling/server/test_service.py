@@ -10,7 +10,7 @@ from aiohttp import ClientSession, web
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
 from holdfast.labelling.review.audit import Suspect
-from holdfast.labelling.server.schema import RecordingDetails
+from holdfast.labelling.server.documents import RecordingDetails
 from holdfast.labelling.server.service import LabellingService
 from holdfast.labelling.server.workspace import Workspace
 from holdfast.recordings import Label

@@ -4,7 +4,7 @@ import pytest
 
 from devices.sources.ros1_master import lines, running_master
 from holdfast.errors import SourceError
-from holdfast.live.publishers.ros1_publisher import Ros1Publisher
+from holdfast.live.publishers.ros_publisher import Ros1Publisher
 from live.estimates import UNITS, check_received
 
 

@@ -1,9 +1,11 @@
 import threading
 import time
+from functools import partial
 
 import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
+from holdfast.devices.ros.link import Link, Publisher
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.publishers import ros_publisher
 from holdfast.live.publishers.ros_publisher import (
@@ -15,44 +17,63 @@ from holdfast.live.publishers.ros_publisher import (
     topic_names,
 )
 from holdfast.live.stream_detector import StreamUpdate
+from holdfast.ros.cdr import MessageEncoder
+from holdfast.ros.topic_messages import DIAGNOSTICS, VECTOR, WRENCH, topic_definition
 from live.estimates import UNITS, FakeGrip, estimate, finger
+
+
+class FakeLink(Link):
+    """Connection that stores the messages, as what a test compares."""
+
+    def __init__(self, publisher):
+        self.of_test = publisher
+
+    def open(self):
+        self.of_test.kinds = {}
+
+    def close(self):
+        self.of_test.log.append("ended")
+
+    def publisher(self, topic, kind):
+        self.of_test.kinds[topic] = kind
+        return Publisher(partial(self.store, topic, kind), lambda: 1)
+
+    def store(self, topic, kind, message):
+        MessageEncoder(topic_definition(kind))(message)  # has all fields
+        assert self.of_test.gate.wait(60)
+        if self.of_test.broken:
+            raise RuntimeError("no network")
+        if kind == DIAGNOSTICS:
+            names = [one["name"].removeprefix("holdfast: ") for one in message["status"]]
+            what = [
+                (name, one["level"]) for name, one in zip(names, message["status"], strict=True)
+            ]
+        elif kind in (VECTOR, WRENCH):
+            newtons = kind == WRENCH
+            force = message["wrench"]["force"] if newtons else message["vector"]
+            what = message["header"]["frame_id"], tuple(force.values()), newtons
+            stamp = message["header"]["stamp"]
+            self.of_test.stamp = stamp["sec"] + stamp["nanosec"] * 1e-9 + 1e-9
+        else:
+            what = message["data"]
+        self.of_test.published.append((topic, what))
+
+    def joint_states(self, topic): ...
+    def n_other_publishers(self, topic): ...
+    def subscribed_topics(self): ...
+    def published_topics(self): ...
 
 
 class FakePublisher(RosPublisher):
     """Publisher that stores its messages."""
 
     def __init__(self, **given):
-        super().__init__(UNITS, **given)
+        super().__init__(UNITS, FakeLink(self), **given)
         self.published = []
         self.log = []
         self.gate = threading.Event()
         self.gate.set()
         self.broken = False
-
-    def _connect(self, topics):
-        self.kinds = dict(topics)
-
-    def _disconnect(self):
-        self.log.append("ended")
-
-    def _store(self, topic, what):
-        assert self.gate.wait(60)
-        if self.broken:
-            raise RuntimeError("no network")
-        self.published.append((topic, what))
-
-    def _publish_text(self, topic, text):
-        self._store(topic, text)
-
-    def _publish_number(self, topic, number):
-        self._store(topic, number)
-
-    def _publish_force(self, topic, stamp, finger, force, *, newtons):
-        self._store(topic, (finger, force, newtons))
-        self.stamp = stamp
-
-    def _publish_diagnostics(self, stamp, statuses):
-        self._store("/diagnostics", [(one.name, one.level) for one in statuses])
 
     def of(self, topic):
         return [what for name, what in self.published if name == topic]

@@ -5,8 +5,8 @@ import pytest
 
 from holdfast.errors import HandError
 from holdfast.io import load_recording
-from holdfast.live.loop.documents import GripDocument
-from holdfast.live.web import grip_routes
+from holdfast.live.documents import GripDocument
+from holdfast.live.web import service
 from live.estimates import FakeGrip
 from live.web.test_service import kernels, patient, run, served, wait_for
 
@@ -60,7 +60,7 @@ def test_a_stop_that_fails_says_why():
 
 
 def test_a_loop_that_does_not_answer(monkeypatch):
-    monkeypatch.setattr(grip_routes, "ANSWER_TIMEOUT", 0.05)
+    monkeypatch.setattr(service, "ANSWER_TIMEOUT", 0.05)
     grip = FakeGrip()
     grip.answers = False
     ((status, document),) = ask(grip, ("POST", STOP))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.twin.randomized.drawing import ranges
-from holdfast.twin.randomized.palm import GRAVITY, GRID_RATE, KINDS, draw_segment, palm_motion
+from holdfast.twin.randomized.palm import GRAVITY, GRID_RATE, PALM_KINDS, draw_segment, palm_motion
 
 ARM = ranges()["arm"]
 
@@ -56,6 +56,6 @@ def test_an_arm_vibrates_by_its_rms():
 
 
 def test_rows_stay_within_the_table():
-    _, moved = motion(*KINDS)
+    _, moved = motion(*PALM_KINDS)
     assert moved.at(-5.0) == 0
     assert moved.at(1e9) == len(moved.gravity) - 1

@@ -5,7 +5,7 @@ from holdfast.contact import ContactState
 from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
 from holdfast.twin.randomized.drawing import SENSOR_KINDS, draw_object, draw_sensor
-from holdfast.twin.randomized.scenario import KINDS, draw_events
+from holdfast.twin.randomized.scenario import EVENT_KINDS, draw_events
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 
 pytestmark = pytest.mark.slow
@@ -87,7 +87,7 @@ def test_events_fill_the_hold_and_do_not_overlap():
         assert all(event.start > end for event, end in zip(events[1:], ends, strict=False))
         assert ends[-1] < 18.0
         found |= {event.kind for event in events}
-    assert found == set(KINDS)
+    assert found == set(EVENT_KINDS)
 
 
 def test_is_saved_and_loaded(hands, tmp_path):

@@ -24,9 +24,9 @@ from holdfast_lab.tasks import Task
 TASK = "cost"
 N_RECORDINGS = 4
 """Recordings that the timed classifiers are fitted to."""
-MAX_SAMPLES = 2_000
+MAX_TIMED_SAMPLES = 2_000
 """Samples of a finger that the timed classifiers are fitted to."""
-N_ROUNDS = 7
+N_COST_ROUNDS = 7
 N_UPDATES = 3_000
 N_WARM_UP = 200
 LIVE_FEATURES: dict[str, tuple[FeatureSpec, ...]] = {
@@ -113,7 +113,7 @@ def table(plan: StudyPlan, results: Results) -> ResultTable:
 def _measure_method(name: str, corpus: Corpus, seed: int) -> MethodCost:
     method = METHODS[name]
     recordings = corpus_features(method, corpus, Variation())
-    training = gather_training_samples(recordings, MAX_SAMPLES)
+    training = gather_training_samples(recordings, MAX_TIMED_SAMPLES)
     fitted = FittedMethod.fit(method, training, range(len(recordings)), seed)
     first = recordings[0]
     hand = hand_signal(corpus.load()[0], Tare.parse(corpus.tare), tuple(first.times))
@@ -168,7 +168,7 @@ def _shortest(work: Callable[[], object]) -> float:
     """Return the shortest time of a piece of work, after one warm-up [s]."""
     work()
     seconds = []
-    for _ in range(N_ROUNDS):
+    for _ in range(N_COST_ROUNDS):
         start = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - start)

@@ -11,9 +11,9 @@ from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_results, method_titles
 from holdfast_lab.study.comparison.rows import ratio_row
 from holdfast_lab.study.evaluation.error_breakdown import (
-    DIRECTIONS,
     OBLIQUE,
-    Count,
+    PULL_DIRECTIONS,
+    CountPair,
     DisturbanceErrors,
     ErrorBreakdown,
     GripErrors,
@@ -70,14 +70,14 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     n_disturbances: dict[str, int] = {}
     for keys, breakdowns in _lines(plan, results):
-        for direction in (*DIRECTIONS, OBLIQUE):
+        for direction in (*PULL_DIRECTIONS, OBLIQUE):
             events = [_disturbances(breakdown, direction) for breakdown in breakdowns]
             n = [sum(event.n for event in of_recording) for of_recording in events]
             wrong = [sum(event.n_wrong for event in of_recording) for of_recording in events]
             if sum(n):
                 rows.append(ratio_row(keys | {"direction": direction}, wrong, n, plan.seed))
                 n_disturbances.setdefault(direction, sum(map(len, events)))
-    ordered = [each for each in (*DIRECTIONS, OBLIQUE) if each in n_disturbances]
+    ordered = [each for each in (*PULL_DIRECTIONS, OBLIQUE) if each in n_disturbances]
     counts = ", ".join(f"{direction} {n_disturbances[direction]}" for direction in ordered)
     note = (
         "Share of the samples labelled not stable, during a disturbance, that are called stable; "
@@ -120,7 +120,7 @@ def _counts_of_quarter(
     return counts
 
 
-def _count_of(grip: GripErrors, kind: str) -> Count:
+def _count_of(grip: GripErrors, kind: str) -> CountPair:
     return grip.stable if kind == STABLE_MISSED else grip.not_stable
 
 

@@ -74,7 +74,12 @@ def events(plan: StudyPlan, results: Results) -> ResultTable:
         f"of those, the ones that belong to a glitch, and the others. {GLITCH_NOTE}"
     )
     return ResultTable(
-        "events", "Events", note, rows, ("on", "threshold", READING, "method"), digits_of=DIGITS
+        "events",
+        "Events",
+        note,
+        rows,
+        ("on", "threshold", READING, "method"),
+        digits_of=EVENT_DIGITS,
     )
 
 
@@ -101,7 +106,7 @@ def slips(plan: StudyPlan, results: Results) -> ResultTable:
         f"{GLITCH_NOTE}"
     )
     lines = ("on", "threshold", READING, "method")
-    return ResultTable("slips", "Slips detected", note, rows, lines, digits_of=DIGITS)
+    return ResultTable("slips", "Slips detected", note, rows, lines, digits_of=EVENT_DIGITS)
 
 
 def glitch_rates(plan: StudyPlan, results: Results) -> ResultTable:
@@ -120,7 +125,7 @@ def glitch_rates(plan: StudyPlan, results: Results) -> ResultTable:
     )
     lines = ("on", READING, "method")
     title = "Sensitivity to the rate of glitches"
-    return ResultTable("glitch_rates", title, note, rows, lines, digits_of=DIGITS)
+    return ResultTable("glitch_rates", title, note, rows, lines, digits_of=EVENT_DIGITS)
 
 
 def glitches(plan: StudyPlan, results: Results) -> ResultTable:
@@ -136,7 +141,7 @@ def glitches(plan: StudyPlan, results: Results) -> ResultTable:
         "the controller's set point; the distance counts until that sliding stops."
     )
     title = "Glitches and the slips that they cause"
-    return ResultTable("glitches", title, note, rows, ("on",), digits_of=DIGITS)
+    return ResultTable("glitches", title, note, rows, ("on",), digits_of=EVENT_DIGITS)
 
 
 def event_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
@@ -177,7 +182,7 @@ GLITCH_RATE_FIGURES = (
     f"detected within {1000 * POST_DURATIONS[0]:.0f} ms [%]",
     SLIP_MEDIAN,
 )
-DIGITS = {
+EVENT_DIGITS = {
     **dict.fromkeys(("delay median [s]", "delay 95 % [s]"), 3),
     **dict.fromkeys((SLIP_MEDIAN, SLIP_P95), 2),
     **dict.fromkeys(("events", "slips", "glitches"), 0),

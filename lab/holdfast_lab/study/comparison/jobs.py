@@ -7,8 +7,8 @@ from typing import Any
 from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationEffort,
     EvaluationJob,
+    GroupSplit,
     MethodEvaluation,
-    Split,
     evaluate_method,
 )
 from holdfast_lab.study.evaluation.variation import Variation
@@ -115,7 +115,7 @@ def evaluation_task(name: str, job: EvaluationJob, *, quick: bool = False) -> Ta
 def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
     """Return the complete evaluation job of a method."""
     tests = tuple(plan.corpora[role] for role in _test_roles(plan, method))
-    splits: tuple[Split, ...] = ("recording", "object")
+    splits: tuple[GroupSplit, ...] = ("recording", "object")
     if plan.quick and method not in QUICK_METHODS:
         splits = ("recording",)
     return EvaluationJob(

@@ -20,18 +20,18 @@ from holdfast_lab.study.comparison.real_estimates import (
     UnitLabels,
 )
 from holdfast_lab.study.comparison.real_models import SHIPPED
-from holdfast_lab.study.comparison.rows import WITHOUT_ESTIMATE, Keys, count_row, ratio_row
+from holdfast_lab.study.comparison.rows import WITHOUT_ESTIMATE, RowKeys, count_row, ratio_row
 
 MIN_RECORDINGS = 3
 """Minimum number of recordings for an interval."""
 MISSED_AFTER = 0.2
 """A slip is missed without an alarm until this time after its onset [s]."""
 AUC, AUC_OF_HAND, MEAN_AUC = "AUC", "AUC of the hand", "mean AUC"
-AUC_OF_SHIPPED, DIFFERENCE = f"AUC of {SHIPPED}", "difference"
+AUC_OF_SHIPPED, AUC_DIFFERENCE = f"AUC of {SHIPPED}", "difference"
 ACCURACY = "accuracy [%]"
 CALLED_STABLE = "stable called STABLE [%]"
-SLIPS, MISSED, FALSE_ALARMS = "slips", "missed slips [%]", "false alarms per minute"
-DIGITS = {AUC: 2, AUC_OF_HAND: 2, MEAN_AUC: 2, SLIPS: 0}
+SLIPS, MISSED_SLIPS, FALSE_ALARMS = "slips", "missed slips [%]", "false alarms per minute"
+COUNT_DIGITS = {AUC: 2, AUC_OF_HAND: 2, MEAN_AUC: 2, SLIPS: 0}
 """Digits after the decimal point, where they are not 1."""
 
 
@@ -70,7 +70,7 @@ class UnitCounts(NamedTuple):
     scores: Scores
 
 
-class EventCounts(NamedTuple):
+class SlipCounts(NamedTuple):
     """Counts of the alarms of the hand in one recording.
 
     Attributes:
@@ -92,7 +92,7 @@ class RecordingCounts(NamedTuple):
     name: str
     fingers: Mapping[str, UnitCounts]
     hand: UnitCounts
-    events: EventCounts
+    events: SlipCounts
 
     @property
     def units(self) -> list[UnitCounts]:
@@ -163,7 +163,7 @@ def count_pairs(
     return pairs
 
 
-def pair_rows(keys: Keys, pairs: Sequence[ScorePair], seed: int) -> list[Row]:
+def pair_rows(keys: RowKeys, pairs: Sequence[ScorePair], seed: int) -> list[Row]:
     """Return the AUC of two methods on the same samples, and the first minus the second.
 
     Args:
@@ -174,7 +174,7 @@ def pair_rows(keys: Keys, pairs: Sequence[ScorePair], seed: int) -> list[Row]:
     first, second = [pair.first for pair in pairs], [pair.second for pair in pairs]
     shipped = auc_row({**keys, "figure": AUC_OF_SHIPPED}, first, seed)
     other = auc_row({**keys, "figure": AUC}, second, seed)
-    key = {**keys, "figure": DIFFERENCE}
+    key = {**keys, "figure": AUC_DIFFERENCE}
     if shipped.ours is None or other.ours is None:
         return [shipped, other, Row(key, None, None, shipped.n)]
     interval = None
@@ -186,7 +186,7 @@ def pair_rows(keys: Keys, pairs: Sequence[ScorePair], seed: int) -> list[Row]:
     return [shipped, other, Row(key, shipped.ours - other.ours, None, shipped.n, interval)]
 
 
-def recording_rows(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> list[Row]:
+def recording_rows(keys: RowKeys, counts: Sequence[RecordingCounts], seed: int) -> list[Row]:
     """Return the figures of a method on some recordings together.
 
     Args:
@@ -205,7 +205,7 @@ def recording_rows(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> 
     ]
 
 
-def mean_auc_row(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> Row:
+def mean_auc_row(keys: RowKeys, counts: Sequence[RecordingCounts], seed: int) -> Row:
     """Return the mean of the AUCs of the recordings that have both classes.
 
     It does not depend on whether the probabilities of different fits have the same scale.
@@ -221,7 +221,7 @@ def mean_auc_row(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> Ro
     return _with_interval_if_enough(row)
 
 
-def auc_row(keys: Keys, scores: Sequence[Scores], seed: int) -> Row:
+def auc_row(keys: RowKeys, scores: Sequence[Scores], seed: int) -> Row:
     """Return the AUC of stable against slip, pooled over recordings, with its interval.
 
     Args:
@@ -244,7 +244,7 @@ def pool(scores: Sequence[Scores]) -> Scores:
 
 
 def _sample_row(
-    keys: Keys, counts: Sequence[RecordingCounts], part: str, whole: str, seed: int
+    keys: RowKeys, counts: Sequence[RecordingCounts], part: str, whole: str, seed: int
 ) -> Row:
     """Return a share of the samples [%], from the names of two counts."""
     parts, wholes = (
@@ -254,13 +254,15 @@ def _sample_row(
     return _with_interval_if_enough(ratio_row(keys, parts, wholes, seed))
 
 
-def _event_rows(keys: Keys, events: Sequence[EventCounts], seed: int) -> Iterator[Row]:
+def _event_rows(keys: RowKeys, events: Sequence[SlipCounts], seed: int) -> Iterator[Row]:
     n_slips = [event.n_slips for event in events]
     missed = [event.n_missed for event in events]
     alarms = [event.n_false_alarms for event in events]
     minutes = [event.stable_minutes for event in events]
     yield count_row({**keys, "figure": SLIPS}, n_slips)
-    yield _with_interval_if_enough(ratio_row({**keys, "figure": MISSED}, missed, n_slips, seed))
+    yield _with_interval_if_enough(
+        ratio_row({**keys, "figure": MISSED_SLIPS}, missed, n_slips, seed)
+    )
     per_minute = ratio_row({**keys, "figure": FALSE_ALARMS}, alarms, minutes, seed, scale=1.0)
     yield _with_interval_if_enough(per_minute)
 
@@ -300,7 +302,7 @@ def _count_unit(
     )
 
 
-def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> EventCounts:
+def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> SlipCounts:
     times, slip = labels.times.array, labels.slip.array
     codes = np.where(common, labels.codes.array, UNKNOWN)
     match = match_alarms(times, codes, alarm_states)
@@ -309,7 +311,7 @@ def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> Even
         for event in match.events
         if slip[np.searchsorted(times, event.onset) : np.searchsorted(times, event.end)].any()
     ]
-    return EventCounts(
+    return SlipCounts(
         n_slips=len(slips),
         n_missed=sum(event.delay > MISSED_AFTER + TIME_TOLERANCE for event in slips),
         n_false_alarms=sum(alarm.label is ContactState.STABLE for alarm in match.false_alarms),

@@ -27,7 +27,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
 )
 from holdfast_lab.study.plan import Corpus
 
-MAX_FOLDS = 20
+MAX_REAL_FOLDS = 20
 """Maximum number of folds. With more recordings, a fold leaves several out."""
 
 
@@ -128,8 +128,8 @@ def load_fingers(real: Corpus) -> list[Recording]:
 
 
 def n_folds(real: Corpus) -> int:
-    """Return the number of folds: one for each recording, but at most `MAX_FOLDS`."""
-    return min(len(real.recordings), MAX_FOLDS)
+    """Return the number of folds: one for each recording, but at most `MAX_REAL_FOLDS`."""
+    return min(len(real.recordings), MAX_REAL_FOLDS)
 
 
 def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEstimates]:

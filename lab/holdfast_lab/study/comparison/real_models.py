@@ -18,7 +18,7 @@ from holdfast.sensors.types import Array
 from holdfast.training import Setting, compute_decisions, train
 from holdfast.training.setting import Split
 from holdfast_lab.study.comparison.real_estimates import (
-    MAX_FOLDS,
+    MAX_REAL_FOLDS,
     Column,
     RecordingEstimates,
     load_fingers,
@@ -95,7 +95,7 @@ def _trained(recordings: Sequence[Recording], setting: Setting) -> Model | None:
 
     Its cross-validation is by recording where that is possible and fast. It is not used here.
     """
-    split: Split = "recording" if 2 <= len(recordings) <= MAX_FOLDS else "random"
+    split: Split = "recording" if 2 <= len(recordings) <= MAX_REAL_FOLDS else "random"
     try:
         return train(recordings, replace(setting, split=split)).model
     except (ModelError, TrainingError):

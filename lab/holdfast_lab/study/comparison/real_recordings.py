@@ -13,7 +13,7 @@ from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import NETWORK, Results, method_titles
 from holdfast_lab.study.comparison.real_counts import (
     AUC,
-    DIGITS,
+    COUNT_DIGITS,
     MIN_RECORDINGS,
     MISSED_AFTER,
     RecordingCounts,
@@ -25,7 +25,7 @@ from holdfast_lab.study.comparison.real_counts import (
     recording_rows,
 )
 from holdfast_lab.study.comparison.real_estimates import (
-    MAX_FOLDS,
+    MAX_REAL_FOLDS,
     RecordingEstimates,
     RecordingLabels,
     method_estimates,
@@ -37,7 +37,7 @@ from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
-QUICK_METHODS = ("logreg", "holdfast", "zhang", "spectrum", "difference", "anyskin")
+QUICK_REAL_METHODS = ("logreg", "holdfast", "zhang", "spectrum", "difference", "anyskin")
 """Methods of a quick study: one or two of each kind."""
 STABLE_SAMPLES, SLIP_SAMPLES = "stable samples", "slip samples"
 UNTOUCHED: Making = "untouched"
@@ -66,7 +66,8 @@ MODELS: Mapping[Making, Line] = {
 }
 """Lines of the model that ships."""
 
-MEANING = f"""One recording is left out at a time (with more than {MAX_FOLDS}, several); methods
+MEANING = f"""\
+One recording is left out at a time (with more than {MAX_REAL_FOLDS}, several); methods
 are trained on the others. {SHIPPED}, trained on the twin only, is shown as it ships, and adapted
 to one or all of the others. All lines are scored on the same samples: those at which every line
 has an estimate of every finger. A line without any estimate in a recording is left out there.
@@ -144,7 +145,7 @@ def real_methods(plan: StudyPlan, real: Corpus) -> dict[str, str]:
         name: title
         for name, title in method_titles(plan).items()
         if not (METHODS[name].whole_hand and one_finger)
-        and not (plan.quick and name not in QUICK_METHODS)
+        and not (plan.quick and name not in QUICK_REAL_METHODS)
     }
 
 
@@ -161,7 +162,7 @@ def _pooled(by_line: Mapping[Line, Sequence[RecordingCounts]], note: str, seed: 
         rows.append(mean_auc_row(_keys(line), counts, seed))
         rows += recording_rows(_keys(line), counts, seed)
     title = "Real recordings, pooled"
-    return ResultTable("real", title, note, rows, ("method", "trained on"), digits_of=DIGITS)
+    return ResultTable("real", title, note, rows, ("method", "trained on"), digits_of=COUNT_DIGITS)
 
 
 def _by_recording(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> ResultTable:
@@ -172,7 +173,7 @@ def _by_recording(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) 
     ]
     lines = ("recording", "method", "trained on")
     title = "Real recordings, one by one"
-    return ResultTable("real_recordings", title, BY_RECORDING, rows, lines, digits_of=DIGITS)
+    return ResultTable("real_recordings", title, BY_RECORDING, rows, lines, digits_of=COUNT_DIGITS)
 
 
 def _by_finger(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> ResultTable:

@@ -11,7 +11,7 @@ from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, Row
 from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
 
-Keys = Mapping[str, Key]
+RowKeys = Mapping[str, Key]
 
 PERCENT = 100.0
 WITHOUT_ESTIMATE = "without estimate [%]"
@@ -30,7 +30,7 @@ DIGITS = {"AUC": 3, "AUC contact": 3, "Brier": 3}
 
 
 def ratio_row(
-    keys: Keys,
+    keys: RowKeys,
     parts: npt.ArrayLike,
     wholes: npt.ArrayLike,
     seed: int,
@@ -55,7 +55,7 @@ def ratio_row(
     return Row(dict(keys), ours, paper, n, interval)
 
 
-def quotient_row(keys: Keys, base: Array, ours: Array, seed: int) -> Row:
+def quotient_row(keys: RowKeys, base: Array, ours: Array, seed: int) -> Row:
     """Return the share of errors of a baseline divided by ours; infinite if we have none.
 
     The interval is paired: a resample draws the same recordings for both.
@@ -80,7 +80,7 @@ def quotient_row(keys: Keys, base: Array, ours: Array, seed: int) -> Row:
     return Row(dict(keys), None if value is None or np.isnan(value) else value, None, n, interval)
 
 
-def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: int) -> Row:
+def quantile_row(keys: RowKeys, values: Sequence[Sequence[float]], q: float, seed: int) -> Row:
     """Return a quantile of the values of all recordings; values may be infinite.
 
     Args:
@@ -95,13 +95,13 @@ def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: 
     return Row(dict(keys), ours, None, len(known), interval)
 
 
-def count_row(keys: Keys, counts: Sequence[int]) -> Row:
+def count_row(keys: RowKeys, counts: Sequence[int]) -> Row:
     """Return the sum of the counts of all recordings."""
     return Row(dict(keys), float(sum(counts)), None, len(counts))
 
 
 def sample_rows(
-    keys: Keys,
+    keys: RowKeys,
     metrics: Metrics,
     figures: Sequence[str] = tuple(SAMPLE_METRICS),
     paper: Mapping[str, float] | None = None,
@@ -133,7 +133,7 @@ def _has_samples(metrics: SampleMetrics) -> bool:
     return metrics.n > 0
 
 
-def without_estimate_row(keys: Keys, counts: Sequence[tuple[int, int]], seed: int) -> Row:
+def without_estimate_row(keys: RowKeys, counts: Sequence[tuple[int, int]], seed: int) -> Row:
     """Return the share of labelled samples without an estimate [%].
 
     Args:
@@ -155,7 +155,7 @@ def correct_and_all(metrics: Metrics) -> dict[str, tuple[int, int]]:
     return counts
 
 
-def difference_row(keys: Keys, first: Metrics, second: Metrics, seed: int) -> Row:
+def difference_row(keys: RowKeys, first: Metrics, second: Metrics, seed: int) -> Row:
     """Return the accuracy of `first` minus that of `second`, on the same recordings [points].
 
     The interval is paired: a resample draws the same recordings for both.
@@ -177,7 +177,7 @@ def _accuracy_difference(counts: Array) -> Statistic:
     return statistic
 
 
-def calibration_row(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Row:
+def calibration_row(keys: RowKeys, evaluation: MethodEvaluation, seed: int) -> Row:
     """Return the calibration error: |mean probability - share of stable samples|, by ten bins.
 
     The error is the mean over samples.

@@ -46,12 +46,12 @@ MARGINS = (0.0, 0.05, UNSTABLE_MARGIN, 0.2)
 """Margins of labels [s]."""
 PROFILES = ("recording", "gentle", "vigorous")
 
-NOISE = "noise"
+NOISE_NAME = "noise"
 MARGIN = "margin [s]"
-RATE = "rate [Hz]"
+RATE_NAME = "rate [Hz]"
 SAMPLE_FIGURES = ("accuracy [%]", "FDR [%]", "AUC contact")
 SLIPS_DETECTED = f"slips detected within {1000 * POST_DURATIONS[0]:.0f} ms [%]"
-ACCURACY_DIFFERENCE = "accuracy less sigma's [points]"
+SIGMA_DIFFERENCE = "accuracy less sigma's [points]"
 CURVES = ("accuracy [%]", "AUC contact", SLIPS_DETECTED)
 """Figures of the tables that are drawn as curves."""
 NOTE = (
@@ -108,7 +108,7 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
 def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """Return the tables of the conditions as curves."""
     swept = [_draw(_sweep_table(plan, results, each), each, CURVES) for each in sweeps(plan)]
-    sweep = Sweep("sigma_energy", "Sigma beside energy", NOISE, _noise(plan), "")
+    sweep = Sweep("sigma_energy", "Sigma beside energy", NOISE_NAME, _noise(plan), "")
     sigma_energy = _draw(_sigma_energy_table(plan, results), sweep, CURVES[:2])
     return [*swept, sigma_energy]
 
@@ -125,7 +125,7 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
     noise = Sweep(
         "noise",
         "Sensitivity to noise",
-        NOISE,
+        NOISE_NAME,
         _noise(plan),
         f"Standard deviation of white noise added to every reading [{unit}], in training and "
         "in test; the readings already contain the noise of the twin.",
@@ -141,7 +141,7 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
     rates = Sweep(
         "rates",
         "Sensitivity to the sampling rate",
-        RATE,
+        RATE_NAME,
         {round(plan.main.rate / step, 1): Variation(every=step) for step in _steps(plan)},
         "Every 1st, 2nd, ... sample, in training and in test. Windows keep their number of "
         "samples, so they last longer.",
@@ -235,10 +235,10 @@ def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
         first = results[_task_name("sigma_cut", variation)]["recording"].metrics
         for name, cut in CUTS.items():
             metrics = results[_task_name(name, variation)]["recording"].metrics
-            keys: Keys = {NOISE: value, "measure": cut.title}
+            keys: Keys = {NOISE_NAME: value, "measure": cut.title}
             rows += sample_rows(keys, metrics, ("accuracy [%]", "AUC", "AUC contact"))
             if name != "sigma_cut":
-                figure = keys | {"figure": ACCURACY_DIFFERENCE}
+                figure = keys | {"figure": SIGMA_DIFFERENCE}
                 rows.append(difference_row(figure, metrics, first, plan.seed))
     note = (
         "One feature and one threshold, the one with the best balanced accuracy in training, by "
@@ -248,7 +248,7 @@ def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
         "threshold. AUC contact: stable against unstable, which depends on no threshold. The "
         "difference is paired."
     )
-    lines = (NOISE, "measure")
+    lines = (NOISE_NAME, "measure")
     title = "Sigma beside energy as noise grows"
     return ResultTable("sigma_energy", title, note, rows, lines, digits_of=DIGITS)
 

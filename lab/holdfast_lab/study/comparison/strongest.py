@@ -23,7 +23,7 @@ from holdfast_lab.study.comparison.jobs import (
 from holdfast_lab.study.comparison.rows import correct_and_all, quotient_row, ratio_row
 from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics
 from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, MethodEvaluation
-from holdfast_lab.study.evaluation.glitch_readings import EVENT, FALSE_ALARM, LEFT_OUT
+from holdfast_lab.study.evaluation.glitch_readings import EVENT, FALSE_ALARM, LEFT_OUT_SPLIT
 from holdfast_lab.study.methods import PAPER_FAMILY
 from holdfast_lab.study.plan import StudyPlan
 
@@ -31,7 +31,7 @@ OURS = "holdfast"
 """Name of our own method."""
 FAMILY, EVERY = "the paper's family", "all other methods"
 RATIO = "ratio of errors"
-Counts = list[tuple[int, int]]
+CountPairs = list[tuple[int, int]]
 """Errors, and all samples or events, of each recording."""
 
 
@@ -47,7 +47,7 @@ class Measure(NamedTuple):
 
     title: str
     left_out: str
-    counts: Callable[[MethodEvaluation], Counts | None]
+    counts: Callable[[MethodEvaluation], CountPairs | None]
     reading: str = ""
 
 
@@ -123,7 +123,7 @@ def _evaluations(plan: StudyPlan, results: Results, key: str) -> dict[str, Metho
     return {name: by_split[key] for name, by_split in evaluations.items() if key in by_split}
 
 
-def _fewest_errors(counts: dict[str, Counts]) -> str | None:
+def _fewest_errors(counts: dict[str, CountPairs]) -> str | None:
     """Return the name with the smallest share of errors; the first of equals."""
     shares = {
         name: sum(wrong for wrong, _ in errors) / max(sum(n for _, n in errors), 1)
@@ -137,19 +137,19 @@ def _false_alarm_row(keys: dict[str, Key], alarms: Sequence[AlarmStatistics], se
     return ratio_row(keys, n, [alarm.stable_seconds / 60 for alarm in alarms], seed, scale=1.0)
 
 
-def _sample_errors(metrics: Metrics) -> Counts:
+def _sample_errors(metrics: Metrics) -> CountPairs:
     return [(n - n_correct, n) for n_correct, n in correct_and_all(metrics).values()]
 
 
-def _finger_errors(evaluation: MethodEvaluation) -> Counts | None:
+def _finger_errors(evaluation: MethodEvaluation) -> CountPairs | None:
     return None if evaluation.fingers is None else _sample_errors(evaluation.fingers)
 
 
-def _hand_errors(evaluation: MethodEvaluation) -> Counts:
+def _hand_errors(evaluation: MethodEvaluation) -> CountPairs:
     return _sample_errors(evaluation.hand)
 
 
-def _held_errors(evaluation: MethodEvaluation) -> Counts | None:
+def _held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
     """Return the errors of fingers while the hand holds the object."""
     if evaluation.fingers is None or not any(each.phases for each in evaluation.breakdown):
         return None
@@ -160,14 +160,14 @@ def _held_errors(evaluation: MethodEvaluation) -> Counts | None:
     return counts
 
 
-def _missed_events(reading: str) -> Callable[[MethodEvaluation], Counts]:
+def _missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
     return lambda evaluation: [
         (alarms.n_missed(POST_DURATIONS[0]), len(alarms.delays))
         for alarms in evaluation.readings[reading].compared
     ]
 
 
-def _missed_slips(reading: str) -> Callable[[MethodEvaluation], Counts]:
+def _missed_slips(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
     return lambda evaluation: [
         (len(alarms.slip_delays) - alarms.n_slips_found(POST_DURATIONS[0]), len(alarms.slip_delays))
         for alarms in evaluation.readings[reading].compared
@@ -182,10 +182,10 @@ MEASURES = (
     Measure("events, a glitch is an event [%]", NOTHING, _missed_events(EVENT), EVENT),
     Measure("events, a glitch is a false alarm [%]", NOTHING, _missed_events(FALSE_ALARM),
             FALSE_ALARM),
-    Measure("events [%]", "glitches", _missed_events(LEFT_OUT), LEFT_OUT),
+    Measure("events [%]", "glitches", _missed_events(LEFT_OUT_SPLIT), LEFT_OUT_SPLIT),
     Measure("slips, a glitch is an event [%]", NOTHING, _missed_slips(EVENT), EVENT),
     Measure("slips, a glitch is a false alarm [%]", NOTHING, _missed_slips(FALSE_ALARM),
             FALSE_ALARM),
-    Measure("slips [%]", "glitches and their slips", _missed_slips(LEFT_OUT), LEFT_OUT),
+    Measure("slips [%]", "glitches and their slips", _missed_slips(LEFT_OUT_SPLIT), LEFT_OUT_SPLIT),
 )  # fmt: skip
 """The kinds of errors in the table: without any exclusion, then with exclusions."""

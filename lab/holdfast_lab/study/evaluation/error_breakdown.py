@@ -13,7 +13,7 @@ from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast_lab.study.methods import HAND
 
-DIRECTIONS = {
+PULL_DIRECTIONS = {
     "down": (0.0, 0.0, -1.0),
     "up": (0.0, 0.0, 1.0),
     "left": (0.0, -1.0, 0.0),
@@ -23,10 +23,10 @@ DIRECTIONS = {
 }
 """Unit vectors of the directions of a disturbance in the world frame."""
 OBLIQUE = "oblique"
-"""Direction of a disturbance that is more than 30 degrees away from all of `DIRECTIONS`."""
-MIN_COSINE = np.cos(np.radians(30.0))
+"""Direction of a disturbance that is more than 30 degrees away from all of `PULL_DIRECTIONS`."""
+MIN_DIRECTION_COSINE = np.cos(np.radians(30.0))
 
-Count = tuple[int, int]
+CountPair = tuple[int, int]
 """Number of samples, and of wrong decisions among them."""
 
 
@@ -40,15 +40,15 @@ class GripErrors(msgspec.Struct, frozen=True):
     """
 
     force: float
-    stable: Count
-    not_stable: Count
+    stable: CountPair
+    not_stable: CountPair
 
 
 class DisturbanceErrors(msgspec.Struct, frozen=True):
     """Errors of all fingers during one disturbance.
 
     Attributes:
-        direction: of the mean outside force: one of `DIRECTIONS`, or `OBLIQUE`.
+        direction: of the mean outside force: one of `PULL_DIRECTIONS`, or `OBLIQUE`.
         n: samples labelled not stable.
         n_wrong: of those, samples called stable.
     """
@@ -67,7 +67,7 @@ class ErrorBreakdown(msgspec.Struct, frozen=True):
         disturbances: of each disturbance.
     """
 
-    phases: dict[str, Count]
+    phases: dict[str, CountPair]
     grips: list[GripErrors]
     disturbances: list[DisturbanceErrors]
 
@@ -93,7 +93,7 @@ def decided_units(decisions: Decisions) -> Mapping[str, FingerDecisions]:
     return {HAND: decisions.hand}
 
 
-def _phase_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> dict[str, Count]:
+def _phase_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> dict[str, CountPair]:
     counts = {str(phase): np.zeros(2, dtype=np.int64) for phase in Phase}
     for unit in units.values():
         known, wrong = _known_and_wrong(unit)
@@ -143,9 +143,9 @@ def _disturbance_errors(
 
 
 def _direction(force: Array) -> str:
-    along = {name: float(force @ np.array(axis)) for name, axis in DIRECTIONS.items()}
+    along = {name: float(force @ np.array(axis)) for name, axis in PULL_DIRECTIONS.items()}
     best = max(along, key=lambda name: along[name])
-    return best if along[best] >= MIN_COSINE * float(np.linalg.norm(force)) else OBLIQUE
+    return best if along[best] >= MIN_DIRECTION_COSINE * float(np.linalg.norm(force)) else OBLIQUE
 
 
 def _known_and_wrong(unit: FingerDecisions) -> tuple[Mask, Mask]:
@@ -154,7 +154,7 @@ def _known_and_wrong(unit: FingerDecisions) -> tuple[Mask, Mask]:
     return known, (unit.labels == STABLE) != (unit.states == STABLE)
 
 
-def _count(samples: Mask, wrong: Mask) -> Count:
+def _count(samples: Mask, wrong: Mask) -> CountPair:
     return int(samples.sum()), int((samples & wrong).sum())
 
 

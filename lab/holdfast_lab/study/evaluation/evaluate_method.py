@@ -25,7 +25,7 @@ from holdfast_lab.study.evaluation.alarm_statistics import (
 )
 from holdfast_lab.study.evaluation.common_samples import find_method, longest_warm_up
 from holdfast_lab.study.evaluation.error_breakdown import (
-    Count,
+    CountPair,
     ErrorBreakdown,
     break_down_errors,
     calibration_counts,
@@ -55,7 +55,7 @@ HOLD_TIME = 0.1
 So one disturbance is one alarm, whatever the method.
 """
 
-Split = Literal["recording", "object"]
+GroupSplit = Literal["recording", "object"]
 
 
 class EvaluationEffort(msgspec.Struct, frozen=True):
@@ -90,7 +90,7 @@ class EvaluationJob(msgspec.Struct, frozen=True):
 
     method: str
     train: Corpus
-    splits: tuple[Split, ...] = ("recording",)
+    splits: tuple[GroupSplit, ...] = ("recording",)
     tests: tuple[Corpus, ...] = ()
     variation: Variation = Variation()
     effort: EvaluationEffort = EvaluationEffort()
@@ -141,8 +141,8 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
     names: list[str]
     fingers: Metrics | None
     hand: Metrics
-    without_estimate: list[Count]
-    hand_without_estimate: list[Count]
+    without_estimate: list[CountPair]
+    hand_without_estimate: list[CountPair]
     readings: dict[str, ReadingAlarms]
     glitches: list[GlitchCount]
     breakdown: list[ErrorBreakdown]
@@ -217,7 +217,7 @@ def _corpus_features(job: EvaluationJob, method: Method, corpus: Corpus) -> list
 
 
 def held_out_folds(
-    objects: Sequence[str | None], split: Split, n_folds: int, seed: int
+    objects: Sequence[str | None], split: GroupSplit, n_folds: int, seed: int
 ) -> Iterator[frozenset[int]]:
     """Yield the numbers of the recordings that each fold holds out.
 
@@ -322,7 +322,7 @@ def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     )
 
 
-def _n_without_estimate(units: Iterable[FingerDecisions | None]) -> Count:
+def _n_without_estimate(units: Iterable[FingerDecisions | None]) -> CountPair:
     """Return the number of labelled samples, and of those of them without an estimate."""
     n = n_without = 0
     for unit in units:

@@ -20,7 +20,7 @@ from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
 from holdfast_lab.study.evaluation.scores import RecordingScores
 from holdfast_lab.study.methods import Method
 
-MAX_SAMPLES = 20_000
+MAX_FITTED_SAMPLES = 20_000
 """Maximum samples of a unit that train a classifier. All samples are evaluated."""
 
 MIN_PROBABILITY = 1e-12
@@ -43,7 +43,7 @@ class TrainingSamples:
 
 
 def gather_training_samples(
-    recordings: Sequence[RecordingFeatures], max_samples: int = MAX_SAMPLES
+    recordings: Sequence[RecordingFeatures], max_samples: int = MAX_FITTED_SAMPLES
 ) -> TrainingSamples:
     """Return the labelled samples of recordings, thinned evenly over the recordings.
 

@@ -15,8 +15,8 @@ from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
 
 EVENT = "an event"
 FALSE_ALARM = "a false alarm"
-LEFT_OUT = "left out"
-READINGS = (EVENT, FALSE_ALARM, LEFT_OUT)
+LEFT_OUT_SPLIT = "left out"
+READINGS = (EVENT, FALSE_ALARM, LEFT_OUT_SPLIT)
 """Readings by the words that stand for them in tables, under "a glitch is"."""
 
 
@@ -42,5 +42,5 @@ def labels_by_reading(recording: RecordingFeatures) -> dict[str, HandLabels]:
     return {
         EVENT: HandLabels(unstable, glitch, without_glitches=False),
         FALSE_ALARM: HandLabels(stable, glitch, without_glitches=False),
-        LEFT_OUT: HandLabels(stable, glitch, without_glitches=True),
+        LEFT_OUT_SPLIT: HandLabels(stable, glitch, without_glitches=True),
     }

@@ -1,6 +1,6 @@
 """The methods that the study compares, in one file for each family."""
 
-from holdfast_lab.study.methods.force_rules import DIFFERENCE, FRICTION, TANGENTIAL
+from holdfast_lab.study.methods.force_rules import DIFFERENCE, FRICTION_METHOD, TANGENTIAL
 from holdfast_lab.study.methods.holdfast import HOLDFAST
 from holdfast_lab.study.methods.learning import ANYSKIN, JAMES_LEPORA, TCN
 from holdfast_lab.study.methods.method import (
@@ -34,7 +34,7 @@ METHODS: dict[str, Method] = {
         ENERGY,
         HOLDFAST,
         ZHANG,
-        FRICTION,
+        FRICTION_METHOD,
         SLIP_SERVO,
         SPECTRUM,
         DIFFERENCE,

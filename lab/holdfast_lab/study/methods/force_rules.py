@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from holdfast.classifiers import Threshold, recipe
+from holdfast.classifiers import recipe
 from holdfast.sensors.types import Array
+from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.study.methods.method import FingerSignal, HandSignal, Method, stretchwise
 
 FRICTION_SOURCE = (
@@ -67,7 +68,7 @@ def _force_rate(finger: FingerSignal) -> Array:
     return np.asarray(np.linalg.norm(steps, axis=1, keepdims=True) * finger.rate)
 
 
-FRICTION = Method(
+FRICTION_METHOD = Method(
     "friction",
     "Coulomb friction margin",
     "friction",

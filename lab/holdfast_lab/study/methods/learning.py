@@ -47,7 +47,7 @@ GROVER_SOURCE = (
     "augmentation. Training ends when the loss of a fifth of the training recordings, which are "
     "held out, has not fallen for 15 epochs"
 )
-N_STEPS = 100
+N_LEARNING_STEPS = 100
 """Time steps of the network's window."""
 STEP = 0.01
 """Time between two steps [s]: the window is one second at 100 Hz."""
@@ -183,14 +183,14 @@ def last_second(hand: HandSignal) -> dict[str, Array]:
 
 def _steps(finger: FingerSignal) -> Array:
     """Return the steps of the second that ends at each sample: x y z of one after the other."""
-    features = np.full((len(finger.times), N_STEPS, 3), np.nan)
-    first = finger.times[:1] + (N_STEPS - 1) * STEP - 0.5 / finger.rate
+    features = np.full((len(finger.times), N_LEARNING_STEPS, 3), np.nan)
+    first = finger.times[:1] + (N_LEARNING_STEPS - 1) * STEP - 0.5 / finger.rate
     full = finger.times >= first
-    at = finger.times[full, None] - STEP * np.arange(N_STEPS)[::-1]
+    at = finger.times[full, None] - STEP * np.arange(N_LEARNING_STEPS)[::-1]
     if full.any():
         for axis in range(3):
             features[full, :, axis] = np.interp(at, finger.times, finger.force[:, axis])
-    return features.reshape(len(features), 3 * N_STEPS)
+    return features.reshape(len(features), 3 * N_LEARNING_STEPS)
 
 
 def _james_lepora(scope: str, classifier: str, title: str) -> Method:

@@ -11,12 +11,12 @@ from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
 from holdfast.metrics.statistics import Statistic
 from holdfast.sensors.types import Array
-from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.paper import published
 from holdfast_lab.study.paper.label_sources import has_truth
-from holdfast_lab.study.paper.paper_tables import TITLES, first_finger
+from holdfast_lab.study.paper.paper_tables import METHOD_TITLES, first_finger
 from holdfast_lab.study.paper.pooled_samples import UNTREATED, Treatment
 from holdfast_lab.study.paper.random_split import (
     HELD_OUT,
@@ -30,11 +30,11 @@ from holdfast_lab.study.paper.random_split import (
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
-N_FIT = 40_000
+N_ATTRIBUTION_FIT = 40_000
 """Maximum number of samples of a fit."""
-WINDOW = 32
+OTHER_WINDOW = 32
 """Another window [samples]."""
-DIFFERENCE = "accuracy less the first line [points]"
+LINE_DIFFERENCE = "accuracy less the first line [points]"
 RATES = ("FPR", "FNR", "FDR", "accuracy")
 
 Keys = dict[str, Key]
@@ -71,14 +71,14 @@ SWITCHES = (
     Switch("sliding", "labels", "only sliding is unstable", treatment=Treatment("sliding")),
     Switch("drawn", "labels", "drawn from the plot", treatment=Treatment("drawn")),
     Switch("finger", "disturbances", "only a finger pushes", role="finger", treatment=EXACT),
-    Switch("balanced", "classifier", TITLES["logreg_balanced"], treatment=EXACT,
+    Switch("balanced", "classifier", METHOD_TITLES["logreg_balanced"], treatment=EXACT,
            classifier="logreg_balanced"),
-    Switch("svm", "classifier", TITLES["svm"], treatment=EXACT, classifier="svm"),
-    Switch("svm_balanced", "classifier", TITLES["svm_balanced"], treatment=EXACT,
+    Switch("svm", "classifier", METHOD_TITLES["svm"], treatment=EXACT, classifier="svm"),
+    Switch("svm_balanced", "classifier", METHOD_TITLES["svm_balanced"], treatment=EXACT,
            classifier="svm_balanced"),
     Switch("noiseless", "noise", "none but rounding", role="noiseless", treatment=EXACT),
     Switch("noisy", "noise", "twice the sensor's", treatment=Treatment("exact", DOUBLE_NOISE)),
-    Switch("window", "window", f"N_w = {WINDOW}", treatment=EXACT, window=WINDOW),
+    Switch("window", "window", f"N_w = {OTHER_WINDOW}", treatment=EXACT, window=OTHER_WINDOW),
 )  # fmt: skip
 """The paper's method on the reference recordings, then with one thing switched at a time."""
 
@@ -93,7 +93,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
     for switch in switches(plan):
         variants = [(switch.classifier, DEPLOYED_FEATURES)]
         trials = 1 if plan.quick else 10
-        budget = FitBudget(trials, N_FIT)
+        budget = FitBudget(trials, N_ATTRIBUTION_FIT)
         arguments = (
             {"main": corpora[switch.role]}, finger, switch.window, variants, budget,
             plan.seed, False, switch.treatment,
@@ -114,7 +114,7 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         result: VariantResult = results[f"attribution/{switch.name}"][0]
         for on in (HELD_OUT, OTHER_RECORDINGS):
             keys: Keys = {"switched": switch.factor, "to": switch.setting, "on": on}
-            paper = published.WINDOW[DEFAULT_WINDOW] if switch.name == "base" else {}
+            paper = published.PUBLISHED_WINDOW[DEFAULT_WINDOW] if switch.name == "base" else {}
             for rate, row in rate_rows(result.counts[on], RATES, plan.seed):
                 figure = keys | {"figure": rate}
                 rows.append(Row(figure, row.ours, paper.get(rate), row.n, row.interval))
@@ -208,7 +208,7 @@ def difference_row(
     ours = float(statistic(np.ones((1, len(both))))[0])
     interval = bootstrap_interval(statistic, len(both), seed=seed)
     n = sum(any(row) for row in counts)
-    return Row({**keys, "figure": DIFFERENCE}, ours, None, n, interval)
+    return Row({**keys, "figure": LINE_DIFFERENCE}, ours, None, n, interval)
 
 
 def _correct_and_all(counts: ConfusionCounts) -> Array:

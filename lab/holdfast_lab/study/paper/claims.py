@@ -28,7 +28,7 @@ from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
-ROLES = ("main", "fresh", "others", "gentle", "vigorous")
+CLAIM_ROLES = ("main", "fresh", "others", "gentle", "vigorous")
 """Corpora whose recordings are used, if they exist; nothing is fitted to a classifier."""
 SETTLING_TIME = 1.0
 """Time after the lock in which the contact settles [s]."""
@@ -102,14 +102,16 @@ def tasks(plan: StudyPlan) -> list[Task]:
         return []
     return [
         Task(f"claims/{role}", claim_data, (plan.corpora[role],), list[ClaimData], cost=15.0)
-        for role in ROLES
+        for role in CLAIM_ROLES
         if role in plan.corpora
     ]
 
 
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """Return the table of the two claims; none without a truth."""
-    by_role = {role: results[f"claims/{role}"] for role in ROLES if f"claims/{role}" in results}
+    by_role = {
+        role: results[f"claims/{role}"] for role in CLAIM_ROLES if f"claims/{role}" in results
+    }
     if not by_role:
         return []
     rows: list[Row] = []

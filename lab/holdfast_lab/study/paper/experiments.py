@@ -11,7 +11,7 @@ import numpy as np
 
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
-from holdfast.plots.time_series import Codes, FingerSeries, finger_series
+from holdfast.plots.time_series import FingerSeries, StateCodes, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable
@@ -34,7 +34,7 @@ SEARCH_ORDER = ("fresh", "others", "gentle", "vigorous", "main")
 """Roles in which a recording is searched; those not used for training come first."""
 
 Experiment = Literal["protocol", "failed", "disturbed", "any"]
-CASES: dict[Experiment, str] = {"failed": "failed", "disturbed": "2"}
+EXPERIMENT_CASES: dict[Experiment, str] = {"failed": "failed", "disturbed": "2"}
 """Case of each experiment in the metadata of a recording; 2 is with disturbances."""
 CAPTIONS: dict[Experiment, tuple[str, str]] = {
     "failed": ("experiment-1", "Experiment 1, a grasp that failed"),
@@ -109,14 +109,14 @@ def predict_examples(
         for example in examples:
             states = _predict(METHODS[name], samples, corpora, example, seed)
             example.states[name] = states.tolist()
-    first = _first(main, finger, CASES["disturbed"]) or main.recordings[0]
+    first = _first(main, finger, EXPERIMENT_CASES["disturbed"]) or main.recordings[0]
     return [ExampleRecording("protocol", "main", first, finger), *examples]
 
 
 def _choose(corpora: Mapping[str, Corpus], finger: str) -> Iterator[ExampleRecording]:
     """Yield a recording of each experiment; the first recording if none has a case."""
     any_found = False
-    for experiment, case in CASES.items():
+    for experiment, case in EXPERIMENT_CASES.items():
         names = ((role, _first(corpus, finger, case)) for role, corpus in corpora.items())
         for role, name in names:
             if name is not None:
@@ -142,7 +142,7 @@ def _predict(
     corpora: Mapping[str, Corpus],
     example: ExampleRecording,
     seed: int,
-) -> Codes:
+) -> StateCodes:
     """Return states (n,) of a recording, by a fit to all other main recordings."""
     own = (example.role, example.recording)
     names = corpora["main"].recordings

@@ -33,11 +33,11 @@ CEILING_WINDOWS = (14, 64)
 CEILING_ROLES = {"main": "main", "finger": "finger protocol of holdfast 0.1"}
 """Roles of the corpora in the table of the ceiling, and their titles."""
 SHOWN = ("accuracy [%]", "FDR [%]", "FNR [%]", "AUC contact", "Brier")
-HELD = "held: disturbance, slip or glitch"
+HELD_LABELS = "held: disturbance, slip or glitch"
 ALL_SAMPLES = "all labelled samples"
 HIDDEN = "without a visible change [%]"
 CEILING = "ceiling [%]"
-MISSED = "events missed at 50 ms [%]"
+MISSED_EVENTS = "events missed at 50 ms [%]"
 FALSE_ALARMS = "false alarms per minute"
 
 Keys = dict[str, Key]
@@ -208,7 +208,7 @@ def _event_rows(keys: Keys, metrics: Metrics) -> Iterator[Row]:
     ends = None if intervals is None else intervals.hand
     missed = None if ends is None else ends.missed["0.05"]
     alarms = None if ends is None else ends.false_alarms_per_minute
-    yield Row(keys | {"figure": MISSED}, hand.missed["0.05"], None, n, missed)
+    yield Row(keys | {"figure": MISSED_EVENTS}, hand.missed["0.05"], None, n, missed)
     yield Row(keys | {"figure": FALSE_ALARMS}, hand.false_alarms_per_minute, None, n, alarms)
 
 
@@ -246,7 +246,7 @@ def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Itera
     held = [cause.value for cause in HELD_CAUSES]
     n = [sum(count.samples.get(kind, 0) for kind in held) for count in counts]
     hidden = [sum(count.hidden.get(kind, 0) for kind in held) for count in counts]
-    yield from _cause_rows(keys | {"cause": HELD}, hidden, n, seed)
+    yield from _cause_rows(keys | {"cause": HELD_LABELS}, hidden, n, seed)
     n_all = [count.n_labelled for count in counts]
     yield from _cause_rows(keys | {"cause": ALL_SAMPLES}, hidden, n_all, seed)
     if "stable" in all_kinds:

@@ -11,12 +11,12 @@ from holdfast_lab.figures.curves import Curve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.paper import published
-from holdfast_lab.study.paper.pooled_samples import ENERGY
+from holdfast_lab.study.paper.pooled_samples import ENERGY_NAME
 from holdfast_lab.study.paper.random_split import (
     FRESH,
     HELD_OUT,
-    OBJECTS,
     OTHER_RECORDINGS,
+    UNSEEN_OBJECTS,
     FitBudget,
     Variant,
     VariantResult,
@@ -28,29 +28,29 @@ from holdfast_lab.tasks import Task
 
 ABLATION_WINDOWS = (14, 18)
 QUICK_WINDOWS = (4, 10, 14, 18)
-TITLES = {
+METHOD_TITLES = {
     "logreg": "LogReg",
     "svm": "SVM",
     "logreg_balanced": "LogReg, balanced classes",
     "svm_balanced": "SVM, balanced classes",
 }
 """Classifiers of Table I. The paper's toolbox weights all samples alike."""
-FINGER_TITLES = {name: TITLES[name] for name in ("logreg", "svm")}
+FINGER_TITLES = {name: METHOD_TITLES[name] for name in ("logreg", "svm")}
 """Classifiers of the tables of all fingers."""
 N_FIT = 80_000
 """Maximum number of samples of a fit: the SVM needs minutes for more."""
 FEATURE_SETS = {"all six": FEATURE_NAMES, "deployed": DEPLOYED_FEATURES}
-SHORT_TESTS = (HELD_OUT, FRESH, OTHER_RECORDINGS, OBJECTS)
+SHORT_TESTS = (HELD_OUT, FRESH, OTHER_RECORDINGS, UNSEEN_OBJECTS)
 """Test data of the tables with many lines."""
 SECONDS_PER_TRIAL = {"logreg": 0.1, "svm": 1.5, "threshold": 0.0}
 """Expected time of a trial on the recordings of the twin [s]."""
 
 _PAPER_VARIANTS: tuple[Variant, ...] = tuple((name, DEPLOYED_FEATURES) for name in FINGER_TITLES)
 _BALANCED: tuple[Variant, ...] = tuple(
-    (name, DEPLOYED_FEATURES) for name in TITLES if name not in FINGER_TITLES
+    (name, DEPLOYED_FEATURES) for name in METHOD_TITLES if name not in FINGER_TITLES
 )
-_ZHANG: Variant = ("svm", (ENERGY,))
-_BEST_THRESHOLD: Variant = ("threshold", (ENERGY,))
+_ZHANG: Variant = ("svm", (ENERGY_NAME,))
+_BEST_THRESHOLD: Variant = ("threshold", (ENERGY_NAME,))
 
 Keys = dict[str, Key]
 
@@ -134,7 +134,7 @@ class PaperResults:
             _, finger, window, *_ = task.arguments
             for result in results[task.name]:
                 self.by_variant[finger, window, (result.classifier, result.features)] = result
-        roles = {FRESH: "fresh", OBJECTS: "others"}
+        roles = {FRESH: "fresh", UNSEEN_OBJECTS: "others"}
         self.tests = [on for on in SHORT_TESTS if on not in roles or roles[on] in plan.corpora]
 
     def of(
@@ -178,7 +178,7 @@ class PaperResults:
 
 def _confusion_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
-    for name, title in TITLES.items():
+    for name, title in METHOD_TITLES.items():
         keys: Keys = {"classifier": title}
         names = ("TNR", "FPR", "FNR", "TPR", "accuracy")
         rows += fits.rows(
@@ -206,7 +206,7 @@ def _window_table(fits: PaperResults) -> ResultTable:
         for title, names in FEATURE_SETS.items():
             keys: Keys = {"features": title, "N_w": window}
             result = fits.of(("logreg", names), window)
-            paper = published.WINDOW[window]
+            paper = published.PUBLISHED_WINDOW[window]
             rows += fits.rows(result, keys, published.RATES, paper, fits.tests)
     rows.sort(key=lambda row: str(row.keys["features"]))
     note = f"All six features include m; the deployed five do not. {fits.protocol}"
@@ -228,10 +228,10 @@ def _ablation_table(fits: PaperResults) -> ResultTable:
 
 def _unseen_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
-    for name, title in TITLES.items():
+    for name, title in METHOD_TITLES.items():
         keys: Keys = {"classifier": title}
         paper = {"accuracy": published.UNSEEN[base_name(name)]}
-        on = (FRESH, OTHER_RECORDINGS, OBJECTS)
+        on = (FRESH, OTHER_RECORDINGS, UNSEEN_OBJECTS)
         rows += fits.rows(fits.of((name, DEPLOYED_FEATURES)), keys, ("accuracy",), paper, on)
     title = "Accuracy on unseen data [%]"
     note = f"The paper does not say what its unseen data are. {fits.protocol}"
@@ -256,7 +256,7 @@ def _finger_table(fits: PaperResults) -> ResultTable:
 
 def _zhang_table(fits: PaperResults) -> ResultTable:
     methods = {
-        "energy of F_x (Zhang), SVM": (_ZHANG, published.ZHANG),
+        "energy of F_x (Zhang), SVM": (_ZHANG, published.PUBLISHED_ZHANG),
         "energy of F_x, best cut": (_BEST_THRESHOLD, {}),
         "LogReg (the paper)": (("logreg", DEPLOYED_FEATURES), published.FIRST_FINGER),
     }
@@ -339,7 +339,7 @@ def _protocol(plan: StudyPlan, result: VariantResult) -> Iterator[str]:
             "Other recordings: each is tested with a fit to others, in 5 folds, with the "
             "hyper-parameters found on the 80 %."
         )
-    if OBJECTS not in result.counts:
+    if UNSEEN_OBJECTS not in result.counts:
         yield "Other objects: none, because the recordings do not name the object."
     elif "others" in plan.corpora:
         yield "Other objects: recordings of objects that were not used for training."

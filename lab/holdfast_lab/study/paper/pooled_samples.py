@@ -30,11 +30,11 @@ from holdfast_lab.study.methods.wavelets import detail_energy
 from holdfast_lab.study.paper.label_sources import LabelSource, relabelled
 from holdfast_lab.study.plan import Corpus
 
-N_PARTS = 25
+N_POOLED_PARTS = 25
 
-ENERGY = "energy"
+ENERGY_NAME = "energy"
 """Zhang's feature: the energy of the Haar details of F_x."""
-COLUMNS = (*FEATURE_NAMES, ENERGY)
+COLUMNS = (*FEATURE_NAMES, ENERGY_NAME)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def pool_samples(
         features = _columns(signal, window)
         rows = usable_rows(features, states)
         samples.append(labelled_samples(features, states, rows, number))
-        drawn = random_folds(len(states), N_PARTS, np.random.default_rng([seed, number]))
+        drawn = random_folds(len(states), N_POOLED_PARTS, np.random.default_rng([seed, number]))
         parts.append(drawn[rows])
     objects = tuple(recording.object for recording in forces)
     return SamplePool(concatenate(samples), np.concatenate(parts), objects)

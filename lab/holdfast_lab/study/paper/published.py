@@ -23,7 +23,7 @@ _WINDOW = {
     "FDR": (8.6, 7.3, 6.5, 6.0, 5.6, 5.4, 5.1, 5.1),
     "accuracy": (93.0, 93.7, 94.2, 94.6, 94.9, 95.0, 95.2, 95.3),
 }
-WINDOW: dict[int, PublishedValues] = {
+PUBLISHED_WINDOW: dict[int, PublishedValues] = {
     n: {rate: values[place] for rate, values in _WINDOW.items()} for place, n in enumerate(WINDOWS)
 }
 """Table II, by N_w."""
@@ -56,7 +56,7 @@ OTHER_FINGERS: dict[str, PublishedValues] = {
     "thumb": {"accuracy": 95.7, "FDR": 3.5},
 }
 
-ZHANG: PublishedValues = {"accuracy": 62.7, "FDR": 49.1}
+PUBLISHED_ZHANG: PublishedValues = {"accuracy": 62.7, "FDR": 49.1}
 """"Not more than" and "up to"; the paper gives no window."""
 
 

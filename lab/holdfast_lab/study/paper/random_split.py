@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples, Threshold
+from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.statistics import Interval, percent
 from holdfast.sensors.types import Integers
@@ -20,6 +20,7 @@ from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.training_samples import thin, thinning_step
 from holdfast.training.tuning import search
+from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.paper.pooled_samples import UNTREATED, SamplePool, Treatment, pool_samples
 from holdfast_lab.study.plan import Corpus
@@ -35,8 +36,8 @@ VALIDATED = "cross-validated"
 HELD_OUT = "held out"
 FRESH = "fresh recordings"
 OTHER_RECORDINGS = "other recordings"
-OBJECTS = "other objects"
-TEST_DATA = (TRAINING, VALIDATED, HELD_OUT, FRESH, OTHER_RECORDINGS, OBJECTS)
+UNSEEN_OBJECTS = "other objects"
+TEST_DATA = (TRAINING, VALIDATED, HELD_OUT, FRESH, OTHER_RECORDINGS, UNSEEN_OBJECTS)
 """Data on which a classifier may be tested, in the order of the tables."""
 
 
@@ -159,7 +160,9 @@ def evaluate_variants(
     """
     rate = corpora["main"].rate
     main = pool_samples(corpora["main"], rate, finger, window, seed, treatment)
-    roles = {role: on for role, on in (("fresh", FRESH), ("others", OBJECTS)) if role in corpora}
+    roles = {
+        role: on for role, on in (("fresh", FRESH), ("others", UNSEEN_OBJECTS)) if role in corpora
+    }
     tests = {
         on: pool_samples(corpora[role], rate, finger, window, seed, treatment)
         for role, on in roles.items()
@@ -263,10 +266,10 @@ def _substitute_folds(
     if FRESH not in tests:
         folds[OTHER_RECORDINGS] = inner_folds(main.samples, N_FOLDS, seed)
     names = sorted({name for name in main.objects if name is not None})
-    if OBJECTS not in tests and thorough and None not in main.objects and len(names) > 1:
+    if UNSEEN_OBJECTS not in tests and thorough and None not in main.objects and len(names) > 1:
         object_of_recording = np.array([names.index(str(name)) for name in main.objects])
         by_object = main.samples._replace(groups=object_of_recording[main.samples.groups])
-        folds[OBJECTS] = inner_folds(by_object, len(names), seed)
+        folds[UNSEEN_OBJECTS] = inner_folds(by_object, len(names), seed)
     return folds
 
 

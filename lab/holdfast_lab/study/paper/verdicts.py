@@ -47,7 +47,7 @@ ROLE_TITLES = {
 """Roles whose recordings are evaluated, and their titles. "main" is evaluated out of fold."""
 ONLY_FAILED = ("gentle", "vigorous")
 """Roles of which only the failed grasps are evaluated."""
-DIGITS = {"delay median [s]": 3, "delay 95 % [s]": 3, "disturbances": 0, "failed grasps": 0}
+VERDICT_DIGITS = {"delay median [s]": 3, "delay 95 % [s]": 3, "disturbances": 0, "failed grasps": 0}
 
 Keys = dict[str, Key]
 
@@ -331,7 +331,7 @@ def _disturbed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int)
     )
     title = "Experiment 2: locked, disturbed, released"
     lines = ("on", "method")
-    digits = DIGITS | dict.fromkeys(_LOCK_FIGURES, 3)
+    digits = VERDICT_DIGITS | dict.fromkeys(_LOCK_FIGURES, 3)
     return ResultTable("experiment_2", title, note, rows, lines, digits_of=digits)
 
 

@@ -349,7 +349,7 @@ def test_tables_and_figures_of_the_conditions(plan, results):
 
 def test_sigma_beside_energy_is_compared_in_pairs(plan, results):
     (table,) = (t for t in sensitivity.tables(plan, results) if t.name == "sigma_energy")
-    less = rows_of(table, figure=sensitivity.ACCURACY_DIFFERENCE, noise=2.0)
+    less = rows_of(table, figure=sensitivity.SIGMA_DIFFERENCE, noise=2.0)
     assert [row.keys["measure"] for row in less] == ["energy of F_a", "energy of F_x (Zhang)"]
     by = {row.keys["measure"]: row.ours for row in rows_of(table, figure="accuracy [%]", noise=2.0)}
     for row in less:

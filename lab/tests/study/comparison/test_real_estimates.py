@@ -8,7 +8,7 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause, ContactState
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.comparison.real_estimates import (
-    MAX_FOLDS,
+    MAX_REAL_FOLDS,
     load_fingers,
     method_estimates,
     n_folds,
@@ -101,7 +101,7 @@ def test_whole_hand_methods_have_no_fingers(corpus):
 def test_there_is_a_fold_for_each_recording_up_to_a_limit(corpus):
     assert n_folds(corpus) == 3
     many = msgspec.structs.replace(corpus, recordings=tuple(map(str, range(99))))
-    assert n_folds(many) == MAX_FOLDS
+    assert n_folds(many) == MAX_REAL_FOLDS
 
 
 def test_only_fingers_of_both_classes_are_loaded(tmp_path):

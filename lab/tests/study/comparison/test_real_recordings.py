@@ -130,7 +130,7 @@ def test_a_quick_study_has_few_methods(corpus):
         "real/from nothing", "real/logreg", "real/holdfast", "real/zhang", "real/spectrum",
         "real/difference", "real/anyskin",
     ]  # fmt: skip
-    assert set(real_recordings.QUICK_METHODS) <= set(METHODS)
+    assert set(real_recordings.QUICK_REAL_METHODS) <= set(METHODS)
 
 
 def test_one_finger_has_no_whole_hand_methods(corpus):

@@ -10,7 +10,7 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast_lab.study.methods import HAND, METHODS, hand_signal
 from holdfast_lab.study.methods.learning import (
-    N_STEPS,
+    N_LEARNING_STEPS,
     hand_motion,
     last_second,
     motion_features,
@@ -161,7 +161,7 @@ def second_windows(recording):
     hand = hand_signal(recording, Tare.parse("none"))
     name = next(iter(hand.fingers))
     rows = last_second(hand)[name]
-    return rows.reshape(len(rows), N_STEPS, 3), hand.fingers[name].force
+    return rows.reshape(len(rows), N_LEARNING_STEPS, 3), hand.fingers[name].force
 
 
 def test_at_100_hz_a_window_is_the_last_100_samples():

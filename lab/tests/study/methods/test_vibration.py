@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
-from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.methods.vibration import BANDS, band_energy, band_pass, high_pass
 

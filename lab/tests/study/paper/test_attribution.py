@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.study.paper import attribution
 from holdfast_lab.study.paper.attribution import (
     DOUBLE_NOISE,
@@ -89,6 +89,6 @@ def test_the_table(plan):
     }
     first = SWITCHES[0].setting
     for row in table.rows:
-        if row.keys["figure"] == attribution.DIFFERENCE:
+        if row.keys["figure"] == attribution.LINE_DIFFERENCE:
             to, on = row.keys["to"], row.keys["on"]
             assert row.ours == pytest.approx(accuracy[to, on] - accuracy[first, on])

@@ -7,7 +7,13 @@ from holdfast.contact import Cause, ContactState
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper import label_tables
-from holdfast_lab.study.paper.label_tables import ALL_SAMPLES, CEILING, HELD, HIDDEN, ceiling_rows
+from holdfast_lab.study.paper.label_tables import (
+    ALL_SAMPLES,
+    CEILING,
+    HELD_LABELS,
+    HIDDEN,
+    ceiling_rows,
+)
 from holdfast_lab.study.paper.visible_changes import (
     HiddenCounts,
     count_hidden,
@@ -77,7 +83,7 @@ def test_the_rows_of_the_ceiling_by_hand():
     assert found["slip", "samples"].ours == 20 and found["glitch", "samples"].n == 1
     assert found["slip", HIDDEN].ours == pytest.approx(30)
     assert found["slip", CEILING].ours == pytest.approx(70)
-    assert found[HELD, HIDDEN].ours == pytest.approx(100 * 9 / 50)
+    assert found[HELD_LABELS, HIDDEN].ours == pytest.approx(100 * 9 / 50)
     assert found[ALL_SAMPLES, CEILING].ours == pytest.approx(100 * (1 - 9 / 500))
     assert found["stable", HIDDEN].ours == pytest.approx(85)
     assert ("stable", CEILING) not in found

@@ -6,17 +6,17 @@ from hypothesis import strategies as st
 
 from holdfast.classifiers import LinearClassifier, Samples
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.threshold import best_cut
 from holdfast.features import DEPLOYED_FEATURES
+from holdfast_lab.classifiers.threshold import best_cut
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
     CONFUSION_RATES,
     FIT_RECIPES,
     FRESH,
     HELD_OUT,
-    OBJECTS,
     OTHER_RECORDINGS,
     TRAINING,
+    UNSEEN_OBJECTS,
     VALIDATED,
     FitBudget,
     VariantResult,
@@ -63,7 +63,7 @@ def naive(corpora, on):
             (train[main.parts[train] % 5 != k], train[main.parts[train] % 5 == k]) for k in range(5)
         ],
         OTHER_RECORDINGS: [(every[data.groups != g], every[data.groups == g]) for g in range(5)],
-        OBJECTS: [
+        UNSEEN_OBJECTS: [
             (every[data.groups % 3 != k], every[data.groups % 3 == k])  # by turns, as synthetic
             for k in range(3)
         ],
@@ -78,27 +78,27 @@ def naive(corpora, on):
     return counts
 
 
-@pytest.mark.parametrize("on", [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS])
+@pytest.mark.parametrize("on", [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, UNSEEN_OBJECTS])
 def test_counts_are_those_of_a_naive_fit(corpora, alone, on):
     assert alone[0].counts[on] == naive(corpora, on)
 
 
 def test_kinds_of_test_data(corpora, alone):
-    together = [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS]
+    together = [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, UNSEEN_OBJECTS]
     assert [list(cell.counts) for cell in alone] == [together] * 2
     light = evaluated({"main": corpora["main"]}, thorough=False)
     assert list(light[0].counts) == [HELD_OUT, OTHER_RECORDINGS]
     assert light[0].counts[OTHER_RECORDINGS] == alone[0].counts[OTHER_RECORDINGS]
     everything = evaluated(corpora)
-    assert list(everything[0].counts) == [TRAINING, VALIDATED, HELD_OUT, FRESH, OBJECTS]
-    assert list(evaluated(corpora, thorough=False)[0].counts) == [HELD_OUT, FRESH, OBJECTS]
+    assert list(everything[0].counts) == [TRAINING, VALIDATED, HELD_OUT, FRESH, UNSEEN_OBJECTS]
+    assert list(evaluated(corpora, thorough=False)[0].counts) == [HELD_OUT, FRESH, UNSEEN_OBJECTS]
 
 
 def test_fresh_recordings_are_all_of_them(corpora):
     counts = evaluated(corpora, thorough=False)[0].counts
     fresh = pool_samples(corpora["fresh"], 150.0, "index", 14, seed=0)
     assert np.sum(counts[FRESH], axis=1).tolist() == np.bincount(fresh.samples.groups).tolist()
-    assert len(counts[OBJECTS]) == 2
+    assert len(counts[UNSEEN_OBJECTS]) == 2
 
 
 def test_the_split_is_reproducible_and_depends_on_the_seed(corpora, alone):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from holdfast.cli.label.inputs import (
     RuleOptions,
+    SaveOptions,
     check_rule,
     current_time,
     recordings_at,
@@ -21,7 +22,7 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.server.store import Labels
+    from holdfast.labelling.server.store import ModuleLabels
     from holdfast.recordings import Recording
 
 MAX_DOUBTFUL_SHOWN = 20
@@ -32,10 +33,8 @@ def label_by_rule(
     paths: Sequence[Path],
     rule: str,
     options: RuleOptions,
+    saving: SaveOptions,
     *,
-    author: str | None,
-    dry_run: bool,
-    force: bool,
     as_json: bool,
 ) -> None:
     """Write the labels that a rule proposes, and print those with low confidence.
@@ -44,9 +43,7 @@ def label_by_rule(
         paths: recordings, or folders of recordings.
         rule: name of the rule.
         options: options of the rule.
-        author: author of the label files; by default the rule.
-        dry_run: write nothing.
-        force: overwrite labels of a person.
+        saving: how they are saved; the author is the rule by default.
         as_json: print JSON.
 
     Raises:
@@ -56,23 +53,14 @@ def label_by_rule(
     """
     check_rule(rule)
     options.arguments(rule)
-    files = recordings_at(paths)
-    if not (dry_run or force):
-        check_no_manual_labels(files)
-
-    def label(path: Path, recording: "Recording") -> "Labels":
-        labels = options.propose(rule, recording)
-        if not dry_run:
-            write_labels(path, recording, labels, author or f"rule:{rule}")
-        return labels
-
-    documents = label_all(files, label)
+    documents = label_all(
+        recordings_at(paths),
+        lambda recording: options.propose(rule, recording),
+        saving,
+        saving.author or f"rule:{rule}",
+    )
     report_loaded_starts(documents, options.tare)
-    if as_json:
-        print_json({"rule": rule, "written": not dry_run, "recordings": documents})
-    else:
-        print_documents(documents)
-    report_failures(documents, written=not dry_run)
+    print_labelled(("rule", rule), documents, saving, as_json=as_json)
 
 
 def check_no_manual_labels(files: Sequence[Path]) -> None:
@@ -112,23 +100,35 @@ def _manual_author(path: Path) -> str | None:
 
 
 def label_all(
-    files: Sequence[Path], label: "Callable[[Path, Recording], Labels]"
+    files: Sequence[Path],
+    labels_of: "Callable[[Recording], ModuleLabels]",
+    saving: SaveOptions,
+    author: str,
 ) -> list[dict[str, Any]]:
-    """Label recordings; return a JSON document of each: its labels, or an error."""
+    """Label recordings; return a JSON document of each: its labels, or an error.
+
+    Raises:
+        OutputError: a recording has labels of a person, or a file cannot be written.
+    """
     from holdfast.errors import HoldfastError
     from holdfast.io import load_recording
 
+    if not (saving.dry_run or saving.force):
+        check_no_manual_labels(files)
     documents: list[dict[str, Any]] = []
     for path in progress(files, "labelling"):
         try:
             recording = load_recording(path, labels=False)
-            documents.append(_document(path, recording, label(path, recording)))
+            labels = labels_of(recording)
+            if not saving.dry_run:
+                write_labels(path, recording, labels, author)
+            documents.append(_document(path, recording, labels))
         except HoldfastError as cause:
             documents.append({"name": path.stem, "path": str(path), "error": str(cause)})
     return documents
 
 
-def write_labels(path: Path, recording: "Recording", labels: "Labels", author: str) -> None:
+def write_labels(path: Path, recording: "Recording", labels: "ModuleLabels", author: str) -> None:
     """Write the label file of a recording; keep its note.
 
     Raises:
@@ -151,22 +151,48 @@ def write_labels(path: Path, recording: "Recording", labels: "Labels", author: s
     )
 
 
-def print_documents(documents: Sequence[dict[str, Any]]) -> None:
+def print_labelled(
+    origin: tuple[str, str],
+    documents: Sequence[dict[str, Any]],
+    saving: SaveOptions,
+    *,
+    as_json: bool,
+) -> None:
+    """Print what was labelled, and report what failed.
+
+    Args:
+        origin: what made the labels, and its name; the first field of the JSON document.
+        documents: from `label_all`.
+        saving: how the labels were saved.
+        as_json: print JSON.
+
+    Raises:
+        RecordingError: a recording failed.
+    """
+    written, (maker, name) = not saving.dry_run, origin
+    if as_json:
+        print_json({maker: name, "written": written, "recordings": documents})
+    else:
+        _print_documents(documents)
+    _report_failures(documents, written=written)
+
+
+def _print_documents(documents: Sequence[dict[str, Any]]) -> None:
     """Print seconds per state of each recording, and labels with low confidence."""
     good = [document for document in documents if "error" not in document]
     if not good:
         return
     rows = [
         (
-            each["name"],
-            *(f"{each['seconds'][state]:.2f}" for state in each["seconds"]),
-            len(each["doubtful"]),
+            document["name"],
+            *(f"{seconds:.2f}" for seconds in document["seconds"].values()),
+            len(document["doubtful"]),
         )
-        for each in good
+        for document in good
     ]
     print_table(("recording", "stable [s]", "unstable [s]", "no contact [s]", "doubtful"), rows)
     doubtful = sorted(
-        ((each["name"], label) for each in good for label in each["doubtful"]),
+        ((document["name"], label) for document in good for label in document["doubtful"]),
         key=lambda item: item[1]["confidence"],
     )
     if doubtful:
@@ -179,14 +205,14 @@ def _print_doubtful(doubtful: Sequence[tuple[str, dict[str, Any]]]) -> None:
     rows = [
         (
             name,
-            one["finger"],
-            f"{one['start']:.2f}",
-            f"{one['end']:.2f}",
-            one["state"],
-            f"{one['confidence']:.2f}",
-            one["evidence"],
+            label["finger"],
+            f"{label['start']:.2f}",
+            f"{label['end']:.2f}",
+            label["state"],
+            f"{label['confidence']:.2f}",
+            label["evidence"],
         )
-        for name, one in doubtful[:MAX_DOUBTFUL_SHOWN]
+        for name, label in doubtful[:MAX_DOUBTFUL_SHOWN]
     ]
     header = ("recording", "finger", "start [s]", "end [s]", "state", "confidence", "evidence")
     print_table(header, rows)
@@ -216,16 +242,8 @@ def report_loaded_starts(documents: Sequence[dict[str, Any]], tare: str | None) 
     print_message(f"{text}: the first sample is their tare{more}")
 
 
-def report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
-    """Report labels that are hidden by the label files, and recordings that failed.
-
-    Args:
-        documents: from `label_all`.
-        written: True if label files were written.
-
-    Raises:
-        RecordingError: a recording failed.
-    """
+def _report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
+    """Report labels that are hidden by the label files, and recordings that failed."""
     from holdfast.errors import RecordingError
 
     n_hidden = sum(bool(document.get("n_inside")) for document in documents)
@@ -245,9 +263,9 @@ def _hidden_text(n_hidden: int, n: int, *, written: bool) -> str:
     return f"{text}outrank them in train and evaluate: delete NAME.labels.json to use them again"
 
 
-def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str, Any]:
+def _document(path: Path, recording: "Recording", labels: "ModuleLabels") -> dict[str, Any]:
     from holdfast.io.label_files import labels_path
-    from holdfast.labelling.rules.start import evidence_of_contact
+    from holdfast.labelling.rules.forces import evidence_of_contact
 
     return {
         "name": recording.name,
@@ -261,7 +279,7 @@ def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str,
     }
 
 
-def _label_seconds(labels: "Labels") -> dict[str, float]:
+def _label_seconds(labels: "ModuleLabels") -> dict[str, float]:
     """Return the duration of each state over all fingers [s], rounded to microseconds."""
     from holdfast.cli.info import label_seconds
 
@@ -269,7 +287,7 @@ def _label_seconds(labels: "Labels") -> dict[str, float]:
     return {state: round(seconds, 6) for state, seconds in total.items()}
 
 
-def _doubtful_labels(labels: "Labels") -> list[dict[str, Any]]:
+def _doubtful_labels(labels: "ModuleLabels") -> list[dict[str, Any]]:
     """Return the labels with low confidence as JSON values, the lowest first."""
     from holdfast.labelling.review.spans import doubtful
 
@@ -286,11 +304,11 @@ def _doubtful_labels(labels: "Labels") -> list[dict[str, Any]]:
     ]
 
 
-def _labels_json(labels: "Labels") -> Mapping[str, Any]:
+def _labels_json(labels: "ModuleLabels") -> Mapping[str, Any]:
     """Return labels by finger as JSON values."""
     from msgspec import to_builtins
 
-    from holdfast.labelling.server.api import labels_data
+    from holdfast.labelling.server.documents import labels_data
 
-    found: Mapping[str, Any] = to_builtins(labels_data(labels))
-    return found
+    values: Mapping[str, Any] = to_builtins(labels_data(labels))
+    return values

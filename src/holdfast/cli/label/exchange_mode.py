@@ -4,22 +4,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.auto_mode import (
-    check_no_manual_labels,
-    label_all,
-    print_documents,
-    report_failures,
-    write_labels,
-)
-from holdfast.cli.label.inputs import login_name, recordings_at
+from holdfast.cli.label.auto_mode import label_all, print_labelled
+from holdfast.cli.label.inputs import SaveOptions, login_name, recordings_at
 from holdfast.cli.terminal.console import print_json, print_line
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Recording
 
-FORMATS = ("label-studio", "csv")
+EXCHANGE_FORMATS = ("label-studio", "csv")
 
 
 def export_labels(
@@ -29,7 +22,7 @@ def export_labels(
 
     Args:
         paths: recordings, or folders of recordings.
-        kind: one of `FORMATS`.
+        kind: one of `EXCHANGE_FORMATS`.
         out: folder for the files.
         force: overwrite existing files.
         as_json: print JSON.
@@ -41,8 +34,8 @@ def export_labels(
     """
     from holdfast.io import Dataset
 
-    if kind not in FORMATS:
-        raise ValueError(f"--export {' or '.join(FORMATS)} expected, {kind!r} given")
+    if kind not in EXCHANGE_FORMATS:
+        raise ValueError(f"--export {' or '.join(EXCHANGE_FORMATS)} expected, {kind!r} given")
     recordings = Dataset(recordings_at(paths))
     if kind == "csv":
         written = _export_csv(recordings, out, force)
@@ -76,11 +69,8 @@ def _export_csv(recordings: "Sequence[Recording]", out: Path, force: bool) -> li
 def import_labels(
     paths: Sequence[Path],
     source: Path,
+    saving: SaveOptions,
     *,
-    annotator: str | None,
-    author: str | None,
-    dry_run: bool,
-    force: bool,
     as_json: bool,
 ) -> None:
     """Import labels from an export of Label Studio, a CSV file or a folder.
@@ -88,10 +78,7 @@ def import_labels(
     Args:
         paths: recordings, or folders of recordings.
         source: the file or folder.
-        annotator: annotator whose labels are read from an export of Label Studio.
-        author: author of the label files.
-        dry_run: write nothing.
-        force: overwrite labels of a person.
+        saving: how they are saved, and whose labels are read from Label Studio.
         as_json: print JSON.
 
     Raises:
@@ -107,18 +94,10 @@ def import_labels(
         raise RecordingError(f"{source} does not exist; labels of Label Studio or CSV expected")
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
         raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
-    if not (dry_run or force):
-        check_no_manual_labels(files)
-
-    def label(path: Path, recording: "Recording") -> "Labels":
-        labels = read_labels(source, recording, annotator)
-        if not dry_run:
-            write_labels(path, recording, labels, author or annotator or login_name())
-        return labels
-
-    documents = label_all(files, label)
-    if as_json:
-        print_json({"source": str(source), "written": not dry_run, "recordings": documents})
-    else:
-        print_documents(documents)
-    report_failures(documents, written=not dry_run)
+    documents = label_all(
+        files,
+        lambda recording: read_labels(source, recording, saving.annotator),
+        saving,
+        saving.author or saving.annotator or login_name(),
+    )
+    print_labelled(("source", str(source)), documents, saving, as_json=as_json)

@@ -1,4 +1,4 @@
-"""Inputs of the modes of `holdfast label`: recordings, options of rules, options of the page."""
+"""Inputs of the modes of `holdfast label`: recordings, and options that modes share."""
 
 import getpass
 from collections.abc import Sequence
@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from holdfast.cli.options import FittingTareOption, ForceOption
 
 if TYPE_CHECKING:
     from holdfast.labelling.rules.poses import Poses
@@ -15,19 +19,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RuleOptions:
-    """Options of a rule.
+    """Group of options: how a rule labels."""
 
-    Attributes:
-        tare: tare of the recordings; by default the one that fits the start of each.
-        poses: path of a CSV file of poses, or of a bag, for the rule `tracking`.
-        tracks: topics or frames of a bag, as BODY=NAME.
-        parameters: other parameters, as NAME=VALUE.
-    """
-
-    tare: str | None = None
-    poses: Path | None = None
-    tracks: tuple[str, ...] = ()
-    parameters: tuple[str, ...] = ()
+    tare: FittingTareOption = None
+    poses: Annotated[
+        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a ROS bag.")
+    ] = None
+    tracks: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--track",
+            metavar="BODY=NAME",
+            help="Topic or frame of a body in the bag; BODY is object or a finger.",
+        ),
+    ] = None
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
+    ] = None
 
     @cached_property
     def tracking(self) -> "Poses | None":
@@ -44,7 +53,7 @@ class RuleOptions:
             if self.tracks:
                 raise ValueError("--track names topics or frames of a bag: give --poses BAG")
             return None if self.poses is None else poses_from_csv(self.poses)
-        names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks)
+        names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks or ())
         if OBJECT not in names:
             raise ValueError(
                 f"{self.poses} is not a .csv file, so it is read as a bag: --track {OBJECT}=NAME "
@@ -58,7 +67,10 @@ class RuleOptions:
         Raises:
             ValueError: a parameter is not NAME=VALUE, or the rule does not use poses.
         """
-        arguments: dict[str, Any] = {"tare": self.tare, **dict(map(_parameter, self.parameters))}
+        arguments: dict[str, Any] = {
+            "tare": self.tare,
+            **dict(map(_parameter, self.parameters or ())),
+        }
         if self.tracking is not None:
             if rule != "tracking":
                 raise ValueError(f"--poses are for the rule tracking; rule {rule!r} given")
@@ -78,22 +90,20 @@ class RuleOptions:
 
 
 @dataclass(frozen=True)
-class PageOptions:
-    """Options of the labelling page.
+class SaveOptions:
+    """Group of options: how labels of a rule or of other programs are saved."""
 
-    Attributes:
-        host: address to listen on.
-        port: port to listen on; 0 selects a free one.
-        token: secret that clients must send; None without one.
-        browser: open the page in a browser.
-        as_json: print the address as JSON.
-    """
-
-    host: str
-    port: int
-    token: str | None
-    browser: bool
-    as_json: bool
+    author: Annotated[
+        str | None,
+        typer.Option(help="Author of the labels.", show_default="login name, or rule:RULE"),
+    ] = None
+    annotator: Annotated[
+        str | None, typer.Option(help="Annotator whose labels are read from Label Studio.")
+    ] = None
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="With --auto or --import: write nothing.")
+    ] = False
+    force: ForceOption = False
 
 
 def recordings_at(paths: Sequence[Path]) -> list[Path]:

@@ -8,12 +8,12 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from holdfast.cli.label.inputs import (
-    PageOptions,
     RuleOptions,
     current_time,
     login_name,
     recordings_at,
 )
+from holdfast.cli.options import ServerOptions
 from holdfast.cli.serve import open_browser, page_url
 from holdfast.cli.terminal.console import print_json, print_message
 
@@ -28,8 +28,11 @@ END_TIMEOUT = 10.0
 def show_label_page(
     paths: Sequence[Path],
     options: RuleOptions,
-    page_options: PageOptions,
+    access: ServerOptions,
     author: str | None,
+    *,
+    browser: bool,
+    as_json: bool,
     suspects: "Sequence[Suspect]" = (),
 ) -> None:
     """Run the labelling page until Ctrl-C.
@@ -37,8 +40,10 @@ def show_label_page(
     Args:
         paths: recordings, or folders of recordings.
         options: options of rules.
-        page_options: address and access.
+        access: address of the page, and who may open it.
         author: author of the labels; by default the login name.
+        browser: open the page in a browser.
+        as_json: print the address as JSON.
         suspects: labels that an audit contradicts.
 
     Raises:
@@ -51,7 +56,8 @@ def show_label_page(
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
-    guard = Guard(page_options.host, page_options.token)
+    token = access.find_token()
+    guard = Guard(access.host, token)
     files = recordings_at(paths)
     workspace = Workspace(
         files,
@@ -63,13 +69,7 @@ def show_label_page(
     )
 
     def announce(url: str) -> None:
-        page = page_url(url, page_options.token)
-        if page_options.as_json:
-            print_json({"url": page, "recordings": len(files)})
-            sys.stdout.flush()
-        opened = page_options.browser and open_browser(page)
-        where = "is open in the browser" if opened else "is the page"
-        print_message(f"{page} {where} for {_describe(files)}; Ctrl-C stops it")
+        _announce(page_url(url, token), files, browser=browser, as_json=as_json)
 
     threads = [
         Thread(target=work, args=(workspace,), daemon=True)
@@ -77,15 +77,19 @@ def show_label_page(
     ]
     for thread in threads:
         thread.start()
-    run_server(
-        LabellingService(workspace, guard).app, page_options.host, page_options.port, announce
-    )
+    run_server(LabellingService(workspace, guard).app, access.host, access.port, announce)
     for thread in threads:  # a library that is at work when Python ends stops with a fatal error
         thread.join(END_TIMEOUT)
 
 
-def _describe(files: Sequence[Path]) -> str:
-    return f"{len(files)} recordings" if len(files) > 1 else str(files[0])
+def _announce(page: str, files: Sequence[Path], *, browser: bool, as_json: bool) -> None:
+    """Print the address of the page, and open it in a browser."""
+    if as_json:
+        print_json({"url": page, "recordings": len(files)})
+        sys.stdout.flush()
+    where = "is open in the browser" if browser and open_browser(page) else "is the page"
+    what = f"{len(files)} recordings" if len(files) > 1 else files[0]
+    print_message(f"{page} {where} for {what}; Ctrl-C stops it")
 
 
 def _prepare(workspace: "Workspace") -> None:

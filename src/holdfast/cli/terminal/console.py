@@ -83,6 +83,16 @@ def print_json(value: object) -> None:
     sys.stdout.write(f"{visible_json(text)}\n")
 
 
+def format_number(value: float | None, digits: int) -> str:
+    """Return a number with so many digits after the point; a dash if there is none.
+
+    Example:
+        >>> format_number(0.126, 2), format_number(None, 2)
+        ('0.13', '-')
+    """
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
 def print_paragraph(text: str, first: str = "", later: str = "") -> None:
     """Print a text on stdout in lines as wide as the terminal.
 

@@ -1,4 +1,4 @@
-"""Progress bars on stderr."""
+"""Progress bars, and the status line of a recording, on stderr."""
 
 import math
 import sys
@@ -6,19 +6,23 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import timedelta
 from threading import Lock, Timer
+from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar
 
-from holdfast.cli.terminal.console import print_message
+from holdfast.cli.terminal.console import print_message, visible
 
 if TYPE_CHECKING:
+    from rich.live import Live
     from rich.progress import Progress
+
+    from holdfast.live.recorder import Recorder, RecorderStatus
 
 T = TypeVar("T")
 
 DISPLAY_DELAY = 2.0
 """Time after which a progress bar appears [s]."""
 
-MESSAGE_INTERVAL = 60.0
+PROGRESS_INTERVAL = 60.0
 """Minimum time between two progress messages where stderr is no terminal [s]."""
 
 MIN_ESTIMATE_SHARE = 0.03
@@ -26,6 +30,12 @@ MIN_ESTIMATE_SHARE = 0.03
 
 MIN_ESTIMATE_TIME = 3.0
 """Time that the work must have taken before the remaining time is estimated [s]."""
+
+
+REFRESH_INTERVAL = 0.25
+"""Time between two updates of the status line on a terminal [s]."""
+STATUS_INTERVAL = 10.0
+"""Time between two status lines where stderr is no terminal [s]."""
 
 
 def progress(
@@ -101,7 +111,7 @@ class ProgressBar:
 
     def _print_sometimes(self) -> None:
         now = time.monotonic()
-        if self._total and now - self._last_message_at > MESSAGE_INTERVAL:
+        if self._total and now - self._last_message_at > PROGRESS_INTERVAL:
             self._last_message_at = now
             left = self._expected_duration() - (now - self._started_at)
             text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"
@@ -150,3 +160,93 @@ def _format_time(seconds: float) -> str:
         ('1:02:05', '0:00:00', '-:--:--')
     """
     return "-:--:--" if math.isnan(seconds) else str(timedelta(seconds=max(0, round(seconds))))
+
+
+class StatusLine:
+    """Status of a recorder: on a terminal one updated line, elsewhere one line every 10 s.
+
+    Args:
+        recorder: a recorder that is open.
+    """
+
+    def __init__(self, recorder: "Recorder") -> None:
+        self._recorder = recorder
+        self._live: Live | None = None
+        self._next_update = 0.0
+
+    def __enter__(self) -> Self:
+        self._next_update = time.monotonic()
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.live import Live
+
+            self._live = Live(
+                console=Console(stderr=True),
+                auto_refresh=False,
+                transient=True,
+                redirect_stdout=False,
+            )
+            self._live.start()
+        else:
+            self._next_update += STATUS_INTERVAL
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live:
+            self._live.stop()
+
+    def print(self, *texts: str) -> None:
+        """Print messages above the line."""
+        for text in texts:
+            if self._live:
+                self._live.console.print(visible(text), markup=False, highlight=False)
+            else:
+                print_message(text)
+
+    def update(self) -> None:
+        """Print the status if the time for the next update has come."""
+        now = time.monotonic()
+        if now < self._next_update:
+            return
+        self._next_update = now + (REFRESH_INTERVAL if self._live else STATUS_INTERVAL)
+        parts = status_parts(self._recorder.status)
+        if self._live is None:
+            print_message("   ".join(text for text, _ in parts))
+            return
+        from rich.text import Text
+
+        line = Text("   ").join(
+            Text(visible(text), "bold red" if bad else "") for text, bad in parts
+        )
+        line.no_wrap, line.overflow = True, "ellipsis"
+        self._live.update(line, refresh=True)
+
+
+def status_parts(status: "RecorderStatus") -> list[tuple[str, bool]]:
+    """Return the parts of the status line; each with True if it reports a problem."""
+    faults = [f"{name} {' '.join(here)}" for name, here in status.recent_faults.items()]
+    return [
+        (f"{status.seconds:.1f} s", False),
+        (f"{status.rate:.1f} Hz", False) if status.rate else ("no samples", True),
+        (f"gaps {status.n_gaps}", status.n_gaps > 0),
+        (f"lost {status.n_lost}", status.n_lost > 0),
+        *([(f"dropped {status.n_dropped}", True)] if status.n_dropped else []),
+        (format_size(status.n_bytes), False),
+        (f"markers {status.n_markers}", False),
+        *((text, True) for text in faults),
+    ]
+
+
+def format_size(n_bytes: int) -> str:
+    """Return a number of bytes in kB or MB.
+
+    Example:
+        >>> format_size(900), format_size(2_500_000)
+        ('0.9 kB', '2.5 MB')
+    """
+    return f"{n_bytes / 1e3:.1f} kB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.1f} MB"

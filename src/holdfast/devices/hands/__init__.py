@@ -30,11 +30,11 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
     """
     scheme, _, rest = uri.partition(":")
     if scheme == "log" and rest:
-        from holdfast.devices.hands.log_file import LogFile
+        from holdfast.devices.hands.local import LogFile
 
         return LogFile(uri, rest)
     if scheme == "call" and rest:
-        from holdfast.devices.hands.scalar import ScalarGripper
+        from holdfast.devices.hands.local import ScalarGripper
 
         return ScalarGripper.from_path(rest, uri)
     if scheme in ("ros1", "ros2") and rest:

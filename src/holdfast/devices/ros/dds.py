@@ -2,11 +2,14 @@
 
 import os
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any, Self
 
+from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.errors import MissingExtra, SourceError
-from holdfast.ros.definitions import NUMBER_CODES, Definition, Field
+from holdfast.ros.cdr import MessageDecoder, MessageEncoder
+from holdfast.ros.definitions import NUMBER_CODES, Definition, MessageField
+from holdfast.ros.topic_messages import JOINT_STATE, JointStates, topic_definition
 
 try:
     from cyclonedds.builtin import (
@@ -266,21 +269,92 @@ class _Raw:
 
 
 @cache
-def _raw_type(name: str, types: tuple[tuple[str, tuple[Field, ...]], ...]) -> type[Any]:
+def _raw_type(name: str, types: tuple[tuple[str, tuple[MessageField, ...]], ...]) -> type[Any]:
     made = _struct(name, dict(types))
     for method in ("__init__", "serialize", "deserialize", "deserialize_key"):
         setattr(made, method, vars(_Raw)[method])
     return made
 
 
-def _struct(name: str, types: Mapping[str, tuple[Field, ...]]) -> type[Any]:
+def _struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type[Any]:
     fields = {field.name: _member(field, types) for field in types[name]}
     _, kind = name.split("/")
     return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
 
 
-def _member(field: Field, types: Mapping[str, tuple[Field, ...]]) -> Any:  # noqa: ANN401
+def _member(field: MessageField, types: Mapping[str, tuple[MessageField, ...]]) -> Any:  # noqa: ANN401
     one = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
     if field.size is None:
         return one
     return idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]
+
+
+class Ros2Link(Link):
+    """Connection to a ROS domain.
+
+    Args:
+        domain: number of the domain as text; by default that of `ROS_DOMAIN_ID`.
+
+    Raises:
+        ValueError: there is no such domain.
+    """
+
+    def __init__(self, domain: str | None = None) -> None:
+        self._domain = domain_number(domain)
+        self.where = f"in ROS domain {self._domain}"
+        self._joined: Node | None = None
+
+    def open(self) -> None:
+        """Join the domain.
+
+        Raises:
+            SourceError: DDS reports an error.
+        """
+        self._joined = Node(self._domain)
+
+    def publisher(self, topic: str, kind: str) -> Publisher:
+        """Return a publisher of messages of a type on a topic."""
+        definition = topic_definition(kind)
+        write, encode = self._node.writer(topic, definition), MessageEncoder(definition)
+        return Publisher(lambda message: write(encode(message)), write.n_readers)
+
+    def joint_states(self, topic: str) -> TakeStates:
+        """Subscribe to the joint states of a topic."""
+        definition = topic_definition(JOINT_STATE)
+        decode = MessageDecoder(definition, ros2=True)
+        return partial(_take, topic, self._node.reader(topic, definition), decode)
+
+    def n_other_publishers(self, topic: str) -> int:
+        """Return the number of publishers on a topic, other than those of this link."""
+        return self._node.n_other_writers(topic)
+
+    def subscribed_topics(self) -> list[str]:
+        """Return the names of all topics with a subscriber."""
+        return sorted(self._node.subscribed_topics())
+
+    def published_topics(self) -> list[str]:
+        """Return the names of all topics with a publisher."""
+        return sorted(self._node.published_topics())
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._joined = None
+
+    @property
+    def _node(self) -> Node:
+        if self._joined is None:
+            raise SourceError(f"the link {self.where} is not open")
+        return self._joined
+
+
+def _take(topic: str, reader: TopicReader, decode: MessageDecoder) -> list[JointStates]:
+    waiting: list[bytes] = []
+    while found := reader.take(0.0):
+        waiting += found
+        if len(found) < MAX_MESSAGES_PER_READ:
+            break
+    try:
+        messages = [decode(data) for data in waiting]
+    except ValueError as cause:
+        raise SourceError(f"{topic} sends damaged joint states: {cause}") from cause
+    return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]

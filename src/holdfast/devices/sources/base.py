@@ -17,7 +17,7 @@ from holdfast.sensors import Sensor
 
 MARKER_PREFIX = "marker: "
 """Begin of a notice that repeats a marker of a recording."""
-READ_TIMEOUT = 0.5
+ITERATION_TIMEOUT = 0.5
 """Timeout of each read while a source is iterated over [s]."""
 MIN_RETRY_DELAY, MAX_RETRY_DELAY = 0.5, 2.0
 """Time from the loss of a connection to the first attempt to reconnect, and the longest time
@@ -122,7 +122,7 @@ class Source(Openable):
     def __iter__(self) -> Iterator[Arrival]:
         """Yield all arrivals until the source ends."""
         while not self.ended:
-            arrival = self.read(READ_TIMEOUT)
+            arrival = self.read(ITERATION_TIMEOUT)
             if arrival is not None:
                 yield arrival
 

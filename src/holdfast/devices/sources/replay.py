@@ -19,7 +19,7 @@ from holdfast.errors import HoldfastError, RecordingError
 from holdfast.io import read_chunks
 from holdfast.recordings import Recording
 
-CHUNK_SIZE = 1024
+SAMPLES_PER_CHUNK = 1024
 """Samples of a module to read at a time; it bounds the memory."""
 PAUSE = 1.0
 """Time between the last sample of a recording and the first of the next [s]; a detector
@@ -265,7 +265,7 @@ class Player(Source):
         )
 
 
-class Replay(Player):
+class ReplaySource(Player):
     """Source that plays one recording.
 
     Its markers become notices. An incomplete recording plays as far as it can be recovered.
@@ -287,7 +287,7 @@ class Replay(Player):
         super().__init__(str(path), speed=speed, loop=loop)
 
     def _chunks(self, number: int) -> Iterable[Recording]:
-        chunks = read_chunks(self.name, CHUNK_SIZE, labels=False)
+        chunks = read_chunks(self.name, SAMPLES_PER_CHUNK, labels=False)
         if number:
             self._notices.append(f"{self.name} starts again")
         return chunks

@@ -18,7 +18,7 @@ try:
 except ImportError as missing:
     raise MissingExtra("pyserial", "serial") from missing
 
-OPEN_TIMEOUT = 3.0
+SERIAL_OPEN_TIMEOUT = 3.0
 """Longest wait for the first sample [s]; boards restart when their port is opened."""
 DEFAULT_BAUD = 115200
 MAX_READ_SIZE = 1 << 16
@@ -87,7 +87,7 @@ class SerialSource(DeviceSource):
         self._port = Serial(self._path, self._baud, exclusive=True)
 
     def _wait_for_sample(self) -> None:
-        deadline = time.monotonic() + OPEN_TIMEOUT
+        deadline = time.monotonic() + SERIAL_OPEN_TIMEOUT
         n_refused = 0
         while (left := deadline - time.monotonic()) > 0:
             decoded = self._read_port(left)
@@ -98,7 +98,7 @@ class SerialSource(DeviceSource):
             n_refused += decoded.n_refused
         came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
         raise SourceError(
-            f"{self.name}: {came} within {OPEN_TIMEOUT:g} s; packets of {self._n_mags} "
+            f"{self.name}: {came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of {self._n_mags} "
             f"magnetometers at {self._baud} baud expected"
         )
 

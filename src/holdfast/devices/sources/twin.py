@@ -14,8 +14,8 @@ from holdfast.devices.uri import Address
 from holdfast.files import file_stem
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
-from holdfast.twin.profile import ATTEMPTS, profile
-from holdfast.twin.simulation import CASES, Grasp, simulate
+from holdfast.twin.profile import GRASP_ATTEMPTS, profile
+from holdfast.twin.simulation import GRASP_CASES, Grasp, simulate
 
 SIMULATION_CODE = "from holdfast.devices.sources.twin import write; write(*sys.argv[1:])"
 """Program of the process that simulates the next grasp."""
@@ -145,7 +145,7 @@ def grasp_of(address: Address) -> Grasp:
         grasp.item  # noqa: B018 (refuses an unknown object)
     except ValueError as cause:
         raise ValueError(f"{address.text}: {cause}") from cause
-    if grasp.case not in CASES or grasp.repeat < 1:
+    if grasp.case not in GRASP_CASES or grasp.repeat < 1:
         raise ValueError(
             f"{address.text}: case 1 or 2 and a repeat of at least 1 expected, "
             f"{grasp.case} and {grasp.repeat} given"
@@ -155,7 +155,7 @@ def grasp_of(address: Address) -> Grasp:
 
 def simulated(grasp: Grasp) -> Recording:
     """Return the recording of a grasp; after a failure, try again more gently."""
-    for attempt in range(ATTEMPTS):
+    for attempt in range(GRASP_ATTEMPTS):
         recording = simulate(replace(grasp, attempt=attempt))
         if recording.metadata["case"] != "failed":
             break

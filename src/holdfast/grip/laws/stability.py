@@ -18,15 +18,18 @@ Four rules, each without units, so that they carry over between counts and newto
 4. Relaxation. In a contact that is stable again the force falls, the faster the more stable, to
    the floor.
 
-The forces of all fingers stay balanced (`holdfast.grip.balance`). Fingers that carry almost
-nothing start no reaction.
+The forces of all fingers stay balanced. In a quiet grasp the normal force of the thumb balances
+those of the fingers opposite to it. If every force grows by the same amount, that balance is lost
+as soon as the two sides have different numbers of fingers: three fingers that add 1 N each push a
+thumb away that adds 1 N. So the forces change by balanced amounts. With one finger on one side
+this has a closed form (`balanced`), and no optimiser is needed. Fingers that carry almost nothing
+start no reaction.
 """
 
 import math
 from collections.abc import Sequence
 
 from holdfast.contact import Cause
-from holdfast.grip.balance import balanced
 from holdfast.grip.command import GripReason
 from holdfast.grip.laws.base import Law, Touch, Wish
 
@@ -255,3 +258,59 @@ class Stability(Law):
 
 def _highest(touches: Sequence[Touch]) -> float:
     return max(touch.scale for touch in touches)
+
+
+def balanced(wanted: Sequence[float], forces: Sequence[float], opposed: int) -> list[float]:
+    """Return the smallest balanced force scales that are at least the wanted ones.
+
+    The forces f of the start are balanced: the finger `opposed`, t, carries the sum of the
+    others. After a change by the scales s this holds if s_t = sum(s_j f_j) / sum(f_j) over the
+    other fingers j. If the wanted s_t is the larger side, the smallest s_j are raised to a common
+    value; otherwise s_t is raised. No scale is lowered.
+
+    Args:
+        wanted: (n,) force scale that each finger needs.
+        forces: (n,) normal force of each finger when the grip began, any unit, at least 0.
+        opposed: index of the finger opposite to all others.
+
+    Returns:
+        (n,) scales, none above the largest of `wanted`.
+
+    Example:
+        >>> balanced([1.0, 2.0, 1.0], [3.0, 1.0, 2.0], opposed=0)
+        [1.3333333333333333, 2.0, 1.0]
+        >>> balanced([2.0, 1.0, 1.5], [3.0, 1.0, 2.0], opposed=0)
+        [2.0, 2.0, 2.0]
+    """
+    total = mean = 0.0
+    for j, scale in enumerate(wanted):
+        if j != opposed:
+            total += forces[j]
+            mean += scale * forces[j]
+    out = list(wanted)
+    if not total > 0:
+        return out
+    mean /= total
+    if out[opposed] <= mean:
+        out[opposed] = mean
+    else:
+        _raise_to_mean(out, forces, opposed, out[opposed] * total)
+    return out
+
+
+def _raise_to_mean(
+    scales: list[float], forces: Sequence[float], opposed: int, needed: float
+) -> None:
+    """Raise the smallest scales to a common level, so that sum(s_j f_j) = needed."""
+    order = sorted((j for j in range(len(scales)) if j != opposed), key=scales.__getitem__)
+    above = sum(scales[j] * forces[j] for j in order)
+    weight = 0.0
+    level = scales[opposed]
+    for k, j in enumerate(order):
+        weight += forces[j]
+        above -= scales[j] * forces[j]
+        level = (needed - above) / weight if weight > 0 else level
+        if k + 1 == len(order) or level <= scales[order[k + 1]]:
+            break
+    for j in order:
+        scales[j] = max(scales[j], min(level, scales[opposed]))

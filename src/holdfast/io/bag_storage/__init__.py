@@ -7,7 +7,7 @@ counts what it unpacks before it does so.
 from collections.abc import Collection, Iterator
 from typing import NamedTuple, Protocol
 
-MAX_CONNECTIONS = 4096
+MAX_BAG_CONNECTIONS = 4096
 """Maximum number of connections of a bag, and of its definitions of messages."""
 
 
@@ -46,5 +46,5 @@ def check_number(n: int) -> None:
     Raises:
         ValueError: there are too many.
     """
-    if n > MAX_CONNECTIONS:
-        raise ValueError(f"at most {MAX_CONNECTIONS} topics and types expected, more given")
+    if n > MAX_BAG_CONNECTIONS:
+        raise ValueError(f"at most {MAX_BAG_CONNECTIONS} topics and types expected, more given")

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from holdfast.errors import RecordingError
-from holdfast.io.bag_storage import MAX_CONNECTIONS, BagConnection, check_number
+from holdfast.io.bag_storage import MAX_BAG_CONNECTIONS, BagConnection, check_number
 from holdfast.io.safe_reading import ReadBudget
 
 STEP_SIZE = 100
@@ -55,7 +55,7 @@ class SqliteBag:
     @property
     def connections(self) -> list[BagConnection]:
         """All connections."""
-        topics = self._rows("SELECT id, name, type FROM topics ORDER BY id", MAX_CONNECTIONS)
+        topics = self._rows("SELECT id, name, type FROM topics ORDER BY id", MAX_BAG_CONNECTIONS)
         if len({number for number, _, _ in topics}) < len(topics):
             raise ValueError("two topics with the same number")
         counts = dict(self._rows("SELECT topic_id, count(*) FROM messages GROUP BY topic_id"))
@@ -97,7 +97,7 @@ class SqliteBag:
         rows = self._rows(
             "SELECT topic_type, encoded_message_definition FROM message_definitions "
             "WHERE encoding = 'ros2msg'",
-            MAX_CONNECTIONS,
+            MAX_BAG_CONNECTIONS,
         )
         return {str(kind): str(text) for kind, text in rows}
 
@@ -109,7 +109,7 @@ class SqliteBag:
                 self._budget.keep(sum(len(v) for v in row if isinstance(v, str | bytes)), 1)
                 rows.append(row)
                 if max_rows is not None:
-                    check_number(len(rows) - max_rows + MAX_CONNECTIONS)
+                    check_number(len(rows) - max_rows + MAX_BAG_CONNECTIONS)
         return rows
 
     @contextmanager

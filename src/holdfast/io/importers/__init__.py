@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from holdfast.errors import RecordingError
+from holdfast.errors import RecordingError, require_extras
 from holdfast.files import check_regular
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.safe_reading import recording_errors
@@ -23,6 +23,8 @@ FORMATS = {
     "csv": "the generic CSV of docs/formats.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order."""
+EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags"}
+"""Extras that formats need."""
 
 
 def import_recordings(
@@ -59,8 +61,12 @@ def import_recordings(
     name = _format_of(place, format, sensors, given)
     with recording_errors(place):
         source = _importer(name)
+        if name in EXTRAS:
+            require_extras(EXTRAS[name])
         recordings: Iterator[Recording] = (
-            source.read(place, sensors, given, report) if name == "csv" else source.read(place)
+            source.read(place, sensors, given, report)
+            if name == "csv"
+            else (recording for part in source.parts(place) for recording in source.read(part))
         )
     return _guarded(place, recordings, labels=labels)
 

@@ -13,14 +13,14 @@ import numpy as np
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import Table, csv_files, header_line, read_table
+from holdfast.io.importers.table import CsvFormat, Table, errors_named, header_line, read_table
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 SOURCE = "pollen-robotics/anyskin_slip_detection"
-NAMES = tuple(f"mag{node}_{axis}" for node in range(1, 6) for axis in "xyz")
-SLIP = "slip"
+MAGNETOMETER_COLUMNS = tuple(f"mag{node}_{axis}" for node in range(1, 6) for axis in "xyz")
+SLIP_COLUMN = "slip"
 TIME_NAMES = ("log_time", "timestamp", "time")
 """Names of the column of times; the first that a file has is used."""
 MIXED = "no_slip"
@@ -35,42 +35,22 @@ _UNITS = ((1e17, 1), (1e14, 1_000), (1e11, 1_000_000))
 """Smallest number that a time since 1970 has in ns, us and ms, and that unit [ns]."""
 
 
-def can_read(path: Path) -> bool:
-    """Return whether `path` is such a CSV file, or a folder with one."""
-    return any(_is_header(header_line(file)) for file in csv_files(path))
-
-
-def parts(path: Path) -> list[Path]:
-    """Return the file, or the files of this format in a folder.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
-    if not files:
-        raise RecordingError(
-            f"no anyskin-slip file in {path}; CSV files with columns mag1_x.. and slip expected"
-        )
-    return files
+_FORMAT = CsvFormat(
+    lambda names: set(MAGNETOMETER_COLUMNS) <= set(names),
+    "no anyskin-slip file in {}; CSV files with columns mag1_x.. and slip expected",
+)
+can_read, parts = _FORMAT.can_read, _FORMAT.parts
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a CSV file, or those in the CSV files of a folder.
+    """Yield the recording in a CSV file.
 
     Raises:
-        RecordingError: there is no CSV file, or one has another form.
+        RecordingError: it has another form.
     """
-    return (_recording(file) for file in parts(path))
-
-
-def _is_header(names: tuple[str, ...]) -> bool:
-    return set(NAMES) <= set(names)
-
-
-def _recording(path: Path) -> Recording:
     names = header_line(path)
-    table, cells = read_table(path, [name for name in names if name not in NAMES])
-    readings = table.columns(NAMES).reshape(-1, 5, 3)
+    table, cells = read_table(path, [name for name in names if name not in MAGNETOMETER_COLUMNS])
+    readings = table.columns(MAGNETOMETER_COLUMNS).reshape(-1, 5, 3)
     skin = sensor("anyskin")
     metadata: dict[str, Any] = {"source": SOURCE}
     if path.stem != MIXED:
@@ -82,13 +62,11 @@ def _recording(path: Path) -> Recording:
     else:
         times = _times(table, time_name, cells[time_name])
         metadata["clock"] = time_name
-    try:
+    with errors_named(path):
         module = Tactile(skin, times, readings)
-        labels = _labels(table, cells.get(SLIP), module)
-        return Recording(path.stem, {"finger1": module}, metadata).with_labels({"finger1": labels})
-    except RecordingError as cause:
-        text = str(cause)
-        raise RecordingError(text if str(path) in text else f"{path}: {text}") from cause
+        labels = {"finger1": _labels(table, cells.get(SLIP_COLUMN), module)}
+        recording = Recording(path.stem, {"finger1": module}, metadata).with_labels(labels)
+    yield recording
 
 
 def _times(table: Table, name: str, cells: Sequence[str]) -> Array:
@@ -142,5 +120,7 @@ def _state(place: str, cell: str) -> tuple[ContactState, Cause | None] | None:
     if not cell:
         return None
     if cell not in _FLAGS:
-        raise RecordingError(f"{place}, column {SLIP!r}: {cell[:40]!r} given, 0 or 1 expected")
+        raise RecordingError(
+            f"{place}, column {SLIP_COLUMN!r}: {cell[:40]!r} given, 0 or 1 expected"
+        )
     return (ContactState.UNSTABLE, Cause.SLIP) if _FLAGS[cell] else (ContactState.STABLE, None)

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
-from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io.importers.table import natural_order, with_integer_type
+from holdfast.errors import RecordingError
+from holdfast.io.importers.table import errors_named, natural_order, with_integer_type
 from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
@@ -26,7 +26,11 @@ from holdfast.sensors.types import Array
 HDF5_SUFFIXES = (".h5", ".hdf5")
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SOURCE = "ARQ-CRISP"
-DATA, TIMES, LABELS = "tactile_data_raw", "tactile_timestamps", "tactile_slips_label"
+RAW_DATA, TIMES_NAME, LABELS_NAME = (
+    "tactile_data_raw",
+    "tactile_timestamps",
+    "tactile_slips_label",
+)
 MILLISECOND = 1e-3
 MAX_GROUP_DEPTH = 16
 """Maximum depth of groups inside groups; the data sets have four."""
@@ -34,7 +38,7 @@ MAX_DEFLATE = 1032
 """Largest number of bytes that one byte of a deflated chunk can become."""
 N_COPIES = 3
 """Number of arrays of the size of a data set in memory while it is converted."""
-PITCH = (7.24e-3, 7.17e-3)
+PATCH_PITCH = (7.24e-3, 7.17e-3)
 """Distances between the taxels of the 4 x 6 patch [m]; those of the 3 x 6 patch are unknown, and
 the same are assumed."""
 
@@ -71,26 +75,6 @@ def parts(path: Path) -> list[Path]:
     return files
 
 
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recordings in an HDF5 file, or in the HDF5 files of a folder.
-
-    Raises:
-        RecordingError: there is no such file, or one has another form.
-        MissingExtra: h5py is not installed.
-    """
-    h5py = _import_h5py()
-    return (recording for file in parts(path) for recording in _recordings(file, h5py))
-
-
-def _import_h5py() -> ModuleType:
-    try:
-        import h5py
-    except ImportError as cause:
-        raise MissingExtra("h5py", "hdf5") from cause
-    module: ModuleType = h5py
-    return module
-
-
 def _files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
@@ -102,7 +86,14 @@ def _is_hdf5(path: Path) -> bool:
         return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
 
 
-def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recordings in an HDF5 file.
+
+    Raises:
+        RecordingError: it has another form.
+    """
+    import h5py
+
     if not _is_hdf5(path):
         raise RecordingError(
             f"{path} is not an HDF5 file (for a Git LFS pointer, fetch the data by `git lfs pull`)"
@@ -113,7 +104,7 @@ def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
             names = _names_of_recordings(file, h5py, budget)
             seen: set[int] = set()
             if not names:
-                raise RecordingError(f"{path}: no group with {DATA} in it")
+                raise RecordingError(f"{path}: no group with {RAW_DATA} in it")
             for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
                 arrays = _Arrays(path, file[name], h5py, budget, seen)
                 yield _recording(f"{path}: {name}", name.split("/"), arrays)
@@ -144,7 +135,7 @@ def _names_of_recordings(file: Any, h5py: ModuleType, budget: ReadBudget) -> lis
             raise RecordingError(
                 f"{budget.path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
             )
-        if name and DATA in group:
+        if name and RAW_DATA in group:
             names.append(name)
             continue
         for key in group:
@@ -263,23 +254,21 @@ class _Arrays:
 
 
 def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
-    if TIMES not in group:
-        raise RecordingError(f"{place} has no {TIMES}; it has {', '.join(group.names())}")
-    raw = group[DATA]
-    times = group[TIMES].ravel() * MILLISECOND
+    if TIMES_NAME not in group:
+        raise RecordingError(f"{place} has no {TIMES_NAME}; it has {', '.join(group.names())}")
+    raw = group[RAW_DATA]
+    times = group[TIMES_NAME].ravel() * MILLISECOND
     if raw.ndim != 3 or raw.shape[1:] != (3, len(times)):
         raise RecordingError(
-            f"{place}: {DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
+            f"{place}: {RAW_DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
         )
     readings = with_integer_type(raw.transpose(2, 0, 1))
-    try:
+    with errors_named(place):
         module = Tactile(_sensor(readings.shape[1]), times, readings)
-        if LABELS in group:
-            labels = _labels(group[LABELS].ravel(), module)
+        if LABELS_NAME in group:
+            labels = _labels(group[LABELS_NAME].ravel(), module)
             module = replace(module, labels=labels)
         return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
-    except RecordingError as cause:
-        raise RecordingError(f"{place}: {cause}") from cause
 
 
 def _metadata(parts: list[str]) -> dict[str, str]:
@@ -294,7 +283,9 @@ def _sensor(n_taxels: int) -> Sensor:
         raise RecordingError(
             f"{n_taxels} taxels given; 18 (3 x 6, 2021) or 24 (4 x 6, 2023) expected"
         )
-    positions = [[(k % 6 - 2.5) * PITCH[0], (1 - k // 6) * PITCH[1], 0.0] for k in range(18)]
+    positions = [
+        [(k % 6 - 2.5) * PATCH_PITCH[0], (1 - k // 6) * PATCH_PITCH[1], 0.0] for k in range(18)
+    ]
     rotations = np.tile(np.eye(3), (18, 1, 1))
     normal = np.array([0.0, 0.0, 1.0])
     return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, limits=(0.0, 65535.0))

@@ -11,6 +11,7 @@ from itertools import product, takewhile
 import numpy as np
 
 from holdfast.errors import RecordingError
+from holdfast.io.importers.table import some_names
 from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number, taxel_numbers
 from holdfast.sensors.types import Array
 
@@ -125,13 +126,13 @@ class Columns:
         cause = self.cause or ("cause" if "cause" in names else None)
         if time is None:
             raise RecordingError(
-                f"no column of times among {_shown(names)}: give --columns time=COLUMN, or "
+                f"no column of times among {some_names(names)}: give --columns time=COLUMN, or "
                 "time=100Hz if there is none"
             )
         if taxels is None:
             raise RecordingError(
-                f"no taxel columns such as x1, y1, z1, x2 among {_shown(names)}: give --columns "
-                "'taxels=F{axis}{taxel}' or, for consecutive columns, taxels=FIRST..LAST"
+                f"no taxel columns such as x1, y1, z1, x2 among {some_names(names)}: give "
+                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, taxels=FIRST..LAST"
             )
         return replace(self, time=time, taxels=taxels, label=label, cause=cause)
 
@@ -144,7 +145,7 @@ class Columns:
         pattern = self.taxels or ""
         layout = _run_layout(pattern, names) if RUN in pattern else pattern_layout(pattern, names)
         if not layout:
-            raise RecordingError(f"no column is named as {pattern!r}; it has {_shown(names)}")
+            raise RecordingError(f"no column is named as {pattern!r}; it has {some_names(names)}")
         return layout
 
 
@@ -213,7 +214,7 @@ def _run_layout(text: str, names: Sequence[str]) -> Layout:
     """Return consecutive columns, three for each taxel."""
     ends = [word.strip() for word in text.split(RUN, 1)]
     if missing := [name for name in ends if name not in names]:
-        raise RecordingError(f"taxels={text}: no column {missing[0]!r}; it has {_shown(names)}")
+        raise RecordingError(f"taxels={text}: no column {missing[0]!r}; it has {some_names(names)}")
     run = names[names.index(ends[0]) : names.index(ends[1]) + 1]
     if not run or len(run) % 3:
         raise RecordingError(f"taxels={text}: {len(run)} columns given; 3 for each taxel expected")
@@ -286,8 +287,3 @@ def _with_module(patterns: Sequence[str]) -> str:
 def _common_start(lists: Sequence[Sequence[str]]) -> list[str]:
     columns = zip(*lists, strict=False)
     return [words[0] for words in takewhile(lambda words: len(set(words)) == 1, columns)]
-
-
-def _shown(names: Sequence[str]) -> str:
-    shown = ", ".join(map(repr, names[:6]))
-    return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown

@@ -14,7 +14,14 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.io.importers.csv_columns import Columns, Layout, seconds_of
-from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
+from holdfast.io.importers.table import (
+    Table,
+    csv_files,
+    errors_named,
+    header_line,
+    read_table,
+    with_integer_type,
+)
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_numbers
 from holdfast.sensors.types import Array, Unit
@@ -113,13 +120,10 @@ def _recording(
     columns: Columns | None,
     report: Callable[[str, tuple[str, str]], None],
 ) -> Recording:
-    try:
+    with errors_named(path):
         if columns is None and _is_header(header_line(path)):
             return _generic(path, sensors)
         return _of_any_logger(path, sensors, columns or Columns(), report)
-    except RecordingError as cause:
-        text = str(cause)
-        raise RecordingError(text if str(path) in text else f"{path}: {text}") from cause
 
 
 def _generic(path: Path, sensors: Mapping[str, Sensor]) -> Recording:

@@ -10,53 +10,42 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
+from holdfast.io.importers.table import (
+    CsvFormat,
+    Table,
+    errors_named,
+    read_table,
+    with_integer_type,
+)
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 N_NODES = 15
-NAMES = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
+NODE_COLUMNS = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
 MILLISECOND = 1e-3
 TO_TAXEL_FRAME = np.array([1, -1, -1])
 """Half a turn about x: z of the device decreases when a section is pressed, z of a taxel
 increases."""
 
 
-def can_read(path: Path) -> bool:
-    """Return whether `path` is such a CSV file, or a folder with one."""
-    return any(_is_header(header_line(file)) for file in csv_files(path))
+def _is_header(names: tuple[str, ...]) -> bool:
+    if set(NODE_COLUMNS) <= set(names):
+        return True
+    numbered = tuple(str(k) for k in range(len(names) - 1))
+    return len(names) > len(NODE_COLUMNS) + 2 and names == ("", *numbered)
 
 
-def parts(path: Path) -> list[Path]:
-    """Return the file, or the files of this format in a folder.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
-    if not files:
-        raise RecordingError(f"no gtac file in {path}; CSV files with columns mag_x1.. expected")
-    return files
+_FORMAT = CsvFormat(_is_header, "no gtac file in {}; CSV files with columns mag_x1.. expected")
+can_read, parts = _FORMAT.can_read, _FORMAT.parts
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a CSV file, or those in the CSV files of a folder.
+    """Yield the recording in a CSV file.
 
     Raises:
-        RecordingError: there is no CSV file, or one has another form.
+        RecordingError: it has another form.
     """
-    return (_recording(file) for file in parts(path))
-
-
-def _is_header(names: tuple[str, ...]) -> bool:
-    if set(NAMES) <= set(names):
-        return True
-    numbered = tuple(str(k) for k in range(len(names) - 1))
-    return len(names) > len(NAMES) + 2 and names == ("", *numbered)
-
-
-def _recording(path: Path) -> Recording:
     table, _ = read_table(path)
     if not _is_header(table.names):
         raise RecordingError(
@@ -64,15 +53,15 @@ def _recording(path: Path) -> Recording:
             f"after an unnamed index; {', '.join(map(repr, table.names[:4]))}... given"
         )
     numbered = table.names[0] == "" and "mag_x1" not in table.names
-    values = table.values[:, 1 : 1 + len(NAMES)] if numbered else table.columns(NAMES)
+    values = table.values[:, 1 : 1 + len(NODE_COLUMNS)] if numbered else table.columns(NODE_COLUMNS)
     times, n_without_time = _times(table)
     rotated = values[n_without_time:].reshape(-1, N_NODES, 3) * TO_TAXEL_FRAME
     readings = with_integer_type(rotated)
     metadata = {"source": "roobooot/GTac_", "rows_without_time": n_without_time}
-    try:
-        return Recording(path.stem, {"finger1": Tactile(sensor("gtac"), times, readings)}, metadata)
-    except RecordingError as cause:
-        raise RecordingError(f"{path}: {cause}") from cause
+    with errors_named(path):
+        modules = {"finger1": Tactile(sensor("gtac"), times, readings)}
+        recording = Recording(path.stem, modules, metadata)
+    yield recording
 
 
 def _times(table: Table) -> tuple[Array, int]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.bag_storage.folder import METADATA
-from holdfast.io.bags import Bag, BagTopic, check_rosbags, find_bags, open_bag
+from holdfast.io.bags import Bag, BagTopic, find_bags, open_bag
 from holdfast.recordings import Recording, Tactile
 from holdfast.ros.sensor_messages import (
     DeviceSample,
@@ -54,20 +54,14 @@ def parts(path: Path) -> list[Path]:
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a bag, or those in the bags of a folder.
+    """Yield the recording in a bag.
 
     Raises:
-        RecordingError: there is no bag, or one is damaged or has no known topic.
-        MissingExtra: rosbags is not installed.
+        RecordingError: it is damaged or has no known topic.
     """
-    bags = parts(path)
-    check_rosbags()
-    return (_recording(bag) for bag in bags)
-
-
-def _recording(path: Path) -> Recording:
     with open_bag(path) as bag:
-        return _BagImport(path, bag).recording()
+        recording = _BagImport(path, bag).recording()
+    yield recording
 
 
 class _TactileTopic(NamedTuple):

@@ -3,7 +3,7 @@
 import csv
 import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple, TextIO, cast
@@ -55,7 +55,7 @@ class Table(NamedTuple):
             raise RecordingError(
                 f"{self.path}: column {missing[0]!r} is missing"
                 f"{f' and {len(missing) - 1} more' if len(missing) > 1 else ''}; "
-                f"it has {_shortened(self.names)}"
+                f"it has {some_names(self.names)}"
             )
         return self.values[:, [places[name] for name in names]]
 
@@ -168,6 +168,51 @@ def csv_files(path: Path) -> list[Path]:
     return [path] if path.is_file() else sorted(path.glob("*.csv"), key=natural_order)
 
 
+class CsvFormat(NamedTuple):
+    """Format of CSV files that are recognised by their header.
+
+    Attributes:
+        is_header: whether the names of the columns are those of the format.
+        expected: message about a folder without such a file, with `{}` for its path.
+        every_file: whether all CSV files of a folder are read, also those with another header.
+    """
+
+    is_header: Callable[[tuple[str, ...]], bool]
+    expected: str
+    every_file: bool = False
+
+    def can_read(self, path: Path) -> bool:
+        """Return whether `path` is such a CSV file, or a folder with one."""
+        return any(self.is_header(header_line(file)) for file in csv_files(path))
+
+    def parts(self, path: Path) -> list[Path]:
+        """Return the file, or the files of this format in a folder.
+
+        Raises:
+            RecordingError: there is none.
+        """
+        files = csv_files(path)
+        if path.is_dir() and not self.every_file:
+            files = [file for file in files if self.is_header(header_line(file))]
+        if not files:
+            raise RecordingError(self.expected.format(path))
+        return files
+
+
+@contextmanager
+def errors_named(place: object) -> Iterator[None]:
+    """Add the path of a file, or another place, to the errors that do not have it.
+
+    Raises:
+        RecordingError: the block raised one.
+    """
+    try:
+        yield
+    except RecordingError as cause:
+        text = str(cause)
+        raise RecordingError(text if str(place) in text else f"{place}: {text}") from cause
+
+
 def natural_order(path: Path) -> list[str | int]:
     """Return a sort key for file names with numbers: Exp2 before Exp10."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
@@ -235,6 +280,7 @@ def _text(problem: Exception) -> str:
     return str(problem)
 
 
-def _shortened(names: Sequence[str]) -> str:
+def some_names(names: Sequence[str]) -> str:
+    """Return the first names of columns, for a message."""
     shown = ", ".join(map(repr, names[:6]))
     return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown

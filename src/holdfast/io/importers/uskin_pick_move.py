@@ -17,7 +17,7 @@ import numpy.typing as npt
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.files import read_input
-from holdfast.io.importers.table import Table, read_table, with_integer_type
+from holdfast.io.importers.table import Table, errors_named, read_table, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, Truth, labels_from_samples
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -53,33 +53,28 @@ def parts(path: Path) -> list[Path]:
     return folders
 
 
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a folder `data_sample_*`, or those in a folder of such folders.
-
-    Raises:
-        RecordingError: there is none, a file is missing, or files contradict each other.
-    """
-    return (_recording(folder) for folder in parts(path))
-
-
 def _folders(path: Path) -> list[Path]:
     if (path / FILES["finger1"]).is_file():
         return [path]
     return sorted(file.parent for file in path.glob(f"*/{FILES['finger1']}"))
 
 
-def _recording(folder: Path) -> Recording:
+def read(folder: Path) -> Iterator[Recording]:
+    """Yield the recording in a folder `data_sample_*`.
+
+    Raises:
+        RecordingError: a file is missing, or files contradict each other.
+    """
     robot, _ = read_table(folder / "robot_state.csv")
     times = robot.columns(["time"])[:, 0]
-    try:
+    with errors_named(folder):
         modules = {name: _module(folder / file, times) for name, file in FILES.items()}
         labels = _labels(folder / "slip_label.csv", modules["finger1"])
         labelled = {name: replace(module, labels=labels) for name, module in modules.items()}
         truth = Truth(times, {**_marker(folder / "marker.csv", len(times)), **_robot(robot)})
-        return Recording(folder.name, labelled, _metadata(folder / "meta_data.csv"), truth)
-    except RecordingError as cause:
-        text = str(cause)
-        raise RecordingError(text if str(folder) in text else f"{folder}: {text}") from cause
+        metadata = _metadata(folder / "meta_data.csv")
+        recording = Recording(folder.name, labelled, metadata, truth)
+    yield recording
 
 
 def _module(path: Path, times: Array) -> Tactile:

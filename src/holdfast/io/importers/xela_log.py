@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import csv_files, header_line, read_table, with_integer_type
+from holdfast.io.importers.table import CsvFormat, errors_named, read_table, with_integer_type
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import hand
 
@@ -14,33 +14,20 @@ WHOLE_HAND = "allegro-uskin"
 N_COLUMNS = 368 * 3
 
 
-def can_read(path: Path) -> bool:
-    """Return whether `path` is such a CSV file, or a folder with one."""
-    return any(len(header_line(file)) == N_COLUMNS + 1 for file in csv_files(path))
-
-
-def parts(path: Path) -> list[Path]:
-    """Return the file, or the CSV files of a folder.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    files = csv_files(path)
-    if not files:
-        raise RecordingError(f"no CSV file in {path}; xela-log files expected")
-    return files
+_FORMAT = CsvFormat(
+    lambda names: len(names) == N_COLUMNS + 1,
+    "no CSV file in {}; xela-log files expected",
+    every_file=True,
+)
+can_read, parts = _FORMAT.can_read, _FORMAT.parts
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a CSV file, or those in the CSV files of a folder.
+    """Yield the recording in a CSV file.
 
     Raises:
-        RecordingError: there is no CSV file, or one has another form.
+        RecordingError: it has another form.
     """
-    return (_recording(file) for file in parts(path))
-
-
-def _recording(path: Path) -> Recording:
     allegro = hand(WHOLE_HAND)
     table, _ = read_table(path)
     n_given = len(table.names) - 1
@@ -53,14 +40,13 @@ def _recording(path: Path) -> Recording:
     times = table.values[:, place]
     readings = with_integer_type(np.delete(table.values, place, axis=1))
     unit = "count" if np.issubdtype(readings.dtype, np.integer) else "N"
-    try:
+    with errors_named(path):
         modules = {
             name: Tactile(allegro.modules[name].sensor, times, part, unit)  # type: ignore[arg-type]
             for name, part in allegro.split(readings.reshape(-1, allegro.n_taxels, 3)).items()
         }
-        return Recording(path.stem, modules, {"hand": WHOLE_HAND, "source": path.name})
-    except RecordingError as cause:
-        raise RecordingError(f"{path}: {cause}") from cause
+        recording = Recording(path.stem, modules, {"hand": WHOLE_HAND, "source": path.name})
+    yield recording
 
 
 def _time_column(names: tuple[str, ...]) -> int:

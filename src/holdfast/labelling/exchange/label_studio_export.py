@@ -29,9 +29,9 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array
 
 TASKS, CONFIG, SIGNALS = "label-studio.json", "label-studio.xml", ".signals.csv"
-TARE = 0.5
+TARE_DURATION = 0.5
 """Duration of the tare at the start of a recording [s]."""
-COLOURS = {
+LABEL_COLOURS = {
     ContactState.STABLE: "#2a9d5c",
     ContactState.UNSTABLE: "#d1495b",
     ContactState.NO_CONTACT: "#8a8f98",
@@ -193,7 +193,7 @@ def _latest_values(module: Tactile, times: Array, window: int) -> Array:
     """Return (n, 5) signals of the latest sample of a finger at each time; NaN before the first."""
     values = np.full((module.n_samples + 1, len(SERIES)), np.nan)
     if module.n_samples:
-        values[1:] = signal_values(module, TARE, window)
+        values[1:] = signal_values(module, TARE_DURATION, window)
     latest: Array = values[np.searchsorted(module.times, times, side="right")]
     return latest
 
@@ -223,4 +223,4 @@ def _finger_config(finger: str, unit: str, names: Sequence[str]) -> str:
 
 
 def _colour(name: str) -> str:
-    return COLOURS[state_of(name)[0]]
+    return LABEL_COLOURS[state_of(name)[0]]

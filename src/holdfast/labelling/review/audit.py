@@ -9,7 +9,8 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from holdfast.contact import UNKNOWN, ContactState
+from holdfast.contact import TIME_TOLERANCE, UNKNOWN
+from holdfast.detector.detection import STATE_BY_CODE
 from holdfast.errors import TrainingError
 from holdfast.features import parse_features
 from holdfast.labelling.review.contradictions import (
@@ -22,8 +23,8 @@ from holdfast.labelling.review.contradictions import (
     unusual_shift,
     usual_shifts,
 )
-from holdfast.labelling.review.out_of_fold import MAX_FOLDS, out_of_fold
-from holdfast.labelling.review.spans import TIME_TOLERANCE, Span, State, spans_of, state_name
+from holdfast.labelling.review.out_of_fold import MAX_AUDIT_FOLDS, out_of_fold
+from holdfast.labelling.review.spans import Span, State, spans_of, state_name
 from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.setting import Setting
@@ -138,7 +139,7 @@ def audit(
     recordings: Sequence[Recording],
     setting: Setting | None = None,
     *,
-    n_folds: int = MAX_FOLDS,
+    n_folds: int = MAX_AUDIT_FOLDS,
     n_jobs: int = 1,
 ) -> Audit:
     """Find labels that a classifier contradicts with confidence.
@@ -313,8 +314,5 @@ def _suspect(
     confidence: float,
     shift: float | None = None,
 ) -> Suspect:
-    given, expected = (state_name(_STATES[code]) for code in codes)
+    given, expected = (state_name(STATE_BY_CODE[code]) for code in codes)
     return Suspect(part.recording, part.finger, kind, *interval, given, expected, confidence, shift)
-
-
-_STATES = tuple(ContactState)

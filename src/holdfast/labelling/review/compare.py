@@ -1,17 +1,15 @@
 """Agreement of two sets of labels of the same recordings: by two people, or a person and a rule."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactState
+from holdfast.contact import TIME_TOLERANCE, ContactState
 from holdfast.errors import RecordingError
-from holdfast.labelling.review.spans import TIME_TOLERANCE, Span, spans_of
+from holdfast.labelling.review.spans import Span, spans_of
 from holdfast.metrics.statistics import quantile
 from holdfast.recordings import Label, label_states
 from holdfast.sensors.types import Array
@@ -22,7 +20,7 @@ MAX_ONSET_DIFFERENCE = 0.5
 MAX_LABEL_GAP = 0.1
 """Largest gap between two labels that follow each other; people draw small gaps [s]."""
 
-Counts = npt.NDArray[np.int64]
+Confusion = npt.NDArray[np.int64]
 
 
 class OnsetDifferences(msgspec.Struct, frozen=True):
@@ -45,8 +43,8 @@ class OnsetDifferences(msgspec.Struct, frozen=True):
     values: list[float]
 
 
-class FingerAgreement(msgspec.Struct, frozen=True):
-    """Agreement of A and B on one finger of one recording.
+class AgreementNumbers(msgspec.Struct, frozen=True):
+    """Numbers of the agreement of A and B, on one finger or over several.
 
     Attributes:
         kappa: Cohen's kappa of no contact, unstable and stable; None if it is undefined.
@@ -58,8 +56,6 @@ class FingerAgreement(msgspec.Struct, frozen=True):
         confusion: (3, 3) number of samples by the state in A (rows) and in B (columns), in the
             order no contact, unstable, stable.
         onset_differences: of changes from stable to another state.
-        missing_in_a: intervals of B that no interval of the same state in A overlaps.
-        missing_in_b: intervals of A that no interval of the same state in B overlaps.
     """
 
     kappa: float | None
@@ -70,6 +66,16 @@ class FingerAgreement(msgspec.Struct, frozen=True):
     only_b: float
     confusion: list[list[int]]
     onset_differences: OnsetDifferences
+
+
+class FingerAgreement(AgreementNumbers, frozen=True):
+    """Agreement of A and B on one finger of one recording.
+
+    Attributes:
+        missing_in_a: intervals of B that no interval of the same state in A overlaps.
+        missing_in_b: intervals of A that no interval of the same state in B overlaps.
+    """
+
     missing_in_a: list[Span]
     missing_in_b: list[Span]
 
@@ -81,17 +87,9 @@ class RecordingAgreement(msgspec.Struct, frozen=True):
     fingers: dict[str, FingerAgreement]
 
 
-class PooledAgreement(msgspec.Struct, frozen=True):
-    """Agreement over recordings, as `FingerAgreement`; missing intervals are only counted."""
+class PooledAgreement(AgreementNumbers, frozen=True):
+    """Agreement over recordings; missing intervals are only counted."""
 
-    kappa: float | None
-    kappa_stable: float | None
-    n: int
-    n_samples: int
-    only_a: float
-    only_b: float
-    confusion: list[list[int]]
-    onset_differences: OnsetDifferences
     n_missing_in_a: int
     n_missing_in_b: int
 
@@ -172,17 +170,19 @@ def compare(
         >>> round(thumb.kappa, 6), round(thumb.onset_differences.median, 6)
         (0.8, 0.2)
     """
-    labelled = {finger for given in (a, b) for finger, labels in given.items() if labels}
+    labelled = {finger for by_finger in (a, b) for finger, labels in by_finger.items() if labels}
     if unknown := sorted(labelled - set(times)):
         raise RecordingError(
             f"labels for {', '.join(unknown)} given; recording {name!r} has {', '.join(times)}"
         )
-    counted = {
-        finger: _count(_in_order(a.get(finger, ())), _in_order(b.get(finger, ())), times[finger])
+    fingers = {
+        finger: _agreement(
+            _in_order(a.get(finger, ())), _in_order(b.get(finger, ())), times[finger]
+        )
         for finger in times
         if finger in labelled
     }
-    return RecordingAgreement(name, {finger: _agreement(each) for finger, each in counted.items()})
+    return RecordingAgreement(name, fingers)
 
 
 def pool(recordings: Sequence[RecordingAgreement]) -> Agreement:
@@ -203,59 +203,24 @@ def pool(recordings: Sequence[RecordingAgreement]) -> Agreement:
     )
 
 
-class _OnsetMatch(NamedTuple):
-    """Differences of matched onsets [s], and numbers of the others."""
-
-    values: list[float]
-    only_a: int
-    only_b: int
-
-
-@dataclass(frozen=True)
-class _FingerCounts:
-    """Counts of one finger in one recording."""
-
-    confusion: Counts
-    n_samples: int
-    n_only_a: int
-    n_only_b: int
-    onsets: _OnsetMatch
-    missing_in_a: list[Span]
-    missing_in_b: list[Span]
-
-
 def _in_order(labels: Sequence[Label]) -> list[Label]:
     return sorted(labels, key=lambda label: label.start)
 
 
-def _count(a: Sequence[Label], b: Sequence[Label], times: Array) -> _FingerCounts:
-    one, two = label_states(a, times), label_states(b, times)
-    table = np.bincount(4 * one.astype(np.int64) + two, minlength=16).reshape(4, 4)
+def _agreement(a: Sequence[Label], b: Sequence[Label], times: Array) -> FingerAgreement:
+    codes_a, codes_b = label_states(a, times), label_states(b, times)
+    table = np.bincount(4 * codes_a.astype(np.int64) + codes_b, minlength=16).reshape(4, 4)
     spans_a, spans_b = spans_of(a), spans_of(b)
-    return _FingerCounts(
-        confusion=table[1:, 1:],
+    n_samples = max(len(times), 1)
+    return FingerAgreement(
+        *_kappas(table[1:, 1:]),
         n_samples=len(times),
-        n_only_a=int(table[1:, 0].sum()),
-        n_only_b=int(table[0, 1:].sum()),
-        onsets=_match(_onsets(a), _onsets(b)),
+        only_a=int(table[1:, 0].sum()) / n_samples,
+        only_b=int(table[0, 1:].sum()) / n_samples,
+        confusion=table[1:, 1:].tolist(),
+        onset_differences=_match(_onsets(a), _onsets(b)),
         missing_in_a=_unmatched(spans_b, spans_a),
         missing_in_b=_unmatched(spans_a, spans_b),
-    )
-
-
-def _agreement(counted: _FingerCounts) -> FingerAgreement:
-    n_samples = max(counted.n_samples, 1)
-    return FingerAgreement(
-        kappa=cohens_kappa(counted.confusion),
-        kappa_stable=cohens_kappa(_binary(counted.confusion)),
-        n=int(counted.confusion.sum()),
-        n_samples=counted.n_samples,
-        only_a=counted.n_only_a / n_samples,
-        only_b=counted.n_only_b / n_samples,
-        confusion=counted.confusion.tolist(),
-        onset_differences=_differences(*counted.onsets),
-        missing_in_a=counted.missing_in_a,
-        missing_in_b=counted.missing_in_b,
     )
 
 
@@ -264,9 +229,7 @@ def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
     n_samples = sum(part.n_samples for part in parts)
     onsets = [part.onset_differences for part in parts]
     return PooledAgreement(
-        kappa=cohens_kappa(confusion),
-        kappa_stable=cohens_kappa(_binary(confusion)),
-        n=int(confusion.sum()),
+        *_kappas(confusion),
         n_samples=n_samples,
         only_a=sum(part.only_a * part.n_samples for part in parts) / max(n_samples, 1),
         only_b=sum(part.only_b * part.n_samples for part in parts) / max(n_samples, 1),
@@ -281,9 +244,10 @@ def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
     )
 
 
-def _binary(confusion: Counts) -> Counts:
-    """Return (2, 2) counts of not stable and stable."""
-    return np.add.reduceat(np.add.reduceat(confusion, [0, 2], axis=0), [0, 2], axis=1)
+def _kappas(confusion: Confusion) -> tuple[float | None, float | None, int]:
+    """Return kappa of three states, kappa of stable against the others, and number of samples."""
+    binary = np.add.reduceat(np.add.reduceat(confusion, [0, 2], axis=0), [0, 2], axis=1)
+    return cohens_kappa(confusion), cohens_kappa(binary), int(confusion.sum())
 
 
 def _differences(values: list[float], only_a: int, only_b: int) -> OnsetDifferences:
@@ -312,7 +276,7 @@ def _onsets(labels: Sequence[Label]) -> Array:
     )
 
 
-def _match(a: Array, b: Array) -> _OnsetMatch:
+def _match(a: Array, b: Array) -> OnsetDifferences:
     """Match as many onsets as possible, with the smallest sum of differences."""
     from scipy.optimize import linear_sum_assignment
 
@@ -322,7 +286,7 @@ def _match(a: Array, b: Array) -> _OnsetMatch:
     rows, columns = linear_sum_assignment(np.where(near, np.abs(differences), unmatched_cost))
     kept = near[rows, columns]
     values = differences[rows[kept], columns[kept]].tolist()
-    return _OnsetMatch(values, len(a) - len(values), len(b) - len(values))
+    return _differences(values, len(a) - len(values), len(b) - len(values))
 
 
 def _unmatched(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:

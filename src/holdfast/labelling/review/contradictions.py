@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import UNKNOWN
-from holdfast.labelling.review.spans import TIME_TOLERANCE, Span
+from holdfast.contact import TIME_TOLERANCE, UNKNOWN
+from holdfast.labelling.review.spans import Span
 from holdfast.sensors.types import Array
 
 Codes = npt.NDArray[np.int8]
@@ -32,7 +32,7 @@ N_STATES = 3
 MAX_EDGE_SHIFT = 0.5
 """Largest distance between an edge and its likeliest time [s]."""
 
-MIN_PROBABILITY = 0.01
+MIN_STATE_PROBABILITY = 0.01
 """Least probability in a likelihood ratio, so that no single sample decides."""
 
 USUAL_DEVIATIONS = 2.0
@@ -129,7 +129,7 @@ def edges_of(spans: Sequence[Span], times: Array, probabilities: Array) -> Itera
         An edge for every two adjacent spans.
     """
     known = np.where(np.isnan(probabilities), 1.0, probabilities)
-    likelihood = np.log(np.clip(known, MIN_PROBABILITY, 1.0))
+    likelihood = np.log(np.clip(known, MIN_STATE_PROBABILITY, 1.0))
     for before, after in pairwise(spans):
         if after.start - before.end > TIME_TOLERANCE:
             continue

@@ -8,8 +8,7 @@ import numpy as np
 
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
-from holdfast.labelling.rules.forces import hand_force
-from holdfast.labelling.rules.start import evidence_of_contact
+from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
 from holdfast.model import RELATIVE_RATES
@@ -20,10 +19,10 @@ CONSTANT_SECONDS = 0.5
 AXES = "xyz"
 MAX_TAXEL_FORCE = 100.0
 """Force on one taxel above which the unit of the readings is in doubt [N]."""
-MAX_SAMPLES = 10_000
+MAX_UNIT_SAMPLES = 10_000
 """Number of samples from which the unit is judged."""
 
-Kind = Literal[
+FindingKind = Literal[
     "constant",
     "dead",
     "axes",
@@ -46,7 +45,7 @@ class Finding(NamedTuple):
     """
 
     module: str
-    kind: Kind
+    kind: FindingKind
     text: str
 
 
@@ -119,7 +118,7 @@ def _hides(path: Path) -> bool:
         return False
 
 
-def _of_module(module: Tactile) -> Iterator[tuple[Kind, str]]:
+def _of_module(module: Tactile) -> Iterator[tuple[FindingKind, str]]:
     low, high = RELATIVE_RATES
     if not low <= module.rate <= high:
         yield "rate", f"{module.rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
@@ -163,7 +162,7 @@ def _constant(module: Tactile) -> str:
 
 def _odd_unit(module: Tactile) -> str:
     """Return a text about readings that cannot be counts, or hardly newtons; empty otherwise."""
-    readings = module.readings[:: max(1, module.n_samples // MAX_SAMPLES)]
+    readings = module.readings[:: max(1, module.n_samples // MAX_UNIT_SAMPLES)]
     low, high = np.nanmin(readings), np.nanmax(readings)
     if module.unit == "count" and high - low < 1:
         return (

@@ -28,7 +28,7 @@ from holdfast.training.model_fit import TrainingData, fit_model
 from holdfast.training.setting import Setting
 from holdfast.training.training_samples import resample_if_needed
 
-MAX_FOLDS = 10
+MAX_AUDIT_FOLDS = 10
 """Largest number of groups of recordings that are held out in turn."""
 
 Probabilities = dict[str, Array]
@@ -47,7 +47,7 @@ def out_of_fold(
     recordings: Sequence[Recording],
     setting: Setting,
     *,
-    n_folds: int = MAX_FOLDS,
+    n_folds: int = MAX_AUDIT_FOLDS,
     n_jobs: int = 1,
 ) -> Iterator[tuple[Recording, Probabilities]]:
     """Yield recordings with probabilities from classifiers that are trained on other recordings.

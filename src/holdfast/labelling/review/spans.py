@@ -5,14 +5,11 @@ from typing import Any, Literal
 
 import msgspec
 
-from holdfast.contact import ContactState
+from holdfast.contact import TIME_TOLERANCE, ContactState
 from holdfast.recordings import Label
 
 State = Literal["no_contact", "unstable", "stable"]
 """State of a label as files and JSON write it."""
-
-TIME_TOLERANCE = 1e-6
-"""Times that differ by less are equal [s]."""
 
 
 class Span(msgspec.Struct, frozen=True):

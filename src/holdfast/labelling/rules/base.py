@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import UNKNOWN, Cause, ContactState
+from holdfast.detector.detection import CAUSE_BY_CODE, STATE_BY_CODE
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
 from holdfast.sensors.types import Array
@@ -21,9 +22,6 @@ EVIDENCE_QUANTILE = 0.25
 
 MAX_RATIO = 200.0
 """Largest evidence ratio, of a confidence of 0.998. A ratio over a threshold of 0 is this one."""
-
-_CAUSES = (None, *Cause)
-_STATES = tuple(ContactState)
 
 EvidenceText = Callable[[ContactState, Cause | None, float], str]
 """Function that returns the evidence of a label from its state, cause and evidence ratio."""
@@ -59,12 +57,12 @@ class StateTimeline:
     ) -> None:
         """Set the state, cause and evidence ratio where the mask is True."""
         self.codes[mask] = state
-        self.causes[mask] = _CAUSES.index(cause)
+        self.causes[mask] = CAUSE_BY_CODE.index(cause)
         self.ratio[mask] = np.broadcast_to(ratio, mask.shape)[mask]
 
     def set_cause(self, mask: Mask, cause: Cause) -> None:
         """Set only the cause where the mask is True."""
-        self.causes[mask] = _CAUSES.index(cause)
+        self.causes[mask] = CAUSE_BY_CODE.index(cause)
 
 
 @dataclass(frozen=True)
@@ -85,19 +83,19 @@ class LabelWriter:
 
     def labels(self, timeline: StateTimeline, span: tuple[float, float]) -> tuple[Label, ...]:
         """Return intervals of equal state and cause, cut to the span of the module [s]."""
-        times, found = timeline.times, []
+        times, labels = timeline.times, []
         change = (np.diff(timeline.codes) != 0) | (np.diff(timeline.causes) != 0)
         edges = np.concatenate([[0], np.flatnonzero(change) + 1, [len(times)]])
         ends = np.append(times, np.inf)
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             start, end = max(float(times[first]), span[0]), min(float(ends[last]), span[1])
             if timeline.codes[first] != UNKNOWN and start < end:
-                found.append(self._label(timeline, slice(first, last), start, end))
-        return tuple(found)
+                labels.append(self._label(timeline, slice(first, last), start, end))
+        return tuple(labels)
 
     def _label(self, timeline: StateTimeline, part: slice, start: float, end: float) -> Label:
-        state = _STATES[timeline.codes[part.start]]
-        cause = _CAUSES[timeline.causes[part.start]]
+        state = STATE_BY_CODE[timeline.codes[part.start]]
+        cause = CAUSE_BY_CODE[timeline.causes[part.start]]
         ratio = max(float(np.quantile(timeline.ratio[part], EVIDENCE_QUANTILE)), 1.0)
         confidence = self.trust * label_confidence(ratio, end - start)
         text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")
@@ -117,11 +115,11 @@ def evidence_ratio(quantity: npt.ArrayLike, threshold: npt.ArrayLike) -> Array:
         >>> evidence_ratio([1.0, 3.0, 0.0], 2.0).tolist(), evidence_ratio([0.0, 3.0], 0.0).tolist()
         ([0.5, 1.5, 0.005], [1.0, 200.0])
     """
-    given, least = np.broadcast_arrays(
+    values, least = np.broadcast_arrays(
         np.asarray(quantity, dtype=np.float64), np.asarray(threshold, dtype=np.float64)
     )
-    ratio = np.where(given > 0, MAX_RATIO, 1.0)
-    np.divide(given, least, out=ratio, where=least > given / MAX_RATIO)
+    ratio = np.where(values > 0, MAX_RATIO, 1.0)
+    np.divide(values, least, out=ratio, where=least > values / MAX_RATIO)
     return np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO)
 
 

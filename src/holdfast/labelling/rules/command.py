@@ -34,7 +34,7 @@ from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label, Recording
 
-AUTHOR = "rule:command"
+COMMAND_RULE = "rule:command"
 
 WORDS = {
     "closing": ("closing", "close", "closed", "grasp", "grasping"),
@@ -53,7 +53,7 @@ CLEAR_RATIO = 5.0
 OPEN_ENDED_RATIO = 1.5
 """Evidence ratio of a disturbance without an end, or with repeated beginnings."""
 
-_STATES: dict[str, tuple[int, Cause | None]] = {
+_STATE_OF_WORD: dict[str, tuple[int, Cause | None]] = {
     "closing": (UNSTABLE, Cause.CLOSING),
     "locked": (STABLE, None),
     "disturbance": (UNSTABLE, Cause.DISTURBANCE),
@@ -105,7 +105,7 @@ def propose(
             f"{', '.join(WORDS)} expected, it has {_shown(recording)}"
         )
     hand = hand_force(recording, tare)
-    writer = LabelWriter(AUTHOR, _evidence)
+    writer = LabelWriter(COMMAND_RULE, _evidence)
     return {
         name: writer.labels(_timeline(finger, hand, commands, opening), finger.span)
         for name, finger in hand.fingers.items()
@@ -114,8 +114,8 @@ def propose(
 
 def protocol_markers(recording: Recording) -> list[ProtocolMarker]:
     """Return the markers with a known word in order of time; others are ignored."""
-    found = ((time, command_word(text)) for time, text in sorted(recording.markers))
-    return [ProtocolMarker(time, word) for time, word in found if word]
+    words = ((time, command_word(text)) for time, text in sorted(recording.markers))
+    return [ProtocolMarker(time, word) for time, word in words if word]
 
 
 def command_word(text: str) -> str | None:
@@ -131,7 +131,7 @@ def command_word(text: str) -> str | None:
     if "contact" in words and "no" in words:
         return "free"
     known = {synonym: word for word, synonyms in WORDS.items() for synonym in synonyms}
-    word = next((known[given] for given in words if given in known), None)
+    word = next((known[text_word] for text_word in words if text_word in known), None)
     if word in ("disturbance", "slip") and any(end in words for end in END_WORDS):
         return "locked"
     return word
@@ -144,12 +144,12 @@ def _timeline(
     times, known = hand.times, finger.known
     if commands[0].word == "closing":
         timeline.set_state(known & (times < commands[0].time), NO_CONTACT, None, CLEAR_RATIO)
-    for one, end, ratio in _spans(commands):
-        state, cause = _STATES[one.word]
-        inside = known & (times >= one.time) & (times < end)
+    for command, end, ratio in _spans(commands):
+        state, cause = _STATE_OF_WORD[command.word]
+        inside = known & (times >= command.time) & (times < end)
         timeline.set_state(inside, state, cause, ratio)
-        if one.word == "released":
-            timeline.set_state(inside & (times >= one.time + opening), NO_CONTACT, None, ratio)
+        if command.word == "released":
+            timeline.set_state(inside & (times >= command.time + opening), NO_CONTACT, None, ratio)
     if finger.threshold is not None:
         _correct_by_force(timeline, finger, times >= commands[0].time)
     return timeline
@@ -157,7 +157,7 @@ def _timeline(
 
 def _spans(commands: list[ProtocolMarker]) -> Iterator[tuple[ProtocolMarker, float, float]]:
     """Yield each command that is not a repetition, its end [s], and its evidence ratio."""
-    groups = [list(group) for _, group in groupby(commands, key=lambda each: each.word)]
+    groups = [list(group) for _, group in groupby(commands, key=lambda command: command.word)]
     for group, following in pairwise([*groups, [ProtocolMarker(np.inf, "")]]):
         ended = len(group) == 1 and following[0].word in ("locked", "lost")
         open_ended = group[0].word == "disturbance" and not ended

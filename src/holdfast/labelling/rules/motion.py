@@ -165,10 +165,10 @@ def clock_offset(seen: Array, felt: Array, known: Mask, period: float) -> ClockO
     """
     reach = min(round(MAX_CLOCK_OFFSET / period), len(seen) // 2)
     a, b = _ranks(seen, known), _ranks(felt, np.ones_like(known))
-    found = [
+    correlations = [
         (_correlation(a, b, known, shift), -abs(shift), shift) for shift in range(-reach, reach + 1)
     ]
-    correlation, _, shift = max(found)
+    correlation, _, shift = max(correlations)
     return ClockOffset(shift * period if correlation >= MIN_CORRELATION else 0.0, correlation)
 
 
@@ -191,9 +191,9 @@ def _interpolated(track: PoseTrack, times: Array) -> PoseTrack:
     known = covered(times, track.times[seen], MAX_POSE_GAP)
     positions, quaternions = np.full((len(times), 3), np.nan), np.full((len(times), 4), np.nan)
     if known.any():
-        own = track.times[seen]
+        seen_times = track.times[seen]
         values = np.concatenate([track.positions[seen], _continuous(track.quaternions[seen])], 1)
-        between = np.stack([np.interp(times, own, column) for column in values.T], axis=1)
+        between = np.stack([np.interp(times, seen_times, column) for column in values.T], axis=1)
         positions[known] = between[known, :3]
         turns = between[known, 3:]
         quaternions[known] = turns / np.linalg.norm(turns, axis=1, keepdims=True)

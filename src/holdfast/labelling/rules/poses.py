@@ -16,7 +16,7 @@ from holdfast.sensors.types import Array
 
 OBJECT = "object"
 """Name of the object among the bodies of a file."""
-COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
+POSE_COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
 """Columns of a CSV file of poses: [s], [m], unit quaternion. Column `body` is optional."""
 LOST_COORDINATE = 10.0
 """Coordinates that trackers report for a marker out of sight [m]."""
@@ -126,7 +126,7 @@ def poses_from_csv(path: str | Path) -> Poses:
         RecordingError: the file cannot be read, or a column or the object is missing.
     """
     table, text = read_table(Path(path), text=("body",))
-    values = table.columns(COLUMNS)
+    values = table.columns(POSE_COLUMNS)
     bodies = np.array(text.get("body", [OBJECT] * len(values)))
     if OBJECT not in bodies:
         raise RecordingError(
@@ -208,7 +208,7 @@ def _track(times: Array, pose: npt.NDArray[np.generic]) -> PoseTrack:
 
 def _measured(rows: Mapping[str, Array], path: Path) -> Poses:
     """Return poses from rows of time and pose by body, on a clock of their own."""
-    tracks = {body: _measured_track(own, path) for body, own in rows.items()}
+    tracks = {body: _measured_track(body_rows, path) for body, body_rows in rows.items()}
     object_track = tracks.pop(OBJECT)
     return Poses(path.name, object_track, tracks, same_clock=False)
 

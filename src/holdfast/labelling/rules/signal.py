@@ -38,12 +38,12 @@ from holdfast.metrics.masks import Mask, drop_short_runs, fill_short_gaps, n_sam
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
 
-AUTHOR = "rule:signal"
+SIGNAL_RULE = "rule:signal"
 RELEASE_SHARE = 0.9
 """A release begins when the force was last above this share of the grip force."""
-LOSS_TIME = 0.1
+MAX_FALL_TIME = 0.1
 """A hand that is empty within this time lost the object: it cannot open so fast [s]."""
-NOISE_FACTOR = 6.0
+CHANGE_NOISE_FACTOR = 6.0
 """Least change in standard deviations of a component of the smoothed force. Noise exceeds it in
 less than one window an hour: three components of about ten independent values each."""
 REST_FACTOR = 3.0
@@ -106,7 +106,7 @@ def propose(
         for name in hand.fingers:
             grasp.label(name, timelines[name])
     _label_loss(hand, timelines)
-    writer = LabelWriter(AUTHOR, _evidence)
+    writer = LabelWriter(SIGNAL_RULE, _evidence)
     return {
         name: writer.labels(timelines[name], finger.span) for name, finger in hand.fingers.items()
     }
@@ -118,7 +118,9 @@ def _change_ratio(finger: FingerForce, rule: SignalRule) -> Array:
     touching = finger.contact
     if not touching.any():
         return np.zeros_like(change)
-    least = NOISE_FACTOR * finger.noise or REST_FACTOR * float(np.quantile(change[touching], 0.2))
+    least = CHANGE_NOISE_FACTOR * finger.noise or REST_FACTOR * float(
+        np.quantile(change[touching], 0.2)
+    )
     if finger.threshold is not None:
         least = max(rule.share * grip_force(finger, touching), least)
     return np.where(touching, evidence_ratio(change, least), 0.0)
@@ -129,8 +131,8 @@ def _changing(hand: HandForce, change: Mapping[str, Array], rule: SignalRule) ->
     shared = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
     gap = n_samples_of(rule.merge - rule.window, hand.period)  # the window fills the rest
     return {
-        name: fill_short_gaps(((change[name] > 1) | shared) & each.contact, gap) & each.contact
-        for name, each in hand.fingers.items()
+        name: fill_short_gaps(((change[name] > 1) | shared) & finger.contact, gap) & finger.contact
+        for name, finger in hand.fingers.items()
     }
 
 
@@ -203,7 +205,7 @@ class _GraspLabeller:
         if not len(strong) or last + 1 >= len(touching) or not finger.known[last + 1]:
             return
         onset = int(strong[-1])
-        cause = Cause.LOST if last - onset < self._n(LOSS_TIME) else Cause.RELEASED
+        cause = Cause.LOST if last - onset < self._n(MAX_FALL_TIME) else Cause.RELEASED
         start = self._start_of_end(self._changing[name] & held, onset)
         timeline.set_state(touching & (samples >= start), UNSTABLE, cause, self._change[name])
 
@@ -231,8 +233,8 @@ def _label_loss(hand: HandForce, timelines: Mapping[str, StateTimeline]) -> None
     if drop is None:
         return
     after = np.arange(len(hand.times)) >= drop
-    for name, each in hand.fingers.items():
-        timelines[name].set_state(after & each.known, NO_CONTACT, Cause.LOST, UNMEASURED_RATIO)
+    for name, finger in hand.fingers.items():
+        timelines[name].set_state(after & finger.known, NO_CONTACT, Cause.LOST, UNMEASURED_RATIO)
 
 
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:

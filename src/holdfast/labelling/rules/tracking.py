@@ -36,6 +36,7 @@ from holdfast.labelling.rules.forces import (
     HandForce,
     centre_of_pressure,
     final_drop,
+    fitting_tare,
     hand_force,
 )
 from holdfast.labelling.rules.motion import (
@@ -47,7 +48,6 @@ from holdfast.labelling.rules.motion import (
     relative_track,
 )
 from holdfast.labelling.rules.poses import Poses, PoseTrack, poses_of, tip_tracks_of
-from holdfast.labelling.rules.start import fitting_tare
 from holdfast.metrics.masks import (
     Mask,
     drop_short_runs,
@@ -60,10 +60,10 @@ from holdfast.metrics.masks import (
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
 
-AUTHOR = "rule:tracking"
-NOISE_FACTOR = 5.0
+TRACKING_RULE = "rule:tracking"
+SPEED_NOISE_FACTOR = 5.0
 """Least threshold of a speed, in standard deviations of the speed of a body at rest."""
-LOSS_TIME = 0.5
+OUT_OF_SIGHT_TIME = 0.5
 """An object that is out of sight for this time after the force has ended is lost. If it was out of
 sight before that, the loss began at most this time before the end of the force [s]."""
 LOSS_RATIO = 2.0
@@ -211,8 +211,8 @@ class _FingerLabeller:
         """Return (n,) the motion over its threshold; 0 while the object is out of sight."""
         rule = self._rule
         if rule.measure == "speed":
-            speed = max(rule.speed, NOISE_FACTOR * motion.speed_noise)
-            spin = max(rule.spin, NOISE_FACTOR * motion.spin_noise)
+            speed = max(rule.speed, SPEED_NOISE_FACTOR * motion.speed_noise)
+            spin = max(rule.spin, SPEED_NOISE_FACTOR * motion.spin_noise)
             ratio = np.maximum(motion.speed / speed, motion.spin / spin)
         else:
             ratio = self._displacement_ratio(motion, point)
@@ -221,7 +221,7 @@ class _FingerLabeller:
     def _displacement_ratio(self, motion: RelativeMotion, point: Array | None) -> Array:
         """Return (n,) the displacement from the pose of the grasp over its threshold."""
         calm = self._contact & motion.known
-        calm &= motion.speed < max(self._rule.speed, NOISE_FACTOR * motion.speed_noise)
+        calm &= motion.speed < max(self._rule.speed, SPEED_NOISE_FACTOR * motion.speed_noise)
         n = n_samples_of(GRASP_REST_TIME, self._finger.period)
         rests = runs(drop_short_runs(calm, n))
         if not len(rests):
@@ -261,7 +261,7 @@ class _FingerLabeller:
 
     def _label_loss(self, timeline: StateTimeline, known: Mask, start: int, end: int) -> None:
         """Label a loss if the object is out of sight when the force ends, and stays so."""
-        n = n_samples_of(LOSS_TIME, self._finger.period)
+        n = n_samples_of(OUT_OF_SIGHT_TIME, self._finger.period)
         seen = np.flatnonzero(known[start:end])
         if not len(seen) or end == len(known) or known[max(end - 1, start) : end + n].any():
             return
@@ -290,7 +290,7 @@ def _label_writer(poses: Poses, clock: ClockOffset, rule: TrackingRule) -> Label
         note += f", later by {clock.seconds:.3f} s"
     if not clock.reliable:
         note += ", clocks not aligned: motion seen and felt are not alike"
-    return LabelWriter(AUTHOR, _evidence_text(rule), 1.0 if clock.reliable else 0.5, note)
+    return LabelWriter(TRACKING_RULE, _evidence_text(rule), 1.0 if clock.reliable else 0.5, note)
 
 
 def _evidence_text(rule: TrackingRule) -> EvidenceText:

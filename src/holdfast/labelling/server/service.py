@@ -9,18 +9,16 @@ import msgspec
 from aiohttp import web
 
 from holdfast.errors import HoldfastError, OutputError
-from holdfast.labelling.server.api import (
-    describe_recording,
-    doubtful_labels,
-    labels_data,
-    list_recordings,
-)
-from holdfast.labelling.server.schema import (
+from holdfast.labelling.server.documents import (
     ChangePoints,
     ProposeReply,
     ProposeRequest,
     SaveReply,
     SaveRequest,
+    describe_recording,
+    doubtful_labels,
+    labels_data,
+    list_recordings,
 )
 from holdfast.labelling.server.signals import DEFAULT_POINTS
 from holdfast.labelling.server.store import ConflictError, ReadOnlyError, parse_labels
@@ -56,17 +54,17 @@ class LabellingService:
         self.app.add_routes(self._routes())
 
     def _routes(self) -> list[web.AbstractRouteDef]:
-        one = r"/api/v1/recordings/{id:\d+}"
+        recording = r"/api/v1/recordings/{id:\d+}"
         return [
             web.get("/", _page),
             web.static("/page", PAGE),
             web.static("/web", SHARED),
             web.get("/api/v1/recordings", self._list),
-            web.get(one, self._open),
-            web.get(one + "/signals", self._signals),
-            web.get(one + "/changes", self._changes),
-            web.put(one + "/labels", self._save),
-            web.post(one + "/propose", self._propose),
+            web.get(recording, self._open),
+            web.get(recording + "/signals", self._signals),
+            web.get(recording + "/changes", self._changes),
+            web.put(recording + "/labels", self._save),
+            web.post(recording + "/propose", self._propose),
             web.get(r"/media/{id:\d+}/{index:\d+}", self._video),
         ]
 
@@ -105,9 +103,9 @@ class LabellingService:
         body = await self._bodies.read(request, ProposeRequest)
 
         def propose() -> ProposeReply:
-            rule, found = self._workspace.propose(index, body.rule, body.parameters)
-            low = doubtful_labels(self._workspace.stored(index).labels, found)
-            return ProposeReply(rule, labels_data(found), low)
+            rule, proposals = self._workspace.propose(index, body.rule, body.parameters)
+            low = doubtful_labels(self._workspace.stored(index).labels, proposals)
+            return ProposeReply(rule, labels_data(proposals), low)
 
         return await _reply(propose)
 

@@ -41,7 +41,7 @@ MIN_DISTANCE = 0.1
 """Shortest time between two change points; the clearer one is kept [s]."""
 MIN_RATIO = 2.5
 """Least ratio of the movement on one side to that on the other."""
-NOISE_FACTOR = 2.0
+MOVEMENT_NOISE_FACTOR = 2.0
 """Movement below this multiple of its median is noise."""
 NOISE_SHARE = 0.01
 """Movement below this share of the largest force is noise, invisible on a plot."""
@@ -191,9 +191,11 @@ class Signals:
             raise ValueError(f"an end after the start expected, [{first}, {last}] s given")
         if not 2 <= points <= MAX_POINTS:
             raise ValueError(f"2 to {MAX_POINTS} points expected, {points:g} given")
-        parts = {name: each.part(first, last, int(points)) for name, each in self.fingers.items()}
-        exact = all(one for one, _ in parts.values())
-        return SignalPart(first, last, exact, {name: own for name, (_, own) in parts.items()})
+        parts = {
+            name: finger.part(first, last, int(points)) for name, finger in self.fingers.items()
+        }
+        exact = all(complete for complete, _ in parts.values())
+        return SignalPart(first, last, exact, {name: series for name, (_, series) in parts.items()})
 
 
 def signal_values(
@@ -255,7 +257,9 @@ def _halved(level: _Level) -> _Level:
     )
     if n == len(level.times):
         return half
-    return _Level(*(np.concatenate([ours, own[n:]]) for ours, own in zip(half, level, strict=True)))
+    return _Level(
+        *(np.concatenate([pairs, blocks[n:]]) for pairs, blocks in zip(half, level, strict=True))
+    )
 
 
 def _falls(earlier: _Level, later: _Level) -> npt.NDArray[np.bool_]:
@@ -316,19 +320,19 @@ def change_points(times: Array, force: Array, period: float) -> Array:
     from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
     known = np.isfinite(force).all(axis=1)
-    own, values = times[known], force[known]
+    known_times, values = times[known], force[known]
     n = max(round(COMPARED_TIME / period), 1)
-    if len(own) <= 2 * n:
+    if len(known_times) <= 2 * n:
         return np.empty(0)
     values = uniform_filter1d(values, 2 * round(SMOOTHING_TIME / period / 2) + 1, axis=0)
     after, before = _movements(values, n)
     largest = float(np.quantile(np.linalg.norm(values, axis=1), 0.99))
     tiny = float(np.finfo(float).tiny)
-    noise = max(NOISE_FACTOR * float(np.median(after)), NOISE_SHARE * largest, tiny)
+    noise = max(MOVEMENT_NOISE_FACTOR * float(np.median(after)), NOISE_SHARE * largest, tiny)
     contrast = np.abs(np.log((after + noise) / (before + noise)))
     width = 2 * max(round(MIN_DISTANCE / period), 1) + 1
     peaks = (contrast >= math.log(MIN_RATIO)) & (contrast == maximum_filter1d(contrast, width))
-    return np.asarray(own[peaks])
+    return np.asarray(known_times[peaks])
 
 
 def _movements(force: Array, n: int) -> tuple[Array, Array]:
@@ -349,8 +353,8 @@ def _movements(force: Array, n: int) -> tuple[Array, Array]:
 
 def _distances(a: Array, b: Array) -> Array:
     """Return (n,) distances of the rows of two arrays, computed in parts to bound the memory."""
-    found = np.empty(len(a))
+    distances = np.empty(len(a))
     for start in range(0, len(a), PART_SAMPLES):
         part = slice(start, start + PART_SAMPLES)
-        found[part] = np.linalg.norm(a[part] - b[part], axis=1)
-    return found
+        distances[part] = np.linalg.norm(a[part] - b[part], axis=1)
+    return distances

@@ -15,7 +15,7 @@ from typing import Literal
 
 import msgspec
 
-from holdfast.contact import LABEL_STATES, Cause, ContactState
+from holdfast.contact import LABEL_STATES, TIME_TOLERANCE, Cause, ContactState
 from holdfast.errors import HoldfastError, OutputError, RecordingError
 from holdfast.files import lock, sync, write_whole
 from holdfast.io.header import label_data
@@ -26,16 +26,15 @@ from holdfast.io.label_files import (
     labels_path,
     load_labels,
 )
-from holdfast.labelling.review.spans import TIME_TOLERANCE
 from holdfast.recordings import Label, Recording, Tactile
 
 NO_REVISION = "none"
 """Revision of a label file that does not exist."""
 
-STATES = tuple(state.value.lower() for state in LABEL_STATES)
-CAUSES = tuple(cause.value for cause in Cause)
+STATE_NAMES = tuple(state.value.lower() for state in LABEL_STATES)
+CAUSE_NAMES = tuple(cause.value for cause in Cause)
 
-Labels = Mapping[str, Sequence[Label]]
+ModuleLabels = Mapping[str, Sequence[Label]]
 Origin = Literal["file", "inside", "none"]
 
 
@@ -114,7 +113,7 @@ def read_stored(path: Path, recording: Recording) -> StoredLabels:
 def save_stored(
     path: Path,
     recording: Recording,
-    labels: Labels,
+    labels: ModuleLabels,
     *,
     revision: str,
     author: str,
@@ -142,13 +141,13 @@ def save_stored(
         ValueError: the labels contradict each other or the recording.
     """
     signed = {
-        name: tuple(each if each.author else replace(each, author=author) for each in own)
-        for name, own in validated(recording, labels).items()
+        name: tuple(label if label.author else replace(label, author=author) for label in valid)
+        for name, valid in validated(recording, labels).items()
     }
     file = LabelFile(
         recording=recording.digest,
         name=recording.name,
-        modules={name: [label_data(each) for each in own] for name, own in signed.items()},
+        modules={name: [label_data(label) for label in done] for name, done in signed.items()},
         author=author,
         time=time,
         notes=note,
@@ -193,7 +192,7 @@ def is_read_only(path: Path) -> bool:
     return not (_writable(target.parent) and (not target.exists() or _writable(target)))
 
 
-def validated(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ...]]:
+def validated(recording: Recording, labels: ModuleLabels) -> dict[str, tuple[Label, ...]]:
     """Return the labels of every finger of a recording in order of time, after validation.
 
     Args:
@@ -209,28 +208,31 @@ def validated(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ..
             f"labels for {', '.join(unknown)} given; recording {recording.name!r} "
             f"has {', '.join(recording.modules)}"
         )
-    for finger, own in labels.items():
-        _validate(finger, recording, own)
+    for finger, finger_labels in labels.items():
+        _validate(finger, recording, finger_labels)
     return {
         finger: tuple(sorted(labels.get(finger, ()), key=lambda label: label.start))
         for finger in recording.modules
     }
 
 
-def parse_labels(given: Mapping[str, Sequence[LabelInput]]) -> dict[str, tuple[Label, ...]]:
+def parse_labels(inputs: Mapping[str, Sequence[LabelInput]]) -> dict[str, tuple[Label, ...]]:
     """Return labels from what a client sent.
 
     Args:
-        given: by finger.
+        inputs: by finger.
 
     Raises:
         ValueError: a state, cause, interval or confidence is invalid. The text names the finger
             and the times.
     """
-    return {finger: tuple(_parse(finger, each) for each in own) for finger, own in given.items()}
+    return {
+        finger: tuple(_parse(finger, label) for label in labels)
+        for finger, labels in inputs.items()
+    }
 
 
-def cut_to_samples(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ...]]:
+def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tuple[Label, ...]]:
     """Cut each label to the samples of its own finger.
 
     Fingers begin and end at different times, while a page has one time axis. Labels that exceed
@@ -243,31 +245,31 @@ def cut_to_samples(recording: Recording, labels: Labels) -> dict[str, tuple[Labe
     """
     end = recording.end + max(module.period for module in recording.modules.values())
     return {
-        finger: tuple(_cut(own, recording.modules.get(finger), recording.start, end))
-        for finger, own in labels.items()
+        finger: tuple(_cut(uncut, recording.modules.get(finger), recording.start, end))
+        for finger, uncut in labels.items()
     }
 
 
-def _parse(finger: str, given: LabelInput) -> Label:
-    where = f"{finger}, [{given.start:.10g}, {given.end:.10g}) s"
-    if given.state not in STATES:
-        raise ValueError(f"{where}: state {', '.join(STATES)} expected, {given.state!r} given")
-    if given.cause not in (None, *CAUSES):
+def _parse(finger: str, label: LabelInput) -> Label:
+    where = f"{finger}, [{label.start:.10g}, {label.end:.10g}) s"
+    if label.state not in STATE_NAMES:
+        raise ValueError(f"{where}: state {', '.join(STATE_NAMES)} expected, {label.state!r} given")
+    if label.cause not in (None, *CAUSE_NAMES):
         raise ValueError(
-            f"{where}: cause {', '.join(CAUSES)} or none expected, {given.cause!r} given"
+            f"{where}: cause {', '.join(CAUSE_NAMES)} or none expected, {label.cause!r} given"
         )
-    state, cause = ContactState(given.state.upper()), given.cause and Cause(given.cause)
-    span = given.start, given.end
+    state, cause = ContactState(label.state.upper()), label.cause and Cause(label.cause)
+    span = label.start, label.end
     try:
-        return Label(*span, state, cause or None, given.evidence, given.confidence, given.author)
+        return Label(*span, state, cause or None, label.evidence, label.confidence, label.author)
     except ValueError as problem:
         raise ValueError(f"{finger}: {problem}") from problem
 
 
 def _validate(finger: str, recording: Recording, labels: Sequence[Label]) -> None:
-    for one, two in pairwise(sorted(labels, key=lambda label: label.start)):
-        if two.start < one.end - TIME_TOLERANCE:
-            raise ValueError(f"{finger}: {_span_text(one)} and {_span_text(two)} overlap")
+    for earlier, later in pairwise(sorted(labels, key=lambda label: label.start)):
+        if later.start < earlier.end - TIME_TOLERANCE:
+            raise ValueError(f"{finger}: {_span_text(earlier)} and {_span_text(later)} overlap")
     try:
         replace(recording.modules[finger], labels=tuple(labels))
     except RecordingError as cause:

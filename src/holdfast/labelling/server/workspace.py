@@ -17,8 +17,8 @@ from holdfast.io import load_recording
 from holdfast.io.header import Header
 from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
+from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import Poses, poses_of
-from holdfast.labelling.rules.start import fitting_tare
 from holdfast.labelling.server.long_recordings import (
     load_for_labelling,
     read_header,
@@ -26,7 +26,7 @@ from holdfast.labelling.server.long_recordings import (
 )
 from holdfast.labelling.server.signals import Signals, change_points
 from holdfast.labelling.server.store import (
-    Labels,
+    ModuleLabels,
     StoredLabels,
     cut_to_samples,
     read_stored,
@@ -104,8 +104,8 @@ class OpenRecording:
         """Change points by finger [s]."""
         modules = self.recording.modules
         return {
-            name: change_points(each.times, each.values[:, 1:4], modules[name].period).tolist()
-            for name, each in self.signals.fingers.items()
+            name: change_points(finger.times, finger.values[:, 1:4], modules[name].period).tolist()
+            for name, finger in self.signals.fingers.items()
         }
 
 
@@ -216,7 +216,7 @@ class Workspace:
             return read_stored(opened.path, opened.recording)
 
     def save(
-        self, index: int, labels: Labels, *, revision: str, author: str, note: str
+        self, index: int, labels: ModuleLabels, *, revision: str, author: str, note: str
     ) -> StoredLabels:
         """Save the labels of a recording with the current time, each cut to its finger's samples.
 
@@ -254,10 +254,10 @@ class Workspace:
         with self._compute_lock:
             recording = opened.with_readings()
             chosen = rule or default_rule(recording, self._poses)
-            given: dict[str, Any] = {"tare": opened.tare, **parameters}
+            arguments: dict[str, Any] = {"tare": opened.tare, **parameters}
             if chosen == "tracking":
-                given["tracking"] = self._poses
-            self._proposals[index] = propose(chosen, recording, **given)
+                arguments["tracking"] = self._poses
+            self._proposals[index] = propose(chosen, recording, **arguments)
         return chosen, self._proposals[index]
 
     def proposals(self, index: int) -> Proposals:

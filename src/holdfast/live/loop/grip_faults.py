@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from holdfast.grip.limits import Limits
-from holdfast.live.loop.documents import GripFault
+from holdfast.live.documents import GripFault
 
 ENDED = "ended"
 """Reason of a fault that ended the loop for good."""

@@ -12,7 +12,7 @@ from msgspec.structs import asdict
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand, GripReason, LoopState
 from holdfast.grip.limits import Limits
-from holdfast.live.loop.documents import GripDocument, GripEntry, GripFault, GripFinger
+from holdfast.live.documents import GripDocument, GripEntry, GripFault, GripFinger
 from holdfast.live.loop.grip_faults import explain_fault
 from holdfast.live.loop.grip_loop import GripLoop
 from holdfast.live.loop.runner import LoopRunner

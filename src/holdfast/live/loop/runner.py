@@ -10,7 +10,7 @@ from typing import NamedTuple
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.grip.command import GripCommand, GripReason
 from holdfast.live.loop.grip_loop import GripLoop
-from holdfast.live.requests import RequestQueue
+from holdfast.live.session import RequestQueue
 from holdfast.live.stream_detector import StreamUpdate
 
 TICK = 0.01

@@ -39,7 +39,7 @@ WATCHDOG_END_TIMEOUT = 5.0
 """Time in which the process must end after its pipe was closed [s]; then it is killed."""
 N_SAFE_COMMANDS, SAFE_COMMAND_PERIOD = 5, 0.02
 """Number of times that the safe command is sent, in case one is lost, and the time between [s]."""
-READY, FAREWELL = b"ready\n", b"farewell\n"
+READY_LINE, FAREWELL_LINE = b"ready\n", b"farewell\n"
 _PROGRAM = "from holdfast.live.loop.watchdog import main; sys.exit(main(*sys.argv[1:]))"
 _MAX_LINE = 65536
 
@@ -79,7 +79,7 @@ class Watchdog:
         answer = b""
         if output is not None and select.select([output], [], [], START_TIMEOUT)[0]:
             answer = output.readline()
-        if answer != READY:
+        if answer != READY_LINE:
             self.kill()
             text = answer.decode("utf-8", "replace").strip() or "it does not start"
             raise HandError(f"the watchdog cannot command {self._arguments[0]}: {text}")
@@ -130,7 +130,7 @@ class Watchdog:
     def stop(self) -> None:
         """End the process without any command."""
         try:
-            self._write(FAREWELL)
+            self._write(FAREWELL_LINE)
         except OSError:
             self.kill()
         self._end()
@@ -226,7 +226,7 @@ def main(uri: str, on_fault: str, timeout: str) -> int:
     except (HoldfastError, ValueError) as failure:
         print(failure, flush=True)  # noqa: T201 (the other end of the pipe reads it)
         return 2
-    os.write(sys.stdout.fileno(), READY)
+    os.write(sys.stdout.fileno(), READY_LINE)
     pipe = sys.stdin.fileno()
     last = _watch(pipe, float(timeout))
     os.close(pipe)  # the next heartbeat of the loop fails, before it can send an old command
@@ -246,7 +246,7 @@ def _watch(pipe: int, timeout: float) -> GripCommand | None:
     while select.select([pipe], [], [], None if last is None else timeout)[0]:
         data = os.read(pipe, _MAX_LINE)
         *lines, rest = (rest + data).split(b"\n")
-        if FAREWELL.strip() in lines:
+        if FAREWELL_LINE.strip() in lines:
             return None
         for line in lines:
             try:

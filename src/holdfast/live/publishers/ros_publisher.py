@@ -1,22 +1,31 @@
-"""Publish estimates on ROS topics: the part that ROS 1 and ROS 2 share."""
+"""Publish estimates on topics of ROS 1 and ROS 2."""
 
 import re
 import time
-from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterable, Mapping
 from threading import Condition, Thread
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 from msgspec.structs import asdict
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
+from holdfast.devices.ros.link import Link, Publisher
 from holdfast.live.documents import numbered
 from holdfast.openable import Openable
+from holdfast.ros.topic_messages import (
+    DIAGNOSTICS,
+    FLOAT64,
+    STRING,
+    VECTOR,
+    WRENCH,
+    header,
+    number_message,
+)
 from holdfast.sensors.types import Unit
 
 if TYPE_CHECKING:
-    from holdfast.live.loop.documents import GripDocument
+    from holdfast.live.documents import GripDocument
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.stream_detector import StreamUpdate
 
@@ -26,19 +35,16 @@ DIAGNOSTICS_PERIOD = 1.0
 """Maximum time between two diagnostics messages [s]."""
 MAX_ESTIMATE_AGE = 1.0
 """Age from which an estimate counts as missing in the diagnostics [s]."""
-STRING, FLOAT = "std_msgs/String", "std_msgs/Float64"
-VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
-DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
-"""Message types of the topics."""
+NUMBER_FIELDS = ("stable_probability", "instability")
+"""Fields of an estimate with a topic of numbers for each finger."""
+NO_TORQUE = {"x": 0.0, "y": 0.0, "z": 0.0}
 GRIP_TEXTS = ("state", "reason")
 """Topics of the grip loop that are texts."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostics in ROS."""
-NOT_IN_DIAGNOSTICS = frozenset({"time", "stable_probability", "instability", "force", "cause"})
+NOT_IN_DIAGNOSTICS = frozenset({"time", "force", "cause", *NUMBER_FIELDS})
 """Fields of an estimate that the diagnostics leave out: those with a topic, the time, and the
 cause, which is no problem of the sensor."""
-
-_Force = tuple[float, float, float]
 
 
 class DiagnosticStatus(NamedTuple):
@@ -57,6 +63,13 @@ class DiagnosticStatus(NamedTuple):
     values: tuple[tuple[str, str], ...]
 
 
+class Others(TypedDict, total=False):
+    """Arguments of every publisher, see `RosPublisher`."""
+
+    namespace: str
+    grip: "LiveGrip | None"
+
+
 class RosPublisher(Openable):
     """Publish estimates in a separate thread; it never delays the caller.
 
@@ -70,6 +83,7 @@ class RosPublisher(Openable):
 
     Args:
         units: of the readings, by finger.
+        link: connection to ROS.
         namespace: prefix of the topics.
         grip: the loop that controls the hand; None if there is none.
 
@@ -85,9 +99,12 @@ class RosPublisher(Openable):
     def __init__(
         self,
         units: Mapping[str, Unit],
+        link: Link,
         namespace: str = "/holdfast",
         grip: "LiveGrip | None" = None,
     ) -> None:
+        self._link = link
+        self._publishers: dict[str, Publisher] = {}
         self._grip = grip
         self._grip_changed = False
         self._units = dict(units)
@@ -110,7 +127,9 @@ class RosPublisher(Openable):
         Raises:
             SourceError: ROS cannot be reached.
         """
-        self._connect(self.topics())
+        self._link.open()
+        topics = self.topics()
+        self._publishers = {topic: self._link.publisher(topic, topics[topic]) for topic in topics}
         self._closing = False
         self._thread = Thread(target=self._run, name="holdfast-ros", daemon=True)
         self._thread.start()
@@ -120,11 +139,11 @@ class RosPublisher(Openable):
         topics = {f"{self._namespace}/hand/state": STRING, "/diagnostics": DIAGNOSTICS}
         for finger, name in self._names.items():
             topics[f"{name}/state"] = STRING
-            topics[f"{name}/stable_probability"] = topics[f"{name}/instability"] = FLOAT
+            topics |= {f"{name}/{field}": FLOAT64 for field in NUMBER_FIELDS}
             topics[f"{name}/force"] = WRENCH if self._units[finger] == "N" else VECTOR
         if self._grip is not None:
             topics |= dict.fromkeys((f"{self._namespace}/grip/{n}" for n in GRIP_TEXTS), STRING)
-            topics |= {f"{name}/force_scale": FLOAT for name in self._names.values()}
+            topics |= {f"{name}/force_scale": FLOAT64 for name in self._names.values()}
         return topics
 
     def close(self) -> None:
@@ -135,7 +154,8 @@ class RosPublisher(Openable):
         thread, self._thread = self._thread, None
         if thread is not None:
             thread.join()
-            self._disconnect()
+            self._publishers.clear()
+            self._link.close()
 
     def put(self, update: "StreamUpdate") -> None:
         """Publish the estimates of an update; a listener of a session."""
@@ -157,27 +177,11 @@ class RosPublisher(Openable):
             self._queue.append((estimate, updated, time.time()))
             self._queue_changed.notify()
 
-    @abstractmethod
-    def _connect(self, topics: Mapping[str, str]) -> None:
-        """Connect to ROS, with these topics and message types."""
+    def _publish(self, topic: str, message: Mapping[str, Any]) -> None:
+        self._publishers[topic].publish(message)
 
-    @abstractmethod
-    def _disconnect(self) -> None:
-        """Disconnect from ROS."""
-
-    @abstractmethod
-    def _publish_text(self, topic: str, text: str) -> None: ...
-
-    @abstractmethod
-    def _publish_number(self, topic: str, number: float) -> None: ...
-
-    @abstractmethod
-    def _publish_force(
-        self, topic: str, stamp: float, finger: str, force: _Force, *, newtons: bool
-    ) -> None: ...
-
-    @abstractmethod
-    def _publish_diagnostics(self, stamp: float, statuses: Iterable[DiagnosticStatus]) -> None: ...
+    def _publish_text(self, topic: str, text: str) -> None:
+        self._publish(topic, {"data": str(text)})
 
     def _wake(self, text: str, time: float) -> None:
         """Publish the grip loop at once; a listener of its events."""
@@ -215,13 +219,16 @@ class RosPublisher(Openable):
     def _publish_estimate(
         self, estimate: HandEstimate, fingers: Iterable[str], stamp: float
     ) -> None:
-        for finger in fingers:
-            one, name = estimate.fingers[finger], self._names[finger]
-            self._publish_text(f"{name}/state", one.state)
-            self._publish_number(f"{name}/stable_probability", one.stable_probability)
-            self._publish_number(f"{name}/instability", one.instability)
-            newtons = self._units[finger] == "N"
-            self._publish_force(f"{name}/force", stamp, finger, one.force, newtons=newtons)
+        for name in fingers:
+            finger, topic = estimate.fingers[name], self._names[name]
+            self._publish_text(f"{topic}/state", finger.state)
+            for field in NUMBER_FIELDS:
+                self._publish(f"{topic}/{field}", number_message(getattr(finger, field)))
+            force = dict(zip("xyz", finger.force, strict=True))
+            message: dict[str, Any] = {"header": header(stamp, name), "vector": force}
+            if self._units[name] == "N":
+                message["wrench"] = {"force": force, "torque": NO_TORQUE}
+            self._publish(f"{topic}/force", message)
         self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 
     def _publish_grip(self, grip: "GripDocument") -> None:
@@ -229,7 +236,8 @@ class RosPublisher(Openable):
         self._publish_text(f"{self._namespace}/grip/reason", grip.reason)
         for finger, command in grip.fingers.items():
             if finger in self._names:
-                self._publish_number(f"{self._names[finger]}/force_scale", command.scale)
+                scale = number_message(command.scale)
+                self._publish(f"{self._names[finger]}/force_scale", scale)
 
     def _update_diagnostics(self, grip: "GripDocument | None") -> None:
         """Publish the diagnostics if they are due or have changed."""
@@ -242,7 +250,30 @@ class RosPublisher(Openable):
             return
         self._levels = levels
         self._diagnostics_due = time.monotonic() + DIAGNOSTICS_PERIOD
-        self._publish_diagnostics(now, statuses)
+        messages = [_status_message(status) for status in statuses]
+        self._publish("/diagnostics", {"header": header(now), "status": messages})
+
+
+class Ros1Publisher(RosPublisher):
+    """Publish estimates on topics of ROS 1, with rospy; by default at `ROS_MASTER_URI`."""
+
+    def __init__(
+        self, units: Mapping[str, Unit], *, master: str | None = None, **others: Unpack[Others]
+    ) -> None:
+        from holdfast.devices.ros.rospy_node import Ros1Link
+
+        super().__init__(units, Ros1Link(master), **others)
+
+
+class Ros2Publisher(RosPublisher):
+    """Publish estimates on topics of ROS 2, over DDS; by default in `ROS_DOMAIN_ID`."""
+
+    def __init__(
+        self, units: Mapping[str, Unit], *, domain: str | None = None, **others: Unpack[Others]
+    ) -> None:
+        from holdfast.devices.ros.dds import Ros2Link
+
+        super().__init__(units, Ros2Link(domain), **others)
 
 
 def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
@@ -326,6 +357,16 @@ def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:
     return DiagnosticStatus(
         name, level, faults or (str(finger.reason) if is_lost else "well"), values
     )
+
+
+def _status_message(status: DiagnosticStatus) -> dict[str, Any]:
+    return {
+        "level": status.level,
+        "name": f"holdfast: {status.name}",
+        "message": status.message,
+        "hardware_id": "holdfast",
+        "values": [{"key": key, "value": value} for key, value in status.values],
+    }
 
 
 def _text(value: object) -> str:

@@ -26,9 +26,10 @@ from holdfast.web.connections import (
     BACKLOG,
     HEADER_TIMEOUT,
     ConnectionLimit,
+    is_local,
     log_exceptions_briefly,
+    refusal,
 )
-from holdfast.web.origin import is_local, refusal
 
 HOST, PORT = "127.0.0.1", 5000
 STOP_CHECK_INTERVAL = 0.2

@@ -8,8 +8,7 @@ from typing import Literal
 from msgspec import Struct
 
 from holdfast.contact import ContactState, Fault
-from holdfast.live.documents import FingerDocument, Number, Vector
-from holdfast.live.loop.documents import GripDocument
+from holdfast.live.documents import FingerDocument, GripDocument, Number, Vector
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):

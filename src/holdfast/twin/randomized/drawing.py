@@ -10,15 +10,14 @@ import numpy as np
 
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
+from holdfast.twin.grasp import PAD_MIDDLE
 from holdfast.twin.objects import SHAPES, GraspObject, make_object
 from holdfast.twin.randomized.gripper import Drives, PadLayout, flat_patch, pad_layout
 from holdfast.twin.randomized.palm import log_uniform, uniform
-from holdfast.twin.skin import Skin
+from holdfast.twin.skin import Skin, Three
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin.parameters import Three, UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 
-PAD = (0.0261, 0.0, 0.016)
-"""The middle of a curved fingertip's pad, in the fingertip frame [m]."""
 SENSOR_KINDS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin", "papillarray", "grid-3x3")
 """Sensors of randomized hands."""
 _PITCH = {"uskin-4x4": 4.7e-3, "uskin-4x6": 7.2e-3, "anyskin": 7e-3, "papillarray": 7e-3}
@@ -155,7 +154,7 @@ def draw_layout(
         ValueError: a pad does not reach the object.
     """
     if kind == "uskin-curved":
-        surface, normal, point = curved_fingertip(), np.array([1.0, 0.0, 0.0]), np.array(PAD)
+        surface, normal, point = curved_fingertip(), np.array([1.0, 0.0, 0.0]), np.array(PAD_MIDDLE)
     else:
         known = _sensor(kind)
         surface = flat_patch(known.positions, _PITCH.get(kind, 6e-3))

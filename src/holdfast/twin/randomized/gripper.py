@@ -12,9 +12,9 @@ import numpy as np
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import touch
-from holdfast.twin.hand import HandModel, object_xml
+from holdfast.twin.hand import HandModel, apply_forces, fill_bodies, object_xml
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.objects import GraspObject, distance_to
+from holdfast.twin.objects import GraspObject, reach_of
 from holdfast.twin.protocol import OPEN_GAP
 from holdfast.twin.randomized.palm import PalmMotion
 from holdfast.twin.skin import Skin
@@ -25,7 +25,7 @@ STEP_RATE = 1500.0
 """Least rate of the physics [Hz]: stiff skins on light objects need more than soft fingertips."""
 MAX_TURN_CHANGE = 0.3
 """Largest change of the object's angular velocity by the operator in a step [rad/s]."""
-N_AXES = 3
+N_PAD_JOINTS = 3
 """Joints of a pad: along its closing line, and two across it."""
 
 
@@ -141,15 +141,13 @@ def _frame(normal: Array, inward: Array) -> Array:
 
 
 def _reach(item: GraspObject, outward: Array, height: float) -> float:
-    """Distance from the object's axis to its surface along a direction, at a height [m]."""
-    distances = np.linspace(0.0, 0.09, 901)
-    points = distances[:, None] * outward + [0.0, 0.0, height]
-    inside = np.flatnonzero(distance_to(item, points) < 0)
-    if not len(inside):
+    """Return the distance at which a pad meets the object, along a direction at a height [m]."""
+    reach = reach_of(item, outward, height)
+    if np.isnan(reach):
         raise ValueError(
             f"the pad at {1e3 * height:.0f} mm does not reach the object {item.name!r}"
         )
-    return float(distances[inside[-1]])
+    return reach
 
 
 def gripper_model(
@@ -231,7 +229,7 @@ class GripperWorld(ContactWorld):
         self._jump_until = -1.0
         self.time = 0.0
         mujoco.mj_forward(self.hand.model, self.hand.data)
-        self.hand.bodies(self.bodies)
+        fill_bodies(self.hand.arrays, self.bodies)
 
     @property
     def unstable(self) -> bool:
@@ -259,7 +257,7 @@ class GripperWorld(ContactWorld):
             at = palm.at(row + k * self.timestep)
             model.opt.gravity[:] = palm.gravity[at]
             mujoco.mj_step1(model, data)
-            self.hand.bodies(self.bodies)
+            fill_bodies(self.hand.arrays, self.bodies)
             touch(self.contact, self.constants, self.bodies, self.timestep)
             operator.fill(self.bodies[-1], self.outside, k * self.timestep)
             self._limit_torque()
@@ -267,7 +265,7 @@ class GripperWorld(ContactWorld):
                 self.contact.wrench, self.outside, self.bodies[-1], self.item.inertia,
                 self.item.mass, palm.spin[at], palm.turn[at], self._wrench,
             )  # fmt: skip
-            self.hand.apply(self.contact.tips, self._wrench, self.bodies)
+            apply_forces(self.hand.arrays, self.contact.tips, self._wrench, self.bodies)
             _drive(
                 data.qpos, data.qvel, travels, self._jump, noise, self.drives.stiffness,
                 self.drives.damping, data.qfrc_applied,
@@ -359,5 +357,5 @@ def _drive(
     out: Array,
 ) -> None:
     for i in range(len(travels)):
-        j = N_AXES * i
+        j = N_PAD_JOINTS * i
         out[j] = stiffness * (travels[i] + jump[i] - place[j]) - damping * speed[j] + noise[i]

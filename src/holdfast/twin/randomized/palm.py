@@ -12,17 +12,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
+from holdfast.twin.hand import GRAVITY
+from holdfast.twin.profile import Span
 
-GRAVITY = 9.81
-"""[m/s^2]"""
 GRID_RATE = 1000.0
 """Rate at which a motion is tabulated [Hz]."""
 N_VIBRATIONS = 12
 """Sinusoids that make up the vibration of the arm."""
-KINDS = ("carry", "swing", "brake", "turn")
+PALM_KINDS = ("carry", "swing", "brake", "turn")
 """Motions of an arm: to another place, to and fro, a sudden stop, a turn against gravity."""
-
-Span = tuple[float, float]
 
 
 class PalmMotion(NamedTuple):
@@ -47,7 +45,7 @@ class Segment(NamedTuple):
     """One motion of the arm.
 
     Attributes:
-        kind: one of `KINDS`.
+        kind: one of `PALM_KINDS`.
         start: since the lock [s].
         duration: [s].
         direction: (3,) unit vector of the motion, or axis of the turn, in the palm frame.
@@ -81,7 +79,7 @@ def draw_segment(
     Args:
         generator: of all that is drawn.
         ranges: `{kind}_size`, `{kind}_duration` and, where it has one, `{kind}_rate`.
-        kind: one of `KINDS`.
+        kind: one of `PALM_KINDS`.
         start: since the lock [s].
     """
     direction = generator.standard_normal(3)

@@ -16,13 +16,12 @@ from holdfast.twin.operator import (
     HOLD_STIFFNESS,
     MOVE,
     Disturbance,
+    disturb_wrench,
     hold_wrench,
-    move_wrench,
-    push_wrench,
 )
+from holdfast.twin.profile import Span
 from holdfast.twin.randomized.gripper import OperatorForce
-from holdfast.twin.randomized.palm import KINDS as PALM_KINDS
-from holdfast.twin.randomized.palm import Segment, Span, draw_segment, log_uniform, uniform
+from holdfast.twin.randomized.palm import PALM_KINDS, Segment, draw_segment, log_uniform, uniform
 
 OPERATOR_KINDS = ("move", "push", "pull", "twist", "drag", "spin", "weight")
 """A person acts on the object: moves it to and fro, pushes it with a finger, pulls or twists it
@@ -30,7 +29,7 @@ with a growing force or torque, drags or spins it through the fingers at a stead
 something into it."""
 GRIP_KINDS = ("regrip", "loosen", "slippery")
 """The grip changes slowly, or falls until the object slides; or friction falls."""
-KINDS = (*PALM_KINDS, *PALM_KINDS, *OPERATOR_KINDS, *GRIP_KINDS, "drag", "spin", "loosen")
+EVENT_KINDS = (*PALM_KINDS, *PALM_KINDS, *OPERATOR_KINDS, *GRIP_KINDS, "drag", "spin", "loosen")
 """Events, as often as they are drawn."""
 LONGEST_EVENT = 3.0
 """An event that does not end by itself ends after this [s]."""
@@ -50,7 +49,7 @@ class Event(NamedTuple):
     """One event of a hold.
 
     Attributes:
-        kind: one of `KINDS`.
+        kind: one of `EVENT_KINDS`.
         start: since the lock [s].
         duration: after which it is over [s]; a provoked slip may end it before.
         size: of the change: share of the grip, factor of friction, share of weight.
@@ -99,7 +98,7 @@ def draw_events(
 def _draw_event(
     generator: np.random.Generator, ranges: dict[str, Span], arm: dict[str, Span], start: float
 ) -> Event:
-    kind = str(generator.choice(KINDS))
+    kind = str(generator.choice(EVENT_KINDS))
     if kind in PALM_KINDS:
         segment = draw_segment(generator, arm, kind, start)
         return Event(kind, start, segment.duration, segment=segment)
@@ -257,22 +256,16 @@ class Scenario(OperatorForce):
         return self._events[self._place] if 0 <= self._place < len(self._events) else None
 
     def _next(self, since: float, body: Array) -> None:
-        while self._place + 1 < len(self._events):
-            coming = self._events[self._place + 1]
-            if coming.start > since:
-                return
-            self._finish()
+        """Begin the next event, if it is time; added weight and a changed grip stay."""
+        coming = self._events[self._place + 1 : self._place + 2]
+        if coming and coming[0].start > since:
+            return
+        self.friction_scale = 1.0
+        if coming:
             self._place += 1
             self._slid = self._turned = 0.0
             self._ended_at = math.inf
             self._origin[:] = body[:12]
-            return
-        if self._place >= 0:
-            self._finish()
-
-    def _finish(self) -> None:
-        """Keep what stays of the event before: added weight, and a changed grip."""
-        self.friction_scale = 1.0
 
     def _change_grip(self, event: Event, since: float) -> None:
         elapsed = since - event.start
@@ -303,7 +296,10 @@ class Scenario(OperatorForce):
         elapsed = self._now + ahead - event.start
         if event.push is not None:
             if elapsed < event.push.duration:
-                out += self._pushed(event.push, body, elapsed)
+                out += disturb_wrench(
+                    body, self._origin, event.push.parameters, event.push.style,
+                    event.push.duration, self._tremors[1], self._tremor, elapsed,
+                )  # fmt: skip
         elif event.kind in ("drag", "spin"):
             out += self._dragged(event, body, elapsed)
         elif event.kind == "weight":
@@ -329,9 +325,8 @@ class Scenario(OperatorForce):
         else:
             turn = Rotation.from_rotvec(way * event.direction).as_matrix()
             anchor[3:12] = (turn @ anchor[3:12].reshape(3, 3)).ravel()
-        return np.array(
-            hold_wrench(body, anchor, gain, 0.0, self._tremors[1], self._tremor, elapsed)
-        )
+        held = hold_wrench(body, anchor, gain, 0.0, self._tremors[1], self._tremor, elapsed)
+        return np.array(held)
 
     _down = np.array([0.0, 0.0, -1.0])
 
@@ -339,18 +334,3 @@ class Scenario(OperatorForce):
         """Take the direction of gravity in the palm frame, for added weight."""
         self._down = gravity / max(float(np.linalg.norm(gravity)), 1e-9)
         self._weight = float(np.linalg.norm(self._weight)) * self._down
-
-    def _pushed(self, push: Disturbance, body: Array, elapsed: float) -> Array:
-        if push.style == MOVE:
-            return np.array(
-                move_wrench(
-                    body, self._origin, push.parameters, push.duration, self._tremors[1],
-                    self._tremor, elapsed,
-                )
-            )  # fmt: skip
-        return np.array(
-            push_wrench(
-                body, self._origin, push.parameters, push.style, push.duration, self._tremors[1],
-                self._tremor, elapsed,
-            )
-        )  # fmt: skip

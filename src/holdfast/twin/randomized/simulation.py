@@ -30,14 +30,14 @@ from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
 from holdfast.twin.randomized.palm import log_uniform, palm_motion, uniform
 from holdfast.twin.randomized.scenario import Scenario, draw_events
 from holdfast.twin.simulation import generator_of
-from holdfast.twin.truth_log import TruthLog
-from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
+from holdfast.twin.uskin import Uskin, with_server_effects
+from holdfast.twin.world import TruthLog
 
 MAX_TRIES = 12
 """Draws of an object and a place of the pads until the pads reach it."""
 MAX_SECONDS = 45.0
 """Longest recording [s]."""
-ATTEMPTS = 6
+HOLD_ATTEMPTS = 6
 """A hold that fails at once is drawn again, this often at the most."""
 SHORTEST_HOLD = 2.5
 """A hold that ends sooner after the lock than this has failed at once [s]."""
@@ -88,7 +88,7 @@ def simulate_random(hold: RandomHold) -> Recording:
     Returns:
         Readings of two to four pads, with truth and labels. The metadata say what was drawn.
     """
-    for attempt in range(ATTEMPTS):
+    for attempt in range(HOLD_ATTEMPTS):
         run = _run(replace(hold, attempt=attempt))
         run.play()
         if run.held_for >= SHORTEST_HOLD and not run.world.unstable:

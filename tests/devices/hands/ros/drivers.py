@@ -136,19 +136,19 @@ class Ros2Driver:
     def __init__(self, driver, domain, **changes):
         from holdfast.devices.ros import dds
         from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-        from holdfast.ros.hand_messages import JOINT_STATE, hand_definition, joint_message
+        from holdfast.ros.topic_messages import JOINT_STATE, joint_message, topic_definition
 
         self.driver = driver
         self.messages = []
         self._node = dds.Node(domain)
         self._readers = []
         for topic, kind in driver.topics.items():
-            definition = hand_definition(kind)
+            definition = topic_definition(kind)
             reader = self._node.reader(topic, definition)
             self._readers.append((topic, reader, MessageDecoder(definition, ros2=True)))
         self._write, self._spoiled, self._n_states = None, (None, 1), 0
         if driver.states is not None:
-            definition = hand_definition(JOINT_STATE)
+            definition = topic_definition(JOINT_STATE)
             names, efforts = changes.get("names", driver.names), changes.get("efforts")
             # Other joints of the robot, and the hand's in another order: names decide.
             names = ["arm_1", *reversed(names)] if names else []

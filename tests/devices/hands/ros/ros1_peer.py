@@ -61,7 +61,7 @@ def listen(spoiled):
 def hands():
     """Each line is [URI, whether it stands by, word, ...]."""
     ros_hand.DISCOVERY_TIME = 0.1
-    ros_hand.OPEN_TIMEOUT = 20.0
+    ros_hand.HAND_OPEN_TIMEOUT = 20.0
     made = {}
     for line in sys.stdin:
         uri, standby, word, *given = json.loads(line)

@@ -12,7 +12,7 @@ from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
 from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.ros.cdr import MessageEncoder
-from holdfast.ros.hand_messages import FLOATS, array_message, hand_definition
+from holdfast.ros.topic_messages import FLOAT_ARRAY, array_message, topic_definition
 
 PATIENCE = 60.0
 SCALES = {"thumb": 1.4, "index": 1.1, "middle": 1.2, "ring": 1.3}
@@ -50,7 +50,7 @@ def test_commands_through_the_wire_reach_the_twin(hand):
 def test_a_message_that_is_no_command_is_refused(hand):
     with DrivenTwin("twin:?object=ball", hand, speed=0) as twin:
         node = dds.Node(int(hand.rpartition("=")[2]))
-        definition = hand_definition(FLOATS)
+        definition = topic_definition(FLOAT_ARRAY)
         write, encode = node.writer(twin.topic, definition), MessageEncoder(definition)
         for n, values in enumerate(([0.1] * 15, [float("nan")] * 16), start=1):
             write(encode(array_message(np.array(values))))

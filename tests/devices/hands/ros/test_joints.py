@@ -11,7 +11,7 @@ from holdfast.devices.hands.ros.joints import (
     V4_LOWEST,
     JointOrder,
 )
-from holdfast.ros.hand_messages import JointStates
+from holdfast.ros.topic_messages import JointStates
 
 
 def test_limits_are_those_of_the_twins_hand():

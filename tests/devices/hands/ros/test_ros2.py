@@ -52,7 +52,7 @@ def driver(domain):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(ros_hand, "OPEN_TIMEOUT", 0.2)
+    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.2)
 
 
 class TestOpening:

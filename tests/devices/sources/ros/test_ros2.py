@@ -132,7 +132,7 @@ def fed(source, write):
 
 
 def test_a_topic_without_publishers(domain, monkeypatch):
-    monkeypatch.setattr(topic, "OPEN_TIMEOUT", 1.0)
+    monkeypatch.setattr(topic, "TOPIC_OPEN_TIMEOUT", 1.0)
     with pytest.raises(SourceError) as caught, open_source("ros2:///xServTopic"):
         pass
     assert str(caught.value) == (
@@ -152,7 +152,7 @@ def test_a_topic_without_publishers(domain, monkeypatch):
 
 
 def test_a_publisher_without_messages(domain, monkeypatch):
-    monkeypatch.setattr(topic, "OPEN_TIMEOUT", 1.0)
+    monkeypatch.setattr(topic, "TOPIC_OPEN_TIMEOUT", 1.0)
     node = dds.Node(domain)
     write = node.writer("/xServTopic", known_definition("xela_server_ros2/SensStream", ros2=True))
     with pytest.raises(SourceError, match="/xServTopic has a publisher, but no samples came in"):

@@ -74,7 +74,7 @@ class Script(Subscription):
 
 @pytest.fixture
 def link(monkeypatch):
-    for name in ("OPEN_TIMEOUT", "DEVICES_TIMEOUT", "PUBLISHER_CHECK_INTERVAL"):
+    for name in ("TOPIC_OPEN_TIMEOUT", "DEVICES_TIMEOUT", "PUBLISHER_CHECK_INTERVAL"):
         monkeypatch.setattr(topic, name, getattr(topic, name) / 10)
     for name in ("MIN_RETRY_DELAY", "MAX_RETRY_DELAY"):
         monkeypatch.setattr(base, name, getattr(base, name) / 10)

@@ -132,7 +132,7 @@ class TestOpening:
 
     @pytest.mark.parametrize("first", [[], [WELCOME]])
     def test_no_samples_come(self, first, monkeypatch):
-        monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
+        monkeypatch.setattr(module, "XELA_OPEN_TIMEOUT", 0.3)
         with server(first) as (port, _), pytest.raises(SourceError) as refusal:
             open_source(f"xela://127.0.0.1:{port}").__enter__()
         assert str(refusal.value) == (
@@ -141,7 +141,7 @@ class TestOpening:
         )
 
     def test_only_invalid_packets_come(self, monkeypatch):
-        monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
+        monkeypatch.setattr(module, "XELA_OPEN_TIMEOUT", 0.3)
         broken = text(1, [sensor(counts(16), data="?")])
         with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError) as refusal:
             open_source(f"xela://127.0.0.1:{port}").__enter__()

@@ -12,7 +12,7 @@ from holdfast.devices.uri import parse
 from holdfast.errors import HandError
 from holdfast.grip.command import FingerCommand, GripCommand, LoopState
 from holdfast.ros.cdr import MessageDecoder
-from holdfast.ros.hand_messages import hand_definition
+from holdfast.ros.topic_messages import topic_definition
 
 
 class DrivenTwin(LiveTwin):
@@ -44,7 +44,7 @@ class DrivenTwin(LiveTwin):
         self._setup = driven.setup
         self.topic = driven.setup.topic
         self._domain = dds.domain_number(parse(hand)[1].parameters.get("domain"))
-        definition = hand_definition(driven.setup.message)
+        definition = topic_definition(driven.setup.message)
         self._definition, self._decode = definition, MessageDecoder(definition, ros2=True)
         self._reader: dds.TopicReader | None = None
         self.n_commands = self.n_refused = 0

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE, N_JOINTS, JointGrip, JointOrder
-from holdfast.devices.hands.ros.link import Link
 from holdfast.devices.hands.ros.ros_hand import RosHand
+from holdfast.devices.ros.link import Link
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 from holdfast.grip.limits import Limits
-from holdfast.ros.hand_messages import JOINT_STATE, JointStates, array_message, joint_message
+from holdfast.ros.topic_messages import JOINT_STATE, JointStates, array_message, joint_message
 from holdfast.sensors.types import Array
 
 SLACK = 1e-9

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.grip.command import GripCommand
-from holdfast.ros.hand_messages import JointStates
+from holdfast.ros.topic_messages import JointStates
 from holdfast.sensors.types import Array
 
-N_JOINTS, JOINTS_PER_FINGER = 16, 4
+N_JOINTS = 16
+JOINTS_PER_FINGER = 4
 THUMB_FIRST = ("thumb", "index", "middle", "ring")
 """Order of the fingers in ROS 2 (V4 and Plexus)."""
 THUMB_LAST = ("index", "middle", "ring", "thumb")

@@ -15,11 +15,11 @@ from holdfast.devices.hands.ros.joints import (
     ByFinger,
     JointOrder,
 )
-from holdfast.devices.hands.ros.link import Link
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.scalar_hand import ScalarHand, ScalarSetup
+from holdfast.devices.ros.link import Link
 from holdfast.devices.uri import Address, parse
-from holdfast.ros.hand_messages import FLOAT32, FLOAT64, FLOATS, JOINT_STATE
+from holdfast.ros.topic_messages import FLOAT32, FLOAT64, FLOAT_ARRAY, JOINT_STATE
 from holdfast.sensors.types import Array
 
 COMMON = ("shared",)
@@ -165,17 +165,17 @@ class GripperKind:
         return ScalarHand(name, link, setup, shared=_shared(given), standby=standby)
 
 
-Kind = JointKind | EnvelopKind | GripperKind
+HandKind = JointKind | EnvelopKind | GripperKind
 
-HAND_KINDS: dict[str, dict[str, Kind]] = {
+HAND_KINDS: dict[str, dict[str, HandKind]] = {
     "ros2": {
         "plexus": JointKind(
-            JointOutput.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOATS,
+            JointOutput.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOAT_ARRAY,
             "/joint_states", THUMB_FIRST, "ah_joint", home_topic="commands",
             release=("limp", "home"),
         ),
         "v4": JointKind(
-            JointOutput.POSITIONS, "/allegro_hand_position_controller", "commands", FLOATS,
+            JointOutput.POSITIONS, "/allegro_hand_position_controller", "commands", FLOAT_ARRAY,
             "/joint_states", THUMB_FIRST, "ah_joint",
             max_torque=joints.V4_MAX_TORQUE, stiffness=joints.ROS2_STIFFNESS, home=joints.V4_HOME,
         ),
@@ -229,13 +229,13 @@ def ros_hand(uri: str, *, standby: bool) -> HandDevice:
 
 
 def _ros2_link(address: Address) -> Link:
-    from holdfast.devices.hands.ros.ros2_link import Ros2Link
+    from holdfast.devices.ros.dds import Ros2Link
 
     return Ros2Link(address.parameters.get("domain"))
 
 
 def _ros1_link(address: Address) -> Link:
-    from holdfast.devices.hands.ros.ros1_link import Ros1Link
+    from holdfast.devices.ros.rospy_node import Ros1Link
 
     return Ros1Link(address.parameters.get("master"))
 

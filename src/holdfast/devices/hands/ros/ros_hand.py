@@ -3,17 +3,18 @@
 import time
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
 from holdfast.devices.hands.base import HandDevice
-from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates
-from holdfast.errors import HandError
+from holdfast.devices.ros.link import Link, Publisher, TakeStates
+from holdfast.errors import HandError, SourceError
 from holdfast.grip.command import GripCommand
-from holdfast.ros.hand_messages import JointStates
+from holdfast.ros.topic_messages import JointStates
 
-OPEN_TIMEOUT = 5.0
+HAND_OPEN_TIMEOUT = 5.0
 """Longest wait until the hand listens and sends its joint states [s]."""
 DISCOVERY_TIME = 0.5
 """Time in which other publishers are found [s]."""
@@ -27,7 +28,7 @@ STATE_MEMORY = 0.2
 for as long [s]."""
 MIN_STATES = 5
 """Least number of these joint states, so that two wrong ones cannot define their median."""
-POLL_INTERVAL = 0.01
+HAND_POLL_INTERVAL = 0.01
 """Time between two checks while the hand is opened [s]."""
 
 
@@ -92,6 +93,10 @@ class RosHand(HandDevice):
             HandError: it does not within 5 s, or another program publishes commands.
         """
         self.close()
+        with _hand_errors():
+            self._connect()
+
+    def _connect(self) -> None:
         self._link.open()
         begun_at = time.monotonic()
         self._publishers = {
@@ -99,8 +104,8 @@ class RosHand(HandDevice):
         }
         if self._states_topic is not None:
             self._take_states = self._link.joint_states(self._states_topic)
-        for topic, publish in self._publishers.items():
-            self._wait(publish.n_listeners, begun_at, partial(self._not_heard, topic))
+        for topic, publisher in self._publishers.items():
+            self._wait(publisher.n_listeners, begun_at, partial(self._not_heard, topic))
         if self._take_states is not None:
             self._wait(self._poll, begun_at, self._no_states)
         if not self._shared:
@@ -145,14 +150,17 @@ class RosHand(HandDevice):
         """Open the hand."""
 
     def _publish(self, topic: str, message: Mapping[str, Any]) -> None:
-        self._publishers[topic](message)
+        with _hand_errors():
+            self._publishers[topic].publish(message)
 
     def _poll(self) -> bool:
         """Read the new joint states; return whether there are enough for a grip to begin."""
         now = time.monotonic()
-        for found in () if self._take_states is None else self._take_states():
+        with _hand_errors():
+            new = () if self._take_states is None else self._take_states()
+        for states in new:
             try:
-                self._states.append((now, self._checked(found)))
+                self._states.append((now, self._checked(states)))
             except ValueError as cause:
                 self.n_refused += 1
                 self._refusal = str(cause)
@@ -161,8 +169,8 @@ class RosHand(HandDevice):
         return len(self._states) >= MIN_STATES
 
     def _check_answers(self) -> None:
-        for topic, publish in self._publishers.items():
-            if not publish.n_listeners():
+        for topic, publisher in self._publishers.items():
+            if not publisher.n_listeners():
                 raise HandError(
                     f"{self.name}: nothing listens on {topic} any more; the hand keeps its last "
                     "command"
@@ -183,9 +191,9 @@ class RosHand(HandDevice):
 
     def _wait(self, done: Callable[[], object], begun_at: float, why: Callable[[], str]) -> None:
         while not done():
-            if time.monotonic() - begun_at > OPEN_TIMEOUT:
+            if time.monotonic() - begun_at > HAND_OPEN_TIMEOUT:
                 raise HandError(why())
-            time.sleep(POLL_INTERVAL)
+            time.sleep(HAND_POLL_INTERVAL)
 
     def _refuse_others(self, at: float) -> None:
         time.sleep(max(at - time.monotonic(), 0.0))
@@ -200,11 +208,11 @@ class RosHand(HandDevice):
         others = ", ".join(self._link.subscribed_topics()) or "none"
         return (
             f"{self.name}: nothing listens on {topic} {self._link.where} after "
-            f"{OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
+            f"{HAND_OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
         )
 
     def _no_states(self) -> str:
-        where = f"{self._states_topic} {self._link.where} in {OPEN_TIMEOUT:g} s"
+        where = f"{self._states_topic} {self._link.where} in {HAND_OPEN_TIMEOUT:g} s"
         if self._states or self._refusal:
             return (
                 f"{self.name}: {len(self._states)} valid joint states on {where}, at least "
@@ -212,3 +220,16 @@ class RosHand(HandDevice):
             )
         others = ", ".join(self._link.published_topics()) or "none"
         return f"{self.name}: no joint states on {where}; published topics: {others}"
+
+
+@contextmanager
+def _hand_errors() -> Iterator[None]:
+    """Turn an error of ROS into one of the hand.
+
+    Raises:
+        HandError: the block raised a `SourceError`.
+    """
+    try:
+        yield
+    except SourceError as cause:
+        raise HandError(str(cause)) from cause

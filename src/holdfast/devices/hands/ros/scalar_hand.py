@@ -3,13 +3,13 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from holdfast.devices.hands.ros.link import Link
+from holdfast.devices.hands.local import largest_scale
 from holdfast.devices.hands.ros.ros_hand import RosHand
-from holdfast.devices.hands.scalar import largest_scale
+from holdfast.devices.ros.link import Link
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 from holdfast.grip.limits import Limits
-from holdfast.ros.hand_messages import STRING, number_message
+from holdfast.ros.topic_messages import STRING, number_message
 
 SLACK = 1e-9
 """Rounding by which a value may exceed its ceiling, as a share of it."""

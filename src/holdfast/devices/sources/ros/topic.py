@@ -12,11 +12,11 @@ from holdfast.errors import SourceError
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors.types import Unit
 
-OPEN_TIMEOUT = 5.0
+TOPIC_OPEN_TIMEOUT = 5.0
 """Longest wait for the first message with samples [s]."""
 DEVICES_TIMEOUT = 1.0
 """Longest wait for the other devices of a topic, if each message has one device [s]."""
-SILENCE_TIMEOUT = 1.0
+TOPIC_SILENCE_TIMEOUT = 1.0
 """A topic without a new sample for this time is silent [s]."""
 PUBLISHER_CHECK_INTERVAL = 0.5
 """Time between two checks for publishers while no message arrives [s]."""
@@ -87,7 +87,7 @@ class Subscription(ABC):
         """Return a message about a topic without samples, with the topics that exist."""
         topics = self.published_topics()
         if self._topic in topics:
-            return f"{self._topic} has a publisher, but no samples came in {OPEN_TIMEOUT:g} s"
+            return f"{self._topic} has a publisher, but no samples came in {TOPIC_OPEN_TIMEOUT:g} s"
         others = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))
         return (
             f"no node publishes {self._topic} {self._network}; published topics: {others or 'none'}"
@@ -106,7 +106,7 @@ class TopicSource(DeviceSource):
         subscription: subscription to the topic.
     """
 
-    silence_timeout = SILENCE_TIMEOUT
+    silence_timeout = TOPIC_SILENCE_TIMEOUT
 
     def __init__(self, address: Address, subscription: Subscription) -> None:
         super().__init__()
@@ -125,7 +125,7 @@ class TopicSource(DeviceSource):
         """
         self.close()
         self._assembler = MessageAssembler(*self._options)
-        deadline = time.monotonic() + OPEN_TIMEOUT
+        deadline = time.monotonic() + TOPIC_OPEN_TIMEOUT
         self._subscription.open(deadline)
         messages, samples = self._first_messages(deadline)
         self._assembler.identify(samples)

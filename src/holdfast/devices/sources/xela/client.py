@@ -21,13 +21,13 @@ from holdfast.devices.sources.xela.places import Place
 from holdfast.errors import SourceError
 from holdfast.sensors import Sensor
 
-OPEN_TIMEOUT = 5.0
+XELA_OPEN_TIMEOUT = 5.0
 """Longest wait for the first packet with samples [s]."""
-CONNECT_TIMEOUT = 1.0
+XELA_CONNECT_TIMEOUT = 1.0
 """Longest time of one attempt to connect [s]; a read may take longer than its timeout by this."""
 MIN_HANDSHAKE_TIME = 0.1
 """Minimum time for the handshake, even if the connection took longer [s]."""
-SILENCE_TIMEOUT = 1.5
+XELA_SILENCE_TIMEOUT = 1.5
 """A connected server without a new sample for this time is silent [s]; it may pause for 1 s."""
 PING_INTERVAL, PING_TIMEOUT = 10.0, 5.0
 """Time between two pings of the server, and longest wait for the answer [s]."""
@@ -54,7 +54,7 @@ class XelaSource(DeviceSource):
         sensor: layout of the separate sensors with this number of taxels.
     """
 
-    silence_timeout = SILENCE_TIMEOUT
+    silence_timeout = XELA_SILENCE_TIMEOUT
 
     def __init__(
         self,
@@ -111,7 +111,7 @@ class XelaSource(DeviceSource):
 
     def _first_packet(self, connection: ClientConnection) -> tuple[bytes, float]:
         """Return the first packet that defines the modules, and its time of arrival."""
-        deadline = time.monotonic() + OPEN_TIMEOUT
+        deadline = time.monotonic() + XELA_OPEN_TIMEOUT
         invalid: InvalidPacket | None = None
         while (left := deadline - time.monotonic()) > 0:
             try:
@@ -128,8 +128,8 @@ class XelaSource(DeviceSource):
         if invalid is not None:
             raise SourceError(f"{self._place} sends invalid packets: {invalid}") from invalid
         raise SourceError(
-            f"connected to {self._place}, but no samples came in {OPEN_TIMEOUT:g} s: is it a XELA "
-            "server, with its sensors plugged in?"
+            f"connected to {self._place}, but no samples came in {XELA_OPEN_TIMEOUT:g} s: is it a "
+            "XELA server, with its sensors plugged in?"
         )
 
     def _receive(self, timeout: float) -> bool:
@@ -163,7 +163,7 @@ class XelaSource(DeviceSource):
             connection.close()
         keepalive = getattr(connection, "keepalive_thread", None)
         if keepalive is not None:
-            keepalive.join(CONNECT_TIMEOUT)
+            keepalive.join(XELA_CONNECT_TIMEOUT)
 
     def _unreachable(self, failures: list[Exception]) -> str:
         where = " or ".join(map(str, self._places))
@@ -179,8 +179,8 @@ class XelaSource(DeviceSource):
 
 def _connect(place: Place) -> ClientConnection:
     """Connect to a server. A redirect to another server is refused."""
-    deadline = time.monotonic() + CONNECT_TIMEOUT
-    address = socket.create_connection((place.host, place.port), CONNECT_TIMEOUT)
+    deadline = time.monotonic() + XELA_CONNECT_TIMEOUT
+    address = socket.create_connection((place.host, place.port), XELA_CONNECT_TIMEOUT)
     address.settimeout(None)
     try:
         return connect(
@@ -191,7 +191,7 @@ def _connect(place: Place) -> ClientConnection:
             open_timeout=max(deadline - time.monotonic(), MIN_HANDSHAKE_TIME),
             ping_interval=PING_INTERVAL,
             ping_timeout=PING_TIMEOUT,
-            close_timeout=CONNECT_TIMEOUT,
+            close_timeout=XELA_CONNECT_TIMEOUT,
             max_size=MAX_PACKET_SIZE,
             max_queue=MAX_QUEUED_PACKETS,
             logger=_LOGGER,

@@ -21,11 +21,11 @@ FIRST_OF_NULL = b"n"[0]
 ZERO, NINE = b"09"
 NO_DIGIT = -(2**20)
 """No other digits outweigh it."""
-DIGITS = np.full(256, NO_DIGIT)
+DIGIT_VALUES = np.full(256, NO_DIGIT)
 """Hexadecimal digits by their characters. A table is faster than branches, which follow no
 pattern in readings."""
 for _value, _characters in enumerate(zip(b"0123456789abcdef", b"0123456789ABCDEF", strict=True)):
-    DIGITS[list(_characters)] = _value
+    DIGIT_VALUES[list(_characters)] = _value
 
 
 def counts_of(data: msgspec.Raw, integers: msgspec.Raw) -> Counts | None:
@@ -60,7 +60,7 @@ def _parse_hex(text: Bytes, counts: Counts) -> bool:
     for i in range(len(counts)):
         value = 0
         for place in range(5 * i + 1, 5 * i + 5):
-            value = 16 * value + DIGITS[text[place]]
+            value = 16 * value + DIGIT_VALUES[text[place]]
         if value < 0:
             return False
         counts[i] = value

@@ -15,7 +15,7 @@ from holdfast.devices.sources.xela.counts import counts_of
 
 ROUTINE_TYPE = "routine"
 """Type of packets with samples; packets have a type since version 1.8."""
-MAX_NAME_LENGTH = 64
+MAX_MODEL_NAME_LENGTH = 64
 """Longest name of a model or version [characters]."""
 MAX_REASON_LENGTH = 160
 """Longest reason of the JSON decoder in a message [characters]."""
@@ -24,7 +24,7 @@ _NOT_A_NUMBER = re.compile(rb"-?\b(?:NaN|Infinity)\b")
 
 _NULL = msgspec.Raw(b"null")
 
-Model = Annotated[str, msgspec.Meta(max_length=MAX_NAME_LENGTH)]
+Model = Annotated[str, msgspec.Meta(max_length=MAX_MODEL_NAME_LENGTH)]
 
 
 class InvalidPacket(ValueError):  # noqa: N818 (it is not an error of the program)
@@ -146,7 +146,7 @@ def read_packet(text: str | bytes) -> Packet | None:
     time = _value(fields, "time")
     version = _value(fields, "version")
     ordered = dict(sorted(sensors.items()))
-    known = version[:MAX_NAME_LENGTH] if isinstance(version, str) else ""
+    known = version[:MAX_MODEL_NAME_LENGTH] if isinstance(version, str) else ""
     return Packet(counter, _stamp(time), known, ordered)
 
 

@@ -1,0 +1,157 @@
+from itertools import pairwise
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from holdfast.classifiers import Samples
+from holdfast.errors import TrainingError
+from holdfast_lab.classifiers.threshold import Threshold, best_cut
+
+pytestmark = pytest.mark.slow
+
+
+def samples(features, stable):
+    features = np.asarray(features, dtype=float)
+    features = features[:, None] if features.ndim == 1 else features
+    return Samples(features, np.asarray(stable, dtype=bool), np.arange(len(features)) % 3)
+
+
+def fit(given_samples, side="either"):
+    recipe = Threshold(side)
+    return recipe.fit(given_samples, recipe.reference, 0)
+
+
+def decisions(fitted, features):
+    return fitted.probability(features) >= fitted.threshold
+
+
+def balanced_accuracy(called, stable):
+    return (called[stable].mean() + (~called[~stable]).mean()) / 2
+
+
+def brute_force(values, stable, side):
+    """The best balanced accuracy of all cuts between two different values."""
+    ordered = sorted(set(values.tolist()))
+    found = []
+    for place in [(a + b) / 2 for a, b in pairwise(ordered)]:
+        if side != "below":
+            found.append(balanced_accuracy(values > place, stable))
+        if side != "above":
+            found.append(balanced_accuracy(values < place, stable))
+    return max(found, default=0.5)
+
+
+labelled = st.lists(st.tuples(st.integers(-20, 20), st.booleans()), min_size=2, max_size=40).filter(
+    lambda rows: len({stable for _, stable in rows}) == 2
+)
+
+
+def test_cuts_computed_by_hand():
+    # Below 2.25 are 2 of 4 stable and 0 of 3 others: 2 x 3 - 0 x 4 = 6. Below 3.5: 3 x 3 - 1 x 4
+    # = 5; below 5.5: 4 x 3 - 2 x 4 = 4.
+    values = np.array([1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0])
+    stable = np.array([True, True, False, True, False, True, False])
+    cut = best_cut(values, stable)
+    assert cut == (2.25, -1, 6)
+    called = decisions(fit(samples(values, stable)), values[:, None])
+    assert called.tolist() == [True] * 2 + [False] * 5
+    assert balanced_accuracy(called, stable) == 0.75 == 0.5 + cut.gain / (2 * 4 * 3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(labelled, st.sampled_from(["below", "above", "either"]))
+def test_against_brute_force(rows, side):
+    values = np.array([value for value, _ in rows]) * 0.37
+    stable = np.array([stable for _, stable in rows])
+    cut = best_cut(values, stable, side)
+    n_pairs = int(stable.sum()) * int((~stable).sum())
+    best = brute_force(values, stable, side)
+    assert 0.5 + cut.gain / (2 * n_pairs) == pytest.approx(best)
+    if len(set(values.tolist())) > 1:
+        called = values > cut.value if cut.sign > 0 else values < cut.value
+        assert balanced_accuracy(called, stable) == pytest.approx(best)
+        assert side == "either" or cut.sign == {"below": -1, "above": 1}[side]
+        fitted = fit(samples(values, stable), side)
+        assert np.array_equal(decisions(fitted, values[:, None]), called)
+
+
+@pytest.mark.parametrize("stable_above", [True, False])
+def test_direction(stable_above):
+    values = np.arange(10.0)
+    fitted = fit(samples(values, (values > 4) == stable_above))
+    assert np.array_equal(decisions(fitted, values[:, None]), (values > 4) == stable_above)
+
+
+def test_the_side_is_kept_even_where_it_is_wrong():
+    values = np.arange(10.0)
+    fitted = fit(samples(values, values > 4), "below")
+    found = fitted.probability(values[:, None])
+    assert (np.diff(found) < 0).all()
+
+
+def test_the_best_feature_is_taken_and_the_first_of_equals():
+    rng = np.random.default_rng(0)
+    stable = np.arange(60) % 2 == 0
+    good = stable + rng.normal(size=60) * 0.1
+    fitted = fit(samples(np.column_stack([rng.normal(size=60), good, 2 * good, good]), stable))
+    assert [c != 0 for c in fitted.coefficients] == [False, True, False, False]
+
+
+def test_the_lowest_of_equal_cuts_is_taken():
+    assert best_cut(np.array([0.0, 1.0, 2.0, 3.0]), np.array([True, False, True, False])) == (
+        0.5,
+        -1,
+        2,
+    )
+
+
+def test_a_constant_feature_has_no_effect():
+    stable = np.arange(20) % 4 == 0
+    assert best_cut(np.full(20, 0.1), stable) == (0.1, -1, 0)
+    found = fit(samples(np.full(20, 0.1), stable)).probability(np.full((3, 1), 0.1))
+    assert found == pytest.approx(0.25, abs=1e-3)
+
+
+def test_scale_and_place_do_not_matter():
+    rng = np.random.default_rng(1)
+    values = rng.lognormal(size=500)
+    stable = rng.random(500) < 1 / (1 + values)
+    one, two = fit(samples(values, stable)), fit(samples(values * 1e6 - 3, stable))
+    rows = values[:, None]
+    assert np.array_equal(decisions(one, rows), decisions(two, rows * 1e6 - 3))
+    assert one.probability(rows) == pytest.approx(two.probability(rows * 1e6 - 3), abs=1e-6)
+
+
+def test_probabilities_are_calibrated():
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=20000)
+    stable = rng.random(20000) < 1 / (1 + np.exp(2 * values - 1))
+    found = fit(samples(values, stable)).probability(values[:, None])
+    for low in np.arange(0, 1, 0.2):
+        inside = (found >= low) & (found < low + 0.2)
+        assert stable[inside].mean() == pytest.approx(found[inside].mean(), abs=0.03)
+
+
+def test_heavy_tails():
+    rng = np.random.default_rng(3)
+    stable = rng.random(5000) < 0.4
+    values = np.exp(3 * rng.normal(size=5000) + np.where(stable, 0, 8))
+    fitted = fit(samples(values, stable))
+    assert balanced_accuracy(decisions(fitted, values[:, None]), stable) == pytest.approx(
+        brute_force(values, stable, "either")
+    )
+
+
+def test_no_parameters_and_deterministic():
+    assert dict(Threshold().reference) == {}
+    assert Threshold().suggest(None) == {}
+    assert Threshold().name == "threshold"
+    given_samples = samples(np.arange(9.0), np.arange(9) % 2 == 0)
+    assert fit(given_samples) == fit(given_samples)
+
+
+def test_one_class_is_refused():
+    with pytest.raises(TrainingError, match="both classes are needed to train"):
+        fit(samples(np.arange(4.0), np.ones(4)))

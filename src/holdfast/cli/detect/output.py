@@ -1,0 +1,276 @@
+"""Output of `holdfast detect`: JSON lines, a summary, or lines of changes, from estimates."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from math import isnan, nan
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from msgspec.json import Encoder
+
+from holdfast.cli.terminal.console import print_line, print_table, visible_json
+from holdfast.contact import (
+    LASTING_DURATION,
+    ContactEstimate,
+    ContactEvent,
+    ContactState,
+    Fault,
+    Reason,
+    StateChanges,
+)
+from holdfast.detector import HAND
+from holdfast.live.documents import estimate_line
+from holdfast.live.fault_notices import FAULT_TEXTS
+from holdfast.recordings import shown_origin
+
+if TYPE_CHECKING:
+    from holdfast.detector import Detection
+    from holdfast.live.arrival_detector import StreamEstimate
+
+HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
+REASON_WORDS = {
+    Reason.NONE: "",
+    Reason.TARE: "taking the tare",
+    Reason.WARM_UP: "too few samples yet",
+    Reason.GAP: "gap in the samples",
+    Reason.FAULT: "fault",
+}
+"""Words for the reason of UNKNOWN."""
+LINES_PER_BLOCK = 8192
+MAX_EVENTS_SHOWN = 40
+"""Maximum number of events in the table; JSON has all of them."""
+
+
+class EstimateChunk(NamedTuple):
+    """Estimates of consecutive samples, oldest first.
+
+    Attributes:
+        name: of the recording or source.
+        fingers: estimates of each finger.
+        hand: time [s] and state of the hand at each instant.
+    """
+
+    name: str
+    fingers: Mapping[str, Sequence[ContactEstimate]]
+    hand: Sequence[tuple[float, ContactState]]
+
+
+def chunk_from_detection(detection: "Detection") -> EstimateChunk:
+    """Convert the arrays of a detection."""
+    states = tuple(ContactState)
+    hand = zip(detection.times.tolist(), detection.hand.tolist(), strict=True)
+    return EstimateChunk(
+        detection.name,
+        {finger: trace.estimates() for finger, trace in detection.fingers.items()},
+        [(time, states[code]) for time, code in hand],
+    )
+
+
+def chunk_from_stream(name: str, estimates: Iterable["StreamEstimate"]) -> EstimateChunk:
+    """Collect the new estimates of a live source."""
+    fingers: dict[str, list[ContactEstimate]] = {}
+    hand = []
+    for estimate, updated_fingers in estimates:
+        hand.append((estimate.time, estimate.state))
+        for finger in updated_fingers:
+            fingers.setdefault(finger, []).append(estimate.fingers[finger])
+    return EstimateChunk(name, fingers, hand)
+
+
+def json_lines(chunk: EstimateChunk) -> Iterator[str]:
+    """Yield blocks of JSON lines, sorted by time and then in the order of the fingers."""
+    lines = [
+        estimate_line(finger, estimate)
+        for finger, estimates in chunk.fingers.items()
+        for estimate in estimates
+    ]
+    lines.sort(key=attrgetter("time"))
+    encoder = Encoder()
+    for start in range(0, len(lines), LINES_PER_BLOCK):
+        # A list, because msgspec 0.22 leaks the items of an iterator.
+        yield visible_json(encoder.encode_lines(lines[start : start + LINES_PER_BLOCK]).decode())
+
+
+class DetectionSummary:
+    """Shares of states, counts of reasons and faults, and the contact events.
+
+    Its memory grows only with the number of events.
+    """
+
+    def __init__(self) -> None:
+        self._name = ""
+        self._counts: dict[str, _StateCounts] = {}
+        self._changes: dict[str, StateChanges] = {}
+        self._events: dict[str, list[ContactEvent]] = {}
+        self._start: float | None = None
+
+    def add(self, chunk: EstimateChunk) -> None:
+        """Add the next chunk of the same recording or source."""
+        self._name = chunk.name
+        if self._start is None and chunk.hand:
+            self._start = chunk.hand[0][0]
+        for finger, estimates in chunk.fingers.items():
+            self._add_changes(finger, map(attrgetter("time", "state"), estimates))
+            counts = self._counts.setdefault(finger, _StateCounts())
+            counts.states.update(estimate.state for estimate in estimates)
+            counts.reasons.update(estimate.reason for estimate in estimates if estimate.reason)
+            counts.faults.update(chain.from_iterable(estimate.faults for estimate in estimates))
+        self._add_changes(HAND, chunk.hand)
+        self._counts.setdefault(HAND, _StateCounts()).states.update(
+            state for _, state in chunk.hand
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the summary as JSON values; shares are of samples, or of instants (hand)."""
+        shares = {name: counts.to_dict() for name, counts in self._counts.items()}
+        hand = shares.pop(HAND)
+        return {
+            "name": self._name,
+            "fingers": shares,
+            "hand": {key: hand[key] for key in ("n_samples", "states")},
+            "events": [event._asdict() for event in self._sorted_events()],
+        }
+
+    def print(self) -> None:
+        """Print tables of shares, of reasons and faults, and of the first events."""
+        names = [name for name in self._counts if name != HAND] + [HAND]
+        states = (f"{state} %" for state in ContactState)
+        print_table(
+            (self._name, "samples", *states),
+            [(name, *self._counts[name].shares()) for name in names],
+        )
+        print_line()
+        print_table(
+            ("finger", "reasons for UNKNOWN", "faults"),
+            [(name, *self._counts[name].causes()) for name in names if name != HAND],
+        )
+        self._print_events()
+
+    def _print_events(self) -> None:
+        events = self._sorted_events()
+        origin = shown_origin(self._start or 0.0)
+        print_line()
+        if origin:
+            print_line(f"times since the first sample, at {origin:.3f} s")
+        print_table(
+            ("time [s]", "finger", "state", "previous"),
+            [
+                (f"{event.time - origin:.3f}", event.finger, event.state, event.previous)
+                for event in events[:MAX_EVENTS_SHOWN]
+            ],
+        )
+        if len(events) > MAX_EVENTS_SHOWN:
+            print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
+
+    def _add_changes(self, name: str, states: Iterable[tuple[float, ContactState]]) -> None:
+        changes = self._changes.setdefault(name, StateChanges((name,)))
+        events = self._events.setdefault(name, [])
+        for time, state in states:
+            events += changes.update([state], time)
+
+    def _sorted_events(self) -> list[ContactEvent]:
+        return sorted(chain.from_iterable(self._events.values()), key=attrgetter("time"))
+
+
+class _StateCounts:
+    """Number of samples with each state, reason and fault."""
+
+    def __init__(self) -> None:
+        self.states: Counter[ContactState] = Counter()
+        self.reasons: Counter[Reason] = Counter()
+        self.faults: Counter[Fault] = Counter()
+
+    def to_dict(self) -> dict[str, Any]:
+        n = self.states.total()
+        return {
+            "n_samples": n,
+            "states": {state.value: self.states[state] / n if n else 0.0 for state in ContactState},
+            "reasons": _ordered(self.reasons, Reason),
+            "faults": _ordered(self.faults, Fault),
+        }
+
+    def shares(self) -> tuple[object, ...]:
+        """Return the number of samples and the share of each state as cells of a table."""
+        counts = self.to_dict()
+        return counts["n_samples"], *(f"{100 * share:.1f}" for share in counts["states"].values())
+
+    def causes(self) -> tuple[str, str]:
+        """Return the counts of reasons and of faults as cells of a table."""
+        counts = self.to_dict()
+        return _text(counts["reasons"]), _text(counts["faults"])
+
+
+def _ordered(counts: Counter[Any], members: Iterable[Any]) -> dict[str, int]:
+    """Return the counts that are not zero, in the order of the members."""
+    return {member.value: counts[member] for member in members if counts[member]}
+
+
+def _text(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{name} {n}" for name, n in counts.items()) or "-"
+
+
+class ChangeLines:
+    """Find the changes of each finger and of the hand that lasted, as lines of text.
+
+    Args:
+        from_first: give times relative to the first sample. Without it, only times since 1970
+            are given like that.
+
+    Attributes:
+        origin: time that is printed as 0 [s]; NaN before the first chunk.
+    """
+
+    def __init__(self, *, from_first: bool) -> None:
+        self.origin = nan
+        self._from_first = from_first
+        self._changes: dict[str, StateChanges] = {}
+        self._why: dict[str, tuple[ContactState, str]] = {}
+
+    def add(self, chunk: EstimateChunk) -> list[str]:
+        """Return the lines for the next chunk of the same source, in the order of time."""
+        if isnan(self.origin) and chunk.hand:
+            first = chunk.hand[0][0]
+            self.origin = first if self._from_first else shown_origin(first)
+        lasting: list[tuple[ContactEvent, str]] = []
+        for finger, estimates in chunk.fingers.items():
+            lasting += self._finger_changes(finger, estimates)
+        for time, state in chunk.hand:
+            lasting += [(event, "") for event in self._lasting(HAND, state, time)]
+        lasting.sort(key=lambda change: change[0].time)
+        return [self._line(event, reason) for event, reason in lasting]
+
+    def _finger_changes(
+        self, finger: str, estimates: Sequence[ContactEstimate]
+    ) -> Iterator[tuple[ContactEvent, str]]:
+        for estimate in estimates:
+            if self._why.get(finger, (None,))[0] is not estimate.state:
+                self._why[finger] = estimate.state, why(estimate)
+            for event in self._lasting(finger, estimate.state, estimate.time):
+                yield event, self._why[finger][1]
+
+    def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
+        changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))
+        return changes.update([state], time)
+
+    def _line(self, event: ContactEvent, reason: str) -> str:
+        time = event.time - self.origin
+        text = f"{time:9.3f} s  {event.finger:8}  {event.previous:10} -> {event.state:10}  {reason}"
+        return text.rstrip()
+
+
+def why(estimate: ContactEstimate) -> str:
+    """Return why a finger has its state, in a few words.
+
+    Example:
+        >>> why(ContactEstimate(1.0, ContactState.UNSTABLE, Reason.NONE, 0.08, 178.0, (1, 0, 0)))
+        'P(stable) 8 %, sigma 178'
+    """
+    if estimate.state is ContactState.UNKNOWN:
+        faults = ", ".join(FAULT_TEXTS[fault].words for fault in estimate.faults)
+        return faults or REASON_WORDS[estimate.reason]
+    if estimate.state is ContactState.NO_CONTACT:
+        return ""
+    percent = 100 * estimate.stable_probability
+    cause = f"{estimate.cause}, " if estimate.cause else ""
+    return f"{cause}P(stable) {percent:.0f} %, sigma {estimate.instability:.4g}"

@@ -1,0 +1,155 @@
+"""Control a running command: signals that stop it, and markers from stdin.
+
+Markers are keys of a terminal, or lines of a pipe.
+"""
+
+import os
+import select
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from types import FrameType, TracebackType
+from typing import Self
+
+STOP_KEY = "q"
+MARKER_KEYS = {
+    " ": "mark",
+    "c": "closing",
+    "l": "locked",
+    "d": "disturbance",
+    "r": "released",
+    **{digit: f"mark {digit}" for digit in "123456789"},
+}
+"""Marker text of each key."""
+KEY_HELP = "keys: c closing, l locked, d disturbance, r released, space or 1-9 a mark, q stops"
+
+_MAX_LINE_LENGTH = 4096
+
+
+class MarkerKeys:
+    """Reader of markers from stdin that never blocks.
+
+    A terminal is switched to single keys, and restored at the end. If this process is in the
+    background, or stdin is closed, there are no markers.
+
+    Attributes:
+        interactive: True if stdin is a terminal whose keys can be read.
+        stop_pressed: True after the stop key.
+    """
+
+    def __init__(self) -> None:
+        self.interactive = self.stop_pressed = False
+        self._stdin: int | None = None
+        self._restore: Callable[[], None] | None = None
+        self._unfinished_line = b""
+
+    def __enter__(self) -> Self:
+        with suppress(OSError, ValueError, AttributeError):
+            self._stdin = sys.stdin.fileno()
+            if os.isatty(self._stdin):
+                self._open_terminal(self._stdin)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._restore:
+            self._restore()
+        self._stdin = self._restore = None
+
+    def poll(self) -> list[str]:
+        """Return the markers since the last call."""
+        data = self._read()
+        if not self.interactive:
+            return self._split_lines(data)
+        keys = data.decode(errors="replace").lower()
+        self.stop_pressed |= STOP_KEY in keys
+        return [MARKER_KEYS[key] for key in keys if key in MARKER_KEYS]
+
+    def _open_terminal(self, stdin: int) -> None:
+        """Switch the terminal to single keys; this would stop a process in the background."""
+        self._stdin = None
+        try:
+            import termios
+            import tty
+        except ImportError:  # not a POSIX system
+            return
+        if os.tcgetpgrp(stdin) != os.getpgrp():
+            return
+        before = termios.tcgetattr(stdin)
+
+        def restore() -> None:
+            with suppress(termios.error):  # the terminal is closed
+                termios.tcsetattr(stdin, termios.TCSADRAIN, before)
+
+        self._stdin, self._restore, self.interactive = stdin, restore, True
+        tty.setcbreak(stdin)
+
+    def _read(self) -> bytes:
+        if self._stdin is None:
+            return b""
+        try:
+            if not select.select([self._stdin], [], [], 0)[0]:
+                return b""
+            data = os.read(self._stdin, _MAX_LINE_LENGTH)
+        except (OSError, ValueError):  # stdin is closed, or cannot be polled
+            data = b""
+        if not data:  # end of file
+            self._stdin = None
+            return b"\n"
+        return data
+
+    def _split_lines(self, data: bytes) -> list[str]:
+        *lines, self._unfinished_line = (self._unfinished_line + data).split(b"\n")
+        if len(self._unfinished_line) > _MAX_LINE_LENGTH:
+            lines, self._unfinished_line = [*lines, self._unfinished_line], b""
+        texts = (line.decode(errors="replace").strip() for line in lines)
+        return [text for text in texts if text]
+
+
+@dataclass
+class StopRequest:
+    """Handler of the signals that stop a command.
+
+    Attributes:
+        requested: True after the first signal.
+        graceful: True if the first signal only sets `requested`. Otherwise every signal raises
+            KeyboardInterrupt, and the second one always does.
+    """
+
+    requested: bool = False
+    graceful: bool = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal."""
+        if self.requested or not self.graceful:
+            raise KeyboardInterrupt
+        self.requested = True
+
+
+@contextmanager
+def handle_stop_signals() -> Iterator[StopRequest]:
+    """Handle the stop signals inside a `with` block; only in the main thread."""
+    stop = StopRequest()
+    numbers = _stop_signals() if threading.current_thread() is threading.main_thread() else []
+    previous = [(number, signal.signal(number, stop)) for number in numbers]
+    try:
+        yield stop
+    finally:
+        for number, handler in previous:
+            signal.signal(number, handler)
+
+
+def _stop_signals() -> list[signal.Signals]:
+    """Return the stop signals; without SIGHUP if it is ignored, as under nohup."""
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    hang_up = getattr(signal, "SIGHUP", None)
+    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
+        numbers.append(hang_up)
+    return numbers

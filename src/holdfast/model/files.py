@@ -1,0 +1,159 @@
+"""Model files: one of JSON, and the ONNX files that it names beside it."""
+
+import re
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
+import numpy as np
+
+from holdfast.classifiers import OnnxClassifier
+from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
+from holdfast.errors import ModelError, OutputError
+from holdfast.files import check_keys, read_input, whole_file, write_whole
+from holdfast.model.parts import FingerModel
+from holdfast.sensors import Sensor
+
+if TYPE_CHECKING:
+    from holdfast.model.model import Model
+
+ModelT = TypeVar("ModelT", bound="Model")
+Fingers = Mapping[str, FingerModel]
+
+MODEL_SCHEMA = "holdfast.model/1"
+MAX_MODEL_SIZE = 1 << 24
+"""Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
+ONNX_NAME = re.compile(r'"([0-9a-f]{16}\.onnx)"')
+"""Name of an ONNX file in a model file, by the digest of its content."""
+
+
+def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
+    """Read a model and its ONNX files.
+
+    Raises:
+        ModelError: a file cannot be read or is no model, see `Model.load`.
+    """
+    try:
+        data = read_input(path, MAX_MODEL_SIZE)
+    except OSError as cause:
+        raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
+    try:
+        check_keys(data)
+        _check_sensors(data)
+        model = decode(data, kind)
+        if any(classifier.content for classifier in _onnx_classifiers(model.fingers)):
+            raise ModelError("a model file names its ONNX file; it does not hold the content")
+        folder = Path(path).parent
+        return _with_contents(model, lambda classifier: _read_onnx(folder / classifier.file))
+    except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
+        raise ModelError(f"{path} is not a model of {MODEL_SCHEMA}: {cause}") from cause
+
+
+def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
+    """Write a model and its ONNX files: all of them or none.
+
+    The ONNX files of a model that is replaced are deleted, unless a model beside it names them.
+
+    Raises:
+        OutputError: the file exists and `force` is not given, or it cannot be written.
+    """
+    if str(path).startswith("builtin:"):
+        raise OutputError(f"{path} is the name of a built-in model; a file expected")
+    replaced = _onnx_names(Path(path))
+    written: list[Path] = []
+    try:
+        with whole_file(path, force=force) as part:
+            part.write_bytes(msgspec.json.format(encode(model), indent=1) + b"\n")
+            for classifier in _onnx_classifiers(model.fingers):
+                file = Path(path).with_name(classifier.file)
+                is_new = not file.exists()
+                if is_new or file.read_bytes() != classifier.content:
+                    write_whole(file, classifier.content, force=force)
+                if is_new:
+                    written.append(file)
+    except BaseException:
+        for file in written:
+            file.unlink(missing_ok=True)
+        raise
+    _delete_unused(replaced, Path(path))
+
+
+def encode(model: "Model") -> bytes:
+    """Return the JSON of a model, without the contents of ONNX files; their digests are in it."""
+    return msgspec.json.encode(_with_contents(model, lambda _: b""), enc_hook=_encode_array)
+
+
+def decode(data: bytes, kind: type[ModelT]) -> ModelT:
+    """Return the model of a JSON text, without the contents of ONNX files.
+
+    Raises:
+        ModelError: the fields contradict each other.
+        ValueError: the text is no JSON, or of another form.
+    """
+    return msgspec.json.decode(data, type=kind, dec_hook=_decode_array)
+
+
+def _onnx_classifiers(fingers: Fingers) -> list[OnnxClassifier]:
+    classifiers = (finger.classifier for finger in fingers.values())
+    return [classifier for classifier in classifiers if isinstance(classifier, OnnxClassifier)]
+
+
+def _with_contents(model: ModelT, content_of: Callable[[OnnxClassifier], bytes]) -> ModelT:
+    """Return the model with other contents of its ONNX files."""
+    if not _onnx_classifiers(model.fingers):
+        return model
+    replace = msgspec.structs.replace
+    fingers = dict(model.fingers)
+    for name, finger in model.fingers.items():
+        if isinstance(finger.classifier, OnnxClassifier):
+            content = content_of(finger.classifier)
+            fingers[name] = replace(finger, classifier=replace(finger.classifier, content=content))
+    return replace(model, fingers=fingers)
+
+
+def _read_onnx(path: Path) -> bytes:
+    try:
+        content = read_input(path, MAX_ONNX_SIZE)
+    except OSError as cause:
+        raise ModelError(f"cannot read {path.name} beside it: {cause.strerror}") from cause
+    if not content:
+        raise ModelError(f"{path.name} beside it is empty")
+    return content
+
+
+def _onnx_names(path: Path) -> set[str]:
+    """Return the names of ONNX files in a model file; none if it cannot be read."""
+    try:
+        return set(ONNX_NAME.findall(read_input(path, MAX_MODEL_SIZE).decode(errors="replace")))
+    except OSError:
+        return set()
+
+
+def _delete_unused(names: set[str], path: Path) -> None:
+    """Delete those of some ONNX files beside a model file that no model file there names."""
+    if names:
+        for other in {path, *path.parent.glob("*.json"), *path.parent.glob(f"*{path.suffix}")}:
+            names -= _onnx_names(other)
+    for name in names:
+        with suppress(OSError):  # a file too many does no harm
+            path.with_name(name).unlink(missing_ok=True)
+
+
+def _check_sensors(data: bytes) -> None:
+    """Refuse fields that no sensor has, which msgspec ignores in a dataclass."""
+    found = msgspec.json.decode(data)
+    sensors = found.get("sensors") if isinstance(found, dict) else None
+    for fields in sensors.values() if isinstance(sensors, dict) else ():
+        Sensor.from_dict(fields if isinstance(fields, dict) else {})
+
+
+def _decode_array(kind: type, data: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)
+    return np.array(data, dtype=np.float64)  # the arrays of a sensor
+
+
+def _encode_array(value: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise NotImplementedError(type(value))

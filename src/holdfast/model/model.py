@@ -1,0 +1,291 @@
+"""The model of a hand: features, classifiers and decision rule."""
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from hashlib import sha256
+from importlib import resources
+from pathlib import Path
+from typing import Literal, Self
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers import LinearClassifier
+from holdfast.errors import ModelError
+from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
+from holdfast.features.stream import StreamPlan, extract
+from holdfast.model.files import decode, encode, read_model, write_model
+from holdfast.model.parts import (
+    MAX_FINGERS,
+    MAX_TAXELS,
+    MAX_WINDOW,
+    Debounce,
+    FingerModel,
+    Training,
+    Tuning,
+    check_limit,
+)
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE
+
+ANY_FINGER = "*"
+"""Name in place of a finger, for a model of any finger."""
+EXACT_RATE = 0.05
+"""Tolerance of a measured rate beside a nominal one, as a share of it."""
+RELATIVE_RATES = (30.0, 500.0)
+"""Rates for which relative features are made [Hz]."""
+RATE_TOLERANCE = 0.2
+"""A source whose rate differs less from the model's, as a share of it, is not resampled."""
+
+
+class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Model of a hand: a classifier for each finger, or one for all fingers (`"*"`).
+
+    Attributes:
+        fingers: models of the fingers, by name; `"*"` alone is for any finger.
+        sensors: the sensors that the fingers name.
+        rate: samples per second for which the windows are meant [Hz]; None for any rate.
+        window: N_w of the instability that is reported [samples].
+        tare: how the baseline is found, as text: "0.5", "first", "none" or "START:END".
+        debounce: debouncing of state changes.
+        training: provenance; None for a model without training.
+        tuning: how the threshold was chosen; None if it follows from the training.
+        schema: version of the file format.
+        name: of the model.
+
+    Raises:
+        ModelError: the fields contradict each other.
+
+    Example:
+        >>> model = Model.load("builtin:twin")
+        >>> model.rate, list(model.fingers), [str(x) for x in model.finger("thumb").features[:2]]
+        (150.0, ['*'], ['log(F_a)', 'log(sigma_xyz[4])'])
+    """
+
+    fingers: dict[str, FingerModel]
+    rate: float | None = None
+    sensors: dict[str, Sensor] = {}
+    window: int = DEFAULT_WINDOW
+    tare: str = "0.5"
+    debounce: Debounce = Debounce()
+    training: Training | None = None
+    tuning: Tuning | None = None
+    schema: Literal["holdfast.model/1"] = "holdfast.model/1"
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.fingers:
+            raise ModelError("a model of at least one finger expected, none given")
+        if ANY_FINGER in self.fingers and len(self.fingers) > 1:
+            raise ModelError(f"a model for any finger ('*') has no others; {list(self.fingers)}")
+        if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
+            raise ModelError(f"a rate above 0 Hz expected, {self.rate} given")
+        check_limit("samples in a second", self.rate or 0, MAX_RATE)
+        check_limit("fingers", max(len(self.fingers), len(self.sensors)), MAX_FINGERS)
+        check_limit("samples in a window", self.window, MAX_WINDOW)
+        for sensor in self.sensors.values():
+            check_limit(f"taxels of {sensor.name}", sensor.n_taxels, MAX_TAXELS)
+        for name, finger in self.fingers.items():
+            if finger.sensor is not None and finger.sensor not in self.sensors:
+                raise ModelError(
+                    f"finger {name!r} names the sensor {finger.sensor!r}; "
+                    f"the model holds {list(self.sensors)}"
+                )
+        Tare.parse(self.tare)
+        FeatureSpec("sigma", self.window)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Load a model from a file, or a built-in model by its name (`builtin:twin`).
+
+        Raises:
+            ModelError: the file or name does not exist; the file is not JSON; it has an unknown
+                field, another shape, a number that is not finite, or another schema; an ONNX
+                file that it names is missing, too large or another.
+        """
+        if str(path).startswith("builtin:"):
+            return cls(**msgspec.structs.asdict(built_in(str(path))))
+        return read_model(path, cls)
+
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the model as JSON, and its ONNX files beside it: all of them or none.
+
+        With `force`, ONNX files of a model that is replaced are deleted.
+
+        Raises:
+            OutputError: the file exists and `force` is not given, or it cannot be written.
+        """
+        write_model(path, self, force=force)
+
+    @property
+    def digest(self) -> str:
+        """Digest of the content, for results that depend on the model."""
+        return sha256(encode(self)).hexdigest()
+
+    def finger(self, name: str) -> FingerModel:
+        """Return the model of a finger.
+
+        Raises:
+            ModelError: the model does not have that finger.
+        """
+        if ANY_FINGER in self.fingers:
+            return self.fingers[ANY_FINGER]
+        if name not in self.fingers:
+            raise ModelError(f"the model has no finger {name!r}; it has {', '.join(self.fingers)}")
+        return self.fingers[name]
+
+    def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
+        """Return the fingers that the model estimates on a hand, and their sensors.
+
+        They are all fingers that the model names, even those that the hand lacks. A model of
+        any finger estimates every module of its sensor (only fingertips, if there are any).
+
+        Args:
+            modules: sensor of each module of the hand.
+
+        Raises:
+            ModelError: the hand has none of the fingers, or a finger has another sensor.
+        """
+        if ANY_FINGER in self.fingers:
+            return self._any_fingers(modules)
+        for name in set(self.fingers) & set(modules):
+            self._check_sensor(name, modules[name])
+        if not set(self.fingers) & set(modules):
+            raise ModelError(
+                f"the model is for {', '.join(self.fingers)}; {', '.join(modules)} given"
+            )
+        return {
+            name: modules[name] if name in modules else self.sensors[str(finger.sensor)]
+            for name, finger in self.fingers.items()
+            if name in modules or finger.sensor is not None
+        }
+
+    def plan(self, sensors: Mapping[str, Sensor], source_rate: float) -> StreamPlan:
+        """Return the plan of the feature stream of some fingers, for a source of a rate [Hz].
+
+        Raises:
+            ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`.
+        """
+        relative = any(spec.seconds for name in sensors for spec in self.finger(name).features)
+        low, high = RELATIVE_RATES
+        rate = self.rate or source_rate
+        if relative and not low * (1 - EXACT_RATE) <= rate <= high * (1 + EXACT_RATE):
+            raise ModelError(
+                f"{rate:.4g} Hz given, the model expects {low:g} to {high:g} Hz; resample the "
+                "recording, or set the sensor to another rate"
+            )
+        return StreamPlan(
+            sensors=sensors,
+            features={name: self.finger(name).features for name in sensors},
+            window=self.window,
+            tare=Tare.parse(self.tare),
+            rate=rate,
+        )
+
+    def rate_fits(self, rate: float) -> bool:
+        """Return whether a source of a rate [Hz] needs no resampling."""
+        return self.rate is None or abs(rate / self.rate - 1) <= RATE_TOLERANCE
+
+    def predict_proba(self, recording: Recording) -> dict[str, npt.NDArray[np.float64]]:
+        """Return the probability of stability of every finger at each of its samples.
+
+        Args:
+            recording: at the model's rate.
+
+        Returns:
+            By finger, (n,); NaN during tare, warm-up, gap and fault.
+
+        Raises:
+            ModelError: the recording has other fingers or sensors.
+        """
+        sensors = self.fingers_of({n: m.sensor for n, m in recording.modules.items()})
+        present = {name: sensor for name, sensor in sensors.items() if name in recording.modules}
+        found = extract(self.plan(present, recording.rate), recording)
+        return {
+            name: self.finger(name).classifier.probability(found[name].features) for name in present
+        }
+
+    def _any_fingers(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
+        wanted = self.fingers[ANY_FINGER].sensor
+        tips = {name: sensor for name, sensor in modules.items() if "/" not in name} or modules
+        if wanted is None:
+            return dict(tips)
+        fitting = {name: sensor for name, sensor in tips.items() if sensor.name == wanted}
+        if not fitting:
+            raise _other_sensor(
+                f"the model is for fingers with the sensor {wanted!r}; given are "
+                + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
+            )
+        for name, sensor in fitting.items():
+            self._check_sensor(name, sensor)
+        return fitting
+
+    def _check_sensor(self, name: str, sensor: Sensor) -> None:
+        wanted = self.finger(name).sensor
+        if wanted is None:
+            return
+        known = self.sensors[wanted]
+        if (sensor.name, sensor.n_taxels) != (known.name, known.n_taxels):
+            raise _other_sensor(
+                f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
+                f"{known.n_taxels} ({known.name})"
+            )
+        if sensor.unit != known.unit:
+            raise _other_sensor(
+                f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"
+            )
+        if not np.allclose(sensor.rotations, known.rotations, atol=ROTATION_TOLERANCE):
+            raise _other_sensor(
+                f"{name}: the taxels of {sensor.name} have other rotations than those of the "
+                "training"
+            )
+
+
+def _other_sensor(text: str) -> ModelError:
+    """Return the error of a model for another sensor, with the built-in model that fits."""
+    return ModelError(f"{text}; builtin:any fits every 3-axis sensor")
+
+
+def built_in(name: str) -> Model:
+    """Return a built-in model by its name.
+
+    Raises:
+        ModelError: the name is unknown.
+    """
+    if name not in BUILT_IN:
+        raise ModelError(f"unknown model {name!r}; built in are {', '.join(BUILT_IN)}")
+    return BUILT_IN[name]()
+
+
+def _shipped(name: str) -> Model:
+    """Return a model whose file is part of the package, see docs/training.md."""
+    data = (resources.files("holdfast") / "models" / f"{name}.json").read_bytes()
+    return msgspec.structs.replace(decode(data, Model), name=f"builtin:{name}")
+
+
+def _noise_floor() -> Model:
+    """Return a model without training: stable while sigma is under three times the noise.
+
+    The noise is that of the tare. At the noise itself the probability is 0.9, at nine times the
+    noise it is 0.1.
+    """
+    slope = 2.0
+    rule = LinearClassifier(
+        mean=(math.log(3.0),), scale=(1.0,), coefficients=(-slope,), intercept=0.0
+    )
+    finger = FingerModel(
+        features=(FeatureSpec("sigma", DEFAULT_WINDOW, "noise"),),
+        classifier=rule,
+        contact_noise=5.0,
+    )
+    return Model(name="builtin:noise-floor", fingers={ANY_FINGER: finger})
+
+
+BUILT_IN: dict[str, Callable[[], Model]] = {
+    "builtin:any": partial(_shipped, "any"),  # trained on randomized hands of the twin
+    "builtin:twin": partial(_shipped, "twin"),  # trained on grasps of the twin
+    "builtin:noise-floor": _noise_floor,
+}

@@ -1,0 +1,119 @@
+"""ROS messages that holdfast publishes, of hands and of estimates: their definitions in ROS 2."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from holdfast.ros.definitions import ROS2_HEADER, SEPARATOR, Definition, parse_definition
+from holdfast.sensors.types import Array
+
+FLOAT32, FLOAT64, STRING = "std_msgs/Float32", "std_msgs/Float64", "std_msgs/String"
+FLOAT_ARRAY, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
+"""Message types of the topics of hands."""
+VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
+DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
+"""Message types of the topics of estimates, besides `STRING` and `FLOAT64`."""
+
+_VECTOR3 = SEPARATOR + "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z"
+_DEFINITIONS = {
+    FLOAT32: "float32 data",
+    FLOAT64: "float64 data",
+    STRING: "string data",
+    FLOAT_ARRAY: (
+        "MultiArrayLayout layout\nfloat64[] data"
+        + SEPARATOR
+        + "std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset"
+        + SEPARATOR
+        + "std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride"
+    ),
+    JOINT_STATE: (
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
+        "float64[] effort" + ROS2_HEADER
+    ),
+    VECTOR: "std_msgs/Header header\nVector3 vector" + ROS2_HEADER + _VECTOR3,
+    WRENCH: (
+        "std_msgs/Header header\nWrench wrench"
+        + ROS2_HEADER
+        + SEPARATOR
+        + "geometry_msgs/Wrench\nVector3 force\nVector3 torque"
+        + _VECTOR3
+    ),
+    DIAGNOSTICS: (
+        "std_msgs/Header header\nDiagnosticStatus[] status"
+        + ROS2_HEADER
+        + SEPARATOR
+        + "diagnostic_msgs/DiagnosticStatus\nbyte level\nstring name\nstring message\n"
+        + "string hardware_id\nKeyValue[] values"
+        + SEPARATOR
+        + "diagnostic_msgs/KeyValue\nstring key\nstring value"
+    ),
+}
+MESSAGE_TYPES = tuple(_DEFINITIONS)
+"""Message types whose definition in ROS 2 is known here."""
+
+
+def topic_definition(kind: str) -> Definition:
+    """Return the definition in ROS 2 of one of `MESSAGE_TYPES`."""
+    return parse_definition(kind, _DEFINITIONS[kind])
+
+
+class JointStates(NamedTuple):
+    """State of the joints of a robot at one instant.
+
+    Attributes:
+        names: names of the joints; empty if the publisher gives none.
+        positions: angles [rad].
+        efforts: torques [N m]; empty if the publisher gives none.
+    """
+
+    names: tuple[str, ...]
+    positions: Array
+    efforts: Array
+
+    @classmethod
+    def of_message(cls, names: Sequence[str], position: Any, effort: Any) -> "JointStates":  # noqa: ANN401
+        """Return the state of the fields of a message."""
+        return cls(tuple(names), np.asarray(position, float), np.asarray(effort, float))
+
+
+def number_message(value: float) -> dict[str, Any]:
+    """Return a message of one number."""
+    return {"data": float(value)}
+
+
+def array_message(values: Array) -> dict[str, Any]:
+    """Return a `std_msgs/Float64MultiArray` without a layout, as controllers expect it."""
+    return {"layout": {"dim": [], "data_offset": 0}, "data": values}
+
+
+def joint_message(
+    time: float,
+    names: Sequence[str],
+    *,
+    positions: Array | None = None,
+    efforts: Array | None = None,
+) -> dict[str, Any]:
+    """Return a `sensor_msgs/JointState`.
+
+    Args:
+        time: time of the sample on which the command rests [s]; negative and NaN are not set.
+        names: names of the joints.
+        positions: set-points [rad], if there are any.
+        efforts: torques [N m], if there are any.
+    """
+    empty = np.empty(0)
+    return {
+        "header": header(time),
+        "name": list(names),
+        "position": empty if positions is None else positions,
+        "velocity": empty,
+        "effort": empty if efforts is None else efforts,
+    }
+
+
+def header(time: float, frame: str = "") -> dict[str, Any]:
+    """Return a header with a time [s], which is not set if it is negative or NaN."""
+    seconds = int(time) if 0.0 <= time < 2.0**31 else 0
+    nanoseconds = int((time - seconds) * 1e9) if 0.0 <= time < 2.0**31 else 0
+    return {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": frame}

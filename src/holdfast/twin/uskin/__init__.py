@@ -1,1 +1,0 @@
-"""Model of a uSkin fingertip: from forces on its skin to counts."""

@@ -1,0 +1,341 @@
+"""Readout of a uSkin fingertip: silicone, magnets, temperature, noise and whole counts.
+
+Every parameter has its source.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.compiled import compiled
+from holdfast.sensors.types import Array
+from holdfast.twin.skin import Three
+
+
+@dataclass(frozen=True)
+class UskinParameters:
+    """Parameters of the model of a uSkin fingertip.
+
+    Nothing is published on the curved fingertip. "Data sheet" is that of the flat uSPa46 (July
+    2025, high sensitivity). "Packets" are two packets of whole Allegro hands, 368 taxels each.
+
+    Attributes:
+        spread: standard deviation of the spread of a force in the silicone [m]. Own choice:
+            less than half of the taxels' pitch of 6.4 mm.
+        gain_spread: standard deviation of the logarithm of the taxels' gains. Own choice; XELA
+            sells a calibration of each taxel in place of the general one.
+        cross_talk: standard deviation of the six ratios by which one axis of a taxel reads
+            another. Own choice.
+        limits: limit of the readings of each axis [N]. Data sheet: the range.
+        lag_shares: shares of a force that the silicone shows with delay. Own choice, typical of
+            silicones. With `lag_times`, a cycle of 20 s up and 20 s down has a hysteresis of
+            1 % of its height (data sheet: 1.06 % on z; its cycle is not published).
+        lag_times: time constant of each share [s]. Own choice.
+        counts_per_newton: scale of each axis [count/N]. Data sheet: 0.000628, 0.000628,
+            0.000729 N/count.
+        baseline: mean reading of each axis at rest [count]. Packets.
+        baseline_spread: standard deviation of the baseline over taxels [count]. Packets.
+        thermal_counts: drift of the baseline of each axis [count/K]. Data sheet: 120 counts on z
+            for 3.5 degrees.
+        thermal_spread: standard deviation of that drift over taxels, every axis [count/K]. Own
+            choice: a fifth of the drift.
+        warming: standard deviation of the temperature's change over `warming_time` [K]. Data
+            sheet: its test. The course of the temperature is an own choice.
+        warming_time: time of the change `warming` [s]. Data sheet: 50 minutes.
+        thermal_time: correlation time of the rate of warming [s]. Own choice: 5 mm of silicone
+            conduct heat in about 100 s, so the temperature is smooth from sample to sample.
+        noise_counts: rms noise of a reading at rest, with rounding [count]. Data sheet: mean
+            square 0.8 (x, y) and 0.9 (z).
+
+    Raises:
+        ValueError: a parameter has another number of values, is not finite or is negative; a
+            limit, scale or time is 0; or the lag shares add up to more than 1.
+    """
+
+    spread: float = 2.8e-3
+    gain_spread: float = 0.15
+    cross_talk: float = 0.04
+    limits: Three = (0.87, 0.87, 7.35)
+    lag_shares: tuple[float, float] = (0.10, 0.05)
+    lag_times: tuple[float, float] = (0.030, 2.0)
+    counts_per_newton: Three = (1 / 0.000628, 1 / 0.000628, 1 / 0.000729)
+    baseline: Three = (32768.0, 32768.0, 36200.0)
+    baseline_spread: Three = (260.0, 260.0, 750.0)
+    thermal_counts: Three = (0.0, 0.0, 120 / 3.5)
+    thermal_spread: float = 7.0
+    warming: float = 3.5
+    warming_time: float = 3000.0
+    thermal_time: float = 100.0
+    noise_counts: float = 0.9
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            values = np.asarray(getattr(self, part.name), dtype=np.float64)
+            positive = part.name in _ABOVE_ZERO
+            if values.shape != np.asarray(part.default).shape:
+                raise ValueError(
+                    f"{part.name}: numbers like {part.default} expected, {values} given"
+                )
+            if not (np.isfinite(values).all() and (values >= 0).all()):
+                raise ValueError(f"{part.name}: finite, not negative expected, {values} given")
+            if positive and not (values > 0).all():
+                raise ValueError(f"{part.name}: above 0 expected, {values} given")
+        if sum(self.lag_shares) > 1:
+            raise ValueError(f"lag_shares: at most 1 in sum expected, {self.lag_shares} given")
+
+    @property
+    def warming_rate(self) -> float:
+        """Standard deviation of the rate of warming [K/s].
+
+        The rate is an Ornstein-Uhlenbeck process. Its integral over t has the variance
+        2 (rate tau)^2 (t / tau - 1 + exp(-t / tau)), where tau is the thermal time.
+        """
+        periods = self.warming_time / self.thermal_time
+        walk = np.sqrt(2 * (periods - 1 + np.exp(-periods)))
+        return float(self.warming / (self.thermal_time * walk))
+
+
+_ABOVE_ZERO = (
+    "spread",
+    "limits",
+    "lag_times",
+    "counts_per_newton",
+    "warming_time",
+    "thermal_time",
+)
+
+
+Counts = npt.NDArray[np.uint16]
+
+ROUNDING_VARIANCE = 1 / 12
+"""Variance of rounding to whole counts [count^2]."""
+UINT16_MAX = 65535.0
+
+
+class Taxels(NamedTuple):
+    """Fixed properties of the taxels of one fingertip.
+
+    Attributes:
+        mixing: (n_taxels, 3, 3) gain and cross-talk, from a force to a reading by axis.
+        baseline: (n_taxels, 3) reading at rest [count].
+        thermal: (n_taxels, 3) drift of the baseline [count/K].
+    """
+
+    mixing: Array
+    baseline: Array
+    thermal: Array
+
+
+class _Constants(NamedTuple):
+    """What a fingertip does not change, for compiled code.
+
+    Attributes:
+        taxels: properties of the taxels.
+        limits: (3,) limits of the readings [N].
+        scales: (3,) scales [count/N].
+        shares: (n_lags,) shares of a force that the silicone delays.
+        taus: (n_lags,) time constant of each [s].
+        prompt: share of a force without delay.
+        noise: standard deviation of the noise before rounding [count].
+        spread: standard deviation of the rate of warming [K/s].
+        thermal_time: its correlation time [s].
+    """
+
+    taxels: Taxels
+    limits: Array
+    scales: Array
+    shares: Array
+    taus: Array
+    prompt: float
+    noise: float
+    spread: float
+    thermal_time: float
+
+
+class _State(NamedTuple):
+    """State of a fingertip.
+
+    Attributes:
+        force: (n_taxels, 3) last forces [N].
+        delayed: (n_lags, n_taxels, 3) delayed parts of the force [N].
+        numbers: (3,) time of the last sample [s], NaN before; rate of warming [K/s];
+            temperature above that at the start [K].
+    """
+
+    force: Array
+    delayed: Array
+    numbers: Array
+
+
+_TIME, _RATE, _WARMTH = range(3)
+
+
+class Readout:
+    """Run of one fingertip, with the state of its silicone and its temperature."""
+
+    def __init__(
+        self, parameters: UskinParameters, taxels: Taxels, generator: np.random.Generator
+    ) -> None:
+        self._constants = _constants(parameters, taxels)
+        self._generator = generator
+        shape = taxels.baseline.shape
+        self._state = _State(
+            np.zeros(shape), np.zeros((len(parameters.lag_times), *shape)), np.array([np.nan, 0, 0])
+        )
+
+    @property
+    def warmth(self) -> float:
+        """Temperature above that at the start [K]."""
+        return float(self._state.numbers[_WARMTH])
+
+    def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
+        """Compute the next samples; arguments, result and errors are those of `Uskin.counts`."""
+        forces, clock = self._checked(taxel_forces, times)
+        counts = np.empty(forces.shape, dtype=np.uint16)
+        if len(clock):
+            drawn = self._generator.standard_normal((len(clock), 1 + self._state.force.size))
+            _read_out(forces, clock, drawn, self._constants, self._state, counts)
+        return counts
+
+    def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
+        forces = np.ascontiguousarray(taxel_forces, dtype=np.float64)
+        clock = np.ascontiguousarray(times, dtype=np.float64)
+        n_taxels = len(self._state.force)
+        if forces.shape != (*clock.shape, n_taxels, 3) or clock.ndim != 1:
+            raise ValueError(
+                f"taxel forces of shape (n, {n_taxels}, 3) and n times expected, "
+                f"{forces.shape} and {clock.shape} given"
+            )
+        if not (np.isfinite(forces).all() and np.isfinite(clock).all()):
+            raise ValueError("finite taxel forces and times expected, NaN or infinity given")
+        if (np.diff(clock, prepend=self._state.numbers[_TIME]) <= 0).any():  # before it, NaN
+            raise ValueError("increasing times expected")
+        return forces, clock
+
+
+def _constants(parameters: UskinParameters, taxels: Taxels) -> _Constants:
+    shares = np.array(parameters.lag_shares)
+    return _Constants(
+        taxels,
+        np.array(parameters.limits),
+        np.array(parameters.counts_per_newton),
+        shares,
+        np.array(parameters.lag_times),
+        1.0 - float(shares.sum()),
+        math.sqrt(max(parameters.noise_counts**2 - ROUNDING_VARIANCE, 0.0)),
+        parameters.warming_rate,
+        parameters.thermal_time,
+    )
+
+
+@compiled
+def saturated(newtons: float, limit: float) -> float:
+    """Return a reading that saturates at a limit: x / (1 + (x / limit)^4)^(1/4).
+
+    With a limit of 7.35 N the slope falls to 85 % at 4.5 N and to 48 % at 7 N, where the data
+    sheet shows a change of slope.
+
+    Args:
+        newtons: reading without a limit [N].
+        limit: limit of the reading [N].
+
+    Returns:
+        The saturated reading [N].
+    """
+    square = (newtons / limit) ** 2
+    return newtons / math.sqrt(math.sqrt(1.0 + square * square))
+
+
+@compiled
+def _read_out(
+    forces: Array, times: Array, drawn: Array, constants: _Constants, state: _State, out: Counts
+) -> None:
+    """Write the counts of samples, and advance the state.
+
+    Args:
+        forces: (n, n_taxels, 3) forces [N].
+        times: (n,) times [s].
+        drawn: (n, 1 + 3 n_taxels) normal random numbers: of the warming, of the readings.
+        constants: properties of the fingertip.
+        state: its state; it is written.
+        out: (n, n_taxels, 3) is written.
+    """
+    numbers = state.numbers
+    if np.isnan(numbers[_TIME]):
+        numbers[_TIME], numbers[_RATE] = times[0], constants.spread * drawn[0, 0]
+        _rest(forces[0], state)
+    passed = np.empty_like(state.force)
+    for k in range(len(times)):
+        step = times[k] - numbers[_TIME]
+        _advance_warming(constants, step, drawn[k, 0], numbers)
+        _low_pass(constants, forces[k], step, state, passed)
+        _write_counts(constants, passed, numbers[_WARMTH], drawn[k, 1:], out[k])
+        numbers[_TIME] = times[k]
+
+
+@compiled
+def _rest(forces: Array, state: _State) -> None:
+    """Set the state of a silicone at rest under forces."""
+    for i in range(forces.shape[0]):
+        for axis in range(forces.shape[1]):
+            state.force[i, axis] = forces[i, axis]
+            for lag in range(len(state.delayed)):
+                state.delayed[lag, i, axis] = forces[i, axis]
+
+
+@compiled
+def _advance_warming(constants: _Constants, step: float, drawn: float, numbers: Array) -> None:
+    """Advance rate and temperature, an integrated random rate; the first step is 0."""
+    keep = np.exp(-step / constants.thermal_time)
+    rate = keep * numbers[_RATE] + np.sqrt(1 - keep * keep) * constants.spread * drawn
+    numbers[_WARMTH] += 0.5 * (numbers[_RATE] + rate) * step
+    numbers[_RATE] = rate
+
+
+@compiled
+def _low_pass(
+    constants: _Constants, forces: Array, step: float, state: _State, passed: Array
+) -> None:
+    """Write the force after the silicone: the sum of a prompt part and low-pass parts.
+
+    It is exact for forces that are linear between samples. Over a step h of a force from u to v:
+    y <- e y + (g - e) u + (1 - g) v, with e = exp(-h / tau) and g = (1 - e) tau / h.
+    """
+    n_taxels, n_axes = forces.shape
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            passed[i, axis] = constants.prompt * forces[i, axis]
+    for lag in range(len(constants.taus)):
+        ratio = step / constants.taus[lag]
+        keep = np.exp(-ratio)
+        mean = 1.0 if ratio == 0.0 else -np.expm1(-ratio) / ratio
+        for i in range(n_taxels):
+            for axis in range(n_axes):
+                late = keep * state.delayed[lag, i, axis]
+                late += (mean - keep) * state.force[i, axis] + (1 - mean) * forces[i, axis]
+                state.delayed[lag, i, axis] = late
+                passed[i, axis] += constants.shares[lag] * late
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            state.force[i, axis] = forces[i, axis]
+
+
+@compiled
+def _write_counts(
+    constants: _Constants, forces: Array, warmth: float, drawn: Array, out: Counts
+) -> None:
+    """Write counts: cross-talk and gain, range, baseline, temperature, noise, rounding."""
+    taxels = constants.taxels
+    n_taxels, n_axes = forces.shape
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            newtons = 0.0
+            for other in range(n_axes):
+                newtons += taxels.mixing[i, axis, other] * forces[i, other]
+            value = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
+            value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
+            value += constants.noise * drawn[i * n_axes + axis]
+            out[i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)

@@ -1,0 +1,83 @@
+import tracemalloc
+
+import pytest
+
+from holdfast.cli.detect.output import (
+    DetectionSummary,
+    EstimateChunk,
+    chunk_from_detection,
+    chunk_from_stream,
+    json_lines,
+)
+from holdfast.contact import ContactState
+from holdfast.detector import Detector, detect
+from holdfast.live.arrival_detector import StreamEstimate
+from holdfast.model import Model
+from holdfast.synthetic import synthetic_recording
+
+
+@pytest.fixture(scope="module")
+def model():
+    return Model.load("builtin:noise-floor")
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return synthetic_recording("grasp", 1, ("thumb", "index"))
+
+
+@pytest.fixture(scope="module")
+def live_estimates(model, recording):
+    """Return the estimates of a detector that is fed with the recording, sample by sample."""
+    detector = Detector.for_recording(model, recording)
+    modules = recording.modules
+    times = modules["thumb"].times.tolist()
+    estimates = []
+    for k, time in enumerate(times):
+        samples = {name: module.readings[k] for name, module in modules.items()}
+        estimates.append(StreamEstimate(detector.update(samples, time), tuple(samples)))
+    return estimates
+
+
+def test_live_and_recorded_estimates_give_the_same_output(model, recording, live_estimates):
+    recorded = chunk_from_detection(detect(model, recording))
+    live = chunk_from_stream("grasp", live_estimates)
+    assert "".join(json_lines(live)) == "".join(json_lines(recorded))
+    summaries = []
+    for chunk in (recorded, live):
+        summary = DetectionSummary()
+        summary.add(chunk)
+        summaries.append(summary.to_dict())
+    assert summaries[0] == summaries[1]
+    assert summaries[0]["events"]
+
+
+def test_a_finger_that_is_not_updated_has_no_line(live_estimates):
+    one = live_estimates[200]._replace(updated_fingers=("index",))
+    (text,) = json_lines(chunk_from_stream("grasp", [one]))
+    assert text.count("\n") == 1
+    assert '"finger":"index"' in text
+
+
+def test_the_summary_of_a_source_without_samples(capsys):
+    summary = DetectionSummary()
+    summary.add(EstimateChunk("xela://auto", {}, []))
+    assert summary.to_dict() == {
+        "name": "xela://auto",
+        "fingers": {},
+        "hand": {"n_samples": 0, "states": dict.fromkeys(map(str, ContactState), 0.0)},
+        "events": [],
+    }
+    summary.print()
+    assert capsys.readouterr().out.splitlines()[1].split()[:2] == ["hand", "0"]
+
+
+def test_lines_do_not_leak_memory(model, recording):
+    chunk = chunk_from_detection(detect(model, recording))
+    sum(len(block) for block in json_lines(chunk))
+    tracemalloc.start()
+    for _ in range(3):
+        sum(len(block) for block in json_lines(chunk))
+    left, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert left < 100_000

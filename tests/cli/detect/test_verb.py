@@ -1,0 +1,502 @@
+import json
+import os
+import re
+import signal
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from holdfast.classifiers import LinearClassifier
+from holdfast.cli import main
+from holdfast.cli.detect.verb import CHUNK_SIZE
+from holdfast.contact import UNSTABLE, Fault
+from holdfast.detector import detect
+from holdfast.devices.sources import open_source
+from holdfast.features import FeatureSpec
+from holdfast.io import load_recording, save_recording
+from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.live.publishers.xela_server import XelaServer
+from holdfast.live.stream_detector import StreamDetector
+from holdfast.model import Debounce, FingerModel, Model
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.synthetic import synthetic_recording
+
+FIELDS = [
+    "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults",
+    "faulty_taxels", "cause",
+]  # fmt: skip
+NOISE_FLOOR = "builtin:noise-floor"
+
+
+def finger_model(name):
+    rule = LinearClassifier(mean=(10.0,), scale=(3.0,), coefficients=(-2.0,), intercept=0.0)
+    return FingerModel(
+        features=(FeatureSpec("sigma", 14),), classifier=rule, sensor=name, contact_threshold=50.0
+    )
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    """A model's file: thumb and index with curved uSkin fingertips at 150 Hz."""
+    curved = sensor("uskin-curved")
+    path = tmp_path_factory.mktemp("model") / "model.json"
+    Model(
+        fingers={name: finger_model("uskin-curved") for name in ("thumb", "index")},
+        sensors={"uskin-curved": curved},
+        rate=150.0,
+    ).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def grasp(tmp_path_factory):
+    """A long grasp, in which the index starts later and has other times."""
+    one = synthetic_recording("grasp", 1, ("thumb", "index"))
+    n = 2 * CHUNK_SIZE // one.modules["thumb"].n_samples + 1
+    modules = {}
+    for name, skipped in (("thumb", 0), ("index", CHUNK_SIZE + 300)):
+        m = one.modules[name]
+        readings = np.concatenate([m.readings] * n)
+        times = np.arange(len(readings)) / 150 + (0.002 if skipped else 0)
+        modules[name] = Tactile(m.sensor, times[skipped:], readings[skipped:])
+    path = tmp_path_factory.mktemp("grasp") / "grasp.parquet"
+    save_recording(Recording("grasp", modules), path)
+    return path
+
+
+@pytest.fixture
+def save(tmp_path):
+    def write(recording, name="a.parquet"):
+        save_recording(recording, tmp_path / name)
+        return tmp_path / name
+
+    return write
+
+
+def refusal(capsys, *words):
+    assert main(["detect", *map(str, words)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def lines(capsys, *words):
+    assert main(["detect", *map(str, words)]) == 0
+    out, err = capsys.readouterr()
+    return [json.loads(line) for line in out.splitlines()], err
+
+
+def summary(capsys, *words):
+    assert main(["detect", *map(str, words), "--summary", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def plain(estimate):
+    numbers = [estimate.stable_probability, estimate.instability, *estimate.force]
+    probability, sigma, *force = [None if np.isnan(x) else x for x in numbers]
+    return {
+        "time": estimate.time,
+        "state": estimate.state.value,
+        "reason": estimate.reason.value,
+        "stable_probability": probability,
+        "instability": sigma,
+        "force": force,
+        "faults": [fault.value for fault in estimate.faults],
+        "faulty_taxels": [taxel + 1 for taxel in estimate.faulty_taxels],
+        "cause": estimate.cause,
+    }
+
+
+@pytest.mark.parametrize("name", ["model", NOISE_FLOOR])
+def test_lines_equal_the_result_of_detect(name, request, capsys, grasp):
+    """Reading in chunks gives the same lines; one per finger and sample, in the order of time."""
+    given = request.getfixturevalue("model") if name == "model" else name
+    got, err = lines(capsys, given, grasp)
+    assert err == ""
+    assert list(got[0]) == FIELDS
+    assert [line["time"] for line in got] == sorted(line["time"] for line in got)
+    want = detect(Model.load(given), load_recording(grasp))
+    for finger, trace in want.fingers.items():
+        mine = [{k: v for k, v in x.items() if k != "finger"} for x in got if x["finger"] == finger]
+        assert mine == [plain(trace.estimate(k)) for k in range(len(trace))]
+    assert len(got) == sum(len(trace) for trace in want.fingers.values())
+    assert {"STABLE", "UNSTABLE", "NO_CONTACT", "UNKNOWN"} == {line["state"] for line in got}
+
+
+@pytest.mark.parametrize("source", ["grasp.parquet", "twin:?object=can"])
+def test_a_source_in_the_place_of_the_model(capsys, source):
+    assert refusal(capsys, source, "other.parquet") == (
+        f"{source} is a source; MODEL SOURCE expected, such as builtin:any {source}"
+    )
+
+
+def test_at_one_instant_fingers_keep_their_order(capsys, save):
+    got, _ = lines(capsys, NOISE_FLOOR, save(synthetic_recording("a", 1, ("thumb", "index"))))
+    assert [line["finger"] for line in got[:4]] == ["thumb", "index", "thumb", "index"]
+    assert got[0]["reason"] == "tare"
+    assert got[0]["force"] == [None, None, None]
+
+
+def test_faults_are_named(capsys, save):
+    recording = synthetic_recording("a", 1, ("thumb",))
+    readings = recording.modules["thumb"].readings.astype(float)
+    readings[400, 3, 2] = np.inf
+    module = replace(recording.modules["thumb"], readings=readings)
+    got, _ = lines(capsys, NOISE_FLOOR, save(Recording("a", {"thumb": module})))
+    assert (got[400]["reason"], got[400]["faults"]) == ("fault", [Fault.NOT_FINITE])
+
+
+def test_label_files_are_not_read(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb",)))
+    path.with_name("a.labels.json").write_text("damaged")
+    assert lines(capsys, NOISE_FLOOR, path)[0]
+
+
+def test_a_cut_file_is_used(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb",)), "a.mcap")
+    path.write_bytes(path.read_bytes()[:60_000])
+    got, err = lines(capsys, NOISE_FLOOR, path)
+    assert got
+    assert err == f"{path} is cut off: only its readable part is used\n"
+
+
+class TestSummary:
+    def test_shares_and_events(self, capsys, model, grasp):
+        document = summary(capsys, model, grasp)
+        want = detect(Model.load(model), load_recording(grasp))
+        assert list(document) == ["model", "name", "fingers", "hand", "events"]
+        assert (document["model"], document["name"]) == (str(model), "grasp")
+        for finger, trace in want.fingers.items():
+            shares = document["fingers"][finger]
+            assert shares["n_samples"] == len(trace)
+            assert sum(shares["states"].values()) == pytest.approx(1)
+            assert shares["states"]["STABLE"] == np.mean(trace.state == 3)
+            assert sum(shares["reasons"].values()) == np.sum(trace.state == 0)
+            changes = np.flatnonzero(np.diff(trace.state, prepend=0))
+            events = [event for event in document["events"] if event["finger"] == finger]
+            assert [event["time"] for event in events] == trace.times[changes].tolist()
+        hand = [event for event in document["events"] if event["finger"] == "hand"]
+        assert len(hand) == np.count_nonzero(np.diff(want.hand, prepend=0))
+        assert document["hand"]["states"]["UNSTABLE"] == np.mean(want.hand == 2)
+
+    def test_the_table(self, capsys, model, grasp):
+        assert main(["detect", str(model), str(grasp), "--summary"]) == 0
+        out = capsys.readouterr().out
+        assert re.search(r"^thumb +\d+( +\d+\.\d){4}$", out, re.MULTILINE)
+        assert re.search(r"^thumb +tare 75, warm_up 13 +-$", out, re.MULTILINE)
+        assert max(map(len, out.splitlines())) <= 80
+        assert re.search(r"^ +\d+\.\d{3} +hand +\w+ +UNKNOWN$", out, re.MULTILINE)
+        assert re.search(r"^and \d+ more events \(--json prints all\)$", out, re.MULTILINE)
+
+    def test_the_table_fits_with_long_names(self, capsys, save):
+        whole = synthetic_recording("a", 1, ("thumb", "index"))
+        long = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in whole.modules.items()}
+        path = save(
+            replace(whole, modules=long), "2025-11-22_grasp-of-the-red-carton_case2-01.mcap"
+        )
+        assert main(["detect", NOISE_FLOOR, str(path), "--summary"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert max(map(len, lines)) <= 80
+        assert {"thumb_of_the_left_", "index_of_the_left_"} <= {line[:18] for line in lines}
+
+    def test_debouncing_reduces_the_events(self, capsys, model, grasp):
+        raw = summary(capsys, model, grasp)["events"]
+        held = summary(capsys, model, grasp, "--debounce", "0.2", "--hysteresis", "0.2")["events"]
+        assert 0 < len(held) < len(raw)
+
+    def test_raw_decisions_have_no_debouncing(self, capsys, model, grasp, tmp_path):
+        raw = summary(capsys, model, grasp)["events"]
+        path = tmp_path / "held.json"
+        steady = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
+        steady.save(path)
+        assert summary(capsys, path, grasp)["events"] != raw
+        assert summary(capsys, path, grasp, "--raw")["events"] == raw
+
+
+class TestNumbersOfTaxels:
+    """Taxels are counted from 1 everywhere, as in the columns of files."""
+
+    @pytest.fixture
+    def spoilt(self, save):
+        """A grasp in which taxels 1, 7 and 30 of the index, by the file, are not numbers."""
+        recording = synthetic_recording("spoilt", 1, ("index",))
+        module = recording.modules["index"]
+        path = save(Recording("spoilt", {"index": module}), "whole.parquet")
+        names = pq.read_schema(path).names
+        assert {"index.t01.x", "index.t07.x", "index.t30.x"} < set(names)
+        assert "index.t00.x" not in names
+        readings = module.readings.astype(float)
+        for column in ("index.t01.x", "index.t07.x", "index.t30.x"):
+            taxel = [name for name in names if name.endswith(".x")].index(column)
+            readings[300:, taxel] = np.nan
+        return save(Recording("spoilt", {"index": replace(module, readings=readings)}))
+
+    def test_lines_have_the_numbers_of_the_file(self, capsys, model, spoilt):
+        got, _ = lines(capsys, model, spoilt)
+        assert {tuple(line["faulty_taxels"]) for line in got[320:]} == {(1, 7, 30)}
+
+    def test_the_numbers_are_those_of_the_option(self, capsys, model, spoilt):
+        got, _ = lines(capsys, model, spoilt, "--ignore", "index:1,index:7,index:30")
+        assert {tuple(line["faulty_taxels"]) for line in got} == {()}
+        assert {tuple(line["faults"]) for line in got} == {()}
+
+    def test_the_numbers_are_those_of_the_configuration(
+        self, capsys, model, spoilt, tmp_path, monkeypatch
+    ):
+        config = tmp_path / "holdfast.toml"
+        config.write_text("ignore = {index = [1, 7, 30]}")
+        monkeypatch.setenv("HOLDFAST_CONFIG", str(config))
+        got, _ = lines(capsys, model, spoilt)
+        assert {tuple(line["faulty_taxels"]) for line in got} == {()}
+
+    def test_the_numbers_are_those_of_the_sensor(self, capsys):
+        assert main(["sensors", "uskin-curved"]) == 0
+        rows = capsys.readouterr().out.splitlines()[-30:]
+        assert [int(row.split()[0]) for row in rows] == list(range(1, 31))
+
+
+class TestRate:
+    @pytest.fixture
+    def slow(self, save):
+        """Half of the samples of a grasp: 75 Hz."""
+        recording = synthetic_recording("slow", 1, ("thumb", "index"))
+        modules = {
+            name: replace(m, times=m.times[::2], readings=m.readings[::2], labels=())
+            for name, m in recording.modules.items()
+        }
+        return save(replace(recording, modules=modules))
+
+    def test_resampled_with_a_message(self, capsys, model, slow):
+        got, err = lines(capsys, model, slow)
+        assert err == f"{slow}: 75 Hz given, the model expects 150 Hz: resampled\n"
+        times = [line["time"] for line in got if line["finger"] == "thumb"]
+        assert np.diff(times) == pytest.approx(1 / 150)
+        want = detect(Model.load(model), load_recording(slow)).fingers["thumb"]
+        assert times == want.times.tolist()
+
+    def test_strict_refuses(self, capsys, model, slow):
+        assert refusal(capsys, model, slow, "--rate", "strict") == (
+            f"{slow}: 75 Hz given, the model expects 150 Hz within 20 % "
+            "(--rate resample accepts it)"
+        )
+
+    def test_strict_takes_what_fits(self, capsys, model, grasp):
+        assert lines(capsys, model, grasp, "--rate", "strict")[0]
+
+
+def test_the_hold_of_a_model_stays(capsys, model, grasp, tmp_path):
+    """It stays when other options of debouncing are given."""
+    path = tmp_path / "held.json"
+    held = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
+    held.save(path)
+    chosen = msgspec.structs.replace(held, debounce=Debounce(0.0, 0.2, 0.4))
+    for words, judge in (([], held), (["--debounce", 0], chosen)):
+        trace = detect(judge, load_recording(grasp)).fingers["thumb"]
+        unstable = np.mean(trace.state == UNSTABLE)
+        got = summary(capsys, path, grasp, *words)["fingers"]["thumb"]["states"]["UNSTABLE"]
+        assert got == pytest.approx(unstable, abs=1e-6)
+
+
+def test_a_tare_by_interval(capsys, model, grasp, tmp_path):
+    given = msgspec.structs.replace(Model.load(model), tare="40:41")
+    given.save(tmp_path / "interval.json")
+    got, _ = lines(capsys, tmp_path / "interval.json", grasp)
+    assert got[0]["reason"] == "warm_up"
+    assert None not in got[0]["force"]
+
+
+def test_missing_fingers_are_reported(capsys, model, save):
+    path = save(synthetic_recording("one", 1, ("index",)))
+    got, err = lines(capsys, model, path)
+    assert {line["finger"] for line in got} == {"index"}
+    assert err == "one has index; the model also has thumb, which get no estimates\n"
+
+
+def test_refusals(capsys, model, grasp, save, tmp_path):
+    readings = np.zeros((100, 24, 3))
+    wide = Recording("a", {"thumb": Tactile(sensor("uskin-4x6"), np.arange(100) / 100, readings)})
+    assert refusal(capsys, model, save(wide)) == (
+        "thumb: 24 taxels (uskin-4x6) given, the model expects 30 (uskin-curved); "
+        "builtin:any fits every 3-axis sensor"
+    )
+    other = save(synthetic_recording("b", 1, ("ring",)), "b.parquet")
+    assert refusal(capsys, model, other) == "the model is for thumb, index; ring given"
+    missing = tmp_path / "none.parquet"
+    assert refusal(capsys, model, missing) == (
+        f"{missing} does not exist; a recording's file expected"
+    )
+    assert refusal(capsys, model, tmp_path) == (
+        f"{tmp_path} is a folder; a recording's file expected"
+    )
+    assert refusal(capsys, missing, grasp) == (
+        f"{missing} is a source; MODEL SOURCE expected, such as builtin:any {missing}"
+    )
+    no_model = tmp_path / "none.json"
+    assert refusal(capsys, no_model, grasp) == (
+        f"cannot read the model {no_model}: No such file or directory"
+    )
+    assert refusal(capsys, "builtin:best", grasp) == (
+        "unknown model 'builtin:best'; built in are builtin:any, builtin:twin, builtin:noise-floor"
+    )
+    assert refusal(capsys, model, "twin:?object=anvil").startswith(
+        "twin:?object=anvil: no object 'anvil'; there are "
+    )
+    assert refusal(capsys, model, "usb:3").startswith(
+        "'usb:3' is neither the path of a recording nor the URI of a source; there are xela:, "
+    )
+    assert refusal(capsys, model, grasp, "--ignore", "7") == (
+        "--ignore: FINGER:TAXEL,... expected, '7' given"
+    )
+    assert refusal(capsys, model, grasp, "--ignore", "index:99") == (
+        "index: taxel 99 to be ignored; it has the taxels 1 to 30"
+    )
+    for taxel in (0, 31):
+        assert refusal(capsys, model, grasp, "--ignore", f"index:3,index:{taxel}") == (
+            f"index: taxel {taxel} to be ignored; it has the taxels 1 to 30"
+        )
+    assert refusal(capsys, model, grasp, "--debounce=-1") == (
+        "a duration of at least 0 s expected, -1.0 given"
+    )
+    assert refusal(capsys, model, grasp, "--raw", "--debounce", 0) == (
+        "--raw decides without debouncing; leave out --debounce and --hysteresis"
+    )
+    assert refusal(capsys, model, grasp, "--hysteresis", "nan") == (
+        "a hysteresis from 0 to 1 expected, nan given"
+    )
+    assert refusal(capsys, model, "twin:", "--seconds", "0") == (
+        "--seconds: more than 0 s expected, 0 given"
+    )
+    assert refusal(capsys, model, grasp, "--seconds", "2") == (
+        f"--seconds is for live sources; {grasp} is a recording"
+    )
+    assert "'slow' is not one of 'resample', 'strict'" in refusal(
+        capsys, model, grasp, "--rate", "slow"
+    )
+
+
+def test_a_recording_without_samples(capsys, tmp_path):
+    path = tmp_path / "empty.mcap"
+    RecordingWriter(path, {"thumb": sensor("uskin-curved")}).close()
+    assert refusal(capsys, NOISE_FLOOR, path) == f"{path} has no samples; at least one expected"
+
+
+def test_a_damaged_file(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb",)))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    assert refusal(capsys, NOISE_FLOOR, path) == (
+        f"{path} is damaged: its content does not match its checksum"
+    )
+
+
+def test_real_uskin(capsys, data_folder, tmp_path):
+    source = data_folder / "uskin_pick_move" / "data_sample_2022-02-22-08-10-01"
+    assert main(["import", str(source), str(tmp_path)]) == 0
+    capsys.readouterr()
+    got, _ = lines(capsys, NOISE_FLOOR, tmp_path / f"{source.name}.parquet")
+    assert len(got) == 2 * 285
+
+
+def test_a_live_source(capsys, save):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    with (
+        open_source(str(grasp)) as source,
+        XelaServer(source, port=0, wait=True) as server,
+    ):
+        got, _ = lines(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "3")
+        found = summary(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "1")
+    assert list(got[0]) == FIELDS
+    want = detect(Model.load(NOISE_FLOOR), load_recording(grasp))
+    for finger, trace in want.fingers.items():
+        mine = [line for line in got if line["finger"] == finger]
+        assert len(mine) > 75
+        for k, line in enumerate(mine[: len(trace)]):
+            if not line["faults"]:  # on a busy machine some are late
+                assert line["state"] == plain(trace.estimate(k))["state"]
+    assert set(found["fingers"]) == set(want.fingers)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_a_live_source(capsys, monkeypatch, save, number):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    read, calls = StreamDetector.read, []
+
+    def read_and_signal(stream):
+        calls.append(stream)
+        if len(calls) == 100:
+            os.kill(os.getpid(), number)
+        return read(stream)
+
+    monkeypatch.setattr(StreamDetector, "read", read_and_signal)
+    with (
+        open_source(str(grasp), speed=1.5, loop=True) as source,
+        XelaServer(source, port=0) as server,
+    ):
+        found = summary(capsys, NOISE_FLOOR, server.uri)
+    assert set(found["fingers"]) == {"thumb", "index"}
+
+
+def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
+    header, *rows = capsys.readouterr().out.splitlines()
+    assert header.split() == ["time", "finger", "from", "to", "why"]
+    times = [float(row.split()[0]) for row in rows]
+    assert times == sorted(times)
+    assert {row.split()[2] for row in rows} == {"thumb", "index", "hand"}
+    assert 3 <= len(rows) < 100  # of 3450 estimates
+    assert all(len(row) <= 80 for row in rows)
+    assert any("-> UNSTABLE    P(stable) " in row for row in rows)
+    assert main(["detect", NOISE_FLOOR, str(grasp), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
+
+
+def since_1970(recording):
+    """Return a recording with the times of a clock that counts from 1970."""
+    modules = {
+        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
+        for name, m in recording.modules.items()
+    }
+    return replace(recording, modules=modules)
+
+
+def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
+    grasp = save(since_1970(synthetic_recording("a", 1, ("thumb", "index"))))
+    assert summary(capsys, NOISE_FLOOR, grasp)["events"][0]["time"] > 1795364053
+    assert main(["detect", NOISE_FLOOR, str(grasp), "--summary"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = lines.index("times since the first sample, at 1795364053.990 s")
+    assert 0 < float(lines[start + 2].split()[0]) < 12
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
+    out, err = capsys.readouterr()
+    assert err == "times since the first sample, at 1795364053.990 s\n"
+    assert all(0 < float(row.split()[0]) < 12 for row in out.splitlines()[1:])
+
+
+def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    update = ArrivalDetector.update
+
+    def late(detector, arrival):
+        return update(detector, arrival._replace(faults={"thumb": (Fault.LATE,)}))
+
+    monkeypatch.setattr(ArrivalDetector, "update", late)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    with (
+        open_source(str(grasp)) as source,
+        XelaServer(source, port=0, wait=True) as server,
+    ):
+        assert main(["detect", NOISE_FLOOR, server.uri, "--seconds", "2.5"]) == 0
+    out, err = capsys.readouterr()
+    assert err.count("thumb: samples arrive late") == 1
+    first = next(row.split() for row in out.splitlines()[1:] if " index " in row)
+    assert 0 <= float(first[0]) < 3  # times count from the first sample
+    assert "thumb" not in out  # it is UNKNOWN all the time
