@@ -23,7 +23,14 @@ from holdfast.twin.contact import Constants, Contact, touch
 from holdfast.twin.control import Controller, control
 from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
+from holdfast.twin.operator import (
+    GUIDE_STIFFNESS,
+    MOVE,
+    guide_wrench,
+    hold_wrench,
+    move_wrench,
+    push_wrench,
+)
 
 FALLING_BODY = """<mujoco><worldbody>
   <body><freejoint/><geom size=".01"/></body>
@@ -77,7 +84,8 @@ class Action(NamedTuple):
         style: style of the disturbance; -1 for none.
         duration: duration of the disturbance [s].
         elapsed: time since it began [s].
-        pull: (3,) force of the loads on the object [N].
+        pull: (6,) force [N] and torque [N m] of the loads on the object.
+        guide: (N_GUIDE,) hand that guides the object, see `guide_wrench`.
     """
 
     anchor: Array
@@ -92,6 +100,7 @@ class Action(NamedTuple):
     duration: float
     elapsed: float
     pull: Array
+    guide: Array
 
 
 class Wrenches(NamedTuple):
@@ -327,8 +336,13 @@ def _operate(
         )  # fmt: skip
         for k in range(6):
             outside[k] += pushed[k]
+    if action.guide[GUIDE_STIFFNESS] > 0.0:
+        ahead = time - action.time
+        guided = guide_wrench(body, action.guide, ahead, action.tremors[1], time)
+        for k in range(6):
+            outside[k] += guided[k]
     for k in range(6):
         out.total[k] = outside[k] + fingers[k]
-    for k in range(3):
+    for k in range(6):
         outside[k] += action.pull[k]
         out.total[k] += action.pull[k]

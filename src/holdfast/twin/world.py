@@ -10,6 +10,7 @@ from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, H
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
+from holdfast.twin.operator import NO_GUIDE
 from holdfast.twin.physics import Action, Steps, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
@@ -101,7 +102,7 @@ class World(ContactWorld):
         self._advance = advance_of(hand)
         self._steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
         self._wrenches = Wrenches(self.outside, np.zeros(6))
-        self._pull = np.zeros(3)
+        self._pull, self._guide = np.zeros(6), NO_GUIDE
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
         self._disturbance = -1
@@ -109,11 +110,12 @@ class World(ContactWorld):
         self._place(start, side)
 
     def set_load(self, load: LoadState) -> None:
-        """Set force, friction and acceleration of the hand until they are set again.
+        """Set force, torque, friction, guide and the hand's acceleration until they are set again.
 
         The hand does not move in the world: its acceleration is a change of gravity.
         """
-        self._pull[:] = load.force
+        self._pull[:3], self._pull[3:] = load.force, load.torque
+        self._guide = load.guide
         self.hand.model.opt.gravity[:] = [0.0, 0.0, -GRAVITY] - load.acceleration
         self.scale_friction(load.friction)
 
@@ -152,7 +154,7 @@ class World(ContactWorld):
         return Action(
             anchor, command.hold, GRAVITY * self.item.mass, self.tremors, plan.profile.tremor,
             self.hand.data.time, self._parameters, self._origin, style, duration,
-            command.elapsed, self._pull,
+            command.elapsed, self._pull, self._guide,
         )  # fmt: skip
 
     def _place(self, start: Array, side: str) -> None:
