@@ -61,6 +61,9 @@ class LoadState(NamedTuple):
         friction: factor of the friction.
         torque: (3,) torque on the object about its centre of mass, in the world [N m].
         guide: (N_GUIDE,) hand that guides the object, see `guide_wrench`.
+        added_mass: mass that was added to the object, with its inertia [kg].
+        steady: how far kinetic friction is raised to static friction, from 0 to 1: then the
+            object creeps steadily, and does not stick and slip.
     """
 
     force: Array
@@ -68,6 +71,8 @@ class LoadState(NamedTuple):
     friction: float
     torque: Array = NO_TORQUE
     guide: Array = NO_GUIDE
+    added_mass: float = 0.0
+    steady: float = 0.0
 
 
 def load_state(loads: Sequence[Load], held_for: float) -> LoadState:

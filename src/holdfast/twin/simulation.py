@@ -205,7 +205,7 @@ class Simulation:
         self._truth_log.add(
             command.phase,
             world.contact,
-            outside_force=world.outside[:3] - slipping.load.force,
+            outside_force=world.outside[:3],
             object_pose=world.object_pose,
             joints=world.hand.data.qpos[:N_JOINTS],
             set_point_error=world.set_point_error,
@@ -233,7 +233,7 @@ class Simulation:
         rms = self._profile.arm_tremor
         shaken = [rms * tremor_at(self._arm_tremor, self.time, axis)[0] for axis in range(3)]
         return load._replace(
-            force=load.force + state.force,
+            force=state.force,
             acceleration=state.acceleration + shaken,
             friction=load.friction * state.friction,
         )
@@ -244,7 +244,7 @@ class Simulation:
             return {}
         return {
             "outside_torque": self.world.outside[3:],
-            "added_weight": -slipping.load.force[2],
+            "added_mass": slipping.load.added_mass,
             "grip_scale": slipping.grip_scale,
             "friction_scale": slipping.load.friction,
         }

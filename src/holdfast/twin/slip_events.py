@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
 from holdfast.twin.grasp import GRASP_DIRECTION
-from holdfast.twin.hand import GRAVITY
 from holdfast.twin.loads import LoadState
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import (
@@ -44,7 +43,7 @@ MIN_GRIP_SCALE = 0.05
 """Smallest scale to which a grip relaxes: the fingers stay in contact."""
 PULL_TIME = 1.5
 """Time in which a hand that pulls ever harder makes the object slide, as a rule [s]."""
-MIN_SLIDE = 5e-5
+MIN_SLIDE = 2e-4
 """Sliding distance from which a hand that has pulled ever harder goes on steadily [m]."""
 SLIPPERY_TIME = 1.0
 """Time for which friction stays low if nothing slides [s]."""
@@ -59,10 +58,11 @@ class SlipKind(StrEnum):
 
     WEIGHT: mass is added at the rate [kg/s]. GRIP: the grip force falls at the rate, in shares of
     that at the lock [1/s]. FRICTION: friction falls at the rate [1/s] to the factor size. CREEP: a
-    hand draws the object at the rate [m/s]; size is the direction [rad], 0 upwards. TWIST: a
-    torque about the grasp line grows at the rate [N m/s]. TURN: a hand turns the object about
-    the grasp line at the rate [rad/s]. ROLL: a hand turns it about its upright axis at the rate
-    [rad/s] by the angle size [rad] and back, so that the fingertips roll on it.
+    hand draws the object at the rate [m/s]; size is the direction [rad], 0 upwards. Kinetic
+    friction is the static one then, because at such speeds the friction of rubber rises with
+    speed. TWIST: a torque about the grasp line grows at the rate [N m/s]. TURN: a hand turns the
+    object about the grasp line at the rate [rad/s]. ROLL: a hand turns it about its upright axis
+    at the rate [rad/s] by the angle size [rad] and back, so that the fingertips roll on it.
     """
 
     WEIGHT = "weight"
@@ -127,7 +127,7 @@ class SlipState(NamedTuple):
     """What acts on the object until the next sample.
 
     Attributes:
-        load: force of the added weight, torque, friction and guiding hand.
+        load: added mass, torque, friction and guiding hand.
         grip_scale: factor of the grip force.
         touching: whether an operator touches the object.
     """
@@ -304,7 +304,7 @@ class SlipEvents:
         rest = REST.load
         match event.kind:
             case SlipKind.WEIGHT:
-                return SlipState(rest._replace(force=-GRAVITY * left * change * UPRIGHT))
+                return SlipState(rest._replace(added_mass=left * change))
             case SlipKind.GRIP:
                 return SlipState(rest, 1.0 - left * min(change, 1.0 - MIN_GRIP_SCALE))
             case SlipKind.FRICTION:
@@ -314,7 +314,9 @@ class SlipEvents:
                 torque = left * change * self._axis
                 return SlipState(rest._replace(torque=torque), touching=True)
         closed = left * min(elapsed / CLOSING_TIME, 1.0)
-        return SlipState(rest._replace(guide=self._guided(event, elapsed, closed)), touching=True)
+        steady = closed if event.kind is SlipKind.CREEP else 0.0
+        guide = self._guided(event, elapsed, closed)
+        return SlipState(rest._replace(guide=guide, steady=steady), touching=True)
 
     def _guided(self, event: SlipEvent, elapsed: float, closed: float) -> Array:
         """Return the hand that guides the object, moved on by one sample."""
