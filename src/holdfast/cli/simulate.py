@@ -37,7 +37,8 @@ def simulate(
     profile: Annotated[
         str,
         typer.Option(
-            help="Profile of grip and disturbances: gentle, reference, vigorous, finger-gentle, ..."
+            help="Profile of grip and disturbances: gentle, reference, vigorous, slips, "
+            "long-hold, finger-gentle, ..."
         ),
     ] = "reference",
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same bytes.")] = 0,
