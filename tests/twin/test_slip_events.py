@@ -276,6 +276,21 @@ class TestSimulated:
         expected = (object_named("ball").mass + added) * GRAVITY
         np.testing.assert_allclose(upwards, expected, rtol=0.03)
 
+    def test_what_is_poured_in_has_inertia(self):
+        """Newton's law on object and added mass, in the second in which they slide most."""
+        recording = held("weight", distance=0.006)
+        (record,) = recording.metadata["slip_events"]
+        truth = recording.truth
+        slid = np.flatnonzero(sliding(recording) & (truth.times < record["end"] - 0.1))
+        span = slice(slid[-1] - 40, slid[-1])
+        mass = 0.24 + truth.hand["added_mass"][span]
+        upwards = sum(finger["contact_force"][span, 2] for finger in truth.fingers.values())
+        velocity = np.gradient(truth.hand["object_pose"][:, 2], PERIOD)[span]
+        gained = (mass * velocity)[-1] - (mass * velocity)[0]
+        impulse = (upwards - mass * GRAVITY)[1:].sum() * PERIOD
+        assert gained < -0.02
+        assert impulse == pytest.approx(gained, abs=0.1 * abs(gained))
+
     def test_creep_is_as_slow_as_the_hand(self):
         recording = held("creep", distance=0.004)
         slipping = sliding(recording)

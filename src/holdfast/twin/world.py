@@ -113,6 +113,9 @@ class World(ContactWorld):
         self._origin = np.zeros(12)
         body = hand.object_body
         self._inertia = np.array([hand.model.body_mass[body], *hand.model.body_inertia[body]])
+        first = hand.model.body_dofadr[body]
+        self._freedom = slice(first, first + 6)
+        self._constant_inertia = hand.model.dof_M0[self._freedom].copy()
         self._added_mass = 0.0
         self._disturbance = -1
         self._tick = 0
@@ -138,6 +141,7 @@ class World(ContactWorld):
         factor = (self.item.mass + mass) / self.item.mass
         model.body_mass[body] = model.body_subtreemass[body] = factor * self._inertia[0]
         model.body_inertia[body] = factor * self._inertia[1:]
+        model.dof_M0[self._freedom] = factor * self._constant_inertia  # of a body that is alone
 
     def advance(
         self, command: Command, plan: Plan, anchor: Array, displacement: Array | None = None
