@@ -310,6 +310,18 @@ class TestTruth:
         with pytest.raises(RecordingError, match=r"^truth 'phase' has 2 rows for 3 times$"):
             Truth(np.arange(3.0), **fields)
 
+    def test_a_slice_has_the_rows_of_its_samples(self):
+        truth = Truth(
+            np.arange(5.0),
+            {"joints": np.arange(10.0).reshape(5, 2)},
+            {"thumb": {"slip_speed": np.arange(5)}},
+        )
+        part = truth.slice(1, 3)
+        assert part.times.tolist() == [1.0, 2.0]
+        assert part.hand["joints"].tolist() == [[2.0, 3.0], [4.0, 5.0]]
+        assert part.fingers["thumb"]["slip_speed"].tolist() == [1, 2]
+        assert len(truth.slice(5, 5).times) == 0
+
     def test_arrays_are_read_only(self):
         truth = Truth(np.arange(3.0), {"joints": np.ones((3, 16))})
         with pytest.raises(ValueError, match="read-only"):

@@ -202,6 +202,16 @@ class Truth:
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
 
+    def slice(self, start: int, stop: int) -> Self:
+        """Return the truth of the samples from index `start` up to `stop`."""
+        part = slice(start, stop)
+        fingers = {
+            finger: {name: array[part] for name, array in arrays.items()}
+            for finger, arrays in self.fingers.items()
+        }
+        hand = {name: array[part] for name, array in self.hand.items()}
+        return replace(self, times=self.times[part], hand=hand, fingers=fingers)
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:

@@ -185,9 +185,7 @@ def test_auc_of_sliding_against_still():
     codes[500:600] = SLIDING
     probability = np.linspace(0.1, 0.2, 1000)
     probability[550:600] = 0.9
-    metrics = slip_metrics(
-        count_slips(decisions([], [made], codes=codes, probability=probability))
-    )
+    metrics = slip_metrics(count_slips(decisions([], [made], codes=codes, probability=probability)))
     ordered = (probability[codes == SLIDING][:, None] > probability[codes == STILL]).mean()
     assert metrics.auc == pytest.approx(ordered, abs=0.002)
 
@@ -216,7 +214,7 @@ def random_recording(seed, n_false):
 
 
 class TestThresholds:
-    curves = [slip_curve(random_recording(seed, seed % 4)) for seed in range(8)]
+    curves = tuple(slip_curve(random_recording(seed, seed % 4)) for seed in range(8))
 
     def test_the_lowest_that_fits_is_chosen(self):
         total = tuple(SlipCounts.total(column) for column in zip(*self.curves, strict=True))

@@ -11,10 +11,13 @@ from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel, apply_for
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import object_named
 from holdfast.twin.operator import (
+    GUIDE_STIFFNESS,
     JERK,
     MOVE,
+    NO_GUIDE,
     PUSH,
     draw_tremor,
+    guide_wrench,
     hold_wrench,
     move_wrench,
     push_wrench,
@@ -31,6 +34,7 @@ from holdfast.twin.world import World
 
 ITEM = object_named("can")
 PATH = closing_path(ITEM)
+GUIDE = np.concatenate([np.zeros(12), [0.01, 0, 0.02, 0, 0.1, 0], [800, 9, 0.7, 0.006, 1e-5]])
 PUSHED = np.array([0.0, 0, -1, 0.01, 0, 0.02, 0.006, 700, 4])
 
 
@@ -41,12 +45,17 @@ def made_world():
     return World(HandModel.build(ITEM), ITEM, PATH, controller, tremors, np.zeros(4))
 
 
-def action(made, style=-1, hold=1.0, elapsed=0.0, pull=(0.0, 0.0, 0.0)):
+def action(made, style=-1, hold=1.0, elapsed=0.0, pull=(0.0,) * 6, guide=NO_GUIDE):
     anchor = made.bodies[-1, :12].copy()
     return Action(
         anchor, hold, GRAVITY * ITEM.mass, made.tremors, 1e-4, made.hand.data.time, PUSHED,
-        anchor, style, 0.6, elapsed, np.array(pull),
+        anchor, style, 0.6, elapsed, np.array(pull), guided(guide, anchor),
     )  # fmt: skip
+
+
+def guided(guide, anchor):
+    """The guide, from the pose of the object on."""
+    return np.concatenate([anchor, guide[12:]])
 
 
 def step_from_python(made, tick, target, given):
@@ -66,10 +75,12 @@ def step_from_python(made, tick, target, given):
         outside += move_wrench(body, given.origin, given.parameters, *disturbing)
     elif given.style >= 0:
         outside += push_wrench(body, given.origin, given.parameters, given.style, *disturbing)
+    if given.guide[GUIDE_STIFFNESS] > 0:
+        ahead = data.time - given.time
+        outside += guide_wrench(body, given.guide, ahead, given.tremors[1], data.time)
     total = outside + made.contact.wrench
-    pull = np.array([*given.pull, 0, 0, 0])
-    made.outside[:] = outside + pull
-    apply_forces(made.hand.arrays, made.contact.tips, total + pull, made.bodies)
+    made.outside[:] = outside + given.pull
+    apply_forces(made.hand.arrays, made.contact.tips, total + given.pull, made.bodies)
     if tick % STEPS_PER_CONTROL == 0:
         number, period = tick // STEPS_PER_CONTROL, STEPS_PER_CONTROL * TIMESTEP
         error = np.abs(made.controller.errors[number]).max()
@@ -84,7 +95,8 @@ ACTIONS = {
     "pushed": {"style": PUSH, "hold": 0.0, "elapsed": 0.2},
     "struck while held": {"style": JERK, "hold": 0.5, "elapsed": 0.3},
     "moved": {"style": MOVE, "hold": 0.0, "elapsed": 0.1},
-    "pulled": {"hold": 0.0, "pull": (0.1, -0.2, 0.3)},
+    "pulled": {"hold": 0.0, "pull": (0.1, -0.2, 0.3, 0.001, 0.0, -0.002)},
+    "guided": {"hold": 0.0, "guide": GUIDE},
 }
 
 

@@ -6,7 +6,8 @@ from holdfast.twin.profile import Profile, profile, profiles
 
 def test_the_profiles_and_those_of_the_old_protocol():
     new = ("gentle", "reference", "vigorous")
-    assert profiles() == tuple(sorted([*new, *(f"finger-{name}" for name in new)]))
+    old = [f"finger-{name}" for name in new]
+    assert profiles() == tuple(sorted([*new, *old, "slips", "long-hold"]))
 
 
 @pytest.mark.parametrize("name", profiles())
@@ -20,6 +21,22 @@ def test_a_profile_is_a_possible_experiment(name):
     assert given.grip > 0
     assert given.tremor > 0
     assert given.push_duration[1] + 2.5 < given.hold  # at least one disturbance fits
+
+
+def test_the_ranges_of_slips_are_possible():
+    slips = profile("slips").slips
+    for span in (value for value in asdict(slips).values() if isinstance(value, tuple)):
+        assert 0 < span[0] < span[1]
+    assert 0 < slips.share < 1
+    assert slips.friction_factor[1] < 1
+    assert slips.creep_speed == (0.0003, 0.003)
+    assert all(profile(name).slips is None for name in profiles() if name != "slips")
+
+
+def test_slips_has_the_disturbances_of_the_reference():
+    slips, reference = asdict(profile("slips")), asdict(profile("reference"))
+    differ = {name for name in reference if slips[name] != reference[name]}
+    assert differ == {"name", "hold", "slips"}
 
 
 def test_profiles_disturb_in_their_order():

@@ -10,7 +10,7 @@ from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
 from holdfast.twin import control, hand, simulation, world
 from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
-from holdfast.twin.profile import profile
+from holdfast.twin.profile import profile, profiles
 from holdfast.twin.protocol import MIN_TOUCH_LOAD
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin_readout import UskinParameters
@@ -344,6 +344,32 @@ class TestSeeds:
 def test_an_unknown_object_case_or_profile_is_refused(grasp, message):
     with pytest.raises(ValueError, match=message):
         simulate(grasp)
+
+
+class TestLongHold:
+    def test_glitches_are_drawn_for_all_of_it_and_as_before_for_the_others(self):
+        period = control.STEPS_PER_CONTROL * hand.TIMESTEP
+        chosen = profile("long-hold")
+        errors = simulation._world(Grasp("can", 2, 1), chosen).controller.errors
+        assert len(errors) * period > chosen.hold + 20.0
+        assert errors[round(250.0 / period) :].any()
+        for name in (name for name in profiles() if name != "long-hold"):
+            errors = simulation._world(Grasp("can", 2, 1), profile(name)).controller.errors
+            assert len(errors) == int(60.0 / period) + 1 or profile(name).hold > 35.0
+
+    def test_a_trembling_arm_shakes_what_is_held_and_is_no_touch(self):
+        chosen = msgspec.structs.replace(profile("long-hold"), idle=(0.7, 0.8), hold=6.0)
+        calm, shaken = (
+            made(Grasp("can", 1, 1), msgspec.structs.replace(chosen, arm_tremor=rms))
+            for rms in (0.0, 0.1)
+        )
+        still = quiet(shaken)
+        assert not shaken.truth.hand["outside_force"][still].any()
+        spreads = [on_object(recording, still)[:, 2].std() for recording in (calm, shaken)]
+        assert spreads[0] < 0.005
+        assert spreads[1] == pytest.approx(0.1 * shaken.metadata["object_mass"], rel=0.35)
+        for module in shaken.modules.values():
+            assert (module.label_states[still] == ContactState.STABLE.code).all()
 
 
 class TestMovedByAHand:

@@ -46,7 +46,8 @@ class GraspOptions:
     profile: Annotated[
         str,
         typer.Option(
-            help="Profile of grip and disturbances: gentle, reference, vigorous, finger-gentle, ..."
+            help="Profile of grip and disturbances: gentle, reference, vigorous, slips, "
+            "long-hold, finger-gentle, ..."
         ),
     ] = "reference"
     seed: SeedOption = 0

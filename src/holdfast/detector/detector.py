@@ -143,9 +143,9 @@ class Detector:
         if not all(isinstance(part.classifier, LinearClassifier) for part in self._parts):
             self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
             self._n_together = -1  # `update` takes the plain way
-        self._decision = new_decision_memory(
-            *self._rule.causes.shape[:2], np.isfinite(self._rule.slip_limits[:, SLIP_THRESHOLD])
-        )
+        has_slip_rule = np.isfinite(self._rule.slip_limits[:, SLIP_THRESHOLD])
+        n_causes = self._rule.causes.shape[1]
+        self._decision = new_decision_memory(len(self._slots), n_causes, has_slip_rule)
         arrays = StepArrays(
             stream.layout, stream.memory, stream.output, self._rule, self._decision,
             self._readings, self._present, self._report, KNOWN_TYPES,

@@ -8,7 +8,10 @@ import numpy as np
 
 from holdfast.sensors.types import Array
 from holdfast.twin.hand import GRAVITY
+from holdfast.twin.operator import NO_GUIDE
 
+NO_TORQUE = np.zeros(3)
+"""Torque of loads that do not turn the object [N m]."""
 RISE_TIME = 0.2
 """Time in which a weight is added, or friction falls [s]."""
 
@@ -56,11 +59,20 @@ class LoadState(NamedTuple):
         force: (3,) force on the object in the world [N].
         acceleration: (3,) acceleration of the hand [m/s^2].
         friction: factor of the friction.
+        torque: (3,) torque on the object about its centre of mass, in the world [N m].
+        guide: (N_GUIDE,) hand that guides the object, see `guide_wrench`.
+        added_mass: mass that was added to the object, with its inertia [kg].
+        steady: how far kinetic friction is raised to static friction, from 0 to 1: then the
+            object creeps steadily, and does not stick and slip.
     """
 
     force: Array
     acceleration: Array
     friction: float
+    torque: Array = NO_TORQUE
+    guide: Array = NO_GUIDE
+    added_mass: float = 0.0
+    steady: float = 0.0
 
 
 def load_state(loads: Sequence[Load], held_for: float) -> LoadState:

@@ -33,6 +33,11 @@ N_TREMORS = 8
 MOVE_GRASP_TIME = 0.15
 """Time in which a hand that moves the object closes on it, and opens again [s]."""
 
+GUIDE_STIFFNESS, N_GUIDE = 18, 23
+"""Place of the stiffness among the numbers of a guiding hand, and their count."""
+NO_GUIDE = np.zeros(N_GUIDE)
+"""A guiding hand that does not touch the object."""
+
 PUSH, JERK, SHAKE, MOVE = range(4)
 """Styles of a disturbance: a finger pushes, strikes or shakes; a hand grips the object and moves
 it."""
@@ -44,6 +49,8 @@ DIRECTIONS = {
     "right": (0.0, 1.0, 0.0),
 }
 """Directions with a name, in the world; the other disturbances have a random direction."""
+PUSH_DIRECTIONS = (*DIRECTIONS, "random", "random")
+"""Directions of the disturbances of a grasp, in turn."""
 
 
 class Disturbance(NamedTuple):
@@ -75,12 +82,11 @@ def draw_disturbances(
         profile: profile with the ranges of all values.
         scale: factor of the depths.
     """
-    names = [*DIRECTIONS, "random", "random"]
     disturbances: list[Disturbance] = []
     start = float(generator.uniform(1.0, 1.5))
     while True:
-        name = names[len(disturbances) % len(names)]
-        push = _draw_disturbance(generator, profile, start, name, scale)
+        name = PUSH_DIRECTIONS[len(disturbances) % len(PUSH_DIRECTIONS)]
+        push = draw_disturbance(generator, profile, start, name, scale)
         if push.start + push.duration + 1.0 > profile.hold:
             return disturbances
         disturbances.append(push)
@@ -131,13 +137,7 @@ def hold_wrench(
         place, speed = tremor_at(tremor, time, axis)
         stretch = anchor[axis] + rms * place - body[axis]
         force[axis] = HOLD_STIFFNESS * stretch + HOLD_DAMPING * (rms * speed - body[12 + axis])
-    turn = np.zeros(3)  # rotation to the anchor, small angles: half the sum of r x r_anchor
-    for column in range(3):
-        x, y, z = body[3 + column], body[6 + column], body[9 + column]
-        u, v, w = anchor[3 + column], anchor[6 + column], anchor[9 + column]
-        turn[0] += 0.5 * (y * w - z * v)
-        turn[1] += 0.5 * (z * u - x * w)
-        turn[2] += 0.5 * (x * v - y * u)
+    turn = _turn_to(body, anchor)
     torque = HOLD_TURN_STIFFNESS * turn - HOLD_TURN_DAMPING * body[15:18]
     return (
         gain * force[0],
@@ -164,6 +164,51 @@ def disturb_wrench(
     if style == MOVE:
         return move_wrench(body, origin, parameters, duration, tremor, rms, elapsed)
     return push_wrench(body, origin, parameters, style, duration, tremor, rms, elapsed)
+
+
+@compiled
+def guide_wrench(
+    body: Array, guide: Array, ahead: float, tremor: Array, time: float
+) -> tuple[float, float, float, float, float, float]:
+    """Compute force and torque of a steady hand that takes the object along.
+
+    The hand is a damped spring to a pose that moves with a constant velocity and spin.
+
+    Args:
+        body: (18,) position, rotation, velocity and spin of the object in the world.
+        guide: (N_GUIDE,) pose [m], its velocity [m/s] and spin [rad/s], stiffness [N/m] and
+            damping [N s/m], both in rotation [N m/rad, N m s/rad], rms of the tremor [m].
+        ahead: time since the pose was set [s].
+        tremor: tremor of the hand.
+        time: time [s].
+
+    Returns:
+        Force [N] and torque about the centre of mass [N m] in the world.
+    """
+    stiffness, damping, turn_stiffness, turn_damping, rms = guide[GUIDE_STIFFNESS:]
+    force = np.zeros(3)
+    for axis in range(3):
+        place, speed = tremor_at(tremor, time, axis)
+        velocity = guide[12 + axis]
+        stretch = guide[axis] + velocity * ahead + rms * place - body[axis]
+        force[axis] = stiffness * stretch + damping * (velocity + rms * speed - body[12 + axis])
+    spin = guide[15:18]
+    turn = _turn_to(body, guide) + ahead * spin
+    torque = turn_stiffness * turn + turn_damping * (spin - body[15:18])
+    return force[0], force[1], force[2], torque[0], torque[1], torque[2]
+
+
+@compiled
+def _turn_to(body: Array, anchor: Array) -> Array:
+    """Return the rotation to an anchor, small angles: half the sum of r x r_anchor [rad]."""
+    turn = np.zeros(3)
+    for column in range(3):
+        x, y, z = body[3 + column], body[6 + column], body[9 + column]
+        u, v, w = anchor[3 + column], anchor[6 + column], anchor[9 + column]
+        turn[0] += 0.5 * (y * w - z * v)
+        turn[1] += 0.5 * (z * u - x * w)
+        turn[2] += 0.5 * (x * v - y * u)
+    return turn
 
 
 @compiled
@@ -288,9 +333,18 @@ def _aim(
     )
 
 
-def _draw_disturbance(
+def draw_disturbance(
     generator: np.random.Generator, profile: Profile, start: float, name: str, scale: float
 ) -> Disturbance:
+    """Draw one disturbance.
+
+    Args:
+        generator: random number generator.
+        profile: profile with the ranges of all values.
+        start: time after the lock [s].
+        name: direction, see `Disturbance`.
+        scale: factor of the depth.
+    """
     drawn = generator.normal(size=3)
     direction = np.array(DIRECTIONS.get(name, tuple(drawn / np.linalg.norm(drawn))))
     arm = generator.normal(0.0, ARM_SPREAD, size=3)

@@ -30,7 +30,7 @@ from holdfast.twin.hand import (
     fill_bodies,
 )
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.operator import disturb_wrench, hold_wrench
+from holdfast.twin.operator import GUIDE_STIFFNESS, disturb_wrench, guide_wrench, hold_wrench
 
 FALLING_BODY = """<mujoco><worldbody>
   <body><freejoint/><geom size=".01"/></body>
@@ -70,7 +70,8 @@ class Action(NamedTuple):
         style: style of the disturbance; -1 for none.
         duration: duration of the disturbance [s].
         elapsed: time since it began [s].
-        pull: (3,) force of the loads on the object [N].
+        pull: (6,) force [N] and torque [N m] of the loads on the object.
+        guide: (N_GUIDE,) hand that guides the object, see `guide_wrench`.
     """
 
     anchor: Array
@@ -85,6 +86,7 @@ class Action(NamedTuple):
     duration: float
     elapsed: float
     pull: Array
+    guide: Array
 
 
 class Wrenches(NamedTuple):
@@ -289,8 +291,13 @@ def _operate(
         )  # fmt: skip
         for k in range(6):
             outside[k] += disturbed[k]
+    if action.guide[GUIDE_STIFFNESS] > 0.0:
+        ahead = time - action.time
+        guided = guide_wrench(body, action.guide, ahead, action.tremors[1], time)
+        for k in range(6):
+            outside[k] += guided[k]
     for k in range(6):
         out.total[k] = outside[k] + fingers[k]
-    for k in range(3):
+    for k in range(6):
         outside[k] += action.pull[k]
         out.total[k] += action.pull[k]

@@ -3,6 +3,8 @@
 `reference`, `gentle` and `vigorous` follow the paper: a hand grips the object and moves it, and
 a finger disturbs it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
 of holdfast 0.1, in which only a finger disturbs; they repeat its recordings and labels exactly.
+In `slips` the object also slides by other things than pushes. `long-hold` is a calm hold of
+minutes, for rates of false alarms.
 """
 
 import tomllib
@@ -16,6 +18,47 @@ GRASP_ATTEMPTS = 4
 
 Span = tuple[float, float]
 """Minimum and maximum of a number that is drawn for each grasp."""
+
+
+class SlipRanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Numbers that describe the slips that no push causes; see `slip_events.SlipKind`.
+
+    Attributes:
+        share: probability that an event of the hold is one of these and no disturbance.
+        distance: sliding distance after which everything recovers (log-uniform) [m].
+        longest: longest time after which everything recovers [s].
+        recovery: time that this takes [s].
+        weight_rate: rate at which mass is added (log-uniform) [kg/s].
+        grip_rate: rate at which the grip relaxes, in shares of its force (log-uniform) [1/s].
+        friction_rate: rate at which friction falls, in shares of it (log-uniform) [1/s].
+        friction_factor: factor to which it falls.
+        creep_speed: speed of a hand that draws the object (log-uniform) [m/s].
+        twist_rate: rate at which a torque about the grasp line grows (log-uniform) [N m/s].
+        turn_speed: spin of a hand that turns the object about that line (log-uniform) [rad/s].
+        roll_speed: spin of a hand that rolls the object between the fingers (log-uniform)
+            [rad/s].
+        roll_angle: angle by which it rolls the object, and back [rad].
+        hand_stiffness: stiffness of these hands (log-uniform) [N/m].
+        hand_tremor: rms tremor of these hands [m].
+        pull_rate: rate at which their force rises until the object slides (log-uniform) [N/s].
+    """
+
+    share: float
+    distance: Span
+    longest: float
+    recovery: Span
+    weight_rate: Span
+    grip_rate: Span
+    friction_rate: Span
+    friction_factor: Span
+    creep_speed: Span
+    twist_rate: Span
+    turn_speed: Span
+    roll_speed: Span
+    roll_angle: Span
+    hand_stiffness: Span
+    hand_tremor: float
+    pull_rate: Span
 
 
 class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -42,6 +85,8 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         glitch_rate: glitches of the hand's controller per second [1/s].
         label_margin: time by which disturbances are labelled longer at both ends [s].
         label_glitches: whether glitches are labelled, as unstable with the cause glitch.
+        arm_tremor: rms acceleration of the hand by the tremor of its arm [m/s^2].
+        slips: ranges of slips that no push causes; None: there are none.
         drawn_as: name under which random numbers are drawn; by default that of the profile.
     """
 
@@ -64,6 +109,8 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     glitch_rate: float = 0.12
     label_margin: float = 0.0
     label_glitches: bool = True
+    arm_tremor: float = 0.0
+    slips: SlipRanges | None = None
     drawn_as: str = ""
 
 

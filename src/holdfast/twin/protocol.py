@@ -14,6 +14,7 @@ from holdfast.contact import Phase
 from holdfast.sensors.types import Array
 from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import Profile
+from holdfast.twin.slip_events import SlipEvent
 
 OPEN_GAP, CLOSED_GAP = 0.035, -0.025
 """Planned gap between a pad and the object at both ends of the closing path [m]."""
@@ -51,6 +52,7 @@ class Plan(NamedTuple):
         before: time with an open hand before the grasp [s].
         after: time after the release until the end [s].
         disturbances: disturbances in order of time.
+        slip_events: events that let the object slide, in order of time.
     """
 
     profile: Profile
@@ -59,6 +61,7 @@ class Plan(NamedTuple):
     before: float
     after: float
     disturbances: Sequence[Disturbance]
+    slip_events: Sequence[SlipEvent] = ()
 
 
 class Command(NamedTuple):
@@ -77,6 +80,11 @@ class Command(NamedTuple):
     disturbance: int
     elapsed: float
     phase: Phase
+
+
+def touched_phase(slip: float) -> Phase:
+    """Return the phase while an operator touches the object, by the slip speed [m/s]."""
+    return Phase.SLIPPING if slip > SLIPPING_SPEED else Phase.DISTURBED
 
 
 class Protocol:
@@ -172,7 +180,7 @@ class Protocol:
         disturbance, elapsed = self._disturbance_at(held_for)
         phase = Phase.LOCKED
         if disturbance >= 0:
-            phase = Phase.SLIPPING if slip > SLIPPING_SPEED else Phase.DISTURBED
+            phase = touched_phase(slip)
         releasing = 1.0 - held_for / HAND_OVER_TIME
         taking = 1.0 - (self._released_at - time) / HAND_OVER_TIME
         return self._new_command(max(0.0, releasing, taking), phase, disturbance, elapsed)

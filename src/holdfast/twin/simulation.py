@@ -16,11 +16,19 @@ from holdfast.sensors.types import Array
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
-from holdfast.twin.loads import Load, load_state
+from holdfast.twin.loads import Load, LoadState, load_state
 from holdfast.twin.objects import GraspObject, object_named
-from holdfast.twin.operator import draw_disturbances, draw_tremor
+from holdfast.twin.operator import draw_disturbances, draw_tremor, tremor_at
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import MIN_TOUCH_LOAD, THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.protocol import (
+    MIN_TOUCH_LOAD,
+    THUMB_SHARE,
+    Command,
+    Plan,
+    Protocol,
+    touched_phase,
+)
+from holdfast.twin.slip_events import REST, SlipEvents, SlipState, draw_course
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_readout import Counts, Readout, UskinParameters
@@ -30,8 +38,11 @@ RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
 GRASP_CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
-MAX_DURATION = 60.0
-"""Time for which random numbers of the controller are drawn, longer than any grasp [s]."""
+MAX_DURATION, MAX_UNHELD_DURATION = 60.0, 25.0
+"""Time for which random numbers of the controller are drawn, longer than a grasp [s]; a long hold
+needs its own duration and this time before and after it."""
+TOUCH_LEVER = 0.03
+"""Lever of a fingertip about the grasp line, by which a torque counts as a touch [m]."""
 PLACE_SPREAD, TURN_SPREAD = 0.002, 0.05
 """Standard deviations of the object's position [m] and turn [rad], as a person places it."""
 GRIP_SPREAD = 0.1
@@ -132,7 +143,7 @@ class Simulation:
             chosen = msgspec.structs.replace(chosen, glitch_rate=grasp.glitch_rate)
         self.grasp, self._profile, self._loads = grasp, chosen, loads
         self.plan = plan or _draw_plan(grasp, chosen)
-        self.world = _world(grasp, chosen.glitch_rate)
+        self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
         if grasp.noise is not None:
             skin = replace(skin, noise_counts=grasp.noise)
@@ -141,6 +152,8 @@ class Simulation:
         self.command: Command | None = None
         self.n_samples = 0
         self._pressing: Pressing | None = None
+        self._slip_events = SlipEvents(self.plan.slip_events, grasp.item, 1 / RATE)
+        self._arm_tremor = draw_tremor(grasp.generator("arm"))
         self._truth_log = TruthLog(FINGERS)
         self._bodies: list[Array] = []  # (4, 18) of each sample
         self._taxel_forces: list[Array] = []  # (4, n_taxels, 3) of each sample [N]
@@ -175,8 +188,13 @@ class Simulation:
         if protocol.locked_at is not None and not was_locked:
             joints = world.hand.data.qpos[:N_JOINTS]
             self._pressing = Pressing(world.path, command.depths, joints)
-        if self._loads and was_locked:
-            world.set_load(load_state(self._loads, self.held_for))
+        slipping = self._slip_state() if was_locked else REST
+        if self._is_loaded and was_locked:
+            world.set_load(self._load(slipping))
+        if slipping.touching:
+            command = command._replace(phase=touched_phase(world.slip))
+        if slipping.grip_scale < 1.0:
+            scales = slipping.grip_scale * (np.ones(len(FINGERS)) if scales is None else scales)
         moved, released = None, protocol.is_released(self.time)
         if scales is not None and self._pressing is not None and not released:
             moved = self._pressing.displacement(scales)
@@ -188,12 +206,45 @@ class Simulation:
             object_pose=world.object_pose,
             joints=world.hand.data.qpos[:N_JOINTS],
             set_point_error=world.set_point_error,
+            **self._slip_truth(slipping),
         )
         self._bodies.append(world.bodies[:-1].copy())
         skin = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
         self._taxel_forces.append(skin.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
+
+    @property
+    def _is_loaded(self) -> bool:
+        return bool(self._loads or self.plan.slip_events or self._profile.arm_tremor)
+
+    def _slip_state(self) -> SlipState:
+        """Return what the slip events do until the next sample; nothing after a loss."""
+        if self.protocol.lost_at is not None or not self.plan.slip_events:
+            return REST
+        return self._slip_events.step(self.held_for, self.world.slip, self.world.bodies[-1])
+
+    def _load(self, slipping: SlipState) -> LoadState:
+        """Return the sum of loads, slip events and tremor of the arm."""
+        load, state = slipping.load, load_state(self._loads, self.held_for)
+        rms = self._profile.arm_tremor
+        shaken = [rms * tremor_at(self._arm_tremor, self.time, axis)[0] for axis in range(3)]
+        return load._replace(
+            force=state.force,
+            acceleration=state.acceleration + shaken,
+            friction=load.friction * state.friction,
+        )
+
+    def _slip_truth(self, slipping: SlipState) -> dict[str, Array | float]:
+        """Return the truth of what the slip events change, if there are any."""
+        if self._profile.slips is None:
+            return {}
+        return {
+            "outside_torque": self.world.outside[3:],
+            "added_mass": slipping.load.added_mass,
+            "grip_scale": slipping.grip_scale,
+            "friction_scale": slipping.load.friction,
+        }
 
     def read(self) -> dict[str, Counts]:
         """Return the counts (n_taxels, 3) of the last sample; call it after every `step`."""
@@ -223,12 +274,24 @@ class Simulation:
             labels = labels_from_truth(truth, finger, label_rule(self._profile))
             modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
         name = grasp.failed_name if self.protocol.failed else grasp.name
-        return Recording(name, modules, _metadata(grasp, self.protocol), truth)
+        metadata = {**_metadata(grasp, self.protocol), **self._slip_metadata()}
+        return Recording(name, modules, metadata, truth)
+
+    def _slip_metadata(self) -> dict[str, object]:
+        """Return the slip events in the time of the recording, if the profile has any."""
+        if self._profile.slips is None:
+            return {}
+        locked_at = self.protocol.locked_at or 0.0
+        records = self._slip_events.records
+        times = ({key: locked_at + record[key] for key in ("start", "end")} for record in records)
+        return {"slip_events": [{**r, **t} for r, t in zip(records, times, strict=True)]}
 
     def _truth(self, times: Array) -> Truth:
         """Return the truth of all samples, in which disturbances last from touch to touch."""
         truth, bodies = self._truth_log.truth(times), np.array(self._bodies)
         push = np.linalg.norm(truth.hand["outside_force"], axis=1)  # the only other contact then
+        if "outside_torque" in truth.hand:
+            push += np.linalg.norm(truth.hand["outside_torque"], axis=1) / TOUCH_LEVER
         phase = phases_from_touch(truth.hand["phase"], push, MIN_TOUCH_LOAD)
         fingers = {
             finger: {**truth.fingers[finger], "tip_pose": _poses(bodies[:, place])}
@@ -275,22 +338,29 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
     generator = grasp.generator("plan")
     scale = chosen.grip * np.exp(GRIP_SPREAD * generator.standard_normal())
     grips = scale * np.array([THUMB_SHARE * 3, 1.0, 1.0, 1.0])
-    return Plan(
+    plan = Plan(
         profile=chosen,
         grips=grips,
         speed=float(generator.uniform(*chosen.closing_speed)),
         before=float(generator.uniform(*chosen.idle)),
         after=float(generator.uniform(*chosen.idle)),
-        disturbances=draw_disturbances(generator, chosen, RETRY_DEPTH_FACTOR**grasp.attempt)
-        if grasp.case == 2
-        else (),
+        disturbances=(),
     )
+    if grasp.case != 2:
+        return plan
+    factor = RETRY_DEPTH_FACTOR**grasp.attempt
+    if chosen.slips is None:
+        return plan._replace(disturbances=draw_disturbances(generator, chosen, factor))
+    disturbances, events = draw_course(generator, chosen, chosen.slips, factor)
+    return plan._replace(disturbances=disturbances, slip_events=events)
 
 
-def _world(grasp: Grasp, glitch_rate: float) -> World:
+def _world(grasp: Grasp, chosen: Profile) -> World:
     item = grasp.item
     generator = grasp.generator("world")
-    controller = draw_controller(generator, MAX_DURATION, STEPS_PER_CONTROL * TIMESTEP, glitch_rate)
+    duration = max(MAX_DURATION, chosen.hold + MAX_UNHELD_DURATION)
+    period = STEPS_PER_CONTROL * TIMESTEP
+    controller = draw_controller(generator, duration, period, chosen.glitch_rate)
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     return World(

@@ -21,6 +21,7 @@ from holdfast.twin.hand import (
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
+from holdfast.twin.operator import NO_GUIDE
 from holdfast.twin.physics import Action, Physics, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
@@ -78,9 +79,15 @@ class ContactWorld:
         """Position [m] and quaternion w, x, y, z of the object, (7,)."""
         return np.concatenate([self.bodies[-1, :3], self.hand.data.qpos[-4:]])
 
-    def scale_friction(self, factor: float) -> None:
-        """Set the friction of the object as a multiple of its own, until it is set again."""
-        self.constants.solid[MU_STATIC : MU_KINETIC + 1] = factor * self._frictions
+    def scale_friction(self, factor: float, steady: float = 0.0) -> None:
+        """Set the friction of the object as a multiple of its own, until it is set again.
+
+        Args:
+            factor: factor of both coefficients.
+            steady: how far the kinetic coefficient is raised to the static one, from 0 to 1.
+        """
+        raised = steady * (self._frictions[0] - self._frictions)
+        self.constants.solid[MU_STATIC : MU_KINETIC + 1] = factor * (self._frictions + raised)
 
 
 class World(ContactWorld):
@@ -112,21 +119,40 @@ class World(ContactWorld):
             hand.arrays, self.contact, self.constants, controller, self.bodies,
             Wrenches(self.outside, np.zeros(6)),
         )  # fmt: skip
-        self._pull = np.zeros(3)
+        self._pull, self._guide = np.zeros(6), NO_GUIDE
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
+        body = hand.object_body
+        self._inertia = np.array([hand.model.body_mass[body], *hand.model.body_inertia[body]])
+        first = hand.model.body_dofadr[body]
+        self._freedom = slice(first, first + 6)
+        self._constant_inertia = hand.model.dof_M0[self._freedom].copy()
+        self._added_mass = 0.0
         self._disturbance = -1
         self._tick = 0
         self._place(start)
 
     def set_load(self, load: LoadState) -> None:
-        """Set force, friction and acceleration of the hand until they are set again.
+        """Set all loads and the hand's acceleration until they are set again.
 
         The hand does not move in the world: its acceleration is a change of gravity.
         """
-        self._pull[:] = load.force
+        self._pull[:3], self._pull[3:] = load.force, load.torque
+        self._guide = load.guide
         self.hand.model.opt.gravity[:] = [0.0, 0.0, -GRAVITY] - load.acceleration
-        self.scale_friction(load.friction)
+        self.scale_friction(load.friction, load.steady)
+        self._add_mass(load.added_mass)
+
+    def _add_mass(self, mass: float) -> None:
+        """Set mass and inertia of the object, as if the added mass were spread over it."""
+        if mass == self._added_mass:
+            return
+        self._added_mass = mass
+        model, body = self.hand.model, self.hand.object_body
+        factor = (self.item.mass + mass) / self.item.mass
+        model.body_mass[body] = model.body_subtreemass[body] = factor * self._inertia[0]
+        model.body_inertia[body] = factor * self._inertia[1:]
+        model.dof_M0[self._freedom] = factor * self._constant_inertia  # of a body that is alone
 
     def advance(
         self, command: Command, plan: Plan, anchor: Array, displacement: Array | None = None
@@ -161,7 +187,7 @@ class World(ContactWorld):
         return Action(
             anchor, command.hold, GRAVITY * self.item.mass, self.tremors, plan.profile.tremor,
             self.hand.data.time, self._parameters, self._origin, style, duration,
-            command.elapsed, self._pull,
+            command.elapsed, self._pull, self._guide,
         )  # fmt: skip
 
     def _place(self, start: Array) -> None:

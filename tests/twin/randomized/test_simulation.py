@@ -4,6 +4,7 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
+from holdfast.twin.randomized import simulation
 from holdfast.twin.randomized.drawing import SENSOR_KINDS, draw_object, draw_sensor
 from holdfast.twin.randomized.scenario import EVENT_KINDS, draw_events
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
@@ -32,7 +33,7 @@ def test_every_hand_has_two_to_four_fingers_and_labels(hands):
 
 
 def test_a_stable_object_does_not_slide(hands):
-    for hand in (hand for hand in hands if hand.truth is not None):
+    for hand in hands:
         for name, arrays in hand.truth.fingers.items():
             times = hand.modules[name].times
             stable = hand.modules[name].label_states == ContactState.STABLE.code
@@ -40,11 +41,33 @@ def test_a_stable_object_does_not_slide(hands):
             assert stable.sum() == 0 or np.quantile(slip[stable], 0.99) < 0.0015
 
 
+def test_a_recording_that_begins_in_contact_has_the_truth_of_its_part(monkeypatch):
+    """The truth of the cut recording is that of the whole, from its first sample on."""
+    seeds = range(20)
+    cut = next(
+        hand
+        for hand in (simulate_random(RandomHold(0, seed=seed)) for seed in seeds)
+        if "starts_loaded" in hand.metadata
+    )
+    monkeypatch.setattr(simulation._Run, "_cut", lambda _, whole, generator: whole)
+    whole = simulate_random(RandomHold(0, seed=cut.metadata["seed"]))
+    n = len(cut.truth.times)
+    assert 0 < n < len(whole.truth.times)
+    first = min(float(module.times[0]) for module in cut.modules.values())
+    assert abs(cut.truth.times[0] - first) < 2 * cut.modules["thumb"].period
+    np.testing.assert_array_equal(cut.truth.times, whole.truth.times[-n:])
+    assert cut.truth.hand.keys() == whole.truth.hand.keys()
+    for name, array in cut.truth.hand.items():
+        np.testing.assert_array_equal(array, whole.truth.hand[name][-n:])
+    for finger, arrays in cut.truth.fingers.items():
+        assert arrays.keys() == whole.truth.fingers[finger].keys()
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(array, whole.truth.fingers[finger][name][-n:])
+
+
 def test_readings_show_the_contact_force():
     """Of a sensor without gains, cross-talk or noise to speak of, the sum of the taxels."""
     hand = simulate_random(RandomHold(2, seed=3, kind="papillarray"))
-    if hand.truth is None:
-        pytest.skip("this hold begins in contact, and has no truth")
     name = "thumb"
     module = hand.modules[name]
     force = np.linalg.norm(fingertip_force(module.readings, module.sensor, tare=0.3), axis=1)

@@ -277,7 +277,11 @@ class _Run:
             name: module.slice(int(np.searchsorted(module.times, start)), module.n_samples)
             for name, module in whole.modules.items()
         }
-        return Recording(whole.name, modules, {**whole.metadata, "starts_loaded": True})
+        metadata = {**whole.metadata, "starts_loaded": True}
+        truth = whole.truth
+        if truth is not None:
+            truth = truth.slice(int(np.searchsorted(truth.times, start)), len(truth.times))
+        return Recording(whole.name, modules, metadata, truth)
 
     def _metadata(self) -> dict[str, object]:
         item = self.world.item
