@@ -67,9 +67,11 @@ def labels_from_truth(
     acts, so the hand alone governs the object, as in the paper. The hand-over at both ends is
     therefore not stable.
 
-    Unstable: while the hand closes or opens on the object; during disturbances (cause slip if
-    the finger slides in them); and after a glitch of the hand's controller, together with the
-    slip that it causes (cause glitch).
+    Unstable: while the hand closes or opens on the object; during disturbances; while the finger
+    slides; and after a glitch of the hand's controller, together with the slip that it causes
+    (cause glitch). The cause is by sample: slip while the finger slides, disturbance in the rest
+    of an interval in which an outside force acts. The margins and gaps of an interval without
+    one have no cause.
 
     No contact: otherwise.
 
@@ -92,13 +94,14 @@ def labels_from_truth(
     slip_of_glitch = runs_with(sliding, glitched)
     glitched, sliding = glitched | slip_of_glitch, sliding & ~slip_of_glitch
     pushed = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
-    unstable = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | pushed
+    pushed |= np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING))
+    unstable = sliding | pushed
     unstable = held & widen_runs(join_runs(unstable, times, rule.merge), times, rule.margin)
     unstable = held & _joined_to(phase == Phase.CLOSING, unstable, times, rule.merge)
     lost = _from_first(held) & ~_from_first(phase == Phase.RELEASED) & (phase == Phase.FREE)
-    slipped = runs_with(unstable, sliding)
     closing = phase == Phase.CLOSING
-    states = _states(touching, held, unstable, slipped, closing, lost, glitched)
+    disturbed = runs_with(unstable, pushed)
+    states = _states(touching, held, unstable, disturbed, sliding, closing, lost, glitched)
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
 
@@ -179,13 +182,14 @@ def phases_from_touch(
 
 
 def _states(
-    touching: Mask, held: Mask, unstable: Mask, slipped: Mask, closing: Mask, lost: Mask,
-    glitched: Mask,
+    touching: Mask, held: Mask, unstable: Mask, disturbed: Mask, sliding: Mask, closing: Mask,
+    lost: Mask, glitched: Mask,
 ) -> list[tuple[ContactState, Cause | None]]:  # fmt: skip
     """Return the state and cause of each sample: those of the first rule that applies."""
     rules = (
-        (unstable & slipped, (ContactState.UNSTABLE, Cause.SLIP)),
-        (unstable, (ContactState.UNSTABLE, Cause.DISTURBANCE)),
+        (unstable & sliding, (ContactState.UNSTABLE, Cause.SLIP)),
+        (unstable & disturbed, (ContactState.UNSTABLE, Cause.DISTURBANCE)),
+        (unstable, (ContactState.UNSTABLE, None)),
         (~touching & lost, (ContactState.NO_CONTACT, Cause.LOST)),
         (~touching, (ContactState.NO_CONTACT, None)),
         (glitched, (ContactState.UNSTABLE, Cause.GLITCH)),
