@@ -43,7 +43,7 @@ from holdfast.training.training_samples import (
     usable_rows,
 )
 
-SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.1
+SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
 SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
