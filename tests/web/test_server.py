@@ -3,6 +3,7 @@ import os
 import signal
 import socket
 import threading
+import time
 import urllib.request
 from contextlib import asynccontextmanager
 
@@ -45,7 +46,14 @@ def test_signals_end_the_server_in_order(number):
 
     def announce(url):
         urls.append(url)
-        threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
+        threading.Thread(target=send_once_handled).start()
+
+    default = signal.getsignal(number)
+
+    def send_once_handled():
+        while signal.getsignal(number) is default:
+            time.sleep(0.01)
+        os.kill(os.getpid(), number)
 
     run_server(app(), "127.0.0.1", 0, announce)
     assert urls[0].startswith("http://127.0.0.1:")

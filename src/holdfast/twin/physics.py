@@ -20,15 +20,8 @@ from numba.extending import intrinsic
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact, touch
-from holdfast.twin.control import STEPS_PER_CONTROL, Controller, control
-from holdfast.twin.hand import (
-    SUBSTEPS,
-    TIMESTEP,
-    HandArrays,
-    HandModel,
-    apply_forces,
-    fill_bodies,
-)
+from holdfast.twin.control import Controller, control
+from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.operator import GUIDE_STIFFNESS, disturb_wrench, guide_wrench, hold_wrench
 
@@ -101,10 +94,25 @@ class Wrenches(NamedTuple):
     total: Array
 
 
+class Steps(NamedTuple):
+    """Steps of a sample.
+
+    Attributes:
+        n: number of steps.
+        period: duration of a step [s], that of the model.
+        per_control: steps in a step of the controller.
+    """
+
+    n: int
+    period: float
+    per_control: int
+
+
 class Physics(NamedTuple):
     """State of hand, object and contact, which a step writes in place, and what it needs.
 
     Attributes:
+        steps: of a sample.
         arrays: arrays of MuJoCo's state.
         contact: state of the contact.
         constants: skin and object.
@@ -113,6 +121,7 @@ class Physics(NamedTuple):
         wrenches: force and torque on the object.
     """
 
+    steps: Steps
     arrays: HandArrays
     contact: Contact
     constants: Constants
@@ -214,11 +223,11 @@ def advance_sample(
         The largest error of a set-point, in a glitch of the controller [rad].
     """
     worst, time = 0.0, action.time
-    for k in range(SUBSTEPS):
+    for k in range(physics.steps.n):
         _call(engine.first_half, engine.model, engine.data)
         worst = max(worst, _apply_all(physics, tick, k, target, action, time))
         _call(engine.second_half, engine.model, engine.data)
-        time += TIMESTEP  # as MuJoCo adds it
+        time += physics.steps.period  # as MuJoCo adds it
     return worst
 
 
@@ -227,11 +236,11 @@ def advance_sample_by_calls(
 ) -> float:
     """Advance the physics by one sample, as `advance_sample`, by MuJoCo's public functions."""
     worst, time = 0.0, action.time
-    for k in range(SUBSTEPS):
+    for k in range(physics.steps.n):
         mujoco.mj_step1(hand.model, hand.data)
         worst = max(worst, _apply_all(physics, tick, k, target, action, time))
         mujoco.mj_step2(hand.model, hand.data)
-        time += TIMESTEP  # as MuJoCo adds it
+        time += physics.steps.period  # as MuJoCo adds it
     return worst
 
 
@@ -245,18 +254,19 @@ def _apply_all(
         The largest error of a set-point, in a glitch of the controller [rad]; 0 between the
         steps of the controller.
     """
-    arrays, contact, bodies = physics.arrays, physics.contact, physics.bodies
+    steps, arrays = physics.steps, physics.arrays
+    contact, bodies = physics.contact, physics.bodies
     fill_bodies(arrays, bodies)
-    touch(contact, physics.constants, bodies, TIMESTEP)
-    elapsed = action.elapsed + k * TIMESTEP
+    touch(contact, physics.constants, bodies, steps.period)
+    elapsed = action.elapsed + k * steps.period
     _operate(action, bodies[-1], contact.wrench, time, elapsed, physics.wrenches)
     apply_forces(arrays, contact.tips, physics.wrenches.total, bodies)
-    if (tick + k) % STEPS_PER_CONTROL != 0:
+    if (tick + k) % steps.per_control != 0:
         return 0.0
-    number = (tick + k) // STEPS_PER_CONTROL
+    number = (tick + k) // steps.per_control
     control(
         physics.controller, number, arrays.qpos, arrays.qfrc_bias, target,
-        STEPS_PER_CONTROL * TIMESTEP, arrays.qfrc_applied,
+        steps.per_control * steps.period, arrays.qfrc_applied,
     )  # fmt: skip
     return _glitch(physics.controller, number)
 

@@ -8,13 +8,14 @@ from holdfast.contact import Phase
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import TIP_SLIP, TIP_SLIPPING_SHARE, Contact, constants_of, new_contact
-from holdfast.twin.control import Controller
+from holdfast.twin.control import STEPS_PER_CONTROL, Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import (
     FINGERS,
     GRAVITY,
     N_JOINTS,
     SUBSTEPS,
+    TIMESTEP,
     HandModel,
     fill_bodies,
 )
@@ -22,7 +23,7 @@ from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import NO_GUIDE
-from holdfast.twin.physics import Action, Physics, Wrenches, advance_of
+from holdfast.twin.physics import Action, Physics, Steps, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
@@ -115,8 +116,9 @@ class World(ContactWorld):
         super().__init__(hand, item, curved_fingertip())
         self.path, self.controller, self.tremors = path, controller, tremors
         self._advance = advance_of(hand)
+        steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
         self._physics = Physics(
-            hand.arrays, self.contact, self.constants, controller, self.bodies,
+            steps, hand.arrays, self.contact, self.constants, controller, self.bodies,
             Wrenches(self.outside, np.zeros(6)),
         )  # fmt: skip
         self._pull, self._guide = np.zeros(6), NO_GUIDE

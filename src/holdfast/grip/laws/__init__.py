@@ -1,8 +1,9 @@
-"""Laws of grip force, one file for each source, behind one interface."""
+"""Laws of grip force, one file each, behind one interface."""
 
 from collections.abc import Callable
 
-from holdfast.grip.laws.base import Fixed, Law, Touch, Wish
+from holdfast.grip.laws.base import Law, Touch, Wish
+from holdfast.grip.laws.fixed import Fixed
 from holdfast.grip.laws.friction_margin import FrictionMargin
 from holdfast.grip.laws.pr2 import Pr2
 from holdfast.grip.laws.stability import Stability

@@ -1,4 +1,4 @@
-"""What a grip law sees, and what it returns; the law of a hand without control."""
+"""What a grip law sees, and what it returns."""
 
 import math
 from abc import ABC, abstractmethod
@@ -129,14 +129,3 @@ class Law(ABC):
 def stay(touches: Sequence[Touch]) -> list[Wish]:
     """Return wishes that change nothing."""
     return [(touch.scale, GripReason.NONE) for touch in touches]
-
-
-class Fixed(Law):
-    """Law that keeps the force with which the grip began; others are compared with it."""
-
-    def start(self, touches: Sequence[Touch], thumb: int) -> None:
-        """Do nothing."""
-
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
-        """Return the scales as they are."""
-        return stay(touches)
