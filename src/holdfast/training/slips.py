@@ -25,11 +25,12 @@ from holdfast.metrics.slip_thresholds import (
     slip_summary,
     total_curve,
 )
-from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
+from holdfast.metrics.slip_truth import SLIDING, STILL, SlipTruth, slip_truth
 from holdfast.metrics.slips import SlipCounts, SlipMetrics, found_shares, slip_metrics
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Flags
 from holdfast.training.dataset_scan import OneRecording, Progress
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.training_samples import (
@@ -47,6 +48,11 @@ SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
 SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
+EARLY_DURATION = 0.1
+"""Time after the onset of a slip whose samples train the rule: later it is found already [s]."""
+QUIET_STEP = 10
+"""Only every tenth sample of quiet hold trains, beside all that are disturbed: the rule must tell
+a slip from a push."""
 MIN_SLIDING_SAMPLES = 50
 """Fewer sliding samples train no slip rule."""
 N_SHOWN = 3
@@ -120,7 +126,11 @@ def gather_slip_samples(
 def _samples_of_part(
     plan: SamplesPlan, place: int, part: Sequence[Recording]
 ) -> dict[str, FingerSamples]:
-    """Return the samples of one recording by finger; class 1 slides."""
+    """Return the samples of one recording by finger; class 1 slides.
+
+    A model of one hand learns the first 0.1 s of slips, and to tell them from pushes. On real
+    recordings that misled a model of any hand, so it learns all that slides and all that does not.
+    """
     scan, setting = plan.scan, plan.setting
     (recording,) = part
     if not scan.relative:
@@ -135,11 +145,14 @@ def _samples_of_part(
         if truth is None:
             continue
         states = np.full(module.n_samples, UNKNOWN, dtype=np.int8)
-        states[truth.codes == SLIDING], states[truth.codes == STILL] = STABLE, UNSTABLE
+        slides = truth.codes == SLIDING if scan.relative else _is_early(truth, module.times)
+        states[slides], states[truth.codes == STILL] = STABLE, UNSTABLE
         usable = usable_rows(rows.features, states)
         step = scan.recordings[place].step * plan.step
-        still = usable[states[usable] == UNSTABLE][::step]
-        kept = np.sort(np.concatenate([usable[states[usable] == STABLE], still]))
+        is_still, is_quiet = states[usable] == UNSTABLE, truth.quiet[usable]
+        quiet = usable[is_still & is_quiet][:: step * (1 if scan.relative else QUIET_STEP)]
+        disturbed = usable[is_still & ~is_quiet][::step]
+        kept = np.sort(np.concatenate([usable[~is_still], quiet, disturbed]))
         fingers[finger] = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),
@@ -150,6 +163,15 @@ def _samples_of_part(
             len(usable),
         )
     return fingers
+
+
+def _is_early(truth: SlipTruth, times: Array) -> Flags:
+    """Return where a slip has begun less than `EARLY_DURATION` ago, and slides."""
+    early = np.zeros(len(times), dtype=bool)
+    for slip in truth.slips:
+        first, last = np.searchsorted(times, (slip.onset, slip.onset + EARLY_DURATION))
+        early[first:last] = True
+    return np.asarray(early & (truth.codes == SLIDING))
 
 
 @dataclass(frozen=True)
