@@ -144,6 +144,14 @@ def test_tokens_that_are_refused(capsys, grasp, tmp_path):
         assert refusal(capsys, MODEL, grasp, *words) == text
 
 
+def test_a_model_without_a_slip_rule_is_reported_once(capsys, grasp):
+    words = ("builtin:noise-floor", grasp, "--once", "--speed", 20, "--port", 0, "--json")
+    code, out, err = run(capsys, *words)
+    assert code == 0
+    assert err.count("builtin:noise-floor has no slip rule: slip_probability is null") == 1
+    assert "slip rule" not in out
+
+
 def test_once_ends_with_the_recording(capsys, grasp):
     code, out, err = run(capsys, MODEL, grasp, "--once", "--speed", 20, "--port", 0)
     assert (code, out) == (0, "")

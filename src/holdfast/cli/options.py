@@ -313,6 +313,18 @@ def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, obje
         )
 
 
+def report_missing_slip_rules(model: "Model") -> None:
+    """Print that the slip probability of a model, or of some of its fingers, is always null."""
+    without = [name for name, part in model.fingers.items() if part.slip is None]
+    if not without:
+        return
+    only = "" if len(without) == len(model.fingers) else f" for {', '.join(without)}"
+    print_message(
+        f"{model.name} has no slip rule{only}: slip_probability is null (holdfast train on "
+        "recordings with a truth adds one)"
+    )
+
+
 def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[int, ...]]:
     """Return the indices of the taxels of each finger from the text of `--ignore`.
 

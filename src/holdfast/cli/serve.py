@@ -29,6 +29,7 @@ from holdfast.cli.options import (
     SourceArgument,
     SpeedOption,
     check_speed,
+    report_missing_slip_rules,
 )
 from holdfast.cli.terminal.console import print_json, print_message
 
@@ -93,6 +94,7 @@ def serve(
     compile_kernels()
 
     def announce(url: str) -> None:
+        report_missing_slip_rules(loaded)
         _announce(page_url(url, token), loaded, source, as_json=as_json)
 
     opened, commanded = _find(source, settings.hand, speed=speed, loop=not once)

@@ -201,6 +201,7 @@ def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
         normal=tuple(sensor.normal.tolist()),
         contact_threshold=part.contact_threshold,
         probability_threshold=part.classifier.threshold,
+        slip_threshold=None if part.slip is None else part.slip.classifier.threshold,
     )
 
 
@@ -219,4 +220,5 @@ def _finger_series(estimates: list[StreamEstimate], name: str) -> schema.Estimat
         instability=[np.nan if row is None else row.instability for row in rows],
         stable_probability=[np.nan if row is None else row.stable_probability for row in rows],
         state=[None if row is None else row.state.code for row in rows],
+        slip_probability=[None if row is None else row.slip_probability for row in rows],
     )

@@ -67,6 +67,7 @@ def test_the_summary_of_a_source_without_samples(capsys):
         "fingers": {},
         "hand": {"n_samples": 0, "states": dict.fromkeys(map(str, ContactState), 0.0)},
         "events": [],
+        "slips": None,
     }
     summary.print()
     assert capsys.readouterr().out.splitlines()[1].split()[:2] == ["hand", "0"]

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers.slip import SlipRule
 from holdfast.cli import main
 from holdfast.cli.detect.verb import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
@@ -21,6 +22,7 @@ from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
+from holdfast.metrics.masks import runs
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -28,9 +30,13 @@ from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
     "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults",
-    "faulty_taxels", "cause",
+    "faulty_taxels", "cause", "slip_probability",
 ]  # fmt: skip
 NOISE_FLOOR = "builtin:noise-floor"
+NO_SLIP_RULE = (
+    "{} has no slip rule: slip_probability is null (holdfast train on recordings with a truth "
+    "adds one)\n"
+)
 
 
 def finger_model(name):
@@ -86,8 +92,10 @@ def refusal(capsys, *words):
 
 
 def lines(capsys, *words):
+    """Return the lines, and the messages but the one about a missing slip rule."""
     assert main(["detect", *map(str, words)]) == 0
     out, err = capsys.readouterr()
+    err = err.replace(NO_SLIP_RULE.format(words[0]), "")
     return [json.loads(line) for line in out.splitlines()], err
 
 
@@ -109,6 +117,7 @@ def plain(estimate):
         "faults": [fault.value for fault in estimate.faults],
         "faulty_taxels": [taxel + 1 for taxel in estimate.faulty_taxels],
         "cause": estimate.cause,
+        "slip_probability": estimate.slip_probability,
     }
 
 
@@ -169,7 +178,8 @@ class TestSummary:
     def test_shares_and_events(self, capsys, model, grasp):
         document = summary(capsys, model, grasp)
         want = detect(Model.load(model), load_recording(grasp))
-        assert list(document) == ["model", "name", "fingers", "hand", "events"]
+        assert list(document) == ["model", "name", "fingers", "hand", "events", "slips"]
+        assert document["slips"] is None
         assert (document["model"], document["name"]) == (str(model), "grasp")
         for finger, trace in want.fingers.items():
             shares = document["fingers"][finger]
@@ -216,6 +226,106 @@ class TestSummary:
         steady.save(path)
         assert summary(capsys, path, grasp)["events"] != raw
         assert summary(capsys, path, grasp, "--raw")["events"] == raw
+
+
+def test_a_model_without_a_slip_rule_says_so_once(capsys, model, grasp):
+    for words in ([], ["--summary"], ["--summary", "--json"]):
+        assert main(["detect", str(model), str(grasp), *words]) == 0
+        out, err = capsys.readouterr()
+        assert err == NO_SLIP_RULE.format(model)
+        assert "slip rule" not in out
+        assert words or {json.loads(line)["slip_probability"] for line in out.splitlines()} == {
+            None
+        }
+
+
+def with_slip_rule(model, fingers=("thumb", "index")):
+    """Return a model whose fingers slide where sigma is over 13; the rule has no hold."""
+    classifier = LinearClassifier(mean=(10.0,), scale=(3.0,), coefficients=(2.0,), intercept=-2.0)
+    parts = {
+        name: msgspec.structs.replace(part, slip=SlipRule(classifier) if name in fingers else None)
+        for name, part in model.fingers.items()
+    }
+    return msgspec.structs.replace(model, fingers=parts)
+
+
+class TestSlips:
+    """A slip is an event of its own: it begins and ends, whatever the state is."""
+
+    @pytest.fixture
+    def sliding(self, model, tmp_path):
+        path = tmp_path / "slips.json"
+        with_slip_rule(Model.load(model)).save(path)
+        return path
+
+    @pytest.fixture
+    def want(self, sliding, grasp):
+        """Slips by finger: first sample, first sample after it or None, largest probability."""
+        slips = {}
+        for name, trace in detect(Model.load(sliding), load_recording(grasp)).fingers.items():
+            found = runs(trace.slip_probability >= 0.5)
+            slips[name] = [
+                (
+                    trace.times[start],
+                    trace.times[end] if end < len(trace) else None,
+                    trace.slip_probability[start:end].max(),
+                )
+                for start, end in found
+            ]
+        return slips
+
+    def test_lines_have_the_probability_and_no_message(self, capsys, sliding, grasp):
+        got, err = lines(capsys, sliding, grasp)
+        assert err == ""
+        for line in got:
+            assert (line["slip_probability"] is None) == (line["state"] == "UNKNOWN")
+            assert (line["cause"] == "slip") == ((line["slip_probability"] or 0) >= 0.5)
+
+    def test_the_summary_has_begin_end_and_probability(self, capsys, sliding, grasp, want):
+        slips = summary(capsys, sliding, grasp)["slips"]
+        assert [slip["begin"] for slip in slips] == sorted(slip["begin"] for slip in slips)
+        for finger, expected in want.items():
+            got = [slip for slip in slips if slip["finger"] == finger]
+            assert [
+                (slip["begin"], slip["end"], slip["max_probability"]) for slip in got
+            ] == expected
+            assert len(got) > 5
+
+    def test_the_table(self, capsys, sliding, grasp, want):
+        assert main(["detect", str(sliding), str(grasp), "--summary"]) == 0
+        out = capsys.readouterr().out
+        begin, end, probability = want["thumb"][0]
+        row = rf"^ +{begin:.3f} +{end:.3f} +thumb +{100 * probability:.0f}$"
+        assert re.search(row, out, re.MULTILINE)
+        assert re.search(r"^and \d+ more slips \(--json prints all\)$", out, re.MULTILINE)
+
+    def test_a_source_without_a_slip_says_so(self, capsys, sliding, save):
+        whole = synthetic_recording("a", 1, ("thumb", "index"))
+        modules = {name: module.slice(0, 150) for name, module in whole.modules.items()}
+        path = save(replace(whole, modules=modules))
+        assert main(["detect", str(sliding), str(path), "--summary"]) == 0
+        assert capsys.readouterr().out.endswith("\nno slips\n")
+        assert summary(capsys, sliding, path)["slips"] == []
+
+    def test_a_terminal_shows_begin_and_end(self, capsys, monkeypatch, sliding, grasp, want):
+        monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+        assert main(["detect", str(sliding), str(grasp)]) == 0
+        rows = capsys.readouterr().out.splitlines()[1:]
+        slips = [row for row in rows if " slip begins " in row or " slip ends " in row]
+        assert len(slips) == sum((end is not None) + 1 for s in want.values() for _, end, _ in s)
+        assert all(len(row) <= 80 for row in slips)
+        begin, end, probability = want["thumb"][0]
+        (last,) = [row for row in slips if row.startswith(f"{end:9.3f} s  thumb     slip ends")]
+        lasted = f"{end - begin:.3f} s, largest P(slip) {100 * probability:.0f} %"
+        assert last.endswith(lasted)
+
+    def test_fingers_without_a_rule_are_named(self, capsys, model, grasp, tmp_path):
+        path = tmp_path / "half.json"
+        with_slip_rule(Model.load(model), ["thumb"]).save(path)
+        got, err = lines(capsys, path, grasp)
+        assert err.startswith(f"{path} has no slip rule for index: slip_probability is null ")
+        assert {x["slip_probability"] for x in got if x["finger"] == "index"} == {None}
+        assert any(x["slip_probability"] for x in got if x["finger"] == "thumb")
 
 
 class TestNumbersOfTaxels:
@@ -477,7 +587,8 @@ def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
     out, err = capsys.readouterr()
-    assert err == "times since the first sample, at 1795364053.990 s\n"
+    origin = "times since the first sample, at 1795364053.990 s\n"
+    assert err == NO_SLIP_RULE.format(NOISE_FLOOR) + origin
     assert all(0 < float(row.split()[0]) < 12 for row in out.splitlines()[1:])
 
 

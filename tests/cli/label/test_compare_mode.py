@@ -1,8 +1,11 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from holdfast.contact import Cause
 from holdfast.io import labels_path, load_recording, save_labels
+from holdfast.recordings import Label
 
 from .helpers import run, run_json, save_manual_labels
 
@@ -50,3 +53,32 @@ def test_agreement_of_label_files(capsys, folder):
     assert row.split()[:3] == ["one", "thumb", f"{thumb['kappa']:.3f}"]
     assert "-100" in out
     assert err.startswith("two is left out: no labels of 'two' in ")
+
+
+def test_causes_are_counted_by_sample(capsys, folder):
+    """A has a slip within a disturbance; B calls all of it a disturbance."""
+    path, eve = folder / "one.parquet", folder.parent / "eve"
+    eve.mkdir()
+    recording = load_recording(path, labels=False)
+    times = recording.modules["thumb"].times
+    start, slip, back, end = (float(times[k]) for k in (300, 400, 430, 500))
+    whole = [Label(start, end, "UNSTABLE", "disturbance")]
+    cut = [
+        Label(start, slip, "UNSTABLE", "disturbance"),
+        Label(slip, back, "UNSTABLE", "slip"),
+        Label(back, end, "UNSTABLE", "disturbance"),
+    ]
+    save_labels(recording.with_labels({"thumb": cut}), path, force=True)
+    save_labels(recording.with_labels({"thumb": whole}), eve / "one.parquet")
+    found = run_json(capsys, "--compare", labels_path(path), eve / "one.labels.json")["pooled"]
+    expected = np.zeros((len(Cause), len(Cause)), dtype=int)
+    disturbance, slip_place = (list(Cause).index(name) for name in ("disturbance", "slip"))
+    expected[disturbance, disturbance], expected[slip_place, disturbance] = 170, 30
+    assert found["causes"] == expected.tolist()
+    assert found["kappa_cause"] == 0.0
+    _, out, _ = run(capsys, "--compare", labels_path(path), eve / "one.labels.json")
+    rows = [line.split() for line in out.splitlines()]
+    at = rows.index(["cause", "disturbance"])
+    table = [row for row in rows[at + 1 :] if row and row[0] in ("disturbance", "slip")]
+    assert table == [["disturbance", "170"], ["slip", "30"]]
+    assert "their kappa is 0.000" in " ".join(out.split())

@@ -92,6 +92,50 @@ def test_label_undo_redo_save_and_reload(visit, service):
     shows(page, "#save-text", "saved by ada")
 
 
+SLIP_COLUMNS = """() => {
+  const canvas = holdfast.plot.canvases.labels, [, bottom] = holdfast.plot.rows[0].labels;
+  const ratio = canvas.width / holdfast.plot.view.width, context = canvas.getContext("2d");
+  const style = getComputedStyle(document.documentElement).getPropertyValue("--slip").trim();
+  const wanted = [1, 3, 5].map((k) => parseInt(style.slice(k, k + 2), 16));
+  const y = Math.round(ratio * (bottom - 2));
+  const row = context.getImageData(0, y, canvas.width, 1).data;
+  const columns = [];
+  for (let x = 0; x < canvas.width; x += 1) {
+    if (wanted.every((value, k) => row[4 * x + k] === value)) columns.push(x / ratio);
+  }
+  return [columns, [8, 10, 12, 12.02].map((time) => holdfast.plot.view.x(time))];
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_a_slip_within_a_disturbance_is_drawn_apart_and_kept_apart(
+    visit, service, scheme, tmp_path
+):
+    parts = [
+        (6, 8, "disturbance"), (8, 10, "slip"), (10, 12, "disturbance"),
+        (12, 12.02, "slip"), (12.02, 14, "disturbance"),
+    ]  # fmt: skip
+    service.recordings[0].save(
+        {"thumb": [label(start, end, "unstable", cause) for start, end, cause in parts]}
+    )
+    page = visit(service.url, scheme=scheme)
+    ready(page)
+    page.wait_for_timeout(100)
+    page.screenshot(path=tmp_path / "page.png")
+    columns, (start, end, short, short_end) = page.evaluate(SLIP_COLUMNS)
+    long = [x for x in columns if x < (end + short) / 2]
+    assert (min(long), max(long)) == (pytest.approx(start, abs=2), pytest.approx(end, abs=2))
+    assert short_end - short < 2  # too narrow for a text, and still drawn
+    narrow = [x for x in columns if x not in long]
+    assert narrow
+    assert narrow == pytest.approx([short] * len(narrow), abs=2)
+    drag(page, "thumb", 20, 22)
+    page.keyboard.press("2")
+    saved(page)
+    kept = [(x["start"], x["end"], x["cause"]) for x in service.saves[-1]["labels"]["thumb"][:5]]
+    assert kept == parts
+
+
 def test_keys_change_the_clicked_label_or_the_next_label(visit, service):
     service.recordings[0].save({"thumb": [label(5, 9, "stable")]})
     page = visit(service.url)

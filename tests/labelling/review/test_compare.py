@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.metrics import cohen_kappa_score
 
-from holdfast.contact import ContactState
+from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.labelling.review.compare import Span, cohens_kappa, compare, pool
 from holdfast.recordings import Label, label_states, labels_from_samples
@@ -220,6 +220,33 @@ def test_pooled_by_finger_and_over_all():
 def test_pooled_of_nothing():
     pooled = pool([]).pooled
     assert (pooled.kappa, pooled.n, pooled.only_a) == (None, 0, 0.0)
+
+
+def caused(*parts):
+    """Unstable labels from (start, end, cause)."""
+    return [Label(start, end, "UNSTABLE", cause) for start, end, cause in parts]
+
+
+def test_causes_are_counted_by_sample_where_both_have_one():
+    a = caused((0, 2, "disturbance"), (2, 5, "slip"), (5, 8, "disturbance"), (8, 9, None))
+    b = caused((0, 3, "disturbance"), (3, 5, "slip"), (5, 6, None), (6, 9, "disturbance"))
+    part = compare({"thumb": a}, {"thumb": b}, {"thumb": np.arange(10.0)})
+    found = part.fingers["thumb"]
+    disturbance, slip = list(Cause).index("disturbance"), list(Cause).index("slip")
+    causes = np.array(found.causes)
+    assert causes[[disturbance, slip]][:, [disturbance, slip]].tolist() == [[4, 0], [1, 2]]
+    assert causes.sum() == 7
+    codes = [0, 0, 1, 1, 1, 0, 0], [0, 0, 0, 1, 1, 0, 0]
+    assert found.kappa_cause == pytest.approx(cohen_kappa_score(*codes))
+    assert (found.kappa, found.n) == (None, 9)  # of one state, for kappa of the states
+    assert pool([part, part]).pooled.causes == (2 * causes).tolist()
+    assert pool([part, part]).pooled.kappa_cause == found.kappa_cause
+
+
+def test_without_causes_there_is_no_kappa_of_causes():
+    found = of("ssuu", "ssuu")
+    assert np.sum(found.causes) == 0
+    assert found.kappa_cause is None
 
 
 def test_the_json_document():

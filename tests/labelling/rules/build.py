@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from holdfast.labelling.review.spans import spans_of
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 
@@ -92,13 +93,17 @@ def tracked(object_pose, tip_pose=None, start=0.0, **more):
 
 
 def drawn(labels):
-    """State, start and end of every label."""
-    return [(label.state.value, label.start, label.end) for label in labels]
+    """State, start and end of every span of one state."""
+    return [(span.state.upper(), span.start, span.end) for span in spans_of(labels)]
 
 
 def check(labels, within, spans=SPANS, start=0.0):
-    """Check that the labels have those spans, with every edge within a tolerance [s]."""
-    assert [label.state.value for label in labels] == [state for state, _, _ in spans]
-    for label, (_, first, last) in zip(labels, spans, strict=True):
-        assert abs(label.start - start - first) <= within
-        assert abs(label.end - start - last) <= within
+    """Check that the labels have those spans, with every edge within a tolerance [s].
+
+    Touching labels of one state are one span: a slip and the disturbance around it.
+    """
+    found = spans_of(labels)
+    assert [span.state.upper() for span in found] == [state for state, _, _ in spans]
+    for span, (_, first, last) in zip(found, spans, strict=True):
+        assert abs(span.start - start - first) <= within
+        assert abs(span.end - start - last) <= within

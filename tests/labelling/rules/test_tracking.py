@@ -47,14 +47,52 @@ def test_a_grasp_is_labelled_by_motion():
     for labels in tracking.propose(sliding()).values():
         check(labels, EDGE)
         causes = [label.cause for label in labels]
-        expected = [None, Cause.CLOSING, None, Cause.SLIP, None, Cause.RELEASED, None]
-        assert causes == expected
+        push = [Cause.DISTURBANCE, Cause.SLIP, Cause.DISTURBANCE]
+        assert causes == [None, Cause.CLOSING, None, *push, None, Cause.RELEASED, None]
+
+
+def slips_of(labels):
+    return [(label.start, label.end) for label in labels if label.cause is Cause.SLIP]
+
+
+def test_a_slip_is_an_interval_of_its_own_within_the_disturbance():
+    labels = tracking.propose(sliding())["thumb"]
+    ((start, end),) = slips_of(labels)
+    assert start == pytest.approx(PUSH, abs=0.02)
+    assert end == pytest.approx(PUSHED, abs=0.02)
+    place = next(k for k, label in enumerate(labels) if label.cause is Cause.SLIP)
+    before, slip, after = labels[place - 1 : place + 2]
+    assert (before.end, after.start) == (slip.start, slip.end)
+    assert {label.state.value for label in (before, slip, after)} == {"UNSTABLE"}
+    assert "over the limit of a slip" in slip.evidence
+    assert before.evidence.startswith("object moves against the finger shortly before or after")
+
+
+def test_two_slips_in_one_disturbance_are_two():
+    times = clock()
+    moves = ((CLOSING, LOCKED), (PUSH, PUSH + 0.2), (PUSH + 0.4, PUSHED), (RELEASE, 9.5))
+    labels = tracking.propose(tracked(poses(times, slide(times, moves))))["thumb"]
+    check(labels, EDGE)
+    slips = slips_of(labels)
+    assert np.ravel(slips) == pytest.approx([PUSH, PUSH + 0.2, PUSH + 0.4, PUSHED], abs=0.02)
+
+
+def test_displacement_has_a_slip_only_while_the_object_moves():
+    times = clock()
+    away = slide(times, ((PUSH, PUSH + 0.3),), speed=0.03)
+    away -= slide(times, ((PUSH + 1.3, PUSH + 1.6),), speed=0.03)
+    labels = tracking.propose(tracked(poses(times, away)), rule=TrackingRule("displacement"))
+    (start, end), (back, _) = slips_of(labels["thumb"])
+    assert PUSH < start < end
+    assert (end, back) == (pytest.approx(PUSH + 0.3, abs=0.02), pytest.approx(PUSH + 1.3, abs=0.02))
+    still = next(label for label in labels["thumb"] if label.start == end)
+    assert (still.state.value, still.cause) == ("UNSTABLE", None)
 
 
 def test_labels_have_author_and_evidence():
     labels = tracking.propose(sliding())["thumb"]
     assert {label.author for label in labels} == {"rule:tracking"}
-    assert "against the finger" in labels[3].evidence
+    assert "against the finger" in labels[4].evidence
     assert all("poses: truth" in label.evidence for label in labels)
 
 

@@ -1,5 +1,4 @@
 import asyncio
-import json
 import time
 from contextlib import asynccontextmanager
 
@@ -8,6 +7,8 @@ import numpy as np
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 
+from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers.slip import SlipRule
 from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
@@ -32,12 +33,14 @@ def kernels():
 
 @asynccontextmanager
 async def served(
-    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, grip=None
-):
+    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, grip=None,
+    model=None,
+):  # fmt: skip
     """Yield a client of the service of a source, and the session."""
-    session = Session(StreamDetector(build.model(), source))
+    model = model or build.model()
+    session = Session(StreamDetector(model, source))
     report = [].append if reports is None else reports.append
-    service = LiveService(session, build.model(), Guard(host, token), folder, report, grip)
+    service = LiveService(session, model, Guard(host, token), folder, report, grip)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -89,6 +92,49 @@ def test_the_first_document_describes_model_and_source(tmp_path):
     assert np.shape(thumb["rotations"]) == (30, 3, 3)
     assert hello["can_record"] is True
     msgspec.convert(hello, schema.HelloDocument)
+
+
+def with_slip_rule(finger):
+    """The model of the twin; one finger has a slip rule that looks at its first feature."""
+    model = build.model()
+    part = msgspec.structs.replace(model.finger(finger), slip=None)
+    n = len(part.features)
+    classifier = LinearClassifier(
+        mean=(0.0,) * n, scale=(1.0,) * n, coefficients=(1.0, *(0.0,) * (n - 1)), intercept=-6.0,
+        threshold=0.7,
+    )  # fmt: skip
+    fingers = dict.fromkeys(build.FINGERS, part)
+    fingers[finger] = msgspec.structs.replace(part, slip=SlipRule(classifier, hold=0.05))
+    return msgspec.structs.replace(model, fingers=fingers)
+
+
+def test_probabilities_and_threshold_of_slips_are_in_the_documents():
+    recording, model = build.grasp(), with_slip_rule("thumb")
+
+    async def work():
+        source = build.Script.of(recording)
+        async with served(source, start=False, model=model) as (client, session):
+            async with client.ws_connect("/api/v1/live") as socket:
+                hello = await socket.receive_json()
+                session.start()
+                found = []
+                while not found or not found[-1]["ended"]:
+                    found.append(await socket.receive_json())
+                found.append(await socket.receive_json())
+            session.stop()
+            return hello, found
+
+    hello, found = run(work())
+    thresholds = {name: finger["slip_threshold"] for name, finger in hello["fingers"].items()}
+    assert thresholds == {"thumb": 0.7, "index": None, "middle": None}
+    trace = detect(model, recording).fingers["thumb"]
+    series = [one["series"]["fingers"] for one in found]
+    got = [x for one in series for x in one["thumb"]["slip_probability"]]
+    np.testing.assert_array_equal(np.array(got, dtype=float), trace.slip_probability)
+    assert (trace.slip_probability > 0.7).any()
+    assert {x for one in series for x in one["index"]["slip_probability"]} == {None}
+    fingers = [one["fingers"] for one in found if one["fingers"]]
+    assert {finger["index"]["slip_probability"] for finger in fingers} == {None}
 
 
 def test_the_errors_of_a_tuned_model_are_in_the_first_document():
@@ -534,7 +580,10 @@ def test_the_schema_is_that_of_the_documents():
 
     document = run(work())
     assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(document["$defs"])
-    assert json.dumps(document)
+    assert "slip_probability" in document["$defs"]["EstimateSeries"]["required"]
+    assert "slip_probability" in document["$defs"]["FingerDocument"]["required"]
+    threshold = document["$defs"]["FingerInfo"]["properties"]["slip_threshold"]
+    assert {"type": "null"} in threshold["anyOf"]
 
 
 def test_listening_to_the_network_needs_a_token():

@@ -4,11 +4,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from math import isnan, nan
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec.json import Encoder
 
+from holdfast.cli.detect.slips import DetectedSlip, SlipWatch
 from holdfast.cli.terminal.console import print_line, print_table, visible_json
 from holdfast.contact import (
     LASTING_DURATION,
@@ -93,9 +94,9 @@ def json_lines(chunk: EstimateChunk) -> Iterator[str]:
 
 
 class DetectionSummary:
-    """Shares of states, counts of reasons and faults, and the contact events.
+    """Shares of states, counts of reasons and faults, the contact events, and the slips.
 
-    Its memory grows only with the number of events.
+    Its memory grows only with the number of events and slips.
     """
 
     def __init__(self) -> None:
@@ -104,6 +105,8 @@ class DetectionSummary:
         self._changes: dict[str, StateChanges] = {}
         self._events: dict[str, list[ContactEvent]] = {}
         self._start: float | None = None
+        self._watch = SlipWatch()
+        self._ended_slips: list[DetectedSlip] = []
 
     def add(self, chunk: EstimateChunk) -> None:
         """Add the next chunk of the same recording or source."""
@@ -116,13 +119,19 @@ class DetectionSummary:
             counts.states.update(estimate.state for estimate in estimates)
             counts.reasons.update(estimate.reason for estimate in estimates if estimate.reason)
             counts.faults.update(chain.from_iterable(estimate.faults for estimate in estimates))
+            slips = self._watch.update(finger, estimates)
+            self._ended_slips += [slip for slip in slips if slip.end is not None]
         self._add_changes(HAND, chunk.hand)
         self._counts.setdefault(HAND, _StateCounts()).states.update(
             state for _, state in chunk.hand
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the summary as JSON values; shares are of samples, or of instants (hand)."""
+        """Return the summary as JSON values; shares are of samples, or of instants (hand).
+
+        Slips are null without a slip rule. A slip that has not ended has no end.
+        """
+        slips = [slip._asdict() for slip in self._sorted_slips()]
         shares = {name: counts.to_dict() for name, counts in self._counts.items()}
         hand = shares.pop(HAND)
         return {
@@ -130,10 +139,11 @@ class DetectionSummary:
             "fingers": shares,
             "hand": {key: hand[key] for key in ("n_samples", "states")},
             "events": [event._asdict() for event in self._sorted_events()],
+            "slips": slips if self._watch.has_rule else None,
         }
 
     def print(self) -> None:
-        """Print tables of shares, of reasons and faults, and of the first events."""
+        """Print tables of shares, of reasons and faults, and of the first events and slips."""
         names = [name for name in self._counts if name != HAND] + [HAND]
         states = (f"{state} %" for state in ContactState)
         print_table(
@@ -145,11 +155,13 @@ class DetectionSummary:
             ("finger", "reasons for UNKNOWN", "faults"),
             [(name, *self._counts[name].causes()) for name in names if name != HAND],
         )
-        self._print_events()
-
-    def _print_events(self) -> None:
-        events = self._sorted_events()
         origin = shown_origin(self._start or 0.0)
+        self._print_events(origin)
+        if self._watch.has_rule:
+            self._print_slips(origin)
+
+    def _print_events(self, origin: float) -> None:
+        events = self._sorted_events()
         print_line()
         if origin:
             print_line(f"times since the first sample, at {origin:.3f} s")
@@ -163,6 +175,19 @@ class DetectionSummary:
         if len(events) > MAX_EVENTS_SHOWN:
             print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
 
+    def _print_slips(self, origin: float) -> None:
+        slips = self._sorted_slips()
+        print_line()
+        if not slips:
+            print_line("no slips")
+            return
+        print_table(
+            ("slip from [s]", "to [s]", "finger", "largest P(slip) %"),
+            [_slip_cells(slip, origin) for slip in slips[:MAX_EVENTS_SHOWN]],
+        )
+        if len(slips) > MAX_EVENTS_SHOWN:
+            print_line(f"and {len(slips) - MAX_EVENTS_SHOWN} more slips (--json prints all)")
+
     def _add_changes(self, name: str, states: Iterable[tuple[float, ContactState]]) -> None:
         changes = self._changes.setdefault(name, StateChanges((name,)))
         events = self._events.setdefault(name, [])
@@ -171,6 +196,15 @@ class DetectionSummary:
 
     def _sorted_events(self) -> list[ContactEvent]:
         return sorted(chain.from_iterable(self._events.values()), key=attrgetter("time"))
+
+    def _sorted_slips(self) -> list[DetectedSlip]:
+        return sorted([*self._ended_slips, *self._watch.running], key=attrgetter("begin"))
+
+
+def _slip_cells(slip: DetectedSlip, origin: float) -> tuple[object, ...]:
+    """Return a slip as cells of a table."""
+    end = "-" if slip.end is None else f"{slip.end - origin:.3f}"
+    return f"{slip.begin - origin:.3f}", end, slip.finger, f"{100 * slip.max_probability:.0f}"
 
 
 class _StateCounts:
@@ -211,7 +245,7 @@ def _text(counts: Mapping[str, int]) -> str:
 
 
 class ChangeLines:
-    """Find the changes of each finger and of the hand that lasted, as lines of text.
+    """Find the changes of each finger and of the hand that lasted, and slips, as lines of text.
 
     Args:
         from_first: give times relative to the first sample. Without it, only times since 1970
@@ -226,37 +260,51 @@ class ChangeLines:
         self._from_first = from_first
         self._changes: dict[str, StateChanges] = {}
         self._why: dict[str, tuple[ContactState, str]] = {}
+        self._watch = SlipWatch()
 
     def add(self, chunk: EstimateChunk) -> list[str]:
         """Return the lines for the next chunk of the same source, in the order of time."""
         if isnan(self.origin) and chunk.hand:
             first = chunk.hand[0][0]
             self.origin = first if self._from_first else shown_origin(first)
-        lasting: list[tuple[ContactEvent, str]] = []
+        lines: list[tuple[float, str]] = []
         for finger, estimates in chunk.fingers.items():
-            lasting += self._finger_changes(finger, estimates)
+            lines += self._finger_changes(finger, estimates)
+            lines += map(self._slip_line, self._watch.update(finger, estimates))
         for time, state in chunk.hand:
-            lasting += [(event, "") for event in self._lasting(HAND, state, time)]
-        lasting.sort(key=lambda change: change[0].time)
-        return [self._line(event, reason) for event, reason in lasting]
+            lines += [self._line(event, "") for event in self._lasting(HAND, state, time)]
+        lines.sort(key=itemgetter(0))
+        return [line for _, line in lines]
 
     def _finger_changes(
         self, finger: str, estimates: Sequence[ContactEstimate]
-    ) -> Iterator[tuple[ContactEvent, str]]:
+    ) -> Iterator[tuple[float, str]]:
+        """Yield the time and the line of each change of a finger."""
         for estimate in estimates:
             if self._why.get(finger, (None,))[0] is not estimate.state:
                 self._why[finger] = estimate.state, why(estimate)
             for event in self._lasting(finger, estimate.state, estimate.time):
-                yield event, self._why[finger][1]
+                yield self._line(event, self._why[finger][1])
 
     def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
         changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))
         return changes.update([state], time)
 
-    def _line(self, event: ContactEvent, reason: str) -> str:
-        time = event.time - self.origin
-        text = f"{time:9.3f} s  {event.finger:8}  {event.previous:10} -> {event.state:10}  {reason}"
-        return text.rstrip()
+    def _line(self, event: ContactEvent, reason: str) -> tuple[float, str]:
+        change = f"{event.previous:10} -> {event.state:10}"
+        return event.time, self._text(event.time, event.finger, change, reason)
+
+    def _slip_line(self, slip: DetectedSlip) -> tuple[float, str]:
+        """Return the time and the line of a slip that has just begun or ended."""
+        percent = 100 * slip.max_probability
+        if slip.end is None:
+            text = self._text(slip.begin, slip.finger, "slip begins", f"P(slip) {percent:.0f} %")
+            return slip.begin, text
+        lasted = f"{slip.end - slip.begin:.3f} s, largest P(slip) {percent:.0f} %"
+        return slip.end, self._text(slip.end, slip.finger, "slip ends", lasted)
+
+    def _text(self, time: float, finger: str, change: str, reason: str) -> str:
+        return f"{time - self.origin:9.3f} s  {finger:8}  {change:24}  {reason}".rstrip()
 
 
 def why(estimate: ContactEstimate) -> str:

@@ -20,6 +20,7 @@ from holdfast.cli.options import (
     check_seconds,
     parse_taxels,
     report_missing_fingers,
+    report_missing_slip_rules,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
@@ -40,7 +41,9 @@ def detect(
     source: SourceArgument,
     summary: Annotated[
         bool,
-        typer.Option("--summary", help="Print the share of each state, and the contact events."),
+        typer.Option(
+            "--summary", help="Print the share of each state, the contact events, and the slips."
+        ),
     ] = False,
     *,
     options: DetectorOptions,
@@ -49,10 +52,11 @@ def detect(
 ) -> None:
     """Detect the contact state of every finger at every sample.
 
-    On a terminal, print one line for each change of state that lasted 0.1 s. In a pipe or file,
-    or with --json, print one line of JSON per finger and sample, in the order of time: time [s],
-    finger, state, reason (why the state is UNKNOWN), stable_probability, instability (sigma) and
-    force (both in the unit of the readings), faults, faulty_taxels and cause. Values that are not
+    On a terminal, print one line for each change of state that lasted 0.1 s, and one when a slip
+    begins and when it ends. In a pipe or file, or with --json, print one line of JSON per finger
+    and sample, in the order of time: time [s], finger, state, reason (why the state is UNKNOWN),
+    stable_probability, instability (sigma) and force (both in the unit of the readings), faults,
+    faulty_taxels, cause (slip while the finger slides) and slip_probability. Values that are not
     known are null. The memory does not grow with the length of the recording.
 
     SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C or
@@ -144,6 +148,7 @@ def _detect_recording(
             taxels = parse_taxels(options.ignore, sensors)
             detector = Detector.for_recording(model, part, ignore=taxels)
             report_missing_fingers(model, part.name, part.modules)
+            report_missing_slip_rules(model)
             readings = ReadingsMonitor(model.fingers_of(sensors))
         for notice in readings.update_recording(part):
             print_message(notice)
@@ -189,6 +194,7 @@ def _detect_live(
     compile_kernels()
     with handle_stop_signals() as stop, open_source(uri) as source:
         stream = options.create_stream(model, source)
+        report_missing_slip_rules(model)
         stop.graceful = True
         for update in _read_updates(stream, seconds, stop):
             yield chunk_from_stream(source.name, update.estimates)

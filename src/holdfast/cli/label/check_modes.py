@@ -178,6 +178,30 @@ def _print(agreement: "Agreement") -> None:
         "onset differences: B minus A, for onsets of instability in both; "
         "not in A, not in B: number of intervals that only the other has"
     )
+    _print_causes(agreement.pooled)
+
+
+def _print_causes(pooled: "PooledAgreement") -> None:
+    """Print the number of samples by their cause in A and in B, if both give causes."""
+    from holdfast.contact import Cause
+
+    counts = dict(zip(Cause, pooled.causes, strict=True))
+    in_b = [cause for k, cause in enumerate(Cause) if any(row[k] for row in counts.values())]
+    if not in_b:
+        return
+    order = list(Cause)
+    rows = [
+        (cause, *(row[order.index(other)] for other in in_b))
+        for cause, row in counts.items()
+        if any(row)
+    ]
+    print_line()
+    print_table(("cause", *in_b), rows)
+    print_line()
+    print_paragraph(
+        "samples for which both give a cause, by that in A (rows) and in B (columns); "
+        f"their kappa is {format_number(pooled.kappa_cause, 3)}"
+    )
 
 
 def _row(labels: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:

@@ -8,6 +8,8 @@ import { LEFT_MARGIN, RIGHT_MARGIN } from "./view.js";
 const STATE_OPACITY = { stable: 0.15, unstable: 0.25, "no-contact": 0.09 };
 const MIN_WIDTH_FOR_EDGE = 3; // [px], narrower labels have no line at their start
 const MIN_WIDTH_FOR_SHAPE = 18; // [px], narrower labels have neither shape nor text
+const SLIP_BAND = 4; // [px], height of the band below a slip
+const MIN_SLIP_WIDTH = 2; // [px], a short slip stays visible within a disturbance
 
 /** Return the left and right pixel of an interval in the plot; null if it is not visible. */
 function pixelRange(view, { start, end }) {
@@ -39,9 +41,25 @@ export function shadeStates(context, view, row, labels) {
   context.globalAlpha = 1;
 }
 
-/** Draw the strip of labels, each with colour, shape and text. */
+/** Draw the strip of labels, each with colour, shape and text, and a band below each slip. */
 export function drawLabels(context, view, row, labels) {
-  for (const [label, [left, right]] of visible(view, labels)) drawLabel(context, row.labels, label, left, right);
+  const shown = visible(view, labels);
+  for (const [label, [left, right]] of shown) drawLabel(context, row.labels, label, left, right);
+  drawSlips(context, row.labels, shown);
+}
+
+// A slip has the colour of its state, unstable, as a disturbance that touches it: the band shows
+// where it begins and ends, also where there is no room for its text.
+function drawSlips(context, [top, bottom], shown) {
+  context.globalAlpha = 1;
+  for (const [{ cause }, [left, right]] of shown) {
+    if (cause !== "slip") continue;
+    const width = Math.max(MIN_SLIP_WIDTH, right - left);
+    context.fillStyle = colours.slip;
+    context.fillRect(left, bottom - SLIP_BAND, width, SLIP_BAND);
+    context.fillRect(left, top, MIN_SLIP_WIDTH, bottom - top);
+    if (width > 2 * MIN_SLIP_WIDTH) context.fillRect(right - MIN_SLIP_WIDTH, top, MIN_SLIP_WIDTH, bottom - top);
+  }
 }
 
 function drawLabel(context, [top, bottom], label, left, right) {
@@ -64,8 +82,8 @@ function drawLabel(context, [top, bottom], label, left, right) {
 
 /** Draw hatched proposals: stronger with more confidence, and weak if they are not in `open`. */
 export function drawProposals(context, view, row, items, open) {
-  const [top, bottom] = row.proposals;
-  for (const [item, [left, right]] of visible(view, items)) {
+  const [top, bottom] = row.proposals, shown = visible(view, items);
+  for (const [item, [left, right]] of shown) {
     const key = stateKey(item.state), width = right - left;
     context.globalAlpha = (0.25 + 0.75 * item.confidence) * (open.has(item) ? 1 : 0.3);
     context.fillStyle = stateLineColour(key);
@@ -82,6 +100,7 @@ export function drawProposals(context, view, row, items, open) {
     context.globalAlpha = 1;
     drawLine(context, left + 0.5, top, left + 0.5, bottom, colours.panel);
   }
+  drawSlips(context, row.proposals, shown);
 }
 
 /** Frame the proposal that Enter accepts. */

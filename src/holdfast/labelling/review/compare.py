@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import TypedDict
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import TIME_TOLERANCE, ContactState
+from holdfast.contact import TIME_TOLERANCE, Cause, ContactState
+from holdfast.detector.detection import CAUSE_BY_CODE
 from holdfast.errors import RecordingError
 from holdfast.labelling.review.spans import Span, spans_of
 from holdfast.metrics.statistics import quantile
@@ -21,6 +23,7 @@ MAX_LABEL_GAP = 0.1
 """Largest gap between two labels that follow each other; people draw small gaps [s]."""
 
 Confusion = npt.NDArray[np.int64]
+NO_CAUSES: Confusion = np.zeros((len(Cause), len(Cause)), dtype=np.int64)
 
 
 class OnsetDifferences(msgspec.Struct, frozen=True):
@@ -56,6 +59,9 @@ class AgreementNumbers(msgspec.Struct, frozen=True):
         confusion: (3, 3) number of samples by the state in A (rows) and in B (columns), in the
             order no contact, unstable, stable.
         onset_differences: of changes from stable to another state.
+        causes: (6, 6) number of samples for which both give a cause, by that in A (rows) and in B
+            (columns), in the order of `holdfast.Cause`.
+        kappa_cause: Cohen's kappa of those causes; None if it is undefined.
     """
 
     kappa: float | None
@@ -66,6 +72,8 @@ class AgreementNumbers(msgspec.Struct, frozen=True):
     only_b: float
     confusion: list[list[int]]
     onset_differences: OnsetDifferences
+    causes: list[list[int]]
+    kappa_cause: float | None
 
 
 class FingerAgreement(AgreementNumbers, frozen=True):
@@ -219,6 +227,7 @@ def _agreement(a: Sequence[Label], b: Sequence[Label], times: Array) -> FingerAg
         only_b=int(table[0, 1:].sum()) / n_samples,
         confusion=table[1:, 1:].tolist(),
         onset_differences=_match(_onsets(a), _onsets(b)),
+        **_cause_agreement(_cause_counts(a, b, times)),
         missing_in_a=_unmatched(spans_b, spans_a),
         missing_in_b=_unmatched(spans_a, spans_b),
     )
@@ -226,6 +235,7 @@ def _agreement(a: Sequence[Label], b: Sequence[Label], times: Array) -> FingerAg
 
 def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
     confusion = sum((np.array(part.confusion) for part in parts), np.zeros((3, 3), dtype=np.int64))
+    causes = sum((np.array(part.causes) for part in parts), np.zeros_like(NO_CAUSES))
     n_samples = sum(part.n_samples for part in parts)
     onsets = [part.onset_differences for part in parts]
     return PooledAgreement(
@@ -239,9 +249,37 @@ def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
             sum(onset.only_a for onset in onsets),
             sum(onset.only_b for onset in onsets),
         ),
+        **_cause_agreement(causes),
         n_missing_in_a=sum(len(part.missing_in_a) for part in parts),
         n_missing_in_b=sum(len(part.missing_in_b) for part in parts),
     )
+
+
+class _CauseAgreement(TypedDict):
+    """Fields of `AgreementNumbers` about causes."""
+
+    causes: list[list[int]]
+    kappa_cause: float | None
+
+
+def _cause_agreement(counts: Confusion) -> _CauseAgreement:
+    return {"causes": counts.tolist(), "kappa_cause": cohens_kappa(counts)}
+
+
+def _cause_counts(a: Sequence[Label], b: Sequence[Label], times: Array) -> Confusion:
+    """Return the number of samples by the cause in A and in B, where both give one."""
+    codes_a, codes_b = _cause_codes(a, times), _cause_codes(b, times)
+    n = len(CAUSE_BY_CODE)
+    return np.bincount(n * codes_a + codes_b, minlength=n * n).reshape(n, n)[1:, 1:]
+
+
+def _cause_codes(labels: Sequence[Label], times: Array) -> npt.NDArray[np.int64]:
+    """Return (n,) the code of the labelled cause at each time; 0 without one."""
+    codes = np.zeros(len(times), dtype=np.int64)
+    for label in labels:
+        first, last = np.searchsorted(times, (label.start, label.end))
+        codes[first:last] = CAUSE_BY_CODE.index(label.cause)
+    return codes
 
 
 def _kappas(confusion: Confusion) -> tuple[float | None, float | None, int]:

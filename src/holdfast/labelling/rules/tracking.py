@@ -121,8 +121,10 @@ def propose(
     """Return labels by finger from the motion of the object relative to the fingertips.
 
     The force decides on contact. A finger in contact is unstable while the object moves relative
-    to it. While the object is out of sight there is no label, unless the force ends as well: then
-    the object is lost.
+    to it, and for the margins and short gaps of the rule. Within that, the intervals in which the
+    object does move are slips; the others touch them, as disturbances (without a cause by
+    `displacement`, where the object is away and still). While the object is out of sight there
+    is no label, unless the force ends as well: then the object is lost.
 
     Args:
         recording: with poses in its truth, unless `tracking` is given. Its labels are ignored.
@@ -200,7 +202,11 @@ class _FingerLabeller:
         moving = self._moving(ratio)
         held = self._contact & motion.known
         timeline.set_state(held, STABLE, None, evidence_ratio(1.0, ratio))
-        timeline.set_state(held & moving, UNSTABLE, Cause.SLIP, ratio)
+        around = Cause.DISTURBANCE if self._rule.measure == "speed" else None
+        timeline.set_state(held & moving, UNSTABLE, around, ratio)
+        speed_ratio = self._speed_ratio(motion)
+        sliding = held & moving & self._sliding(speed_ratio)
+        timeline.set_state(sliding, UNSTABLE, Cause.SLIP, speed_ratio)
         self._label_no_contact(timeline)
         for start, end in runs(self._contact):
             self._label_ends(timeline, start, end)
@@ -209,14 +215,30 @@ class _FingerLabeller:
 
     def _motion_ratio(self, motion: RelativeMotion, point: Array | None) -> Array:
         """Return (n,) the motion over its threshold; 0 while the object is out of sight."""
+        if self._rule.measure == "speed":
+            return self._speed_ratio(motion)
+        return np.where(motion.known, self._displacement_ratio(motion, point), 0.0)
+
+    def _speed_ratio(self, motion: RelativeMotion) -> Array:
+        """Return (n,) the speed or spin over its threshold; 0 while the object is out of sight."""
         rule = self._rule
-        if rule.measure == "speed":
-            speed = max(rule.speed, SPEED_NOISE_FACTOR * motion.speed_noise)
-            spin = max(rule.spin, SPEED_NOISE_FACTOR * motion.spin_noise)
-            ratio = np.maximum(motion.speed / speed, motion.spin / spin)
-        else:
-            ratio = self._displacement_ratio(motion, point)
+        speed = max(rule.speed, SPEED_NOISE_FACTOR * motion.speed_noise)
+        spin = max(rule.spin, SPEED_NOISE_FACTOR * motion.spin_noise)
+        ratio = np.maximum(motion.speed / speed, motion.spin / spin)
         return np.where(motion.known, ratio, 0.0)
+
+    def _sliding(self, ratio: Array) -> Mask:
+        """Return (n,) where the object moves against the finger, without margins.
+
+        The fit of the speed smears the edge of a motion over half of its window. The edge is
+        where the fitted speed is half of the largest within that time.
+        """
+        from scipy.ndimage import maximum_filter1d
+
+        period = self._finger.period
+        largest = maximum_filter1d(ratio, 2 * n_samples_of(SPEED_WINDOW / 2, period) + 1)
+        sliding = (ratio >= 1) & (ratio >= 0.5 * largest)
+        return drop_short_runs(sliding, n_samples_of(self._rule.least, period))
 
     def _displacement_ratio(self, motion: RelativeMotion, point: Array | None) -> Array:
         """Return (n,) the displacement from the pose of the grasp over its threshold."""
@@ -302,6 +324,10 @@ def _evidence_text(rule: TrackingRule) -> EvidenceText:
         if state is ContactState.NO_CONTACT:
             lost = "object out of sight, " if cause else ""
             return f"{lost}force {ratio:.3g} times under contact"
+        if cause is Cause.SLIP:
+            return f"object moves against the finger: {ratio:.3g} times over the limit of a slip"
+        if cause is Cause.DISTURBANCE:
+            return "object moves against the finger shortly before or after"
         limit = "over" if state is ContactState.UNSTABLE else "under"
         return f"object {what} against the finger: {ratio:.3g} times {limit} the limit"
 

@@ -1,5 +1,6 @@
 """Publish estimates on topics of ROS 1 and ROS 2."""
 
+import math
 import re
 import time
 from collections import deque
@@ -35,8 +36,8 @@ DIAGNOSTICS_PERIOD = 1.0
 """Maximum time between two diagnostics messages [s]."""
 MAX_ESTIMATE_AGE = 1.0
 """Age from which an estimate counts as missing in the diagnostics [s]."""
-NUMBER_FIELDS = ("stable_probability", "instability")
-"""Fields of an estimate with a topic of numbers for each finger."""
+NUMBER_FIELDS = ("stable_probability", "slip_probability", "instability")
+"""Fields of an estimate with a topic of numbers for each finger; NaN where there is none."""
 NO_TORQUE = {"x": 0.0, "y": 0.0, "z": 0.0}
 GRIP_TEXTS = ("state", "reason")
 """Topics of the grip loop that are texts."""
@@ -73,10 +74,11 @@ class Others(TypedDict, total=False):
 class RosPublisher(Openable):
     """Publish estimates in a separate thread; it never delays the caller.
 
-    The topics of each finger are `NAMESPACE/FINGER/state` (text), `stable_probability` and
-    `instability` (numbers), and `force` (a wrench if the unit is N, else a vector). The topic
-    of the hand is `NAMESPACE/hand/state`. `/diagnostics` is published once a second, and when
-    faults change. Time stamps are the host's time when `publish` was called.
+    The topics of each finger are `NAMESPACE/FINGER/state` (text), `stable_probability`,
+    `slip_probability` (NaN without a slip rule) and `instability` (numbers), and `force` (a
+    wrench if the unit is N, else a vector). The topic of the hand is `NAMESPACE/hand/state`.
+    `/diagnostics` is published once a second, and when faults change. Time stamps are the host's
+    time when `publish` was called.
 
     With a grip loop there are also `NAMESPACE/grip/state` and `reason` (texts), and
     `NAMESPACE/FINGER/force_scale` (numbers), published with every estimate and at every event.
@@ -223,7 +225,9 @@ class RosPublisher(Openable):
             finger, topic = estimate.fingers[name], self._names[name]
             self._publish_text(f"{topic}/state", finger.state)
             for field in NUMBER_FIELDS:
-                self._publish(f"{topic}/{field}", number_message(getattr(finger, field)))
+                value = getattr(finger, field)
+                number = number_message(math.nan if value is None else value)
+                self._publish(f"{topic}/{field}", number)
             force = dict(zip("xyz", finger.force, strict=True))
             message: dict[str, Any] = {"header": header(stamp, name), "vector": force}
             if self._units[name] == "N":

@@ -24,6 +24,8 @@ class FingerInfo(Struct, frozen=True, kw_only=True):
         contact_threshold: F_a below which there is no contact [unit]; null if the model finds
             it from the noise.
         probability_threshold: probability from which a contact is stable, by the model.
+        slip_threshold: probability of a slip from which the finger slides; null if the model has
+            no slip rule for it.
     """
 
     sensor: str
@@ -34,6 +36,7 @@ class FingerInfo(Struct, frozen=True, kw_only=True):
     normal: Vector
     contact_threshold: float | None
     probability_threshold: float
+    slip_threshold: float | None = None
 
 
 class FaultInfo(Struct, frozen=True, kw_only=True):
@@ -102,12 +105,14 @@ class EstimateSeries(Struct, frozen=True, gc=False):
         instability: sigma [unit].
         stable_probability: from 0 to 1.
         state: 0 UNKNOWN, 1 NO_CONTACT, 2 UNSTABLE, 3 STABLE.
+        slip_probability: from 0 to 1; null without a slip rule.
     """
 
     force: tuple[list[Number], list[Number], list[Number]]
     instability: list[Number]
     stable_probability: list[Number]
     state: list[int | None]
+    slip_probability: list[Number]
 
 
 class HandSeries(Struct, frozen=True, gc=False):

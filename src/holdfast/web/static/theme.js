@@ -5,7 +5,7 @@ const NAMES = [
   "stable", "unstable", "no-contact", "unknown",
   "stable-line", "unstable-line", "no-contact-line", "unknown-line",
   "finger-0", "finger-1", "finger-2", "finger-3", "finger-4", "finger-5",
-  "axis-x", "axis-y", "axis-z", "marker",
+  "axis-x", "axis-y", "axis-z", "marker", "slip", "slip-line",
 ];
 export const lightTheme = window.matchMedia("(prefers-color-scheme: light)");
 

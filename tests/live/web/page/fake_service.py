@@ -117,6 +117,7 @@ class Tape:
         self.n_packets = 0
         self.points = []  # expected errors by threshold
         self.change = {}  # finger -> fields to write over its part of a message
+        self.slip_threshold = None  # without a slip rule
 
     def hello(self):
         fingers = {
@@ -129,6 +130,7 @@ class Tape:
                 "normal": track.layout.normal.tolist(),
                 "contact_threshold": 60.0,
                 "probability_threshold": 0.5,
+                "slip_threshold": self.slip_threshold,
             }
             for name, track in self.tracks.items()
         }
@@ -163,6 +165,7 @@ class Tape:
                 "instability": plain(track.sigma[rows]),
                 "stable_probability": plain(track.probability[rows]),
                 "state": track.state[rows].tolist(),
+                "slip_probability": self.slips(track, rows),
             }
             for name, track in self.tracks.items()
         }
@@ -185,6 +188,12 @@ class Tape:
             "recording": None, "ended": False,
         }  # fmt: skip
 
+    def slips(self, track, rows):
+        """Return a probability of a slip that is high where that of stability is low."""
+        if self.slip_threshold is None:
+            return [None] * len(rows)
+        return plain(1 - track.probability[rows])
+
     def finger(self, track, k):
         return {
             "state": STATES[int(track.state[k])],
@@ -194,6 +203,8 @@ class Tape:
             "force": plain(track.force[k]),
             "faults": [fault.value for fault in track.faults[k]],
             "faulty_taxels": [],
+            "cause": None,
+            "slip_probability": self.slips(track, [k])[0],
             "taxels": plain(np.round(track.taxels[k], 1)),
         }
 

@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 from live.web.page.fake_service import Service, Tape, made_up
@@ -125,8 +126,115 @@ def test_cards_show_the_current_state(visit, service):
     shows(page, '[aria-label="ring"] .values', r"–[\s\S]*–[\s\S]*–")
     crossed = "[...holdfast.cards.cards.get('ring').map.faulty].join()"  # indices
     assert page.evaluate(crossed) == "3,11"
-    shape = page.locator('[aria-label="ring"] .head use').get_attribute("href")
+    shape = page.locator('[aria-label="ring"] .head > .shape use').get_attribute("href")
     assert shape == "#shape-unknown"
+
+
+def plot_keys(page):
+    return page.evaluate("holdfast.plots.rows.map(({ kind }) => kind.key)")
+
+
+def visible_slips(page):
+    """Return the fingers whose card says that they slip."""
+    return page.evaluate(
+        """() => [...document.querySelectorAll(".card")]
+          .filter((card) => card.querySelector(".slips").checkVisibility())
+          .map((card) => card.getAttribute("aria-label"))"""
+    )
+
+
+def test_a_card_says_that_its_finger_slips_whatever_its_state(visit, service):
+    service.tape.slip_threshold = 0.6
+    change(service, state="STABLE", stable_probability=0.9, cause=None)
+    service.tape.change["index"] = {"state": "STABLE", "stable_probability": 0.9, "cause": "slip"}
+    service.tape.change["ring"] = {"state": "UNSTABLE", "cause": "disturbance"}
+    page = visit(service.url)
+    shows(page, '[aria-label="index"] .head', "slips")
+    assert visible_slips(page) == ["index"]
+    shows(page, '[aria-label="index"] .word', "^STABLE$")
+    pill = page.locator('[aria-label="index"] .slips')
+    assert pill.locator("use").get_attribute("href") == "#shape-slip"
+    colours = page.evaluate(
+        """() => ["index", "thumb"].map((name) =>
+          getComputedStyle(document.querySelector(`[aria-label="${name}"].card`)).borderColor)"""
+    )
+    assert colours[0] != colours[1]
+    change(service, state="UNSTABLE", cause="disturbance")
+    until(page, "() => !document.querySelector('.sliding')")
+    assert visible_slips(page) == []
+
+
+def test_a_slip_is_not_shown_without_a_connection(visit):
+    with Service(Tape(*made_up())) as service:
+        service.tape.slip_threshold = 0.6
+        change(service, state="UNSTABLE", cause="slip")
+        page = visit(service.url)
+        until(page, "() => document.querySelectorAll('.sliding').length === 4")
+    shows(page, "#hand-word", "NO CONNECTION")
+    assert visible_slips(page) == []
+
+
+def test_a_model_without_a_slip_rule_shows_nothing_of_slips(visit, service):
+    change(service, state="UNSTABLE", cause="slip")  # the likely cause, by the causes of the model
+    page = visit(service.url)
+    wait_for_samples(page)
+    assert visible_slips(page) == []
+    assert plot_keys(page) == ["force", "sigma", "probability"]
+    page.keyboard.press("?")
+    assert "slip" not in page.locator("#help-box").inner_text()
+
+
+def test_the_probability_of_a_slip_has_a_curve_and_its_threshold(visit, service):
+    service.tape.slip_threshold = 0.6
+    page = visit(service.url)
+    wait_for_samples(page)
+    assert plot_keys(page) == ["force", "sigma", "probability", "slip"]
+    until(page, "() => holdfast.plots.rows[3].plot.data[1].some((x) => x !== null)")
+    probabilities = page.evaluate(
+        """() => {
+          const { fingers, start, end } = holdfast.store;
+          const { probability, slip } = fingers.get("thumb");
+          return [probability, slip].map((column) => [...column.subarray(start, end)]);
+        }"""
+    )
+    stable, slips = (np.array(column, dtype=float) for column in probabilities)
+    known = np.isfinite(stable)
+    assert known.any()
+    np.testing.assert_allclose(slips[known], 1 - stable[known], atol=1e-6)
+    # The threshold is a dashed line at its height: other colours there than without it.
+    row = """async () => {
+      const { plot } = holdfast.plots.rows[3], y = Math.round(plot.valToPos(0.6, "y", true));
+      plot.redraw();
+      await new Promise(requestAnimationFrame);
+      return [...plot.ctx.getImageData(plot.bbox.left, y, plot.bbox.width, 1).data].join();
+    }"""
+    page.keyboard.press("k")
+    with_line = page.evaluate(row)
+    page.evaluate(
+        "() => Object.values(holdfast.plots.fingers).forEach((f) => { f.slip_threshold = null; })"
+    )
+    assert page.evaluate(row) != with_line
+    page.keyboard.press("2")
+    assert plot_keys(page) == ["force", "sigma", "probability"]  # of a finger without a rule
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_slips_fit_without_scrolling(visit, service, size, tmp_path):
+    service.tape.slip_threshold = 0.6
+    change(service, state="UNSTABLE", cause="slip", force=[-23456.7, -9876.5, -8e4])
+    page = visit(service.url, size)
+    until(page, "() => document.querySelectorAll('.sliding').length === 4")
+    page.screenshot(path=tmp_path / "page.png")
+    extent = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    assert page.evaluate(extent) == list(size)
+    heights = page.evaluate("holdfast.plots.rows.map(({ plot }) => plot.height)")
+    assert min(heights) >= 40
+    cut = page.evaluate(
+        """() => [...document.querySelectorAll(".slips, .legend, .name span")]
+          .filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1)
+          .map((e) => `${e.className} ${e.textContent}`)"""
+    )
+    assert cut == []
 
 
 def test_without_contact_no_probability_of_stability_is_shown(visit, service):

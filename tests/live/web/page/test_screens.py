@@ -35,6 +35,23 @@ def test_nothing_overlaps_or_overflows(visit, service, size, tmp_path):
     assert flaws(page, size) == []
 
 
+@pytest.mark.parametrize("size", [*SCREENS, (820, 1180), (1400, 900)])
+@pytest.mark.parametrize("n", [4, 6])
+def test_slips_overlap_nothing(visit, size, n, tmp_path):
+    names = ("thumb", "index", "middle", "ring", "left palm", "right palm")[:n]
+    with Service(Tape(*made_up(names))) as service:
+        service.at = 3.5
+        service.tape.slip_threshold = 0.6
+        change(service, state="UNSTABLE", cause="slip")
+        page = visit(service.url, size)
+        shows(page, '[aria-label="index"] .head', "slips")
+        wait_for_samples(page)
+        page.screenshot(path=tmp_path / "page.png", full_page=True)
+        assert flaws(page, size) == []
+        page.keyboard.press("2")
+        assert flaws(page, size) == []
+
+
 @pytest.mark.parametrize("n", [1, 6])
 def test_other_hands_on_a_phone(visit, n):
     names = [f"finger{k + 1} of a long name" for k in range(n)]

@@ -3,7 +3,7 @@
 import { make, shape, setText } from "../web/dom.js";
 import { fingerColour } from "../web/theme.js";
 import { Scale, TaxelMap } from "./taxel_map.js";
-import { debounceNote, faultWord, number, percent, reasonWord, shownProbability, stateKey, stateWord, unitWord } from "./format.js";
+import { debounceNote, faultWord, hasSlipRule, number, percent, reasonWord, shownProbability, stateKey, stateWord, unitWord } from "./format.js";
 
 // Range of the sigma bar by unit, from noise to a strong slip.
 const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
@@ -67,7 +67,10 @@ export class Cards {
 
   /** Show all fingers as UNKNOWN: an old STABLE must not look like a current one. */
   clearStates(reason) {
-    for (const card of this.cards.values()) card.showState("UNKNOWN", reason);
+    for (const card of this.cards.values()) {
+      card.showState("UNKNOWN", reason);
+      card.showSlip(false);
+    }
   }
 
   /** Dim the values if they are not current. */
@@ -98,9 +101,11 @@ class Card {
     this.word = make("strong", "word", "UNKNOWN");
     this.reason = make("span", "reason");
     this.longReason = make("span", "reason long");
+    this.slip = make("span", "slips", shape("slip"), "slips");
+    this.slip.title = "The model's slip rule decided that this finger slides";
     const title = make("span", "name", swatch, make("span", "", name));
     title.title = name;
-    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason), this.word));
+    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason, this.slip), this.word));
     this.head.type = "button";
     this.head.title = `Plots of ${name} (${index + 1})`;
     this.head.addEventListener("click", onChoose);
@@ -114,6 +119,7 @@ class Card {
     this.element = make("article", "card", this.head, body, this.faults);
     this.element.setAttribute("aria-label", name);
     this.showState("UNKNOWN", "");
+    this.showSlip(false);
   }
 
   makeValues() {
@@ -142,6 +148,7 @@ class Card {
   update(finger, frozen) {
     const note = debounceNote(finger, this.threshold, this.hello.debounce);
     this.showState(finger.state, note?.short ?? reasonWord(finger.reason), note?.long);
+    this.showSlip(hasSlipRule(this.sensor) && finger.cause === "slip");
     const probability = shownProbability(finger.state, finger.stable_probability);
     setText(this.probability.value, percent(probability));
     setBar(this.probability, probability ?? 0);
@@ -162,6 +169,12 @@ class Card {
     if (this.element.dataset.state === key) return;
     this.element.dataset.state = key;
     this.shape.firstChild.setAttribute("href", `#shape-${key}`);
+  }
+
+  // Say that the finger slides, whatever its state; a model without a slip rule never does.
+  showSlip(slips) {
+    this.slip.hidden = !slips;
+    this.element.classList.toggle("sliding", slips);
   }
 
   showFaults(faults, taxels) {

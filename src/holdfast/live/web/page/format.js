@@ -21,8 +21,10 @@ export const stateKey = (state) =>
 
 export const stateWord = (state) => withSpaces(state ?? "UNKNOWN");
 export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(reason) : "");
-/** Return the probability of stability to show; null without contact, where nothing can be stable. */
+/** Return the probability to show; null without contact, where nothing can be stable or slide. */
 export const shownProbability = (state, probability) => (state === "NO_CONTACT" ? null : probability ?? null);
+/** Return whether the model has a slip rule for a finger of the hello message. */
+export const hasSlipRule = (sensor) => Number.isFinite(sensor?.slip_threshold);
 /** Return the name of a fault; `texts` are those of the service, by fault. */
 export const faultWord = (fault, texts) => texts?.[fault]?.words ?? withSpaces(fault);
 

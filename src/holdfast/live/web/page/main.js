@@ -7,7 +7,7 @@ import { HandBanner, HealthLine, showAlert } from "./banner.js";
 import { Cards } from "./cards.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
-import { STATES, duration } from "./format.js";
+import { STATES, duration, hasSlipRule } from "./format.js";
 import { FrameLimiter } from "./frame_rate.js";
 import { GripPanel } from "./grip.js";
 import { listenToKeys } from "./keys.js";
@@ -63,6 +63,9 @@ class Page {
     this.events.clear();
     for (const part of [this.banner, this.cards, this.controls, this.threshold, this.grip]) part.start(hello);
     this.plots.start(hello, this.store);
+    const hasSlips = Object.values(hello.fingers).some(hasSlipRule);
+    document.body.classList.toggle("has-slips", hasSlips);
+    byId("slip-help").hidden = !hasSlips;
     this.fillFingers();
     this.showStream(hello);
   }

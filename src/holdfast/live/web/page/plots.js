@@ -1,14 +1,15 @@
-// Plots of force, instability and probability over time, drawn by uPlot, a script of index.html.
+// Plots of force, instability and probabilities over time, drawn by uPlot, a script of index.html.
 
 import { make, setText } from "../web/dom.js";
 import { colours, fingerColour, font } from "../web/theme.js";
 import { RIBBON_HEIGHT, drawLevel, drawMarkers, drawRibbons, shadeStates } from "./plot_layers.js";
 import { downsample } from "./store.js";
-import { number, unitWord } from "./format.js";
+import { hasSlipRule, number, unitWord } from "./format.js";
 
 const FONT = font(11);
 const MAX_MARKERS = 50;
 const MAX_BINS = 600;
+const PROBABILITIES = ["probability", "slip"];
 const AXES = [["fx", "x"], ["fy", "y"], ["fz", "z"]];
 
 // Round the ends of an axis, so that they do not change with every small change of the data.
@@ -69,12 +70,17 @@ export class Plots {
         title: "Force", range: (plot, low, high) => roundedRange(low ?? 0, high ?? 0, 10),
         lines: AXES.map(([column, axis]) => ({ finger: this.chosen, column, label: `F${axis}`, colour: colours[`axis-${axis}`] })),
       };
-    return [
+    const kinds = [
       { ...force, key: "force", unit, brief: brief && this.names.length > 4 },
       { key: "sigma", title: "Instability σ", brief, lines: lines("sigma"), range: decadeRange, log: true },
       { key: "probability", title: "P(stable)", brief, lines: lines("probability"), range: () => [-0.04, 1.04] },
+      { key: "slip", title: "P(slip)", brief, lines: lines("slip"), range: () => [-0.04, 1.04] },
     ];
+    return this.shown().some((name) => hasSlipRule(this.fingers[name])) ? kinds : kinds.slice(0, -1);
   }
+
+  // Names of the fingers in the plots.
+  shown() { return this.chosen === null ? this.names : [this.chosen]; }
 
   // Range from zero, with room for the ribbons above the lines.
   rangeBelowRibbons(plot, high) {
@@ -115,7 +121,7 @@ export class Plots {
         { ...axis, size: last ? 22 : 4, gap: 3, values: (_, ticks) => ticks.map((t) => (last ? timeLabel(t) : "")) },
         {
           ...axis, size: 50, gap: 5, space: kind.log ? 16 : 22,
-          ...(kind.key === "probability" ? { splits: [0, 0.5, 1] } : {}),
+          ...(PROBABILITIES.includes(kind.key) ? { splits: [0, 0.5, 1] } : {}),
           ...(kind.log ? { splits: decadeTicks, filter: (_, ticks) => ticks } : {}),
           values: (_, ticks) => ticks.map((v) => (v === null ? null : valueLabel(v))),
         },
@@ -143,9 +149,11 @@ export class Plots {
   drawOverlay(plot, row) {
     const now = this.store.latest;
     drawMarkers(plot, this.markers.map((time) => time - now));
-    if (row.kind.key !== "probability") return;
-    const shown = this.chosen === null ? this.names : [this.chosen];
-    for (const value of new Set(shown.map((name) => this.thresholds[name] ?? this.fingers[name].probability_threshold))) {
+    if (!PROBABILITIES.includes(row.kind.key)) return;
+    const thresholdOf = row.kind.key === "slip"
+      ? (name) => this.fingers[name].slip_threshold
+      : (name) => this.thresholds[name] ?? this.fingers[name].probability_threshold;
+    for (const value of new Set(this.shown().map(thresholdOf))) {
       if (Number.isFinite(value)) drawLevel(plot, value);
     }
   }

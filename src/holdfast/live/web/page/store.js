@@ -3,7 +3,7 @@
 import { STATES, UNKNOWN, shownProbability } from "./format.js";
 
 export const SECONDS = 60;
-const COLUMNS = ["fx", "fy", "fz", "force", "sigma", "probability"];
+const COLUMNS = ["fx", "fy", "fz", "force", "sigma", "probability", "slip"];
 
 /** Return the number of samples in a minute at a rate [Hz]; sensors reach up to 1000 Hz. */
 export const capacityFor = (rate) => Math.ceil(SECONDS * Math.min(1000, Math.max(200, 1.05 * (rate ?? 0))));
@@ -127,7 +127,9 @@ function writeSample(columns, index, from, k) {
   columns.force[index] = Math.sqrt(x * x + y * y + z * z);
   columns.sigma[index] = value(from?.instability, k);
   columns.state[index] = from?.state?.[k] ?? UNKNOWN;
-  columns.probability[index] = shownProbability(STATES[columns.state[index]], from?.stable_probability?.[k]) ?? NaN;
+  const state = STATES[columns.state[index]];
+  columns.probability[index] = shownProbability(state, from?.stable_probability?.[k]) ?? NaN;
+  columns.slip[index] = shownProbability(state, from?.slip_probability?.[k]) ?? NaN;
 }
 
 /**
