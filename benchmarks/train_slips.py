@@ -104,7 +104,9 @@ def save(model: Model, recordings: Sequence[Recording], out: Path) -> None:
     """Write the model; its provenance names the recordings of the slip rule, too."""
     training = model.training
     if training is not None:
-        digests = training.recordings | {item.name: item.digest for item in recordings}
+        known = set(training.recordings.values())
+        added = {item.name: item.digest for item in recordings if item.digest not in known}
+        digests = training.recordings | added
         training = msgspec.structs.replace(training, recordings=digests)
     msgspec.structs.replace(model, training=training, name=out.stem).save(out, force=True)
     print(f"{out} written")
