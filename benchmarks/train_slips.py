@@ -1,8 +1,7 @@
 """Add a slip rule to a model: trained on true sliding, with the threshold from folds.
 
     holdfast simulate twin/ --seed 0
-    holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
-    python benchmarks/train_slips.py builtin:twin twin/ slips/ -o src/holdfast/models/twin.json
+    python benchmarks/train_slips.py builtin:twin twin/ -o src/holdfast/models/twin.json
     holdfast simulate hands/ --randomize --repeats 300 --seed 0
     python benchmarks/train_slips.py builtin:any hands/ -o src/holdfast/models/any.json
 
