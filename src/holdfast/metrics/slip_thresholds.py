@@ -20,9 +20,9 @@ from holdfast.metrics.slips import (
 from holdfast.metrics.statistics import Interval, Statistic, bootstrap_interval
 from holdfast.sensors.types import Array, Flags, Integers
 
-LOG_ODDS = np.arange(-40, 81) * 0.1
+THRESHOLD_LOG_ODDS = np.arange(-40, 81) * 0.1
 """Log odds of the thresholds that are tried."""
-THRESHOLDS = 1.0 / (1.0 + np.exp(-LOG_ODDS))
+THRESHOLDS = 1.0 / (1.0 + np.exp(-THRESHOLD_LOG_ODDS))
 """Thresholds of the probability of a slip that are tried, lowest first."""
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
