@@ -6,7 +6,7 @@ import pytest
 from holdfast import Model
 from holdfast.devices.sources import Arrival
 from holdfast.live.arrival_detector import ArrivalDetector
-from holdfast.live.readings_monitor import MISSING_AXES, PULLED, NO_CHANGE, ReadingsMonitor
+from holdfast.live.readings_monitor import MISSING_AXES, NO_CHANGE, PULLED, ReadingsMonitor
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording

@@ -13,10 +13,10 @@ from holdfast.twin.profile import profile
 from holdfast.twin.protocol import THUMB_SHARE, Plan
 from holdfast.twin.simulation import Grasp, Simulation
 from holdfast.twin.slip_events import (
-    RECLOSING_TIME,
     DISPLACED,
     GRASP_LINE,
     RATE_FIELDS,
+    RECLOSING_TIME,
     SIDEWAYS,
     UPRIGHT,
     SlipEvent,

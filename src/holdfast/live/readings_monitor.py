@@ -29,7 +29,9 @@ PULL_OF_NOISE = 20.0
 PULL_OF_LARGEST = 0.1
 """Least fall below the first value, as a share of the largest change; elastomers creep by less."""
 
-NO_CHANGE = "no reading has changed since the start: touch the sensor; if that changes none, check it"
+NO_CHANGE = (
+    "no reading has changed since the start: touch the sensor; if that changes none, check it"
+)
 MISSING_AXES = "readings along {} never change: 3 axes are expected, and slip shows in the shear"
 PULLED = (
     "the normal force fell far below its first value: the finger was in contact at the start, or "
