@@ -86,7 +86,7 @@ def count_model(model: Model, folder: Path) -> ModelCounts:
 def model_rows(name: str, train: Path, test: Path, seed: int) -> Iterator[Row]:
     """Yield the rows of a model: at its own threshold, and at one chosen on the training folder."""
     model = Model.load(name)
-    keys = {FITTED_TO: MODEL, METHOD: Path(name).stem if Path(name).suffix else name}
+    keys = {FITTED_TO: MODEL, METHOD: title_of(name)}
     tested = count_model(model, test)
     if not tested.shipped:
         raise SystemExit(f"{name} has no slip rule, or no slips are known in {test}")
@@ -98,6 +98,11 @@ def model_rows(name: str, train: Path, test: Path, seed: int) -> Iterator[Row]:
     training = count_model(model, train)
     chosen = summarise_fresh(tested.curves, training.curves, seed)
     yield from slip_rows({**keys, THRESHOLD: CHOSEN}, chosen)
+
+
+def title_of(name: str) -> str:
+    """Return the name of a model as it stands in the tables: of a file, without its folder."""
+    return Path(name).stem if Path(name).suffix else name
 
 
 def cause_counts(name: str, folder: Path) -> list[Integers]:
@@ -140,7 +145,7 @@ def main() -> None:
         rows += model_rows(name, options.train, options.test, options.seed)
     print(to_markdown(slip_table(rows, LINES)))
     if options.model:
-        counts = {name: cause_counts(name, options.test) for name in options.model}
+        counts = {title_of(name): cause_counts(name, options.test) for name in options.model}
         print(to_markdown(cause_table(counts, options.seed)))
     if options.picture:
         draw(options.model[0], options.test, options.picture)

@@ -25,6 +25,7 @@ from holdfast.metrics.slip_truth import (
 from holdfast.model import Model
 from holdfast.plots.style import (
     COLOURS,
+    FAINT,
     GREY,
     INK,
     add_labels,
@@ -119,7 +120,7 @@ def slip_figure(model: Model, recording: Recording, kind: str) -> Figure:
         rows[0], f"{kind}: {recording.metadata.get('object', recording.name)}, {series.finger}"
     )
     figure.align_ylabels(rows)
-    add_legend(figure, _handles(series), per_row=4)
+    add_legend(figure, _handles(series), per_row=3)
     return figure
 
 
@@ -203,7 +204,8 @@ def _draw_probability(axes: Axes, series: SlipSeries) -> None:
     times, probability = series.decided_at[shown], series.probability[shown]
     axes.plot(times, probability, color=SCORE_COLOUR, linewidth=1.0)
     axes.axhline(series.threshold, color=INK, linestyle="--", linewidth=0.8)
-    axes.set_ylim(-0.03, 1.03)
+    highest = max(float(np.nanmax(probability, initial=0.0)), series.threshold)
+    axes.set_ylim(-0.03 * highest, min(1.3 * highest, 1.03))
     add_labels(axes, y="slip\nprobability")
 
 
@@ -216,6 +218,7 @@ def _draw_strips(axes: Axes, series: SlipSeries) -> None:
             (series.decided_at[a], series.decided_at[b - 1] + steps[b - 1] - series.decided_at[a])
             for a, b in runs(mask)
         ]
+        axes.axhline(height, color=FAINT, linewidth=0.8, zorder=0)
         axes.broken_barh(spans, (height - 0.35, 0.7), color=colour, linewidth=0)
     axes.set_yticks((1.0, 0.0), ("slides", "decision"))
     axes.set_ylim(-0.5, 1.5)
@@ -230,6 +233,5 @@ def _handles(series: SlipSeries) -> list[Artist]:
     handles: list[Artist] = [Line2D([], [], label="incipient", **INCIPIENT_STYLE)]
     if any(not math.isnan(slip.gross) for slip in series.slips):
         handles.append(Line2D([], [], label="gross", **GROSS_STYLE))
-    handles.append(Line2D([], [], color=GREY, linestyle=":", linewidth=0.8, label="1 mm/s"))
     handles.append(Line2D([], [], color=INK, linestyle="--", linewidth=0.8, label="threshold"))
     return handles
