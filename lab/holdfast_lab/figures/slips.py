@@ -43,7 +43,7 @@ COLUMN_HEIGHT = 4.3
 """Height of the figure [inch]."""
 MARGIN_TIME = 0.5
 """Time that is drawn before the first and after the last slip [s]."""
-MAX_TIME = 3.0
+MAX_SHOWN_TIME = 3.0
 """Maximum time that is drawn after the first onset [s]."""
 MIN_SPEED = 0.1
 """Lower end of the axis of the speed [mm/s]; slower is drawn there."""
@@ -51,7 +51,7 @@ MILLIMETRES_PER_METRE = 1e3
 SPEED_COLOUR, SCORE_COLOUR, RAISED_COLOUR = COLOURS[0], COLOURS[2], COLOURS[3]
 INCIPIENT_STYLE: dict[str, Any] = {"color": COLOURS[5], "linestyle": "-", "linewidth": 1.0}
 GROSS_STYLE: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.0}
-EVENTS = "slip_events"
+EVENTS_KEY = "slip_events"
 """Key of the metadata with the slip events of a recording."""
 
 
@@ -87,7 +87,7 @@ class SlipSeries(NamedTuple):
 
 def event_kinds(recording: Recording) -> list[str]:
     """Return the kinds of the slip events of a recording in which a finger slips."""
-    events = recording.metadata.get(EVENTS) or []
+    events = recording.metadata.get(EVENTS_KEY) or []
     return [event["kind"] for event in events if _slipping_finger(recording, event["kind"])[1]]
 
 
@@ -126,7 +126,7 @@ def slip_figure(model: Model, recording: Recording, kind: str) -> Figure:
 
 def _slipping_finger(recording: Recording, kind: str) -> tuple[str, tuple[Slip, ...]]:
     """Return the finger that slides farthest in the first event of a kind, and its slips there."""
-    events = recording.metadata.get(EVENTS) or []
+    events = recording.metadata.get(EVENTS_KEY) or []
     event = next((event for event in events if event["kind"] == kind), None)
     truth = recording.truth
     best: tuple[str, tuple[Slip, ...]] = ("", ())
@@ -168,7 +168,7 @@ def _series(model: Model, recording: Recording, kind: str) -> SlipSeries:
         slips=tuple(
             slip._replace(onset=slip.onset - onset, gross=slip.gross - onset) for slip in slips
         ),
-        end=min(slips[-1].end - onset, MAX_TIME) + MARGIN_TIME,
+        end=min(slips[-1].end - onset, MAX_SHOWN_TIME) + MARGIN_TIME,
     )
 
 

@@ -1,6 +1,6 @@
 """Part of the study: the slip of single fingers, decided by each method and scored by the truth."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
 from holdfast.metrics.slip_truth import DISTANCES
@@ -15,6 +15,7 @@ from holdfast.training.slips import SLIP_RULE_HOLD, SLIP_SMOOTHING
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
+from holdfast_lab.study.comparison.rows import RowKeys
 from holdfast_lab.study.evaluation.evaluate_slips import (
     SLIP_RATE,
     SlipEvaluation,
@@ -35,7 +36,7 @@ OTHER_SECONDS = 60.0
 """Approximate duration of the other tasks [s]."""
 FITTED_TO, METHOD = "fitted to", "method"
 TARGET_TITLES = {"sliding": "true sliding", "stability": "stability"}
-LIMITS = {
+FOUND_TITLES = {
     "before": "before",
     **{str(limit): f"within {1000 * limit:.0f} ms" for limit in FOUND_WITHIN},
 }
@@ -45,9 +46,9 @@ SLIP_KINDS = {"incipient": "", "gross": "gross, ", "over_1mm": "over 1 mm, "}
 FALSE_HELD, FALSE_QUIET = "false alarms per minute held", "false alarms per minute quiet"
 QUIET_RAISED = "quiet hold raised [%]"
 N_SLIPS, N_GROSS, N_OVER_1MM = "n slips", "n gross", "n over 1 mm"
-HELD_TIME = "held [min]"
+HELD_MINUTES = "held [min]"
 SLIP_DIGITS = {"AUC": 3, FALSE_HELD: 2, FALSE_QUIET: 2, N_SLIPS: 0, N_GROSS: 0, N_OVER_1MM: 0}
-NOTE = (
+SLIP_NOTE = (
     "Of single fingers, by the truth of each sample. A finger slides where the load-weighted speed "
     "of its contact exceeds 1 mm/s; below 0.3 mm/s it is still; between, nothing counts. Slips: "
     "share found before the first sliding, and up to 30, 50 and 100 ms after it; the same from the "
@@ -62,8 +63,6 @@ NOTE = (
     f"{SLIP_RULE_HOLD:g} s, as in the slip rule of a model. 'Stability' is our rule of stability "
     "used as a decision about slip. A global method decides alike for all fingers."
 )
-
-Keys = Mapping[str, Key]
 
 
 def tasks(plan: StudyPlan) -> list[Task]:
@@ -93,7 +92,7 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """Return the table of slips; none if no slips are known."""
     rows: list[Row] = []
     for name in slip_methods(plan):
-        evaluations: Mapping[str, SlipEvaluation] = results[f"slips/{name}"]
+        evaluations: dict[str, SlipEvaluation] = results[f"slips/{name}"]
         for role in ("main", *TESTED_ROLES):
             corpus = plan.corpora.get(role)
             if corpus is not None and corpus.name in evaluations:
@@ -115,12 +114,12 @@ def method_keys(name: str) -> dict[str, Key]:
     return {FITTED_TO: TARGET_TITLES[slip_method.target], METHOD: slip_method.method.title}
 
 
-def slip_table(rows: list[Row], lines: tuple[str, ...], note: str = NOTE) -> ResultTable:
+def slip_table(rows: list[Row], lines: tuple[str, ...], note: str = SLIP_NOTE) -> ResultTable:
     """Return the table of slips with these rows."""
     return ResultTable("slips", "Slips of fingers", note, rows, lines, digits_of=SLIP_DIGITS)
 
 
-def slip_rows(keys: Keys, evaluation: SlipEvaluation) -> list[Row]:
+def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:
     """Return the rows of one line of the table of slips.
 
     Args:
@@ -138,7 +137,7 @@ def slip_rows(keys: Keys, evaluation: SlipEvaluation) -> list[Row]:
         N_SLIPS: pooled.n,
         N_GROSS: pooled.n_gross,
         N_OVER_1MM: pooled.n_over_1mm,
-        HELD_TIME: pooled.held_minutes,
+        HELD_MINUTES: pooled.held_minutes,
     }
     return rows + [Row({**keys, "figure": name}, value, None, n) for name, value in counts.items()]
 
@@ -147,7 +146,7 @@ def _shares(summary: SlipSummary) -> Iterator[tuple[str, float | None, Interval 
     """Yield head, value and interval of each figure that has an interval."""
     pooled, intervals = summary.pooled, summary.intervals
     for kind, begin in SLIP_KINDS.items():
-        for limit, words in LIMITS.items():
+        for limit, words in FOUND_TITLES.items():
             yield f"{begin}{words} [%]", getattr(pooled, kind)[limit], _of(intervals, kind, limit)
     for distance, name in zip(DISTANCES, ("before_1mm", "before_3mm"), strict=True):
         head = f"before {1000 * distance:g} mm [%]"

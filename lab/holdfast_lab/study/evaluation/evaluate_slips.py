@@ -87,7 +87,7 @@ def evaluate_slips(job: SlipJob) -> dict[str, SlipEvaluation]:
     of other corpora from all recordings of `train`, each scored out of fold.
 
     Returns:
-        By name of the corpus; empty if no slips of `train` are known.
+        By name of each corpus with slips; empty if `train` trains no classifier.
     """
     chosen = SLIP_METHODS[job.method]
     warm_up = longest_warm_up(_compared(job), job.train.rate)
@@ -111,7 +111,7 @@ def evaluate_slips(job: SlipJob) -> dict[str, SlipEvaluation]:
         fresh = [_curves(score_slips(fitted, recording), ranks) for recording in tested]
         if fresh:
             results[corpus.name] = summarise_fresh(fresh, curves, job.seed)
-    return results
+    return {name: result for name, result in results.items() if result.summary.pooled.n}
 
 
 def _compared(job: SlipJob) -> Iterator[str]:

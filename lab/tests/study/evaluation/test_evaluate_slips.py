@@ -61,7 +61,8 @@ def test_methods_are_scored_on_the_same_samples(corpora):
 
 def test_without_known_slips_there_are_no_results(tmp_path):
     corpus = scan_corpus("main", save_synthetic(tmp_path / "main", range(3)))
-    assert evaluate_slips(SlipJob("holdfast", corpus, effort=EFFORT)) == {}
+    for name in ("holdfast", "holdfast_stability"):
+        assert evaluate_slips(SlipJob(name, corpus, effort=EFFORT)) == {}
 
 
 def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
