@@ -6,7 +6,7 @@ import pytest
 from holdfast import Model
 from holdfast.devices.sources import Arrival
 from holdfast.live.arrival_detector import ArrivalDetector
-from holdfast.live.readings_monitor import MISSING_AXES, PULLED, STILL, ReadingsMonitor
+from holdfast.live.readings_monitor import MISSING_AXES, NO_CHANGE, PULLED, ReadingsMonitor
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -59,7 +59,7 @@ def test_axes_that_never_change():
 
 def test_readings_that_never_change():
     ((text, time),) = notices(np.full((len(TIMES), 16, 3), 1000))
-    assert text == f"index: {STILL}"
+    assert text == f"index: {NO_CHANGE}"
     assert time == pytest.approx(10, abs=0.1)
 
 

@@ -3,7 +3,7 @@ import pytest
 from sklearn.metrics import roc_auc_score
 
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
-from holdfast.metrics.statistics import _draws, auc_of, quantile_of
+from holdfast.metrics.statistics import auc_of, draw_recordings, quantile_of
 
 RNG = np.random.default_rng(5)
 DRAWS = RNG.multinomial(6, np.full(6, 1 / 6), size=20).astype(float)
@@ -15,7 +15,7 @@ def drawn(values, draw):
 
 
 def test_a_resample_draws_as_many_recordings_as_there_are():
-    draws = _draws(7, 100, 0)
+    draws = draw_recordings(7, 100, 0)
     assert draws.shape == (100, 7)
     assert (draws.sum(axis=1) == 7).all()
 

@@ -13,10 +13,10 @@ from holdfast.twin.profile import profile
 from holdfast.twin.protocol import THUMB_SHARE, Plan
 from holdfast.twin.simulation import Grasp, Simulation
 from holdfast.twin.slip_events import (
-    CLOSING_TIME,
     DISPLACED,
     GRASP_LINE,
-    RATES,
+    RATE_FIELDS,
+    RECLOSING_TIME,
     SIDEWAYS,
     UPRIGHT,
     SlipEvent,
@@ -83,7 +83,7 @@ class TestCourse:
             first = [e.kind for e in events[: len(SlipKind)]]
             assert len(set(first)) == len(first)
             for e in events:
-                low, high = getattr(ranges, RATES[e.kind])
+                low, high = getattr(ranges, RATE_FIELDS[e.kind])
                 assert low <= e.rate <= high
                 assert ranges.distance[0] <= e.distance <= ranges.distance[1]
                 assert 0 < e.duration <= ranges.longest
@@ -153,7 +153,7 @@ class TestRunner:
             assert np.sign(guide[12:15] @ UPRIGHT + guide[15:18] @ GRASP_LINE) == -sign
 
     def test_rolling_goes_there_and_back(self):
-        _, states = run([event("roll", duration=CLOSING_TIME + 2 * 0.25 / 0.3, distance=1.0)])
+        _, states = run([event("roll", duration=RECLOSING_TIME + 2 * 0.25 / 0.3, distance=1.0)])
         turns = [Rotation.from_matrix(state.load.guide[3:12].reshape(3, 3)).as_rotvec()[2]
                  for state in states.values() if state.touching]  # fmt: skip
         assert max(turns) == pytest.approx(0.25, abs=0.01)

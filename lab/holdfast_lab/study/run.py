@@ -11,7 +11,7 @@ from holdfast_lab.report.folder import ReportKind, check_output_folder, write_re
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, to_json
 from holdfast_lab.study import environment
-from holdfast_lab.study.comparison import all_methods, real_recordings, sensitivity
+from holdfast_lab.study.comparison import all_methods, real_recordings, sensitivity, slip_table
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper import (
     attribution,
@@ -53,6 +53,7 @@ PARTS: Mapping[str, StudyPart] = {
     "attribution": attribution,
     "claims": claims,
     "comparison": all_methods,
+    "slips": slip_table,
     "sensitivity": sensitivity,
     "real": real_recordings,
 }

@@ -143,7 +143,15 @@ minute of undisturbed hold. A threshold with fewer missed events has more false 
 methods at similar rates of false alarms. All thresholds are chosen on training recordings
 only.""",
         "",
-        ("events", "slips", "glitches", "alarms"),
+        ("events", "glitches", "alarms"),
+    ),
+    SectionOutline(
+        "Slips of fingers",
+        """Slip is a second question beside stability: does this finger slide over its object? Every
+method is fitted to true sliding, sample by sample, and its decisions are scored as slips. Early
+alarms count as found, and a decision that stays raised gains nothing. Compare "within 100 ms" and
+"before 1 mm", at rates of false alarms that are alike.""",
+        "slips",
     ),
     SectionOutline(
         "Where the errors are",

@@ -43,7 +43,7 @@ CLOSING_SPEED = (0.012, 0.03)
 """Speed of closing [m/s], that of the profile `reference`."""
 PROFILE = "reference"
 """Profile of the tremor of the operator and the glitches of the hand's controller."""
-PUSH_DIRECTIONS = [(s * x, s * y, s * z) for x, y, z in np.eye(3).tolist() for s in (1.0, -1.0)]
+AXIS_DIRECTIONS = [(s * x, s * y, s * z) for x, y, z in np.eye(3).tolist() for s in (1.0, -1.0)]
 LOAD_KINDS = tuple(LoadKind)
 
 
@@ -138,7 +138,7 @@ def _objects() -> list[tuple[str, GraspObject, Path | None]]:
 
 def _draw_load(generator: np.random.Generator, kind: LoadKind, mass: float) -> Load:
     start = float(generator.uniform(*QUIET_TIME))
-    direction = PUSH_DIRECTIONS[int(generator.integers(len(PUSH_DIRECTIONS)))]
+    direction = AXIS_DIRECTIONS[int(generator.integers(len(AXIS_DIRECTIONS)))]
     share = float(generator.random())
 
     def between(low: float, high: float) -> float:

@@ -142,7 +142,8 @@ class TestOneFinger:
             row for row in tables["events"].rows if row.keys["figure"] == "missed at 50 ms [%]"
         ]
         assert missed and all(row.ours is None and row.n == 0 for row in missed)
-        assert {"methods", "hands", "slips", *PAPER} <= set(tables)
+        assert {"methods", "hands", *PAPER} <= set(tables)
+        assert "slips" not in tables  # no slips are known
         report = (tmp_path / "out" / "report.html").read_text()
         assert "only the thumb has labels of both classes" in report
 

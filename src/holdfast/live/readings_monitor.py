@@ -29,7 +29,9 @@ PULL_OF_NOISE = 20.0
 PULL_OF_LARGEST = 0.1
 """Least fall below the first value, as a share of the largest change; elastomers creep by less."""
 
-STILL = "no reading has changed since the start: touch the sensor; if that changes none, check it"
+NO_CHANGE = (
+    "no reading has changed since the start: touch the sensor; if that changes none, check it"
+)
 MISSING_AXES = "readings along {} never change: 3 axes are expected, and slip shows in the shear"
 PULLED = (
     "the normal force fell far below its first value: the finger was in contact at the start, or "
@@ -114,7 +116,7 @@ class _FingerReadings:
     def _still(self, time: float) -> list[str]:
         """Return what has not changed for too long."""
         if not self._n_moved:
-            return [STILL] if time - self._start >= STILL_SECONDS else []
+            return [NO_CHANGE] if time - self._start >= STILL_SECONDS else []
         if self._moved.all() or self._n_moved * SAMPLE_CHECK_INTERVAL < MOVED_SECONDS:
             return []
         axes = [axis for axis, moved in zip("xyz", self._moved, strict=True) if not moved]

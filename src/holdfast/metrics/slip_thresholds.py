@@ -17,12 +17,17 @@ from holdfast.metrics.slips import (
     count_slips,
     slip_metrics,
 )
-from holdfast.metrics.statistics import Interval, Statistic, bootstrap_interval
+from holdfast.metrics.statistics import (
+    Interval,
+    Statistic,
+    bootstrap_interval,
+    draw_recordings,
+)
 from holdfast.sensors.types import Array, Flags, Integers
 
-LOG_ODDS = np.arange(-40, 81) * 0.1
+THRESHOLD_LOG_ODDS = np.arange(-40, 81) * 0.1
 """Log odds of the thresholds that are tried."""
-THRESHOLDS = 1.0 / (1.0 + np.exp(-LOG_ODDS))
+THRESHOLDS = 1.0 / (1.0 + np.exp(-THRESHOLD_LOG_ODDS))
 """Thresholds of the probability of a slip that are tried, lowest first."""
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
@@ -165,6 +170,7 @@ def slip_intervals(
     curves: Sequence[Curve],
     choice: ThresholdChoice | None = None,
     *,
+    training: Sequence[Curve] = (),
     n: int = 1000,
     seed: int = 0,
     level: float = 0.95,
@@ -174,6 +180,8 @@ def slip_intervals(
     Args:
         curves: of each recording, at `THRESHOLDS`; of one threshold each without a choice.
         choice: that is made again in each resample; None for a threshold that is given.
+        training: of the recordings from which the threshold is chosen, resampled too; by default
+            those of `curves`.
         n: number of resamples.
         seed: of the resamples.
         level: fraction of the resamples within each interval.
@@ -184,7 +192,7 @@ def slip_intervals(
     if len(curves) < 2:
         return None
     table = [[_ratios(counts) for counts in curve] for curve in curves]
-    chosen = _chooser(table, choice)
+    chosen = _resampled(training, choice, n, seed) if training else _chooser(table, choice)
     intervals: dict[str, dict[str, Interval | None]] = {}
     for name, limit in table[0][0]:
         ratios = [[row[name, limit] for row in curve] for curve in table]
@@ -200,6 +208,15 @@ def slip_intervals(
         raised_quiet=intervals["raised_quiet"][""],
         false_alarms_per_minute=intervals["false_alarms"],
     )
+
+
+def _resampled(
+    training: Sequence[Curve], choice: ThresholdChoice | None, n: int, seed: int
+) -> Callable[[Array], Integers]:
+    """Return a function that gives the thresholds of n resamples of the training recordings."""
+    table = [[_ratios(counts) for counts in curve] for curve in training]
+    places = _chooser(table, choice)(draw_recordings(len(training), n, seed + 1))
+    return lambda draws: places[: len(draws)]
 
 
 Table = Sequence[Sequence[Mapping[tuple[str, str], _Ratio]]]

@@ -117,7 +117,7 @@ def bootstrap_interval(
     """
     if n_recordings < 2:
         return None
-    values = statistic(_draws(n_recordings, n, seed))
+    values = statistic(draw_recordings(n_recordings, n, seed))
     ordered = np.sort(values[~np.isnan(values)])
     if not len(ordered):
         return None
@@ -189,7 +189,7 @@ def quantile_of(values: Sequence[Array], q: float) -> Statistic:
 
 
 @lru_cache(maxsize=1)
-def _draws(n_recordings: int, n: int, seed: int) -> Array:
+def draw_recordings(n_recordings: int, n: int, seed: int) -> Array:
     """Return (n, n_recordings) number of times that each resample drew each recording."""
     shares = np.full(n_recordings, 1 / n_recordings)
     draws = np.random.default_rng(seed).multinomial(n_recordings, shares, size=n).astype(float)

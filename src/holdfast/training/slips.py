@@ -44,7 +44,7 @@ from holdfast.training.training_samples import (
     usable_rows,
 )
 
-SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.05
+SLIP_SMOOTHING, SLIP_RULE_HOLD = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
 SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
@@ -89,7 +89,7 @@ class SlipSamples:
         classifier = msgspec.structs.replace(
             fitted, offset=fitted.offset - float(thinning), threshold=0.5
         )
-        return SlipRule(classifier, SLIP_SMOOTHING, SLIP_HOLD)
+        return SlipRule(classifier, SLIP_SMOOTHING, SLIP_RULE_HOLD)
 
 
 def gather_slip_samples(

@@ -18,7 +18,7 @@ from holdfast.twin.skin import (
     BY,
     BZ,
     N_BRISTLE,
-    SLIDING,
+    PLASTIC_SPEED,
     SLIPPING,
     Nine,
     Skin,
@@ -288,17 +288,17 @@ def _sum_nodes(
             _clear_node(bristles, forces, i)
             continue
         node = (depth, nodes[i, NODE_STIFFNESS], pressed)
-        bristle = (bristles[i, BX], bristles[i, BY], bristles[i, BZ], bristles[i, SLIDING])
+        bristle = (bristles[i, BX], bristles[i, BY], bristles[i, BZ], bristles[i, PLASTIC_SPEED])
         held, bristle = friction(
             solid, skin, bristle, pose[0], normal, tangential(velocity, normal), node, dt, keep
         )
-        bristles[i, BX], bristles[i, BY], bristles[i, BZ], bristles[i, SLIDING] = bristle
+        bristles[i, BX], bristles[i, BY], bristles[i, BZ], bristles[i, PLASTIC_SPEED] = bristle
         total = add(scaled(normal, pressed), held)
         forces[i, 0], forces[i, 1], forces[i, 2] = apply_transposed(pose[0], total)
         force, torque = add(force, total), add(torque, cross(point, total))
         load += pressed
-        slip += pressed * bristle[SLIDING]
-        slipping += pressed * (bristle[SLIDING] > skin[SLIPPING])
+        slip += pressed * bristle[PLASTIC_SPEED]
+        slipping += pressed * (bristle[PLASTIC_SPEED] > skin[SLIPPING])
     weight = max(load, 1e-300)
     state.tips[tip, TIP_SLIP], state.tips[tip, TIP_SLIPPING_SHARE] = (
         slip / weight,
@@ -316,5 +316,5 @@ def _unpacked_skin(a: Array) -> tuple[float, ...]:
 @compiled
 def _clear_node(bristles: Array, forces: Array, i: int) -> None:
     """Clear the state of a node that touches nothing."""
-    bristles[i, BX] = bristles[i, BY] = bristles[i, BZ] = bristles[i, SLIDING] = 0.0
+    bristles[i, BX] = bristles[i, BY] = bristles[i, BZ] = bristles[i, PLASTIC_SPEED] = 0.0
     forces[i, 0] = forces[i, 1] = forces[i, 2] = 0.0

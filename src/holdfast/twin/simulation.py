@@ -28,7 +28,7 @@ from holdfast.twin.protocol import (
     Protocol,
     touched_phase,
 )
-from holdfast.twin.slip_events import REST, SlipEvents, SlipState, draw_course
+from holdfast.twin.slip_events import NO_SLIP, SlipEvents, SlipState, draw_course
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_readout import Counts, Readout, UskinParameters
@@ -188,7 +188,7 @@ class Simulation:
         if protocol.locked_at is not None and not was_locked:
             joints = world.hand.data.qpos[:N_JOINTS]
             self._pressing = Pressing(world.path, command.depths, joints)
-        slipping = self._slip_state() if was_locked else REST
+        slipping = self._slip_state() if was_locked else NO_SLIP
         if self._is_loaded and was_locked:
             world.set_load(self._load(slipping))
         if slipping.touching:
@@ -221,7 +221,7 @@ class Simulation:
     def _slip_state(self) -> SlipState:
         """Return what the slip events do until the next sample; nothing after a loss."""
         if self.protocol.lost_at is not None or not self.plan.slip_events:
-            return REST
+            return NO_SLIP
         return self._slip_events.step(self.held_for, self.world.slip, self.world.bodies[-1])
 
     def _load(self, slipping: SlipState) -> LoadState:

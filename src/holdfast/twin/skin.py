@@ -63,7 +63,7 @@ def scaled(v: Three, by: float) -> Three:
 
 # Columns of bristles.
 BX, BY, BZ = 0, 1, 2  # stretch of the node along the surface, fingertip frame [m]
-SLIDING = 3  # its plastic slip speed, low-pass filtered [m/s]
+PLASTIC_SPEED = 3  # its plastic slip speed, low-pass filtered [m/s]
 N_BRISTLE = 4
 Bristle = tuple[float, float, float, float]
 
@@ -163,7 +163,7 @@ def friction(
     """
     depth, stiffness, pressed = node
     kt = skin[SHEAR] * elastic(skin, stiffness, depth) / (depth + skin[ENGAGEMENT])
-    limit = pressed * _coefficient(solid, skin, bristle[SLIDING])
+    limit = pressed * _coefficient(solid, skin, bristle[PLASTIC_SPEED])
     b = apply(rotation, (bristle[BX], bristle[BY], bristle[BZ]))
     b = tangential(add(b, scaled(sliding, dt)), normal)
     length = math.sqrt(dot(b, b))
@@ -172,7 +172,7 @@ def friction(
         slip = (length - limit / kt) / dt
         b = scaled(b, limit / (kt * length))
     x, y, z = apply_transposed(rotation, b)
-    after = x, y, z, _smoothed(bristle[SLIDING], slip, keep)
+    after = x, y, z, _smoothed(bristle[PLASTIC_SPEED], slip, keep)
     force = scaled(add(b, scaled(sliding, skin[SHEAR_TIME])), -kt)
     square = dot(force, force)
     if square > limit * limit:

@@ -33,7 +33,7 @@ UPRIGHT = np.array([0.0, 0.0, 1.0])
 """Axis of the object in the world."""
 SIDEWAYS = np.cross(UPRIGHT, GRASP_LINE)
 """Unit vector in the world across the grasp line and the axis of the object."""
-CLOSING_TIME = 0.2
+RECLOSING_TIME = 0.2
 """Time in which a hand that guides the object closes on it, and opens again [s]."""
 GUIDE_LEVER = 0.03
 """Half of the width over which that hand grips the object: it gives stiffness in rotation [m]."""
@@ -76,7 +76,7 @@ class SlipKind(StrEnum):
 
 N_KINDS = len(SlipKind)
 """Number of kinds."""
-RATES = {
+RATE_FIELDS = {
     SlipKind.WEIGHT: "weight_rate",
     SlipKind.GRIP: "grip_rate",
     SlipKind.FRICTION: "friction_rate",
@@ -137,7 +137,7 @@ class SlipState(NamedTuple):
     touching: bool = False
 
 
-REST = SlipState(LoadState(np.zeros(3), np.zeros(3), 1.0))
+NO_SLIP = SlipState(LoadState(np.zeros(3), np.zeros(3), 1.0))
 """State between events."""
 
 
@@ -193,7 +193,7 @@ def draw_slip_event(
         start: time after the lock [s].
         scale: factor of the sliding distance.
     """
-    rate = _log_uniform(generator, getattr(ranges, RATES[kind]))
+    rate = _log_uniform(generator, getattr(ranges, RATE_FIELDS[kind]))
     size = _draw_size(generator, ranges, kind)
     event = SlipEvent(
         kind,
@@ -229,7 +229,7 @@ def _natural_duration(event: SlipEvent) -> float:
         SlipKind.CREEP: PULL_TIME + event.distance / event.rate,
         SlipKind.TWIST: MAX_TWIST / event.rate,
         SlipKind.TURN: PULL_TIME + event.distance / (event.rate * GUIDE_LEVER),
-        SlipKind.ROLL: CLOSING_TIME + 2 * event.size / event.rate,
+        SlipKind.ROLL: RECLOSING_TIME + 2 * event.size / event.rate,
     }
     return durations[event.kind]
 
@@ -280,7 +280,7 @@ class SlipEvents:
             self._event = event = self._coming.pop()
             self._begin(event, body, self._locked_pose)
         if event is None:
-            return REST
+            return NO_SLIP
         elapsed = held_for - event.start
         self._slid += slip * self._period
         over = self._slid >= event.distance or elapsed >= event.duration
@@ -301,7 +301,7 @@ class SlipEvents:
         gone = min(max(elapsed - self._ended_at, 0.0) / event.recovery, 1.0)
         left = 0.5 + 0.5 * math.cos(math.pi * gone)
         change = event.rate * min(elapsed, self._ended_at)
-        rest = REST.load
+        rest = NO_SLIP.load
         match event.kind:
             case SlipKind.WEIGHT:
                 return SlipState(rest._replace(added_mass=left * change))
@@ -313,7 +313,7 @@ class SlipEvents:
             case SlipKind.TWIST:
                 torque = left * change * self._axis
                 return SlipState(rest._replace(torque=torque), touching=True)
-        closed = left * min(elapsed / CLOSING_TIME, 1.0)
+        closed = left * min(elapsed / RECLOSING_TIME, 1.0)
         steady = closed if event.kind is SlipKind.CREEP else 0.0
         guide = self._guided(event, elapsed, closed)
         return SlipState(rest._replace(guide=guide, steady=steady), touching=True)
@@ -333,10 +333,10 @@ class SlipEvents:
 
     def _speed(self, event: SlipEvent, elapsed: float) -> float:
         """Return speed [m/s] or spin [rad/s] of the hand: it pulls until the object slides."""
-        if elapsed < CLOSING_TIME or self._ended_at < math.inf:
+        if elapsed < RECLOSING_TIME or self._ended_at < math.inf:
             return 0.0
         if event.kind is SlipKind.ROLL:
-            return event.rate if elapsed - CLOSING_TIME < event.size / event.rate else -event.rate
+            return event.rate if elapsed - RECLOSING_TIME < event.size / event.rate else -event.rate
         if self._slid >= MIN_SLIDE:
             return event.rate
         lever = GUIDE_LEVER if event.kind is SlipKind.TURN else 1.0

@@ -45,7 +45,6 @@ TABLES = (
     sample_tables.methods,
     sample_tables.hands,
     event_tables.events,
-    event_tables.slips,
     event_tables.glitches,
     event_tables.glitch_rates,
     sample_tables.splits,
@@ -119,31 +118,28 @@ def _accuracy_figure(plan: StudyPlan, results: Results) -> ReportFigure:
 
 def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     post = f"{1000 * POST_DURATIONS[0]:.0f} ms"
-    groups: dict[str, dict[str, Curve]] = {
-        f"events missed at {post} [%]": {},
-        f"slips not detected within {post} [%]": {},
+    curves = {
+        title: _alarm_curve(evaluation)
+        for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items()
     }
-    for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items():
-        for group, curve in zip(groups.values(), _alarm_curves(evaluation), strict=True):
-            group[title] = curve
     caption = (
-        "Missed events and slips against false alarms, by recording. Thresholds are chosen on "
+        "Missed events against false alarms, by recording. Thresholds are chosen on "
         "training recordings for false alarms under a stable label of "
         f"{', '.join(f'{rate:g}' for rate in FALSE_ALARM_RATES)} per minute; the figure shows "
         "the rates that result on the other recordings. Large marks: chosen for "
         f"{COMPARED_RATE:g} per minute. A glitch of the hand's controller is an event here."
     )
-    return ReportFigure("alarms", caption, draw_alarms(groups, bar=COMPARED_RATE))
+    return ReportFigure(
+        "alarms", caption, draw_alarms({f"events missed at {post} [%]": curves}, bar=COMPARED_RATE)
+    )
 
 
-def _alarm_curves(evaluation: MethodEvaluation) -> tuple[Curve, Curve]:
-    """Return missed events, and slips not detected, over false alarms under a stable label."""
+def _alarm_curve(evaluation: MethodEvaluation) -> Curve:
+    """Return missed events over false alarms under a stable label."""
     by_rate = evaluation.alarms.by_rate
     rates = np.array([_false_alarms_per_minute(alarms) for alarms in by_rate])
     missed = np.array([_missed_share(alarms) for alarms in by_rate])
-    not_detected = 100 - np.array([_slips_detected_share(alarms) for alarms in by_rate])
-    chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
-    return Curve(rates, missed, chosen=chosen), Curve(rates, not_detected, chosen=chosen)
+    return Curve(rates, missed, chosen=FALSE_ALARM_RATES.index(COMPARED_RATE))
 
 
 def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
@@ -154,11 +150,6 @@ def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
 def _missed_share(alarms: Sequence[AlarmStatistics]) -> float:
     n_events = sum(len(alarm.delays) for alarm in alarms)
     return _percent(sum(alarm.n_missed(POST_DURATIONS[0]) for alarm in alarms), n_events)
-
-
-def _slips_detected_share(alarms: Sequence[AlarmStatistics]) -> float:
-    n_slips = sum(len(alarm.slip_delays) for alarm in alarms)
-    return _percent(sum(alarm.n_slips_found(POST_DURATIONS[0]) for alarm in alarms), n_slips)
 
 
 def _percent(part: int, whole: int) -> float:

@@ -1,4 +1,4 @@
-"""Tables of the comparison by event: detection delay, false alarms, slips and glitches."""
+"""Tables of the comparison by event: detection delay, false alarms and glitches."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -17,8 +17,8 @@ from holdfast_lab.study.comparison.jobs import (
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics
 from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME, ReadingAlarms
+from holdfast_lab.study.evaluation.glitch_counts import GlitchCount
 from holdfast_lab.study.evaluation.glitch_readings import READINGS
-from holdfast_lab.study.evaluation.slips import MIN_SLIP_DISTANCE, MIN_SLIP_DURATION, GlitchCount
 from holdfast_lab.study.plan import StudyPlan
 
 COMPARED = f"for {COMPARED_RATE:g}/min"
@@ -28,8 +28,6 @@ ALARMS_BY_THRESHOLD: dict[str, Callable[[ReadingAlarms], list[AlarmStatistics]]]
     HELD: lambda alarms: alarms.held,
     COMPARED: lambda alarms: alarms.compared,
 }
-SLIP_THRESHOLDS = (HELD, COMPARED)
-SLIP_SPLITS = ("recording", "object", "others")
 READING = "a glitch is"
 """Key of the tables: how glitches of the hand's controller count."""
 FALSE_ALARMS = "false alarms per minute"
@@ -38,7 +36,6 @@ FALSE_ALARMS_OF_GLITCH = "of a glitch"
 OTHER_FALSE_ALARMS = "other false alarms"
 ALREADY_NOT_STABLE = "already not stable at onset [%]"
 SLIP_MEDIAN, SLIP_P95 = "slip distance median [mm]", "slip distance 95 % [mm]"
-NOT_CALLED_STABLE = "stable called otherwise [%]"
 MILLIMETRES = 1e3
 
 GLITCH_NOTE = (
@@ -47,8 +44,7 @@ GLITCH_NOTE = (
     "stable, because nothing outside the hand acts, as a user sees it. 'Left out': alarms that "
     f"belong to a glitch (from {1000 * EARLY_TOLERANCE:.0f} ms before it to "
     f"{LATE_TOLERANCE:g} s after it), the "
-    "stable label of that time, and the slips that a glitch caused are not counted. Thresholds "
-    "are chosen for each reading."
+    "stable label of that time are not counted. Thresholds are chosen for each reading."
 )
 THRESHOLD_NOTE = (
     f"Thresholds: the method's own; the same with states held not stable for {HOLD_TIME:g} s "
@@ -83,39 +79,13 @@ def events(plan: StudyPlan, results: Results) -> ResultTable:
     )
 
 
-def slips(plan: StudyPlan, results: Results) -> ResultTable:
-    """Return the table of slips detected in time, at thresholds with few false alarms."""
-    rows: list[Row] = []
-    for keys, alarms in _lines(plan, results, SLIP_THRESHOLDS, SLIP_SPLITS):
-        rows += slip_rows(keys, alarms, plan.seed)
-        not_stable = [alarm.n_not_called_stable for alarm in alarms]
-        stable = [alarm.n_stable for alarm in alarms]
-        rows.append(ratio_row(keys | {"figure": NOT_CALLED_STABLE}, not_stable, stable, plan.seed))
-        false_alarms = list(_false_alarm_rows(keys, alarms, plan.seed))
-        rows += [row for row in false_alarms if row.keys["figure"] in _SLIP_FALSE_ALARMS]
-        rows.append(count_row(keys | {"figure": "slips"}, [len(a.slip_delays) for a in alarms]))
-    note = (
-        "A slip: the object begins to slide on a finger (over 1 mm/s) after the hand has held it "
-        f"without a slip for half a second; it lasts at least {1000 * MIN_SLIP_DURATION:.0f} ms "
-        f"or slides at least {1000 * MIN_SLIP_DISTANCE:g} mm. Detected: by an alarm, a change "
-        f"of the hand from STABLE, from {1000 * EARLY_TOLERANCE:.0f} ms before the onset until "
-        "that time. "
-        "A slip without an alarm is missed and stays in the denominator, also where the hand "
-        "was already not called stable; how often this is so is a column. Slip distance: what "
-        f"the object has slid at the alarm; infinite for a missed slip. {THRESHOLD_NOTE} "
-        f"{GLITCH_NOTE}"
-    )
-    lines = ("on", "threshold", READING, "method")
-    return ResultTable("slips", "Slips detected", note, rows, lines, digits_of=EVENT_DIGITS)
-
-
 def glitch_rates(plan: StudyPlan, results: Results) -> ResultTable:
-    """Return the table of events and slips on corpora that differ in the rate of glitches."""
+    """Return the table of events on corpora that differ in the rate of glitches."""
     rows: list[Row] = []
     splits = tuple(key for key in GLITCH_RATE_SPLITS if key in plan.corpora)
     for keys, alarms in _lines(plan, results, (COMPARED,), splits):
         del keys["threshold"]
-        every = [*event_rows(keys, alarms, plan.seed), *slip_rows(keys, alarms, plan.seed)]
+        every = event_rows(keys, alarms, plan.seed)
         rows += [row for row in every if row.keys["figure"] in GLITCH_RATE_FIGURES]
     note = (
         "The rate of glitches is a free choice of the twin. Grasps of unseen objects with 0, 1 "
@@ -159,35 +129,18 @@ def event_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iter
     yield count_row(keys | {"figure": "events"}, n_events)
 
 
-def slip_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
-    """Yield the rows of one line of the table of slips that concern slips."""
-    n_slips = [len(alarm.slip_delays) for alarm in alarms]
-    for post in POST_DURATIONS:
-        n_detected = [alarm.n_slips_found(post) for alarm in alarms]
-        figure = {"figure": f"detected within {1000 * post:.0f} ms [%]"}
-        yield ratio_row(keys | figure, n_detected, n_slips, seed)
-    not_stable = [alarm.n_slips_not_stable for alarm in alarms]
-    yield ratio_row(keys | {"figure": ALREADY_NOT_STABLE}, not_stable, n_slips, seed)
-    distances = [[MILLIMETRES * d for d in alarm.slip_distances] for alarm in alarms]
-    yield quantile_row(keys | {"figure": SLIP_MEDIAN}, distances, 0.5, seed)
-    yield quantile_row(keys | {"figure": SLIP_P95}, distances, 0.95, seed)
-
-
 GLITCH_RATE_FIGURES = (
     f"missed at {1000 * POST_DURATIONS[0]:.0f} ms [%]",
     f"missed at {1000 * POST_DURATIONS[-1]:.0f} ms [%]",
     FALSE_ALARMS_UNDER_STABLE,
     FALSE_ALARMS_OF_GLITCH,
     "events",
-    f"detected within {1000 * POST_DURATIONS[0]:.0f} ms [%]",
-    SLIP_MEDIAN,
 )
 EVENT_DIGITS = {
     **dict.fromkeys(("delay median [s]", "delay 95 % [s]"), 3),
     **dict.fromkeys((SLIP_MEDIAN, SLIP_P95), 2),
-    **dict.fromkeys(("events", "slips", "glitches"), 0),
+    **dict.fromkeys(("events", "glitches"), 0),
 }
-_SLIP_FALSE_ALARMS = (FALSE_ALARMS_UNDER_STABLE, FALSE_ALARMS_OF_GLITCH, OTHER_FALSE_ALARMS)
 
 
 def _lines(

@@ -30,8 +30,8 @@ AUC, AUC_OF_HAND, MEAN_AUC = "AUC", "AUC of the hand", "mean AUC"
 AUC_OF_SHIPPED, AUC_DIFFERENCE = f"AUC of {SHIPPED}", "difference"
 ACCURACY = "accuracy [%]"
 CALLED_STABLE = "stable called STABLE [%]"
-SLIPS, MISSED_SLIPS, FALSE_ALARMS = "slips", "missed slips [%]", "false alarms per minute"
-COUNT_DIGITS = {AUC: 2, AUC_OF_HAND: 2, MEAN_AUC: 2, SLIPS: 0}
+SLIP_COUNT, MISSED_SLIPS, FALSE_ALARMS = "slips", "missed slips [%]", "false alarms per minute"
+COUNT_DIGITS = {AUC: 2, AUC_OF_HAND: 2, MEAN_AUC: 2, SLIP_COUNT: 0}
 """Digits after the decimal point, where they are not 1."""
 
 
@@ -70,7 +70,7 @@ class UnitCounts(NamedTuple):
     scores: Scores
 
 
-class SlipCounts(NamedTuple):
+class RealAlarmCounts(NamedTuple):
     """Counts of the alarms of the hand in one recording.
 
     Attributes:
@@ -92,7 +92,7 @@ class RecordingCounts(NamedTuple):
     name: str
     fingers: Mapping[str, UnitCounts]
     hand: UnitCounts
-    events: SlipCounts
+    events: RealAlarmCounts
 
     @property
     def units(self) -> list[UnitCounts]:
@@ -254,12 +254,12 @@ def _sample_row(
     return _with_interval_if_enough(ratio_row(keys, parts, wholes, seed))
 
 
-def _event_rows(keys: RowKeys, events: Sequence[SlipCounts], seed: int) -> Iterator[Row]:
+def _event_rows(keys: RowKeys, events: Sequence[RealAlarmCounts], seed: int) -> Iterator[Row]:
     n_slips = [event.n_slips for event in events]
     missed = [event.n_missed for event in events]
     alarms = [event.n_false_alarms for event in events]
     minutes = [event.stable_minutes for event in events]
-    yield count_row({**keys, "figure": SLIPS}, n_slips)
+    yield count_row({**keys, "figure": SLIP_COUNT}, n_slips)
     yield _with_interval_if_enough(
         ratio_row({**keys, "figure": MISSED_SLIPS}, missed, n_slips, seed)
     )
@@ -302,7 +302,7 @@ def _count_unit(
     )
 
 
-def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> SlipCounts:
+def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> RealAlarmCounts:
     times, slip = labels.times.array, labels.slip.array
     codes = np.where(common, labels.codes.array, UNKNOWN)
     match = match_alarms(times, codes, alarm_states)
@@ -311,7 +311,7 @@ def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> Slip
         for event in match.events
         if slip[np.searchsorted(times, event.onset) : np.searchsorted(times, event.end)].any()
     ]
-    return SlipCounts(
+    return RealAlarmCounts(
         n_slips=len(slips),
         n_missed=sum(event.delay > MISSED_AFTER + TIME_TOLERANCE for event in slips),
         n_false_alarms=sum(alarm.label is ContactState.STABLE for alarm in match.false_alarms),

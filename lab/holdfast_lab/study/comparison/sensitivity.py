@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import UNSTABLE_MARGIN
-from holdfast.metrics.events import POST_DURATIONS
 from holdfast.twin.profile import profile, profiles
 from holdfast_lab.figures.curves import Curve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
@@ -50,14 +49,13 @@ NOISE_NAME = "noise"
 MARGIN = "margin [s]"
 RATE_NAME = "rate [Hz]"
 SAMPLE_FIGURES = ("accuracy [%]", "FDR [%]", "AUC contact")
-SLIPS_DETECTED = f"slips detected within {1000 * POST_DURATIONS[0]:.0f} ms [%]"
 SIGMA_DIFFERENCE = "accuracy less sigma's [points]"
-CURVES = ("accuracy [%]", "AUC contact", SLIPS_DETECTED)
+CURVES = ("accuracy [%]", "AUC contact", FALSE_ALARMS_UNDER_STABLE)
 """Figures of the tables that are drawn as curves."""
 NOTE = (
-    "By recording. Slips and false alarms: at the threshold for "
+    "By recording. False alarms: at the threshold for "
     f"{COMPARED_RATE:g} false alarm per minute under a stable label in training, chosen for each "
-    "value separately. A slip without an alarm is missed; a glitch of the controller is an event."
+    "value separately. A glitch of the controller is an event."
 )
 
 Keys = dict[str, Key]
@@ -136,7 +134,7 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
         MARGIN,
         _margins(plan),
         "Time by which labels extend every disturbance at both ends, in training and in the "
-        "figures by sample; slips and alarms are counted by labels without margin.",
+        "figures by sample; alarms are counted by labels without margin.",
     )
     rates = Sweep(
         "rates",
@@ -223,7 +221,7 @@ def _profile_table(plan: StudyPlan, results: Results) -> ResultTable:
                 rows += _rows(keys, evaluations[name], plan.seed)
     note = (
         "Fitted to main, evaluated on recordings with another grip force and other disturbances "
-        "by the operator, without a new fit; slips and alarms at the threshold chosen on main."
+        "by the operator, without a new fit; alarms at the threshold chosen on main."
     )
     title = "Sensitivity to the profile"
     return ResultTable("profiles", title, note, rows, ("method", "on"), digits_of=DIGITS)
@@ -256,10 +254,6 @@ def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
 def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
     yield from sample_rows(keys, evaluation.metrics, SAMPLE_FIGURES)
     alarms = evaluation.alarms.compared
-    n_slips = [len(alarm.slip_delays) for alarm in alarms]
-    if sum(n_slips):
-        n_detected = [alarm.n_slips_found(POST_DURATIONS[0]) for alarm in alarms]
-        yield ratio_row(keys | {"figure": SLIPS_DETECTED}, n_detected, n_slips, seed)
     minutes = [alarm.stable_seconds / 60 for alarm in alarms]
     n_false = [alarm.n_under_stable for alarm in alarms]
     figure = keys | {"figure": FALSE_ALARMS_UNDER_STABLE}

@@ -62,12 +62,12 @@ def table(plan: StudyPlan, results: Results) -> ResultTable:
         "recordings: among the paper's method and its variants (both classifiers, with balanced "
         "and with unweighted classes; log F_a with log sigma; the energy of the details), and "
         "among all other methods. By sample: at each method's own threshold. By event: the hand, "
-        f"missed or not detected until {posts} after the onset, at the threshold chosen for "
+        f"missed until {posts} after the onset, at the threshold chosen for "
         f"{COMPARED_RATE:g} false alarm per minute under a stable label in training; the false "
         "alarms that result are given. The ratio is that of the baseline to ours; its interval "
         "is paired: a resample draws the same recordings for both. What is left out is left out "
         "of numerator and denominator. A glitch is a jump of the hand's own controller: an "
-        "event, a false alarm, or left out together with the slips that it caused."
+        "event, a false alarm, or left out."
     )
     lines = ("on", "error", "left out", "baseline of", "baseline")
     title = "Ours against the strongest baseline"
@@ -167,13 +167,6 @@ def _missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
     ]
 
 
-def _missed_slips(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
-    return lambda evaluation: [
-        (len(alarms.slip_delays) - alarms.n_slips_found(POST_DURATIONS[0]), len(alarms.slip_delays))
-        for alarms in evaluation.readings[reading].compared
-    ]
-
-
 NOTHING = "nothing"
 MEASURES = (
     Measure("samples of fingers [%]", NOTHING, _finger_errors),
@@ -183,9 +176,5 @@ MEASURES = (
     Measure("events, a glitch is a false alarm [%]", NOTHING, _missed_events(FALSE_ALARM),
             FALSE_ALARM),
     Measure("events [%]", "glitches", _missed_events(LEFT_OUT_SPLIT), LEFT_OUT_SPLIT),
-    Measure("slips, a glitch is an event [%]", NOTHING, _missed_slips(EVENT), EVENT),
-    Measure("slips, a glitch is a false alarm [%]", NOTHING, _missed_slips(FALSE_ALARM),
-            FALSE_ALARM),
-    Measure("slips [%]", "glitches and their slips", _missed_slips(LEFT_OUT_SPLIT), LEFT_OUT_SPLIT),
 )  # fmt: skip
 """The kinds of errors in the table: without any exclusion, then with exclusions."""

@@ -1,6 +1,5 @@
-"""Statistics of the alarms of a hand in one recording: events, slips and false alarms."""
+"""Statistics of the alarms of a hand in one recording: events and false alarms."""
 
-import math
 from collections.abc import Sequence
 
 import msgspec
@@ -8,10 +7,10 @@ import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, match_alarms
-from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, alarm_places
+from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
+from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
-from holdfast_lab.study.evaluation.slips import Slip, sample_durations
 
 
 class AlarmStatistics(msgspec.Struct, frozen=True):
@@ -20,9 +19,6 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
     Attributes:
         delays: alarm minus onset of each event [s]; infinite for a missed event.
         n_events_not_stable: events at whose onset the hand was already not called stable.
-        slip_delays: alarm minus onset of each slip [s]; infinite for a missed slip.
-        slip_distances: distance slid at the alarm, for each slip [m]; infinite for a missed slip.
-        n_slips_not_stable: slips at whose onset the hand was already not called stable.
         n_false_alarms: alarms that belong to no event.
         n_under_stable: false alarms under a stable label.
         n_of_glitch: of those, alarms that belong to a glitch of the hand's controller.
@@ -33,9 +29,6 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
 
     delays: list[float]
     n_events_not_stable: int
-    slip_delays: list[float]
-    slip_distances: list[float]
-    n_slips_not_stable: int
     n_false_alarms: int
     n_under_stable: int
     n_of_glitch: int
@@ -47,29 +40,23 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
         """Return the number of events without an alarm until onset + post [s]."""
         return sum(delay > post + TIME_TOLERANCE for delay in self.delays)
 
-    def n_slips_found(self, within: float) -> int:
-        """Return the number of slips that have an alarm within a time [s]."""
-        return sum(delay <= within + TIME_TOLERANCE for delay in self.slip_delays)
-
 
 def alarm_statistics(
     hand: FingerDecisions,
-    slips: Sequence[Slip],
     glitch: Mask | None = None,
     *,
     without_glitches: bool = False,
 ) -> AlarmStatistics:
     """Return the statistics of the alarms of a hand.
 
-    An alarm belongs to a slip, or to a glitch, by the rule for events: it comes from 0.02 s
-    before the onset to 0.25 s after the end.
+    An alarm belongs to a glitch by the rule for events: it comes from 0.02 s before the onset to
+    0.25 s after the end.
 
     Args:
         hand: labels and decisions.
-        slips: in the recording, see `find_slips`.
         glitch: (n,) samples at which a glitch acts; by default none.
-        without_glitches: leave out the false alarms of glitches, the stable label in which they
-            would count, and the slips that a glitch caused.
+        without_glitches: leave out the false alarms of glitches, and the stable label in which they
+            would count.
     """
     match = match_alarms(hand.times, hand.labels, hand.states)
     near = near_glitch(hand.times, glitch)
@@ -82,16 +69,11 @@ def alarm_statistics(
         of_glitch = np.zeros(len(alarms), dtype=np.bool_)
         stable_seconds -= float(sample_durations(hand.times)[stable & near].sum())
         stable = stable & ~near
-        slips = [slip for slip in slips if not slip.of_glitch]
     under_stable = np.array([alarm.label.code == STABLE for alarm in alarms], dtype=np.bool_)
     decided = stable & (hand.states != UNKNOWN)
-    found = [_slip_alarm(slip, hand) for slip in slips]
     return AlarmStatistics(
         delays=[event.delay for event in match.events],
         n_events_not_stable=_n_not_stable(hand, [event.onset for event in match.events]),
-        slip_delays=[alarm - slip.onset for alarm, slip in zip(found, slips, strict=True)],
-        slip_distances=[_distance(slip, alarm) for alarm, slip in zip(found, slips, strict=True)],
-        n_slips_not_stable=_n_not_stable(hand, [slip.onset for slip in slips]),
         n_false_alarms=len(alarms),
         n_under_stable=int(under_stable.sum()),
         n_of_glitch=int((under_stable & of_glitch).sum()),
@@ -117,19 +99,6 @@ def near_glitch(times: Array, glitch: Mask | None) -> Mask:
 def _at(mask: Mask, times: Array, instants: Array) -> Mask:
     """Return the value of a mask over `times` at some of these times."""
     return mask[np.searchsorted(times, instants)] if len(instants) else np.zeros(0, dtype=np.bool_)
-
-
-def _slip_alarm(slip: Slip, hand: FingerDecisions) -> float:
-    """Return the time of the first alarm that belongs to a slip [s]; infinite without one."""
-    alarms = hand.times[alarm_places(hand.states)]
-    first = np.searchsorted(alarms, slip.onset - EARLY_TOLERANCE - TIME_TOLERANCE)
-    if first == len(alarms) or alarms[first] > slip.end + LATE_TOLERANCE + TIME_TOLERANCE:
-        return math.inf
-    return float(alarms[first])
-
-
-def _distance(slip: Slip, alarm: float) -> float:
-    return math.inf if math.isinf(alarm) else slip.distance_until(alarm)
 
 
 def _n_not_stable(hand: FingerDecisions, onsets: Sequence[float]) -> int:

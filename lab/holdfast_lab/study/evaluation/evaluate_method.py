@@ -36,10 +36,10 @@ from holdfast_lab.study.evaluation.fitted_method import (
     TrainingSamples,
     gather_training_samples,
 )
+from holdfast_lab.study.evaluation.glitch_counts import GlitchCount, count_glitches
 from holdfast_lab.study.evaluation.glitch_readings import EVENT, READINGS, labels_by_reading
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast_lab.study.evaluation.scores import RecordingScores
-from holdfast_lab.study.evaluation.slips import GlitchCount, Slip, count_glitches, find_slips
 from holdfast_lab.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
 from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import HAND, Method
@@ -338,24 +338,15 @@ def _alarms(scored: ScoredRecording) -> dict[str, list[AlarmStatistics]]:
     recording = scored.recording
     scores = scored.scores.hand(recording)
     held = scores.hold(HOLD_TIME)
-    slips = [slip for slip in find_slips(recording.truth) if _is_scored(slip, recording)]
     by_reading = {}
     for reading, hand in labels_by_reading(recording).items():
         decided = [scores.decide(hand.labels)]
         decided += [held.decide(hand.labels, s) for s in (0.0, *scored.shifts[reading])]
         left_out = hand.without_glitches
         by_reading[reading] = [
-            alarm_statistics(each, slips, hand.glitch, without_glitches=left_out)
-            for each in decided
+            alarm_statistics(each, hand.glitch, without_glitches=left_out) for each in decided
         ]
     return by_reading
-
-
-def _is_scored(slip: Slip, recording: RecordingFeatures) -> bool:
-    """Return whether all compared methods can have an estimate of the hand at the onset."""
-    hand = recording.hand_labels(recording.exact_labels)
-    place = int(np.searchsorted(hand.times, slip.onset + 1e-6)) - 1
-    return place >= 0 and bool(hand.labels[place] != UNKNOWN)
 
 
 def _pooled(alarms: Sequence[Sequence[AlarmStatistics]]) -> ReadingAlarms:

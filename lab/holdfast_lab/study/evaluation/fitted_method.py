@@ -1,13 +1,14 @@
 """A method fitted to some recordings of a corpus, which scores other recordings."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Classifier, Samples
+from holdfast.metrics.decisions import Codes
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import (
     concatenate,
@@ -53,22 +54,50 @@ def gather_training_samples(
         recordings: features of the corpus.
         max_samples: of each unit.
     """
+    most = -(-max_samples // max(len(recordings), 1))
+
+    def choose(place: int, unit: str) -> ChosenRows:
+        recording = recordings[place]
+        labels = recording.unit_labels(unit)
+        rows = usable_rows(recording.features[unit], labels)
+        return ChosenRows(labels, rows[:: thinning_step(len(rows), most)])
+
+    return gather_rows(recordings, choose)
+
+
+class ChosenRows(NamedTuple):
+    """Labels of a unit in one recording, and the places of the samples that train it."""
+
+    labels: Codes
+    rows: npt.NDArray[np.int64]
+
+
+def gather_rows(
+    recordings: Sequence[RecordingFeatures], choose: Callable[[int, str], ChosenRows | None]
+) -> TrainingSamples:
+    """Return chosen samples of recordings.
+
+    A recording without one of the fingers gives no samples to a whole-hand method.
+
+    Args:
+        recordings: features of the corpus.
+        choose: function from the place of a recording and the name of a unit to the samples
+            that train it; None for none.
+    """
     n_features = _n_features(recordings)
-    parts: dict[str, list[Samples]] = {unit: [] for unit in n_features}
+    parts: dict[str, list[Samples]] = {}
     fingers = dict.fromkeys(finger for recording in recordings for finger in recording.at_rest)
     at_rest = {finger: np.zeros((len(recordings), 3)) for finger in fingers}
-    max_per_recording = -(-max_samples // max(len(recordings), 1))
     for place, recording in enumerate(recordings):
         for unit, features in recording.features.items():
-            if features.shape[1] == n_features[unit]:
-                labels = recording.unit_labels(unit)
-                rows = usable_rows(features, labels)
-                rows = rows[:: thinning_step(len(rows), max_per_recording)]
-                parts[unit].append(labelled_samples(features, labels, rows, place))
+            chosen = choose(place, unit) if features.shape[1] == n_features[unit] else None
+            if chosen is not None:
+                samples = labelled_samples(features, chosen.labels, chosen.rows, place)
+                parts.setdefault(unit, []).append(samples)
         for finger, moments in recording.at_rest.items():
             at_rest[finger][place] = moments
-    samples = {unit: concatenate(each) for unit, each in parts.items()}
-    return TrainingSamples(samples, at_rest, tuple(each.object for each in recordings))
+    gathered = {unit: concatenate(each) for unit, each in parts.items()}
+    return TrainingSamples(gathered, at_rest, tuple(each.object for each in recordings))
 
 
 def _n_features(recordings: Sequence[RecordingFeatures]) -> dict[str, int]:

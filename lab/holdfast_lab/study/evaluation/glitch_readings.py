@@ -2,7 +2,7 @@
 
 The paper counts the detection of a glitch as a success. For a user it is a false alarm, because
 nothing but the hand itself moved the object. So every table of events has both readings. In a
-third one glitches are left out, and with them the slips that they caused.
+third one glitches are left out.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ class HandLabels(NamedTuple):
     Attributes:
         labels: (n,) label codes.
         glitch: (n,) samples at which a glitch is the only reason not to be stable.
-        without_glitches: whether alarms and slips of glitches are left out.
+        without_glitches: whether alarms of glitches are left out.
     """
 
     labels: Codes

@@ -34,8 +34,8 @@ class RecordingFeatures:
         times: sample times of each finger [s].
         amplitude: F_a of each finger [unit of the readings]; NaN where there is no force.
         labels: label codes of each finger.
-        scored_labels: the same, UNKNOWN at samples at which not all compared methods can have
-            an estimate.
+        compared: (n,) samples of each finger at which all compared methods can have an estimate.
+        scored_labels: the labels, UNKNOWN at other samples.
         exact_labels: the same without margin, if the truth is known.
         glitches: (n,) samples of each finger whose exact label has the cause glitch.
         at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
@@ -49,6 +49,7 @@ class RecordingFeatures:
     times: Mapping[str, Array]
     amplitude: Mapping[str, Array]
     labels: Mapping[str, Codes]
+    compared: Mapping[str, Mask]
     scored_labels: Mapping[str, Codes]
     exact_labels: Mapping[str, Codes]
     glitches: Mapping[str, Mask]
@@ -98,14 +99,27 @@ def corpus_features(
         stride: keep the features of every n-th sample. They are computed from all samples.
         warm_up: time at the start of every unbroken stretch that is not scored [s].
     """
-    rows = []
-    for recording in corpus.load():
-        varied = variation.apply(recording)
-        fingers = _fingers(corpus, varied)
-        if fingers:
-            hand = hand_signal(varied, Tare.parse(corpus.tare), fingers)
-            rows.append(_recording_features(method, hand, fingers, stride, warm_up))
-    return rows
+    varied = (variation.apply(recording) for recording in corpus.load())
+    rows = (recording_features(method, corpus, each, stride, warm_up) for each in varied)
+    return [row for row in rows if row is not None]
+
+
+def recording_features(
+    method: Method, corpus: Corpus, recording: Recording, stride: int = 1, warm_up: float = 0.0
+) -> RecordingFeatures | None:
+    """Return the features of a recording; None without any of the fingers of its corpus.
+
+    Args:
+        method: computes the features.
+        corpus: gives the fingers and the tare.
+        recording: of the corpus.
+        stride: keep the features of every n-th sample. They are computed from all samples.
+        warm_up: time at the start of every unbroken stretch that is not scored [s].
+    """
+    if not (fingers := _fingers(corpus, recording)):
+        return None
+    hand = hand_signal(recording, Tare.parse(corpus.tare), fingers)
+    return _recording_features(method, hand, fingers, stride, warm_up)
 
 
 def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
@@ -130,6 +144,7 @@ def _recording_features(
         times={name: finger.times[::stride] for name, finger in hand.fingers.items()},
         amplitude={name: finger.amplitude[::stride] for name, finger in hand.fingers.items()},
         labels=labels,
+        compared=compared,
         scored_labels=_masked(labels, compared),
         exact_labels=_masked(_label_codes(exact, fingers, stride), compared),
         glitches={name: _glitch_samples(exact, name)[::stride] for name in fingers},

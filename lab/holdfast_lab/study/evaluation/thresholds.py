@@ -15,9 +15,9 @@ from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
 from holdfast_lab.study.evaluation.scores import HandScores
-from holdfast_lab.study.evaluation.slips import sample_durations
 
 
 class FalseAlarmRanges(NamedTuple):

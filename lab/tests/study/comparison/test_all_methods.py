@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 FEW = ("logreg", "logreg_unweighted", "holdfast", "zhang", "jl_global_logreg")
 TABLES = (
-    "strongest", "methods", "hands", "events", "slips", "glitches", "glitch_rates", "splits",
+    "strongest", "methods", "hands", "events", "glitches", "glitch_rates", "splits",
     "phases", "force", "directions", "reliability", "cost",
 )  # fmt: skip
 
@@ -188,7 +188,7 @@ READINGS = ["an event", "a false alarm", "left out"]
 
 
 def test_every_table_of_events_has_all_readings_of_glitches(tables):
-    for name in ("events", "slips", "glitch_rates"):
+    for name in ("events", "glitch_rates"):
         found = list(dict.fromkeys(row.keys["a glitch is"] for row in tables[name].rows))
         assert found == READINGS
     assert {row.keys["on"] for row in tables["glitch_rates"].rows} == {"1 glitch a minute"}
@@ -209,17 +209,6 @@ def test_false_alarms_add_up(tables):
             for figure in ("of a glitch", "other false alarms")
         ]
         assert row.ours == pytest.approx(sum(part.ours for part in parts))
-
-
-def test_slips_are_counted_if_the_truth_is_known(tables):
-    for row in rows_of(tables["slips"], figure="slips", on="by recording"):
-        assert row.ours == 4
-    for figure in ("detected within 200 ms [%]", "already not stable at onset [%]"):
-        found = rows_of(tables["slips"], figure=figure)
-        assert found
-        assert all(0 <= row.ours <= 100 for row in found)
-    for row in rows_of(tables["slips"], figure="slip distance 95 % [mm]"):
-        assert 0 <= row.ours <= 3.01 or np.isinf(row.ours)
 
 
 def test_glitches_are_described_by_the_truth(tables):

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 def recording_at(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
-    return RecordingFeatures("one", None, None, times, {}, empty, empty, empty, {}, {}, {})
+    return RecordingFeatures("one", None, None, times, {}, empty, {}, empty, empty, {}, {}, {})
 
 
 def state_of_finger(margin, in_contact, shift):

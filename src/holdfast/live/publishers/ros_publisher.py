@@ -38,7 +38,7 @@ MAX_ESTIMATE_AGE = 1.0
 """Age from which an estimate counts as missing in the diagnostics [s]."""
 NUMBER_FIELDS = ("stable_probability", "slip_probability", "instability")
 """Fields of an estimate with a topic of numbers for each finger; NaN where there is none."""
-NO_TORQUE = {"x": 0.0, "y": 0.0, "z": 0.0}
+NO_TORQUE_FIELDS = {"x": 0.0, "y": 0.0, "z": 0.0}
 GRIP_TEXTS = ("state", "reason")
 """Topics of the grip loop that are texts."""
 OK, WARN, ERROR = 0, 1, 2
@@ -231,7 +231,7 @@ class RosPublisher(Openable):
             force = dict(zip("xyz", finger.force, strict=True))
             message: dict[str, Any] = {"header": header(stamp, name), "vector": force}
             if self._units[name] == "N":
-                message["wrench"] = {"force": force, "torque": NO_TORQUE}
+                message["wrench"] = {"force": force, "torque": NO_TORQUE_FIELDS}
             self._publish(f"{topic}/force", message)
         self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 

@@ -1,0 +1,162 @@
+"""Part of the study: the slip of single fingers, decided by each method and scored by the truth."""
+
+from collections.abc import Iterator
+
+from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
+from holdfast.metrics.slip_truth import DISTANCES
+from holdfast.metrics.slips import (
+    EARLIEST_ALARM,
+    FALSE_ALARM_DURATION,
+    FOUND_WITHIN,
+    LATEST_ALARM,
+)
+from holdfast.metrics.statistics import Interval
+from holdfast.training.slips import SLIP_RULE_HOLD, SLIP_SMOOTHING
+from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
+from holdfast_lab.study.comparison.rows import RowKeys
+from holdfast_lab.study.evaluation.evaluate_slips import (
+    SLIP_RATE,
+    SlipEvaluation,
+    SlipJob,
+    evaluate_slips,
+)
+from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
+from holdfast_lab.study.plan import StudyPlan
+from holdfast_lab.tasks import Task
+
+QUICK_SLIP_METHODS = ("holdfast", "holdfast_stability", "slip_servo", "jl_local_logreg", "anyskin")
+"""Methods of a quick study."""
+TESTED_ROLES = ("others", "fresh")
+"""Roles of the corpora on which the methods are tested, where they exist."""
+TASK_SECONDS = {"jl_local_svm": 300.0, "jl_global_svm": 400.0, "holdfast_trees": 200.0}
+"""Approximate duration of the slow tasks [s]."""
+OTHER_SECONDS = 60.0
+"""Approximate duration of the other tasks [s]."""
+FITTED_TO, METHOD = "fitted to", "method"
+TARGET_TITLES = {"sliding": "true sliding", "stability": "stability"}
+FOUND_TITLES = {
+    "before": "before",
+    **{str(limit): f"within {1000 * limit:.0f} ms" for limit in FOUND_WITHIN},
+}
+"""Words for the times until which a slip is found, by key of the metrics."""
+SLIP_KINDS = {"incipient": "", "gross": "gross, ", "over_1mm": "over 1 mm, "}
+"""Begin of the heads of the columns, by name of the metric."""
+FALSE_HELD, FALSE_QUIET = "false alarms per minute held", "false alarms per minute quiet"
+QUIET_RAISED = "quiet hold raised [%]"
+N_SLIPS, N_GROSS, N_OVER_1MM = "n slips", "n gross", "n over 1 mm"
+HELD_MINUTES = "held [min]"
+SLIP_DIGITS = {"AUC": 3, FALSE_HELD: 2, FALSE_QUIET: 2, N_SLIPS: 0, N_GROSS: 0, N_OVER_1MM: 0}
+SLIP_NOTE = (
+    "Of single fingers, by the truth of each sample. A finger slides where the load-weighted speed "
+    "of its contact exceeds 1 mm/s; below 0.3 mm/s it is still; between, nothing counts. Slips: "
+    "share found before the first sliding, and up to 30, 50 and 100 ms after it; the same from the "
+    "onset of gross slip (90 % of the load slides) and of slips over 1 mm; share found before 1 mm "
+    "and 3 mm were slid. An alarm is a change of the decision to slipping; one that is more than "
+    f"{EARLIEST_ALARM:g} s early finds nothing. Each begun {FALSE_ALARM_DURATION:g} s raised "
+    f"outside [onset - {EARLIEST_ALARM:g} s, end + {LATEST_ALARM:g} s] of all slips is one false "
+    "alarm, of all held time (pushes and glitches included) and of quiet hold. Thresholds: chosen "
+    f"on training recordings, out of fold, for {SLIP_RATE:g} false alarm per minute held and at "
+    "most 2 % of quiet hold raised; the intervals repeat the choice. All methods are scored on the "
+    f"same samples, their log odds smoothed over {SLIP_SMOOTHING:g} s and decisions held for "
+    f"{SLIP_RULE_HOLD:g} s, as in the slip rule of a model. 'Stability' is our rule of stability "
+    "used as a decision about slip. A global method decides alike for all fingers."
+)
+
+
+def tasks(plan: StudyPlan) -> list[Task]:
+    """Return the tasks that evaluate each method."""
+    names = slip_methods(plan)
+    tests = tuple(plan.corpora[role] for role in TESTED_ROLES if role in plan.corpora)
+    return [
+        Task(
+            f"slips/{name}",
+            evaluate_slips,
+            (SlipJob(name, plan.main, tests, method_effort(plan, name), plan.seed, names),),
+            dict[str, SlipEvaluation],
+            cost=TASK_SECONDS.get(name, OTHER_SECONDS) * (0.5 if plan.quick else 1.0),
+        )
+        for name in names
+    ]
+
+
+def slip_methods(plan: StudyPlan) -> tuple[str, ...]:
+    """Return the names of the compared methods; those for hands need two fingers."""
+    one_finger = len(plan.main.fingers) < 2
+    names = QUICK_SLIP_METHODS if plan.quick else tuple(SLIP_METHODS)
+    return tuple(n for n in names if not (SLIP_METHODS[n].method.whole_hand and one_finger))
+
+
+def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
+    """Return the table of slips; none if no slips are known."""
+    rows: list[Row] = []
+    for name in slip_methods(plan):
+        evaluations: dict[str, SlipEvaluation] = results[f"slips/{name}"]
+        for role in ("main", *TESTED_ROLES):
+            corpus = plan.corpora.get(role)
+            if corpus is not None and corpus.name in evaluations:
+                evaluation = evaluations[corpus.name]
+                keys = {"on": SPLIT_TITLES[evaluation.split or role], **method_keys(name)}
+                rows += slip_rows(keys, evaluation)
+    return [slip_table(rows, ("on", FITTED_TO, METHOD))] if rows else []
+
+
+def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
+    """Return no figures."""
+    del plan, results
+    return []
+
+
+def method_keys(name: str) -> dict[str, Key]:
+    """Return the keys of the rows of a method."""
+    slip_method = SLIP_METHODS[name]
+    return {FITTED_TO: TARGET_TITLES[slip_method.target], METHOD: slip_method.method.title}
+
+
+def slip_table(rows: list[Row], lines: tuple[str, ...], note: str = SLIP_NOTE) -> ResultTable:
+    """Return the table of slips with these rows."""
+    return ResultTable("slips", "Slips of fingers", note, rows, lines, digits_of=SLIP_DIGITS)
+
+
+def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:
+    """Return the rows of one line of the table of slips.
+
+    Args:
+        keys: of the rows, but for their figure.
+        evaluation: of a method.
+    """
+    n = evaluation.n_recordings
+    pooled = evaluation.summary.pooled
+    rows = [
+        Row({**keys, "figure": figure}, value, None, n, interval)
+        for figure, value, interval in _shares(evaluation.summary)
+    ]
+    counts = {
+        "AUC": pooled.auc,
+        N_SLIPS: pooled.n,
+        N_GROSS: pooled.n_gross,
+        N_OVER_1MM: pooled.n_over_1mm,
+        HELD_MINUTES: pooled.held_minutes,
+    }
+    return rows + [Row({**keys, "figure": name}, value, None, n) for name, value in counts.items()]
+
+
+def _shares(summary: SlipSummary) -> Iterator[tuple[str, float | None, Interval | None]]:
+    """Yield head, value and interval of each figure that has an interval."""
+    pooled, intervals = summary.pooled, summary.intervals
+    for kind, begin in SLIP_KINDS.items():
+        for limit, words in FOUND_TITLES.items():
+            yield f"{begin}{words} [%]", getattr(pooled, kind)[limit], _of(intervals, kind, limit)
+    for distance, name in zip(DISTANCES, ("before_1mm", "before_3mm"), strict=True):
+        head = f"before {1000 * distance:g} mm [%]"
+        yield head, getattr(pooled, name), _of(intervals, name)
+    yield QUIET_RAISED, pooled.raised_quiet, _of(intervals, "raised_quiet")
+    rates = "false_alarms_per_minute"
+    for where, head in (("held", FALSE_HELD), ("quiet", FALSE_QUIET)):
+        yield head, getattr(pooled, rates)[where], _of(intervals, rates, where)
+
+
+def _of(intervals: SlipIntervals | None, name: str, key: str | None = None) -> Interval | None:
+    interval = None if intervals is None else getattr(intervals, name)
+    return interval if key is None or interval is None else interval[key]
