@@ -298,9 +298,9 @@ class _Trainer:
         """
         replace_fields, init = msgspec.structs.replace, self.setting.init
         if init is not None:
-            slips = {name: init.finger(name).slip for name in model.fingers}
             fingers = {
-                name: replace_fields(part, slip=slips[name]) for name, part in model.fingers.items()
+                name: replace_fields(part, slip=init.finger(name).slip)
+                for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics
         for warning in missing_slip_rules(model, self.data.slips):
