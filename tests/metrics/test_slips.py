@@ -268,5 +268,5 @@ class TestThresholds:
 
     def test_thresholds_are_probabilities_in_order(self):
         assert (np.diff(THRESHOLDS) > 0).all()
-        assert 0 < THRESHOLDS[0] < 0.02
-        assert 0.999 < THRESHOLDS[-1] < 1
+        assert 0 < THRESHOLDS[0] < 0.02  # log odds of -4
+        assert 0.999 < THRESHOLDS[-1] < 1  # log odds of 8

@@ -14,6 +14,7 @@ from holdfast.cli.options import (
     SeedOption,
     start_engine,
 )
+from holdfast.cli.slip_scores import print_slips
 from holdfast.cli.terminal.console import (
     format_number,
     print_json,
@@ -52,10 +53,11 @@ def evaluate(
     """Evaluate a model on labelled recordings.
 
     Print metrics by sample (accuracy, FDR, FPR, FNR, AUC) and by event (missed events, detection
-    delay, false alarms), for each finger and for the hand, with bootstrap intervals over the
-    recordings. A sentence before them says what the model is good for, from the recordings that
-    it was not trained on. The others are named, because their metrics are optimistic. The figure
-    shows errors and delays.
+    delay, false alarms), for each finger and for the hand, and of the slips of each finger (found
+    in time, false alarms), if the model has a slip rule; with bootstrap intervals over the
+    recordings. Sentences before them say what the model is good for, from the recordings that it
+    was not trained on. The others are named, because their metrics are optimistic. The figure
+    shows errors, delays and slips.
 
     Example:
       holdfast evaluate model.json recordings/
@@ -89,6 +91,7 @@ def evaluate(
         return
     print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), len(recordings)))
     print_metrics(metrics)
+    print_slips(metrics.slips, has_rule=loaded.has_slip_rule)
     print_line()
     print_line(f"{model} on {len(recordings)} recordings")
 

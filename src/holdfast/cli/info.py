@@ -39,6 +39,10 @@ def info(
     *,
     figure: PlotOptions,
     tare: TareOption = "0.5",
+    model: Annotated[
+        str | None,
+        typer.Option(help="Model whose decisions about slips the figure shows, beside the truth."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show the content of a recording, a folder of them, or a model.
@@ -49,38 +53,45 @@ def info(
     in contact, hidden labels (docs/command-line.md defines every word).
 
     The figure shows forces, sigma, labels, markers and slip (if the recording has truth) of each
-    finger over time. The tare is used for the figure and the faults; choose a time without
-    contact.
+    finger over time; with --model, the probability of a slip and where the finger is decided to
+    slide, too. The tare is used for the figure and the faults; choose a time without contact.
 
-    Of a model, print sensor, rate, features, threshold, contact and hold, and the recordings on
-    which it was trained and tuned.
+    Of a model, print sensor, rate, features, threshold, contact and hold, the slip rule and how
+    its threshold was chosen, and the recordings on which it was trained and tuned.
 
     Example:
       holdfast info real/
       holdfast info builtin:any
       holdfast info grasp.parquet --plot grasp.pdf
       holdfast info grasp.mcap --plot grasp.svg --tare first --json
+      holdfast info grasp.mcap --plot slips.png --model model.json
     """
     from holdfast.features import Tare
 
     kind = "model" if is_model(path) else "folder" if path.is_dir() else "recording"
     if figure.plot is not None and kind != "recording":
         raise ValueError(f"--plot draws one recording; the {kind} {path} given")
+    if model is not None and figure.plot is None:
+        raise ValueError("--model is for the figure; --plot FILE expected beside it")
     if kind == "model":
         print_model(path, as_json)
     elif kind == "folder":
         _print_folder(path, Tare.parse(tare), as_json)
     else:
-        _print_file(path, figure, Tare.parse(tare), as_json)
+        _print_file(path, figure, Tare.parse(tare), model, as_json)
 
 
-def _print_file(path: Path, figure: PlotOptions, tare: "Tare", as_json: bool) -> None:
+def _print_file(
+    path: Path, figure: PlotOptions, tare: "Tare", model: str | None, as_json: bool
+) -> None:
     from holdfast.io import load_recording
+    from holdfast.model import Model
 
     def draw() -> "Figure":
         from holdfast.plots.recording import plot_recording
 
-        return plot_recording(recording, tare)
+        loaded = None if model is None else Model.load(model)
+        return plot_recording(recording, tare, model=loaded)
 
     figure.check()
     recording = load_recording(path)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from holdfast.cli.terminal.console import print_json, print_table
 
 if TYPE_CHECKING:
+    from holdfast.classifiers.slip import SlipRule
     from holdfast.model import FingerModel, Model
 
 N_NAMES = 3
@@ -65,6 +66,23 @@ def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
         "contact_threshold": part.contact_threshold,
         "contact_noise": part.contact_noise,
         "contact_load": part.contact_load,
+        "slip": None if part.slip is None else _slip(part.slip),
+    }
+
+
+def _slip(rule: "SlipRule") -> dict[str, Any]:
+    """Return the facts about a slip rule."""
+    import msgspec
+
+    chosen = None
+    if rule.thresholds is not None:
+        chosen = msgspec.to_builtins(rule.thresholds)
+        chosen["recordings"] = list(rule.thresholds.recordings)
+    return {
+        "threshold": rule.classifier.threshold,
+        "smoothing": rule.smoothing,
+        "hold": rule.hold,
+        "chosen_on": chosen,
     }
 
 
@@ -83,6 +101,7 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield finger, f"sensor {sensor}; {part['classifier']}"
         yield "", f"features {_few(part['features'])}"
         yield "", f"STABLE from a probability of {part['threshold']:.3g} on; {_contact(part)}"
+        yield from (("", line) for line in _slip_lines(part["slip"]))
     training, tuning = document["training"], document["tuning"]
     yield "trained on", "nothing" if training is None else _trained(training)
     yield "tuned on", "nothing" if tuning is None else _tuned(tuning)
@@ -98,6 +117,29 @@ def _contact(part: dict[str, Any]) -> str:
         if part[field] is not None:
             return text.format(part[field])
     return "no threshold of contact"
+
+
+def _slip_lines(slip: dict[str, Any] | None) -> Iterator[str]:
+    """Yield the slip rule of a finger, and on what its threshold was chosen."""
+    if slip is None:
+        yield "no slip rule"
+        return
+    yield (
+        f"slides from a probability of {slip['threshold']:.3g} on; smoothing "
+        f"{slip['smoothing']:g} s, hold {slip['hold']:g} s"
+    )
+    chosen = slip["chosen_on"]
+    if chosen is None:
+        yield "threshold of slips given, not chosen on recordings"
+        return
+    names = chosen["recordings"]
+    place = f"{len(names)} recordings ({_few(names)})" if names else "the training, out of fold"
+    found = "" if chosen["found"] is None else f"; {chosen['found']:.0f} % found within 0.1 s"
+    yield (
+        f"threshold of slips from {place}: {chosen['false_alarms_per_minute']:.2g} false alarms a "
+        f"minute (at most {chosen['requested']:g} wanted) in {chosen['held_minutes']:.3g} min of "
+        f"held time; {chosen['n_slips']} slips{found}"
+    )
 
 
 def _trained(training: dict[str, Any]) -> str:

@@ -215,6 +215,7 @@ def _fit(recordings: "Dataset", setting: "Setting", journal: Path, engine: "Engi
 
 def _print(trained: "Trained", model: Path, n_recordings: int, *, as_json: bool) -> None:
     from holdfast.cli.evaluate import print_metrics, print_verdict
+    from holdfast.cli.slip_scores import KEPT_RULE, print_slips
     from holdfast.training.verdict import no_verdict
 
     if as_json:
@@ -231,6 +232,11 @@ def _print(trained: "Trained", model: Path, n_recordings: int, *, as_json: bool)
         trained.verdict or no_verdict(len(trained.known), n_recordings, "the model of --init")
     )
     print_metrics(trained.cross_validation)
+    print_slips(
+        trained.cross_validation.slips,
+        has_rule=trained.model.has_slip_rule,
+        unscored=KEPT_RULE,
+    )
     print_line()
     print_line(
         f"{model}: trained on {n_recordings} recordings; "

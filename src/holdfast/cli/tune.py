@@ -1,5 +1,6 @@
 """`holdfast tune`: a model with the threshold for a wanted rate of false alarms."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,6 +8,7 @@ import typer
 
 from holdfast.cli.evaluate import print_verdict, warn_about_training
 from holdfast.cli.options import ForceOption, JsonOption, ModelArgument, ModelOutput
+from holdfast.cli.slip_scores import print_slip_points, slips_origin
 from holdfast.cli.terminal.console import format_number, print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
@@ -14,8 +16,19 @@ from holdfast.errors import require_extras
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from holdfast.io import Dataset
+    from holdfast.metrics.slips import SlipMetrics
+    from holdfast.model import Model
     from holdfast.recordings import Recording
     from holdfast.training import ThresholdMetrics, Tuned
+    from holdfast.training.slips import TunedSlips
+
+
+class TunedQuestion(StrEnum):
+    """Question whose threshold is chosen."""
+
+    STABLE = "stable"
+    SLIP = "slip"
 
 
 def tune(
@@ -25,9 +38,15 @@ def tune(
     false_alarms: Annotated[
         float,
         typer.Option(
-            "--false-alarms", help="Maximum number of false alarms per minute of stable hold."
+            "--false-alarms",
+            help="Maximum number of false alarms per minute of stable hold; for slip, per minute "
+            "of all held time of a finger.",
         ),
     ],
+    question: Annotated[
+        TunedQuestion,
+        typer.Option("--for", help="Threshold to choose: that of STABLE, or that of a slip."),
+    ] = TunedQuestion.STABLE,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -38,8 +57,13 @@ def tune(
     events. Tare, contact, hysteresis and hold time stay, and count. Use recordings that the model
     was not trained on: the rate is a promise for similar grasps only.
 
+    With --for slip, it has the lowest threshold of the slip rule that gives at most so many false
+    alarms of a finger, and reports a slip in at most 2 % of quiet hold. The recordings need a
+    truth, or labels with the cause slip.
+
     Example:
       holdfast tune model.json recordings/ -o tuned.json --false-alarms 1
+      holdfast tune model.json recordings/ -o tuned.json --false-alarms 1 --for slip
       holdfast tune builtin:any recordings/ -o mine.json --false-alarms 0.5 --json
     """
     require_extras("train")
@@ -47,34 +71,105 @@ def tune(
     from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training import tune as choose
-    from holdfast.training.evaluation import was_trained_on
-    from holdfast.training.verdict import no_verdict, verdict_of_events
+    from holdfast.training.slips import tune_slips
 
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
-    recordings = load_dataset(data)
-    trained_on: list[str] = []
+    recordings = _Recordings(loaded, load_dataset(data))
+    if question is TunedQuestion.SLIP:
+        slips = tune_slips(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
+        recordings.warn()
+        slips.model.save(out, force=force)
+        _print_slips(loaded, slips, out, recordings, as_json=as_json)
+        return
+    tuned = choose(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
+    recordings.warn()
+    tuned.model.save(out, force=force)
+    _print_stable(tuned, out, recordings, as_json=as_json)
 
-    def with_progress(items: "Iterable[Recording]") -> "Iterator[Recording]":
-        for recording in progress(items, "deciding", len(recordings)):
-            if was_trained_on(loaded, recording):
-                trained_on.append(recording.name)
+
+class _Recordings:
+    """Recordings that a model is tuned on, and the names of those that it was trained on."""
+
+    def __init__(self, model: "Model", recordings: "Dataset") -> None:
+        self.model, self.all = model, recordings
+        self.trained_on: list[str] = []
+
+    def with_progress(self, items: "Iterable[Recording]") -> "Iterator[Recording]":
+        """Yield the recordings with a bar of progress, and keep the names."""
+        from holdfast.training.evaluation import was_trained_on
+
+        for recording in progress(items, "deciding", len(self.all)):
+            if was_trained_on(self.model, recording):
+                self.trained_on.append(recording.name)
             yield recording
 
-    tuned = choose(loaded, recordings, false_alarms, progress=with_progress)
-    warn_about_training(trained_on, len(recordings))
-    tuned.model.save(out, force=force)
-    sentence = None if trained_on else verdict_of_events(tuned.chosen.events)
+    def warn(self) -> None:
+        """Print the names, if there are any."""
+        warn_about_training(self.trained_on, len(self.all))
+
+    def print_verdict(self, sentence: str) -> None:
+        """Print the sentence, or why there is none."""
+        from holdfast.training.verdict import no_verdict
+
+        n = len(self.trained_on)
+        print_verdict(no_verdict(n, len(self.all)) if n else sentence)
+
+
+def _print_stable(tuned: "Tuned", out: Path, recordings: _Recordings, *, as_json: bool) -> None:
+    from holdfast.training.verdict import verdict_of_events
+
+    sentence = verdict_of_events(tuned.chosen.events)
     if as_json:
-        print_json(_document(tuned, out, sentence, trained_on))
+        known = recordings.trained_on
+        print_json(_document(tuned, out, None if known else sentence, known))
         return
-    print_verdict(sentence or no_verdict(len(trained_on), len(recordings)))
+    recordings.print_verdict(sentence)
     _print_points(tuned)
     print_line()
     print_line(
         f"{out}: STABLE from a probability of {tuned.chosen.threshold:.3g} on, was "
         f"{tuned.before.threshold:.3g}"
     )
+
+
+def _print_slips(
+    model: "Model", tuned: "TunedSlips", out: Path, recordings: _Recordings, *, as_json: bool
+) -> None:
+    from holdfast.training.verdict import verdict_of_slips
+
+    if as_json:
+        print_json(_slip_document(tuned, out, recordings.trained_on))
+        return
+    recordings.print_verdict(verdict_of_slips(tuned.chosen))
+    rules = [part.slip for part in model.fingers.values() if part.slip is not None]
+    thresholds = sorted({rule.classifier.threshold for rule in rules})
+    points = dict(tuned.points)
+    if len(thresholds) == 1:
+        points.setdefault(thresholds[0], tuned.before)
+    notes = dict.fromkeys(thresholds, "before") | {tuned.threshold: "chosen"}
+    print_slip_points(sorted(points.items()), notes, slips_origin(tuned.chosen))
+    print_line()
+    before = ", ".join(f"{threshold:.3g}" for threshold in thresholds)
+    print_line(f"{out}: a slip from a probability of {tuned.threshold:.3g} on, was {before}")
+
+
+def _slip_document(tuned: "TunedSlips", out: Path, trained_on: list[str]) -> dict[str, object]:
+    return {
+        "model": out,
+        "for": TunedQuestion.SLIP.value,
+        "threshold": tuned.threshold,
+        "chosen": tuned.chosen,
+        "before": tuned.before,
+        "around": [_slip_point(threshold, metrics) for threshold, metrics in tuned.points],
+        "trained_on": trained_on,
+    }
+
+
+def _slip_point(threshold: float, metrics: "SlipMetrics") -> dict[str, object]:
+    from msgspec import to_builtins
+
+    return {"threshold": threshold, **to_builtins(metrics)}
 
 
 def _document(

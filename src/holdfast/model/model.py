@@ -125,6 +125,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Digest of the content, for results that depend on the model."""
         return sha256(encode(self)).hexdigest()
 
+    @property
+    def has_slip_rule(self) -> bool:
+        """Whether the model decides of any finger whether it slides."""
+        return any(part.slip is not None for part in self.fingers.values())
+
     def finger(self, name: str) -> FingerModel:
         """Return the model of a finger.
 

@@ -111,6 +111,7 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         versions: versions of the packages that fitted it.
         samples: number of used and of all labelled samples of each finger of which only every
             n-th was used.
+        sliding_samples: number of sliding samples that each slip rule was trained on.
     """
 
     recordings: dict[str, str]
@@ -120,6 +121,7 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seed: int = 0
     versions: dict[str, str] = {}
     samples: dict[str, tuple[int, int]] | msgspec.UnsetType = msgspec.UNSET
+    sliding_samples: dict[str, int] | msgspec.UnsetType = msgspec.UNSET
 
 
 class ThresholdPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,4 +1,4 @@
-"""Figure of an evaluation: accuracy, calibration and delays."""
+"""Figure of an evaluation: accuracy, calibration, delays and slips."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -18,6 +18,7 @@ from holdfast.metrics import (
 )
 from holdfast.metrics.decisions import FingerDecisions
 from holdfast.metrics.events import EARLY_TOLERANCE, POST_DURATIONS, event_delays
+from holdfast.plots.slips import draw_false_alarms, draw_slips_found
 from holdfast.plots.style import (
     FAINT,
     GREY,
@@ -34,6 +35,8 @@ from holdfast.sensors.types import Array
 
 WIDTH = 9.6
 """Width of the figure [inch]."""
+SLIPS_HEIGHT = 2.6
+"""Height of the panels about slips [inch]."""
 HAND_COLOUR = "black"
 MAX_NAMED_RECORDINGS = 25
 """With more recordings only their number is written."""
@@ -43,7 +46,9 @@ MAX_DELAY = 0.5
 
 
 def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
-    """Draw accuracy and AUC of each recording, calibration, and delays of alarms.
+    """Draw accuracy and AUC of each recording, calibration, delays of alarms, and slips.
+
+    Slips are drawn if the model has a slip rule, and slips are known.
 
     Args:
         metrics: of all recordings.
@@ -52,14 +57,18 @@ def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
     n_recordings = len(metrics.recordings)
     named = n_recordings <= MAX_NAMED_RECORDINGS
     n_rows = max(4, n_recordings if named else MAX_NAMED_RECORDINGS // 2)
-    figure = page_figure(4.7 + 0.16 * n_rows, WIDTH)
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.0 + 0.16 * n_rows, 3.3))
+    heights = [1.0 + 0.16 * n_rows, 3.3, *([] if metrics.slips is None else [SLIPS_HEIGHT])]
+    figure = page_figure(0.4 + sum(heights), WIDTH)
+    grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     styles = _finger_styles(metrics.fingers)
     left = figure.add_subplot(grid[0, 0])
     right = figure.add_subplot(grid[0, 1], sharey=left)
     _draw_recordings(left, right, metrics, styles)
     _draw_calibration(figure.add_subplot(grid[1, 0]), metrics.pooled, decisions, styles)
     _draw_delays(figure.add_subplot(grid[1, 1]), metrics, decisions, styles)
+    if metrics.slips is not None:
+        draw_slips_found(figure.add_subplot(grid[2, 0]), decisions, metrics.slips.pooled)
+        draw_false_alarms(figure.add_subplot(grid[2, 1]), metrics.slips)
     for axes in figure.axes:
         style_axes(axes)
     right.tick_params(labelleft=False)

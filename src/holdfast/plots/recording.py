@@ -9,6 +9,15 @@ from matplotlib.patches import Patch
 
 from holdfast.contact import ContactState
 from holdfast.features import DEFAULT_WINDOW, Tare
+from holdfast.model import Model
+from holdfast.plots.slips import (
+    DECIDED_ALPHA,
+    SLIP_COLOUR,
+    SlipSeries,
+    draw_slip_decisions,
+    draw_slip_speed,
+    slip_series,
+)
 from holdfast.plots.style import (
     COMPONENT_COLOURS,
     FONT_SIZE,
@@ -27,14 +36,12 @@ from holdfast.plots.time_series import (
     component_handles,
     draw_components,
     draw_curve,
-    draw_line,
     draw_sigma,
     finger_series,
 )
 from holdfast.recordings import Recording, Tactile, shown_origin
 
-MM_PER_M = 1e3
-ROW_HEIGHTS = {"force": 1.75, "sigma": 0.9, "slip": 0.75}
+ROW_HEIGHTS = {"force": 1.75, "sigma": 0.9, "slip": 0.75, "decision": 0.75}
 """Heights of the axes of a finger [inch]."""
 LEGEND_HEIGHT = 0.75
 MAX_FINGERS_IN_COLUMN = 3
@@ -44,7 +51,10 @@ MARKER_LETTER_WIDTH = 0.011
 
 
 def plot_recording(
-    recording: Recording, tare: Tare | None = None, window: int = DEFAULT_WINDOW
+    recording: Recording,
+    tare: Tare | None = None,
+    window: int = DEFAULT_WINDOW,
+    model: Model | None = None,
 ) -> Figure:
     """Draw forces, sigma, labels and slip of each finger over time.
 
@@ -54,9 +64,11 @@ def plot_recording(
         recording: to draw.
         tare: how the baseline is found; by default the mean of the first 0.5 s.
         window: N_w of sigma [samples].
+        model: whose decisions about slips are drawn too.
 
     Raises:
-        ValueError: no sample lies in the interval of the tare.
+        ValueError: no sample lies in the interval of the tare; or the model has no slip rule.
+        ModelError: the recording has other fingers or sensors than the model.
     """
     chosen = tare or Tare.parse(0.5)
     fingers = _fingers(recording)
@@ -64,10 +76,15 @@ def plot_recording(
     curves = {
         name: _since(finger_series(recording, name, chosen, window), origin) for name in fingers
     }
-    figure, stacks = _stacks(curves)
+    decisions = None if model is None else _decisions(model, recording, origin)
+    rows = _rows(curves, has_decisions=decisions is not None)
+    figure, stacks = _stacks(curves, rows)
     n_columns = _n_columns(curves)
     for place, (name, axes) in enumerate(zip(fingers, stacks, strict=False)):
-        _draw_finger(axes, fingers[name], curves[name], origin)
+        panels = dict(zip(rows, axes, strict=True))
+        _draw_finger(panels, fingers[name], curves[name], origin)
+        if decisions is not None:
+            draw_slip_decisions(panels.get("slip"), panels["decision"], decisions.get(name))
         _draw_markers(axes, recording, origin, named=place < n_columns)
         if place + n_columns >= len(fingers):
             add_labels(axes[-1], x=_time_label(origin))
@@ -76,7 +93,10 @@ def plot_recording(
             axis.set_axis_off()
     figure.align_ylabels()
     figure.suptitle(literal(_title(recording, chosen, window)), fontsize=FONT_SIZE + 1.5)
-    add_legend(figure, _handles(list(fingers.values())), "outside lower center")
+    handles = _handles(list(fingers.values()))
+    if decisions is not None:
+        handles.append(Patch(facecolor=SLIP_COLOUR, alpha=DECIDED_ALPHA, label="slides (decided)"))
+    add_legend(figure, handles, "outside lower center")
     return figure
 
 
@@ -91,16 +111,31 @@ def _since(series: FingerSeries, origin: float) -> FingerSeries:
     return series._replace(times=series.times - origin, slip=slip)
 
 
+def _decisions(model: Model, recording: Recording, origin: float) -> dict[str, SlipSeries]:
+    """Return the decisions about slips with times since an origin [s]."""
+    if not model.has_slip_rule:
+        raise ValueError(f"{model.name or 'the model'} has no slip rule, whose decisions to draw")
+    series = slip_series(model, recording)
+    return {name: slips._replace(times=slips.times - origin) for name, slips in series.items()}
+
+
 def _n_columns(curves: Mapping[str, FingerSeries]) -> int:
     return 1 if len(curves) <= MAX_FINGERS_IN_COLUMN else 2
 
 
-def _stacks(curves: Mapping[str, FingerSeries]) -> tuple[Figure, list[list[Axes]]]:
+def _rows(curves: Mapping[str, FingerSeries], *, has_decisions: bool) -> list[str]:
+    """Return the names of the axes of a finger, from top to bottom."""
+    has_slip = any(series.slip is not None for series in curves.values())
+    absent = {"slip": not has_slip, "decision": not has_decisions}
+    return [row for row in ROW_HEIGHTS if not absent.get(row, False)]
+
+
+def _stacks(
+    curves: Mapping[str, FingerSeries], rows: Sequence[str]
+) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure and the axes of each finger, from top to bottom; fingers row by row."""
     n_columns = _n_columns(curves)
     n_lines = -(-len(curves) // n_columns)
-    has_slip = any(series.slip is not None for series in curves.values())
-    rows = [row for row in ROW_HEIGHTS if row != "slip" or has_slip]
     heights = [ROW_HEIGHTS[row] for row in rows] * n_lines
     width = PAGE_WIDTH * (1 if n_columns == 1 else 1.6)
     figure = page_figure(sum(heights) + LEGEND_HEIGHT, width)
@@ -119,34 +154,22 @@ def _stacks(curves: Mapping[str, FingerSeries]) -> tuple[Figure, list[list[Axes]
 
 
 def _draw_finger(
-    axes: Sequence[Axes], module: Tactile, series: FingerSeries, origin: float
+    panels: Mapping[str, Axes], module: Tactile, series: FingerSeries, origin: float
 ) -> None:
-    for axis in axes:
-        _shade_labels(axis, module, origin)
-        style_axes(axis)
-    draw_curve(axes[0], series, series.amplitude, COMPONENT_COLOURS["F_a"], 1.5)
-    draw_components(axes[0], series)
-    add_title(axes[0], series.name)
-    add_labels(axes[0], y=f"force {series.unit_label}")
-    draw_sigma(axes[1], series)
-    add_labels(axes[1], y=f"σ {series.unit_label}")
-    axes[-1].tick_params(labelbottom=True)
-    if len(axes) > 2:
-        _draw_slip(axes[2], series)
-
-
-def _draw_slip(axes: Axes, series: FingerSeries) -> None:
-    if series.slip is not None:
-        times, speed = series.slip
-        draw_line(axes, times, MM_PER_M * speed)
-        add_labels(axes, y="slip [mm/s]")
-        axes.set_ylim(bottom=0)
-        return
-    axes.set_yticks([])
-    axes.text(
-        0.5, 0.5, "slip not known", transform=axes.transAxes, fontsize=FONT_SIZE, color=INK,
-        ha="center", va="center",
-    )  # fmt: skip
+    for row, axes in panels.items():
+        if row in ("force", "sigma") or "decision" not in panels:
+            _shade_labels(axes, module, origin)
+        style_axes(axes)
+    force, sigma = panels["force"], panels["sigma"]
+    draw_curve(force, series, series.amplitude, COMPONENT_COLOURS["F_a"], 1.5)
+    draw_components(force, series)
+    add_title(force, series.name)
+    add_labels(force, y=f"force {series.unit_label}")
+    draw_sigma(sigma, series)
+    add_labels(sigma, y=f"σ {series.unit_label}")
+    list(panels.values())[-1].tick_params(labelbottom=True)
+    if "slip" in panels:
+        draw_slip_speed(panels["slip"], series)
 
 
 def _shade_labels(axes: Axes, module: Tactile, origin: float) -> None:

@@ -169,6 +169,7 @@ def training_record(
     parameters: Mapping[str, Parameters],
     pooled: SampleMetrics,
     thinned: Mapping[str, tuple[int, int]],
+    sliding: Mapping[str, int],
 ) -> Training:
     """Return the provenance of a model, which its file contains.
 
@@ -178,6 +179,7 @@ def training_record(
         parameters: hyper-parameters of each finger's classifier.
         pooled: metrics out of fold, of all fingers and recordings.
         thinned: number of used and of all samples of each finger of which not all are used.
+        sliding: number of sliding samples of each slip rule.
     """
     init = None if setting.init is None else setting.init.training
     before = {} if init is None else init.recordings
@@ -189,5 +191,6 @@ def training_record(
         figures={name: getattr(pooled, name) for name in FIGURES},
         seed=setting.seed,
         samples=dict(thinned) or UNSET,
+        sliding_samples=dict(sliding) or UNSET,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )

@@ -58,6 +58,11 @@ MIN_SLIDING_SAMPLES = 50
 N_SHOWN = 3
 """Thresholds that are shown on either side of the chosen one."""
 
+NO_SLIP_DECISIONS = (
+    "no decision about a slip out of fold, from which a threshold could be chosen; the model gets "
+    "no slip rule"
+)
+
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
@@ -72,6 +77,11 @@ class SlipSamples:
 
     own: FingerSamples
     n_still: int
+
+    @property
+    def n_sliding(self) -> int:
+        """Number of samples that slide."""
+        return int(self.own.samples.stable.sum())
 
     def fit(self, held: Collection[int]) -> SlipRule | None:
         """Fit a rule to the samples that are not in held units, with a threshold of 0.5.
@@ -172,6 +182,26 @@ def _is_early(truth: SlipTruth, times: Array) -> Flags:
         first, last = np.searchsorted(times, (slip.onset, slip.onset + EARLY_DURATION))
         early[first:last] = True
     return np.asarray(early & (truth.codes == SLIDING))
+
+
+def missing_slip_rules(model: Model, samples: Mapping[str, SlipSamples]) -> list[str]:
+    """Return a warning for each finger that slides, but too little to train a slip rule."""
+    return [
+        f"{'all fingers' if finger == ANY_FINGER else finger}: {own.n_sliding} samples that slide "
+        f"and {own.n_still} that hold still given, at least {MIN_SLIDING_SAMPLES} and 1 expected; "
+        "the model gets no slip rule there"
+        for finger, own in samples.items()
+        if model.finger(finger).slip is None
+    ]
+
+
+def sliding_samples(model: Model, samples: Mapping[str, SlipSamples]) -> dict[str, int]:
+    """Return the number of sliding samples that each slip rule of a model was trained on."""
+    return {
+        finger: own.n_sliding
+        for finger, own in samples.items()
+        if model.finger(finger).slip is not None
+    }
 
 
 @dataclass(frozen=True)
@@ -315,7 +345,7 @@ def tune_slips(
     """
     if not (math.isfinite(false_alarms) and false_alarms > 0):
         raise ValueError(f"false alarms per minute above 0 expected, {false_alarms:g} given")
-    if all(part.slip is None for part in model.fingers.values()):
+    if not model.has_slip_rule:
         raise ModelError(
             f"{model.name or 'the model'} has no slip rule; train one on recordings whose slips "
             "are known"

@@ -40,7 +40,14 @@ from holdfast.training.model_fit import (
     training_record,
 )
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
-from holdfast.training.slips import choose_slip_threshold, gather_slip_samples, with_slip_threshold
+from holdfast.training.slips import (
+    NO_SLIP_DECISIONS,
+    choose_slip_threshold,
+    gather_slip_samples,
+    missing_slip_rules,
+    sliding_samples,
+    with_slip_threshold,
+)
 from holdfast.training.splits import DataSplit, inner_folds, split_data
 from holdfast.training.training_samples import SamplesPlan, gather_samples, thin, thinning_step
 from holdfast.training.tuning import INNER_FOLDS, search
@@ -130,7 +137,12 @@ def train(
     _warn_of_undecided(metrics, warn)
     model, metrics = trainer.choose_slip_threshold(model, metrics)
     provenance = training_record(
-        trainer.setting, trainer.scan, final, metrics.pooled, trainer.data.thinned
+        trainer.setting,
+        trainer.scan,
+        final,
+        metrics.pooled,
+        trainer.data.thinned,
+        sliding_samples(model, trainer.data.slips),
     )
     model = msgspec.structs.replace(model, training=provenance)
     init = trainer.setting.init
@@ -281,23 +293,28 @@ class _Trainer:
     def choose_slip_threshold(self, model: Model, metrics: Metrics) -> tuple[Model, Metrics]:
         """Return the model with the threshold of its slip rules, and the metrics of slips.
 
-        Call it after the cross-validation. A model that is adapted keeps its slip rules.
+        Call it after the cross-validation. A model that is adapted keeps its slip rules. Warn of
+        each rule that is not made.
         """
         replace_fields, init = msgspec.structs.replace, self.setting.init
         if init is not None:
-            slips = {name: init.finger(name).slip for name in model.fingers}
             fingers = {
-                name: replace_fields(part, slip=slips[name]) for name, part in model.fingers.items()
+                name: replace_fields(part, slip=init.finger(name).slip)
+                for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics
+        for warning in missing_slip_rules(model, self.data.slips):
+            self.warn(warning)
         curves = [curve for curve, _ in self.slip_curves]
         groups = [group for _, group in self.slip_curves]
-        chosen = choose_slip_threshold(curves, groups, self.setting.seed)
-        if chosen is None:
-            return with_slip_threshold(model, None), metrics
-        if chosen.reason:
-            self.warn(chosen.reason)
-        return with_slip_threshold(model, chosen), replace_fields(metrics, slips=chosen.metrics)
+        chosen = None
+        if model.has_slip_rule:
+            chosen = choose_slip_threshold(curves, groups, self.setting.seed)
+            if chosen is None or chosen.reason:
+                self.warn(NO_SLIP_DECISIONS if chosen is None else chosen.reason)
+        model = with_slip_threshold(model, chosen)
+        slips = chosen.metrics if chosen is not None and model.has_slip_rule else None
+        return model, replace_fields(metrics, slips=slips)
 
     def _results(
         self, evaluated: Iterator[tuple[RecordingResults, bool]]
