@@ -106,6 +106,7 @@ def test_estimates_can_be_written_as_json():
         "faults": [],
         "faulty_taxels": [],
         "cause": None,
+        "slip_probability": None,
     }
     with pytest.raises(AttributeError):
         finger.state = ContactState.UNSTABLE

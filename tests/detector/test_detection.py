@@ -168,7 +168,8 @@ def test_the_future_changes_nothing():
     assert np.array_equal(one.hand[:260], two.hand[:260])
     for finger, trace in one.fingers.items():
         for found, other in zip(trace, two.fingers[finger], strict=True):
-            assert np.array_equal(found[:130], other[:130], equal_nan=True)
+            if found is not None:  # no slip rule
+                assert np.array_equal(found[:130], other[:130], equal_nan=True)
 
 
 @pytest.mark.parametrize("start", [0.0, 0.3, 1e9, 1.7e9])
@@ -177,7 +178,8 @@ def test_a_shift_of_time_changes_nothing(start):
     plain = detect(hand_model, recording(thumb=tactile(seed=4))).fingers["thumb"]
     moved = detect(hand_model, recording(thumb=tactile(seed=4, start=start))).fingers["thumb"]
     for found, expected in zip(moved[1:], plain[1:], strict=True):
-        assert np.array_equal(found, expected, equal_nan=True)
+        if expected is not None:  # no slip rule
+            assert np.array_equal(found, expected, equal_nan=True)
 
 
 class TestIntervalTare:

@@ -277,8 +277,8 @@ def test_laws(data):
             assert (phase[inside] == Phase.LOCKED).all()
             assert (data.fingers["thumb"]["slip_speed"][inside] <= RULE.sliding).all()
             assert label.cause is None
-        if label.state == U:
-            assert label.cause is not None
+        if label.cause == Cause.SLIP:
+            assert (data.fingers["thumb"]["slip_speed"][inside] > RULE.sliding).all()
         if label.cause in (Cause.SLIP, Cause.DISTURBANCE):
             held = np.isin(phase[inside], [Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING])
             assert held.all()

@@ -325,7 +325,7 @@ class TestTwin:
         assert (
             len(hand_model.training.recordings)
             == len(set(hand_model.training.recordings.values()))
-            == 60
+            == 121  # 60 of the stability, 61 of the slip rule
         )
         assert all(len(digest) == 32 for digest in hand_model.training.recordings.values())
         assert hand_model.training.figures["accuracy"] > 90

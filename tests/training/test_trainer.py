@@ -10,7 +10,7 @@ from holdfast.classifiers import Samples, recipe
 from holdfast.contact import STABLE, UNSTABLE, ContactState
 from holdfast.errors import TrainingError
 from holdfast.features import Tare, parse_features
-from holdfast.metrics import summarise
+from holdfast.metrics import score_recording, summarise
 from holdfast.recordings import Recording
 from holdfast.training import Setting, compute_decisions, train, trainer
 from holdfast.training.dataset_scan import scan_dataset
@@ -136,7 +136,12 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
     given_decisions = []
-    monkeypatch.setattr(trainer, "score_recording", given_decisions.append)
+
+    def score(decisions, *, slip_curves):
+        given_decisions.append(decisions)
+        return score_recording(decisions)
+
+    monkeypatch.setattr(trainer, "score_recording", score)
     monkeypatch.setattr(trainer, "summarise_results", lambda each, seed: list(each) and _some())
     train(grasps, replace(SETTING, split="random"))
     for place, decisions in enumerate(given_decisions):
@@ -369,6 +374,7 @@ def test_long_steps_report_progress(grasps):
     assert steps == [
         ("reading", 6),
         ("features", 6),
+        ("slips", 6),
         ("searching", 12),
         ("fitting", 6),
         ("evaluating", 6),

@@ -200,7 +200,7 @@ def test_metadata_are_plain(monkeypatch):
         (
             "twin:?profile=wild",
             "twin:?profile=wild: unknown profile 'wild'; there are finger-gentle, "
-            "finger-reference, finger-vigorous, gentle, reference, vigorous",
+            "finger-reference, finger-vigorous, gentle, long-hold, reference, slips, vigorous",
         ),
         (
             "twin:?case=3",
