@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from holdfast.contact import ContactState
-from holdfast.recordings import Label, Recording, Tactile
+from holdfast.contact import Cause, ContactState
+from holdfast.recordings import Label, Recording, Tactile, Truth
 from holdfast.sensors import Sensor
 
 TINY = Sensor(
@@ -39,3 +39,41 @@ def tiny_module(seed, *, n=400, sensor=TINY, rate=100.0, states=STATES, **kwargs
 def tiny_recording(seed, fingers=("thumb", "index"), *, metadata=None, **kwargs):
     modules = {name: tiny_module([seed, k], **kwargs) for k, name in enumerate(fingers)}
     return Recording(f"grasp-{seed}", modules, {"object": f"object {seed % 3}"} | (metadata or {}))
+
+
+def sliding_module(seed, slips, *, n=1500, jolt=25.0):
+    """No contact for 2 s, then held; the shear force is rough while the finger slides."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(n) / TINY.rate
+    sliding = np.zeros(n, dtype=bool)
+    for start in slips:
+        sliding[start : start + 40] = True
+    readings = rng.normal(0, 4, size=(n, 1, 3))
+    readings[:, 0, 2] += np.where(times < 2, 0.0, 600.0)
+    readings[:, 0, 0] += np.where(sliding, rng.normal(0, jolt, size=n), 0.0)
+    labels = (Label(0.0, 2.0, ContactState.NO_CONTACT),)
+    bounds = [2.0, *(k / TINY.rate for start in slips for k in (start, start + 40)), n / TINY.rate]
+    states = [(ContactState.STABLE, None), (ContactState.UNSTABLE, Cause.SLIP)] * len(bounds)
+    labels += tuple(
+        Label(start, end, state, cause)
+        for start, end, (state, cause) in zip(bounds[:-1], bounds[1:], states, strict=False)
+    )
+    arrays = {
+        "contact_force": np.where(times < 2, 0.0, 1.0)[:, None] * [1.0, 0.0, 0.0],
+        "slip_speed": np.where(sliding, 0.01, 0.0),
+        "slipping_share": np.where(sliding, 1.0, 0.0),
+    }
+    return Tactile(TINY, times, readings, labels=labels), arrays
+
+
+def sliding_recording(seed, fingers=("thumb", "index"), *, slips=(400, 700, 1000, 1300), **kwargs):
+    """Return a recording with a truth, in which each finger slides four times for 0.4 s."""
+    made = {name: sliding_module([seed, k], slips, **kwargs) for k, name in enumerate(fingers)}
+    modules = {name: module for name, (module, _) in made.items()}
+    times = next(iter(modules.values())).times
+    truth = Truth(
+        times,
+        {"phase": np.where(times < 2, "free", "locked")},
+        {name: arrays for name, (_, arrays) in made.items()},
+    )
+    return Recording(f"slips-{seed}", modules, {"object": f"object {seed % 3}"}, truth)

@@ -136,7 +136,13 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
     given_decisions = []
-    monkeypatch.setattr(trainer, "score_recording", given_decisions.append)
+    score = trainer.score_recording
+
+    def keep(decisions, **options):
+        given_decisions.append(decisions)
+        return score(decisions, **options)
+
+    monkeypatch.setattr(trainer, "score_recording", keep)
     monkeypatch.setattr(trainer, "summarise_results", lambda each, seed: list(each) and _some())
     train(grasps, replace(SETTING, split="random"))
     for place, decisions in enumerate(given_decisions):
@@ -369,6 +375,7 @@ def test_long_steps_report_progress(grasps):
     assert steps == [
         ("reading", 6),
         ("features", 6),
+        ("slips", 6),
         ("searching", 12),
         ("fitting", 6),
         ("evaluating", 6),

@@ -1,0 +1,260 @@
+"""Slip rules: their training, the choice of their threshold, and what is refused."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.detector import detect
+from holdfast.errors import ModelError, TrainingError
+from holdfast.features import parse_features
+from holdfast.io import load_dataset, save_recording
+from holdfast.metrics import summarise
+from holdfast.metrics.slip_thresholds import MAX_RAISED_QUIET, slip_curve
+from holdfast.metrics.slip_truth import SLIDING, STILL, SlipDecisions, SlipTruth, slip_truth
+from holdfast.model import Model
+from holdfast.training import Setting, compute_decisions, train
+from holdfast.training.slips import (
+    MIN_SLIDING_SAMPLES,
+    SLIP_FALSE_ALARMS,
+    SLIP_HOLD,
+    SLIP_SMOOTHING,
+    choose_slip_threshold,
+    tune_slips,
+    with_slip_threshold,
+)
+
+from .build import sliding_recording, tiny_recording
+
+pytestmark = pytest.mark.slow
+
+FEATURES = parse_features("F_a,F_x,F_y,F_z,sigma", 6)
+SETTING = Setting(window=6, features=FEATURES, trials=0, shared=True)
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [sliding_recording(seed) for seed in range(6)]
+
+
+@pytest.fixture(scope="module")
+def trained(recordings):
+    warnings = []
+    return train(recordings, SETTING, warn=warnings.append), warnings
+
+
+@pytest.fixture(scope="module")
+def model(trained):
+    return trained[0].model
+
+
+@pytest.fixture(scope="module")
+def others():
+    return [sliding_recording(seed) for seed in range(20, 26)]
+
+
+def rule_of(model):
+    (part,) = model.fingers.values()
+    return part.slip
+
+
+def slips_of(model, recordings):
+    return summarise([compute_decisions(model, made) for made in recordings]).slips.pooled
+
+
+def unsmoothed(model):
+    """The model whose probability of a slip is that of each sample alone."""
+    part = model.fingers["*"]
+    rule = msgspec.structs.replace(part.slip, smoothing=0.0)
+    parts = {"*": msgspec.structs.replace(part, slip=rule)}
+    return msgspec.structs.replace(model, fingers=parts)
+
+
+def mean_and_share(model, recordings):
+    """Mean probability of a slip over samples whose truth is known, and the share that slides."""
+    plain = unsmoothed(model)
+    probability, slides = [], []
+    for made in recordings:
+        for name, trace in detect(plain, made).fingers.items():
+            codes = slip_truth(made, name, trace.times).codes
+            known = (codes >= STILL) & ~np.isnan(trace.slip_probability)
+            probability.append(trace.slip_probability[known])
+            slides.append(codes[known] == SLIDING)
+    return np.concatenate(probability).mean(), np.concatenate(slides).mean()
+
+
+class TestTraining:
+    def test_the_rule_finds_slips_of_other_recordings(self, trained, others):
+        model, warnings = trained[0].model, trained[1]
+        rule = rule_of(model)
+        assert (rule.smoothing, rule.hold) == (SLIP_SMOOTHING, SLIP_HOLD)
+        metrics = slips_of(model, others)
+        assert metrics.n == 6 * 2 * 4
+        assert metrics.incipient["0.1"] > 50
+        assert metrics.auc > 0.8
+        assert not [text for text in warnings if "slip" in text]
+
+    @pytest.mark.parametrize("max_samples", [200_000, 2000])
+    def test_the_probability_is_calibrated_though_still_samples_are_thinned(
+        self, recordings, max_samples
+    ):
+        thinned = train(recordings, replace(SETTING, max_samples=max_samples)).model
+        mean, share = mean_and_share(thinned, recordings)
+        assert 0.05 < share < 0.2
+        assert mean == pytest.approx(share, rel=0.15)
+
+    def test_the_threshold_of_the_record_holds_out_of_fold(self, trained):
+        metrics = trained[0].cross_validation.slips
+        record = rule_of(trained[0].model).thresholds
+        assert record.requested == SLIP_FALSE_ALARMS
+        assert record.false_alarms_per_minute <= SLIP_FALSE_ALARMS
+        assert record.n_slips == metrics.pooled.n == 6 * 2 * 4
+        assert record.held_minutes == pytest.approx(metrics.pooled.held_minutes)
+        assert record.recordings == {}
+        assert metrics.threshold_chosen
+        low, high = metrics.intervals.false_alarms_per_minute["held"]
+        assert 0 <= low <= high <= SLIP_FALSE_ALARMS
+
+    def test_the_record_is_in_the_file(self, model, tmp_path):
+        model.save(tmp_path / "model.json")
+        loaded = Model.load(tmp_path / "model.json")
+        assert loaded.fingers == model.fingers
+        assert loaded.training.sliding_samples == {"*": 6 * 2 * 4 * 40}
+
+    def test_every_finger_has_its_own_rule(self, recordings):
+        separate = train(recordings, replace(SETTING, shared=False)).model
+        rules = {name: part.slip for name, part in separate.fingers.items()}
+        assert set(rules) == {"thumb", "index"}
+        assert rules["thumb"].classifier.coefficients != rules["index"].classifier.coefficients
+        assert rules["thumb"].classifier.threshold == rules["index"].classifier.threshold
+        assert rules["thumb"].thresholds == rules["index"].thresholds
+
+    def test_slips_may_come_from_labels(self, recordings):
+        labelled = [replace(made, truth=None) for made in recordings]
+        found = train(labelled, SETTING)
+        assert rule_of(found.model) is not None
+        assert found.cross_validation.slips.pooled.onsets == "labels"
+
+    def test_engines_give_the_same(self, recordings, trained, tmp_path):
+        for made in recordings:
+            save_recording(made, tmp_path / f"{made.name}.parquet")
+        found = train(load_dataset(tmp_path), SETTING, n_jobs=2)
+        assert found.model.fingers == trained[0].model.fingers
+        assert found.cross_validation == trained[0].cross_validation
+
+
+class TestNoRule:
+    def test_without_slips(self, grasps):
+        warnings = []
+        found = train(grasps, SETTING, warn=warnings.append)
+        assert rule_of(found.model) is None
+        assert found.cross_validation.slips is None
+        assert found.model.training.sliding_samples is msgspec.UNSET
+        assert not [text for text in warnings if "slip" in text]
+
+    def test_with_too_few_sliding_samples_it_warns_once(self):
+        few = [sliding_recording(0, ("thumb",), slips=(400,))]
+        few += [sliding_recording(seed, ("thumb",), slips=()) for seed in (1, 2)]
+        few = [made.with_labels(labels_of(tiny_recording(9, ("thumb",)))) for made in few]
+        warnings = []
+        found = train(few, SETTING, warn=warnings.append)
+        assert rule_of(found.model) is None
+        n_still = 3 * 1300 - 40
+        assert [text for text in warnings if "slip" in text] == [
+            f"all fingers: 40 samples that slide and {n_still} that hold still given, at least "
+            f"{MIN_SLIDING_SAMPLES} and 1 expected; the model gets no slip rule there"
+        ]
+
+    def test_with_false_alarms_at_every_threshold(self, model):
+        n = 6000
+        times, still = np.arange(n) / 100, np.full(n, STILL, dtype=np.int8)
+        truth = SlipTruth(still, still == STILL, (), "truth")
+        sure = SlipDecisions(times, np.full(n, 1 - 1e-9), still == STILL, 0.0, truth)
+        chosen = choose_slip_threshold([{"thumb": slip_curve(sure)}] * 2, [0, 1], 0)
+        assert chosen.reason == (
+            "no threshold of slips has at most 1 false alarms a minute in 2 min of held time; the "
+            "model gets no slip rule"
+        )
+        assert rule_of(with_slip_threshold(model, chosen)) is None
+
+    def test_an_adapted_model_keeps_its_rule(self, model):
+        few = [tiny_recording(seed) for seed in (50, 51)]
+        adapted = train(few, Setting.adapting(model, trials=0)).model
+        assert set(adapted.fingers) == {"thumb", "index"}
+        assert all(part.slip == rule_of(model) for part in adapted.fingers.values())
+
+    def test_an_adapted_model_without_a_rule_gets_none(self, grasps, recordings):
+        plain = train(grasps, SETTING).model
+        adapted = train(recordings, Setting.adapting(plain, trials=0)).model
+        assert all(part.slip is None for part in adapted.fingers.values())
+
+
+def labels_of(recording):
+    return {name: module.labels for name, module in recording.modules.items()}
+
+
+class TestTuning:
+    @pytest.mark.parametrize("rate", [1.0, 20.0])
+    def test_the_detector_keeps_to_the_rate(self, model, others, rate):
+        tuned = tune_slips(model, others, rate)
+        metrics = slips_of(tuned.model, others)
+        assert metrics.false_alarms_per_minute["held"] <= rate
+        assert metrics.raised_quiet <= MAX_RAISED_QUIET
+        assert metrics == tuned.chosen
+        assert slips_of(model, others) == tuned.before
+
+    def test_a_higher_rate_never_finds_less(self, model, others):
+        strict, loose = (tune_slips(model, others, rate) for rate in (1.0, 20.0))
+        assert loose.threshold <= strict.threshold
+        assert loose.chosen.incipient["0.1"] >= strict.chosen.incipient["0.1"]
+
+    def test_points_around_it_are_in_order(self, model, others):
+        tuned = tune_slips(model, others, 5.0)
+        thresholds = [threshold for threshold, _ in tuned.points]
+        assert thresholds == sorted(thresholds)
+        assert dict(tuned.points)[tuned.threshold] == tuned.chosen
+
+    def test_the_model_keeps_how_it_was_tuned(self, model, others):
+        named = msgspec.structs.replace(model, name="mine")
+        tuned = tune_slips(named, others, 5.0)
+        rule = rule_of(tuned.model)
+        assert tuned.model.name == "mine, tuned"
+        assert rule.classifier.threshold == tuned.threshold
+        assert rule.thresholds.requested == 5.0
+        assert rule.thresholds.recordings == {made.name: made.digest for made in others}
+        assert rule.thresholds.found == tuned.chosen.incipient["0.1"]
+        assert tuned.model.tuning == model.tuning
+
+    @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
+    def test_a_rate_that_is_none(self, model, others, rate):
+        with pytest.raises(ValueError) as refusal:
+            tune_slips(model, others, rate)
+        assert str(refusal.value) == f"false alarms per minute above 0 expected, {rate:g} given"
+
+    def test_a_model_without_a_rule(self, others):
+        with pytest.raises(ModelError) as refusal:
+            tune_slips(Model.load("builtin:noise-floor"), others, 1.0)
+        assert str(refusal.value).endswith(
+            "has no slip rule; train one on recordings whose slips are known"
+        )
+
+    def test_recordings_without_labels_or_truth(self, model):
+        bare = tiny_recording(1, states=(None,) * 4)
+        with pytest.raises(TrainingError) as refusal:
+            tune_slips(model, [bare], 1.0)
+        assert str(refusal.value) == "1 recordings without slips that are known"
+
+    def test_labels_without_slips_have_false_alarms_only(self, model):
+        quiet = tiny_recording(1, states=(ContactState.NO_CONTACT, *[ContactState.STABLE] * 3))
+        tuned = tune_slips(model, [quiet], 60.0)
+        assert tuned.chosen.n == 0
+        assert rule_of(tuned.model).thresholds.found is None
+
+    def test_a_held_time_that_is_too_short(self, model, others):
+        with pytest.raises(TrainingError) as refusal:
+            tune_slips(model, others[:1], 1.0)
+        assert str(refusal.value) == (
+            "0.43 min of held time given; 1 false alarms a minute need at least 1 min"
+        )
