@@ -244,3 +244,9 @@ def test_refusals(capsys, path):
     data[1000] ^= 1
     path.write_bytes(data)
     assert refusal(capsys, path) == f"{path} is damaged: its content does not match its checksum"
+
+
+def test_a_model_without_a_figure_is_refused(capsys, path):
+    assert refusal(capsys, path, "--model", "builtin:twin") == (
+        "--model is for the figure; --plot FILE expected beside it"
+    )

@@ -3,10 +3,12 @@ import json
 import pytest
 
 from holdfast.cli import main
+from holdfast.features import parse_features
 from holdfast.io import load_dataset, save_recording
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
+from training.build import sliding_recording, tiny_recording
 
 pytestmark = pytest.mark.slow
 
@@ -117,3 +119,110 @@ def test_info_of_a_model_has_no_plot(capsys, tmp_path):
     code, _, err = run(capsys, "info", "builtin:any", "--plot", tmp_path / "a.png")
     assert code == 2
     assert err == "holdfast: --plot draws one recording; the model builtin:any given\n"
+
+
+# --- slips ------------------------------------------------------------------------------------
+
+SLIP_SETTING = Setting(window=6, features=parse_features("F_a,F_x,F_y,F_z,sigma", 6), trials=0)
+
+
+@pytest.fixture(scope="module")
+def sliding(tmp_path_factory):
+    """Recordings of fingers that slide, and a model of other ones with a slip rule."""
+    place = tmp_path_factory.mktemp("slips")
+    (place / "data").mkdir()
+    for seed in range(20, 24):
+        made = sliding_recording(seed)
+        save_recording(made, place / "data" / f"{made.name}.parquet")
+    others = [sliding_recording(seed) for seed in range(6)]
+    train(others, SLIP_SETTING).model.save(place / "model.json")
+    return place
+
+
+def test_the_threshold_of_slips(capsys, sliding, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    out = tmp_path / "tuned.json"
+    code, printed, err = tune(capsys, sliding, out, "--false-alarms", 5, "--for", "slip")
+    assert (code, err) == (0, "")
+    rules = [part.slip for part in Model.load(out).fingers.values()]
+    assert all(rule.thresholds.false_alarms_per_minute <= 5 for rule in rules)
+    lines = printed.splitlines()
+    assert lines[0].startswith("Slips: ")
+    assert sum(line.endswith("chosen") for line in lines) == 1
+    assert lines[-1].startswith(f"{out}: a slip from a probability of ")
+    assert all(len(line) <= 80 for line in lines[:-1])
+
+
+def test_json_and_info_of_slips(capsys, sliding, tmp_path):
+    out = tmp_path / "tuned.json"
+    words = ["--false-alarms", 5, "--for", "slip", "--json"]
+    code, printed, _ = tune(capsys, sliding, out, *words)
+    report = json.loads(printed)
+    assert code == 0
+    assert list(report) == ["model", "for", "threshold", "chosen", "before", "around", "trained_on"]
+    assert report["for"] == "slip"
+    assert report["chosen"]["false_alarms_per_minute"]["held"] <= 5
+    chosen = next(p for p in report["around"] if p["threshold"] == report["threshold"])
+    assert chosen == {"threshold": report["threshold"], **report["chosen"]}
+    rule = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["thumb"]["slip"]
+    assert rule["threshold"] == report["threshold"]
+    assert rule["chosen_on"]["recordings"] == [f"slips-{seed}" for seed in range(20, 24)]
+    text = " ".join(run(capsys, "info", out)[1].split())
+    assert f"slides from a probability of {rule['threshold']:.3g} on" in text
+    assert "threshold of slips from 4 recordings (slips-20, " in text
+    text = " ".join(run(capsys, "info", sliding / "model.json")[1].split())
+    assert "threshold of slips from the training, out of fold: " in text
+    assert "no slip rule" in run(capsys, "info", "builtin:noise-floor")[1]
+
+
+def refused(capsys, model, data, out, rate="1"):
+    code, printed, err = run(
+        capsys, "tune", model, data, "-o", out, "--false-alarms", rate, "--for", "slip"
+    )
+    assert (code, printed, err.count("\n")) == (2, "", 1)
+    assert not out.exists()
+    return err
+
+
+def test_refusals_of_slips(capsys, sliding, folder, tmp_path):
+    out, model, data = tmp_path / "t.json", sliding / "model.json", sliding / "data"
+    assert "false alarms per minute above 0 expected, 0 given" in refused(
+        capsys, model, data, out, "0"
+    )
+    assert "has no slip rule" in refused(capsys, "builtin:noise-floor", data, out)
+    assert "of held time given; 0.01 false alarms a minute need at least 1e+02 min" in refused(
+        capsys, model, data, out, "0.01"
+    )
+    bare = tiny_recording(1, states=(None,) * 4)
+    save_recording(bare, tmp_path / "bare.parquet")
+    assert "1 recordings without slips that are known" in refused(
+        capsys, model, tmp_path / "bare.parquet", out
+    )
+
+
+def test_evaluate_prints_slips(capsys, sliding, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    code, printed, _ = run(capsys, "evaluate", sliding / "model.json", sliding / "data")
+    assert code == 0
+    lines = printed.splitlines()
+    place = lines.index("slips of fingers (by the truth)")
+    rows = {line.split()[0]: line.split() for line in lines[place:] if line.strip()}
+    assert rows["all"][1] == "32"
+    assert rows["thumb"][1] == rows["index"][1] == "16"
+    assert "without a choice of the threshold" in " ".join(printed.split())
+    assert "Slips: " in " ".join(lines[:6])
+    assert all(len(line) <= 80 for line in lines[:-1])
+
+
+def test_train_and_evaluate_without_a_slip_rule(capsys, folder):
+    _, printed, _ = run(capsys, "evaluate", folder / "model.json", folder / "data")
+    assert "slips of fingers: the model has no slip rule\n" in printed
+
+
+def test_train_prints_slips(capsys, sliding, tmp_path):
+    words = ["-o", tmp_path / "m.json", "--trials", "0", "--shared"]
+    _, printed, _ = run(capsys, "train", sliding / "data", *words)
+    assert "slips of fingers (by the truth)" in printed
+    assert "95 % intervals of all slips, with the choice of the threshold: " in " ".join(
+        printed.split()
+    )

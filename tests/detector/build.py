@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 
 from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers.slip import SlipRule
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording, Tactile
@@ -50,12 +51,23 @@ def finger_model(features=None, seed=0, **options):
     return FingerModel(features=features, **options)
 
 
-def model(fingers=("thumb", "index"), features=None, which=None, threshold=None, **options):
+def slip_rule(n_features, seed=0, smoothing=0.02, hold=0.05):
+    return SlipRule(classifier(n_features, 90 + seed), smoothing, hold)
+
+
+def model(
+    fingers=("thumb", "index"), features=None, which=None, threshold=None, slips=(), **options
+):
+    """Return a model; the fingers in `slips` have a slip rule."""
     which = sensor() if which is None else which
+    n_features = 5 if features is None else len(features)
     parts = {
-        name: finger_model(features, seed, sensor=which.name, contact_threshold=threshold)
+        name: finger_model(
+            features, seed, sensor=which.name, contact_threshold=threshold,
+            slip=slip_rule(n_features, seed) if name in slips else None,
+        )
         for seed, name in enumerate(fingers)
-    }
+    }  # fmt: skip
     options = {"rate": which.rate, "window": 6, "tare": "0.2"} | options
     return Model(fingers=parts, sensors={which.name: which}, **options)
 

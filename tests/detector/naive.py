@@ -89,6 +89,7 @@ class Finger:
         self.faults = ()
         self.force = (NAN, NAN, NAN)
         self.sigma = self.probability = NAN
+        self.slip, self.odds, self.slid, self.slides = NAN, None, -math.inf, False
         self.state = self.candidate = "UNKNOWN"
         self.since = self.unstable_at = NAN
 
@@ -295,6 +296,7 @@ class Finger:
                 self.state = self.candidate = "UNKNOWN"
             if self.state == "UNKNOWN":
                 self.probability = self.unstable_at = NAN
+                self.end_slip(NAN)
             else:
                 self.status = ""
             return
@@ -304,8 +306,34 @@ class Finger:
         elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
             state = "UNSTABLE"
         self.debounce(state, time, debounce.min_duration)
+        self.decide_slip(features, time)
         if state == "NO_CONTACT":
             self.rest += min(1, self.period / 3) * (np.array(self.force) - self.rest)
+
+    def end_slip(self, probability):
+        self.slip, self.odds, self.slid, self.slides = probability, None, -math.inf, False
+
+    def decide_slip(self, features, time):
+        """Smoothed log odds; it slides from the threshold on, and for the hold time after it."""
+        rule = self.part.slip
+        if rule is None:
+            return
+        if self.empty:
+            self.end_slip(0.0)
+            return
+        linear = rule.classifier
+        z = linear.intercept
+        for value, c, mean, scale in zip(
+            features, linear.coefficients, linear.mean, linear.scale, strict=True
+        ):
+            z += c * (value - mean) / scale
+        odds = linear.slope * z + linear.offset
+        gain = 1 - math.exp(-self.period / rule.smoothing) if rule.smoothing else 1
+        self.odds = odds if self.odds is None else self.odds + gain * (odds - self.odds)
+        self.slip = 1 / (1 + math.exp(min(-self.odds, 700)))
+        if self.slip >= linear.threshold:
+            self.slid = time
+        self.slides = time == self.slid or time - self.slid + self.period / 2 < rule.hold
 
     def debounce(self, state, time, min_duration):
         if state != self.candidate:
@@ -396,7 +424,8 @@ class Hand:
     def row(finger):
         last = NAN if finger.last is None else finger.last
         names = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
-        return names, (last, finger.probability, finger.sigma, *finger.force)
+        slip = None if finger.part.slip is None else (finger.slip, finger.slides)
+        return names, (last, finger.probability, finger.sigma, *finger.force), slip
 
     def state(self):
         states = [finger.state for finger in self.fingers.values()]

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from holdfast.contact import Cause
 from holdfast.detector import Detector
 from holdfast.features import Tare
 from holdfast.model import ANY_FINGER, Debounce, Model
@@ -43,12 +44,17 @@ def same(estimate, slow):
     assert estimate.time == time
     assert str(estimate.state) == hand
     assert list(estimate.fingers) == list(rows)
-    for name, (names, numbers) in rows.items():
+    for name, (names, numbers, slip) in rows.items():
         one = estimate.fingers[name]
         faults = tuple(map(str, one.faults))
         assert (str(one.state), str(one.reason), faults, one.faulty_taxels) == names
         found = (one.time, one.stable_probability, one.instability, *one.force)
         assert found == pytest.approx(numbers, rel=1e-9, abs=1e-9, nan_ok=True)
+        if slip is None:
+            assert one.slip_probability is None
+        else:
+            assert one.slip_probability == pytest.approx(slip[0], rel=1e-9, abs=1e-9, nan_ok=True)
+            assert (one.cause is Cause.SLIP) == slip[1]
 
 
 MODELS = {
@@ -58,6 +64,8 @@ MODELS = {
     "debounced": {"tare": "0.1", "debounce": Debounce(0.05, 0.1), "threshold": 30.0},
     "held": {"tare": "0.1", "debounce": Debounce(0.02, 0.05, 0.12), "threshold": 30.0},
     "long window": {"tare": "0.3", "window": 20},
+    "slips": {"tare": "0.1", "threshold": 30.0, "slips": ("thumb", "index", "ring")},
+    "slips of some": {"tare": "first", "features": RICH, "slips": ("index",)},
 }
 
 

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
-from holdfast.contact import ContactState
+from holdfast.classifiers.cause import ALL_CAUSES
+from holdfast.classifiers.slip import raised_at
+from holdfast.contact import Cause, ContactState
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import fingertip_force
@@ -34,6 +37,7 @@ def feed(detector, made):
 def fields(estimate):
     numbers = (estimate.time, estimate.stable_probability, estimate.instability, *estimate.force)
     codes = (estimate.state, estimate.reason, estimate.faults, estimate.faulty_taxels)
+    codes += (estimate.cause, estimate.slip_probability)
     return repr((*numbers, *codes))
 
 
@@ -163,7 +167,7 @@ def test_the_future_changes_nothing():
         values = np.array(module.readings)
         values[130:] = 990 - values[130:]
         modules[name] = type(module)(module.sensor, module.times, values)
-    hand_model = model(features=RICH, threshold=20.0)
+    hand_model = model(features=RICH, threshold=20.0, slips=("thumb", "index"))
     one, two = detect(hand_model, made), detect(hand_model, recording(**modules))
     assert np.array_equal(one.hand[:260], two.hand[:260])
     for finger, trace in one.fingers.items():
@@ -174,12 +178,104 @@ def test_the_future_changes_nothing():
 
 @pytest.mark.parametrize("start", [0.0, 0.3, 1e9, 1.7e9])
 def test_a_shift_of_time_changes_nothing(start):
-    hand_model = model(("thumb",), threshold=20.0)
+    hand_model = model(("thumb",), threshold=20.0, slips=("thumb",))
     plain = detect(hand_model, recording(thumb=tactile(seed=4))).fingers["thumb"]
     moved = detect(hand_model, recording(thumb=tactile(seed=4, start=start))).fingers["thumb"]
     for found, expected in zip(moved[1:], plain[1:], strict=True):
-        if expected is not None:  # no slip rule
-            assert np.array_equal(found, expected, equal_nan=True)
+        assert np.array_equal(found, expected, equal_nan=True)
+    assert plain.slip_probability is not None
+
+
+class TestSlip:
+    """The slip rule: live equals batch, and both equal the rule over arrays."""
+
+    @pytest.mark.parametrize("slips", [("thumb", "index"), ("thumb",), ()])
+    @pytest.mark.parametrize("clock", CLOCKS)
+    def test_detect_equals_update(self, clock, slips):
+        made = recording(**CLOCKS[clock])
+        hand_model = model(features=RICH, threshold=20.0, slips=slips)
+        found = detect(hand_model, made)
+        assert_same(found, list(feed(Detector(hand_model), made)))
+        for name, trace in found.fingers.items():
+            assert (trace.slip_probability is None) == (name not in slips)
+
+    @pytest.mark.parametrize("clock", ["one clock", "two rates", "since 1970", "broken"])
+    def test_the_decision_is_that_of_raised_at(self, clock):
+        made = recording(**CLOCKS[clock])
+        hand_model = model(threshold=20.0, slips=("thumb", "index"))
+        n_raised = 0
+        for name, trace in detect(hand_model, made).fingers.items():
+            rule = hand_model.finger(name).slip
+            threshold = rule.classifier.threshold
+            expected = raised_at(trace.times, trace.slip_probability, threshold, rule.hold)
+            found = trace.cause == SLIP_CODE
+            assert np.array_equal(found, expected)
+            n_raised += found.sum()
+        assert n_raised
+
+    def test_the_probability_is_smoothed(self):
+        """s(k) = s(k-1) + gain (z(k) - s(k-1)), from the log odds z without smoothing."""
+        made = recording(thumb=tactile(seed=1))
+        smoothed = model(("thumb",), slips=("thumb",))
+        plain = with_rule(smoothed, smoothing=0.0)
+        values = [log_odds_of(detect(one, made).fingers["thumb"]) for one in (plain, smoothed)]
+        gain = smoothed.finger("thumb").slip.gain(RATE)
+        assert 0 < gain < 1
+        first = np.flatnonzero(np.isfinite(values[0]))[0]
+        expected = [values[0][first]]
+        for value in values[0][first + 1 :]:
+            expected.append(expected[-1] + gain * (value - expected[-1]))
+        np.testing.assert_allclose(values[1][first:], expected, rtol=1e-9, atol=1e-9)
+
+    def test_unknown_has_no_slip_and_forgets_it(self):
+        trace = detect(
+            model(("thumb",), slips=("thumb",)), recording(thumb=CLOCKS["broken"]["thumb"])
+        ).fingers["thumb"]
+        unknown = trace.state == 0
+        assert unknown.any() and not unknown.all()
+        assert np.isnan(trace.slip_probability[unknown]).all()
+        assert not np.isnan(trace.slip_probability[~unknown]).any()
+        assert not (trace.cause[unknown] == SLIP_CODE).any()
+
+    def test_without_contact_nothing_slides(self):
+        trace = detect(
+            model(("thumb",), threshold=1e6, slips=("thumb",)), recording(thumb=tactile(seed=1))
+        ).fingers["thumb"]
+        empty = trace.state == STATES.index(ContactState.NO_CONTACT)
+        assert empty.any()
+        assert (trace.slip_probability[empty] == 0).all()
+        assert not (trace.cause == SLIP_CODE).any()
+
+    def test_unloading_ends_a_slip_at_once(self):
+        """Also within the hold time."""
+        module = tactile(seed=1)
+        values = np.array(module.readings)
+        values[140:160] = values[:20]  # as during the tare
+        made = recording(thumb=type(module)(module.sensor, module.times, values))
+        hand_model = model(("thumb",), threshold=20.0, slips=("thumb",))
+        sure = replace(hand_model.finger("thumb").slip.classifier, threshold=1e-9)
+        trace = detect(with_rule(hand_model, hold=10.0, classifier=sure), made).fingers["thumb"]
+        slides = trace.cause == SLIP_CODE
+        assert slides[144] and slides[165]
+        empty = trace.slip_probability == 0
+        assert empty[141:160].any()
+        assert not slides[empty].any()
+
+
+SLIP_CODE = ALL_CAUSES.index(Cause.SLIP) + 1
+
+
+def log_odds_of(trace):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(trace.slip_probability) - np.log1p(-trace.slip_probability)
+
+
+def with_rule(hand_model, **fields):
+    fingers = {
+        name: replace(part, slip=replace(part.slip, **fields))
+        for name, part in hand_model.fingers.items()
+    }
+    return replace(hand_model, fingers=fingers)
 
 
 class TestIntervalTare:

@@ -10,7 +10,7 @@ from holdfast.classifiers import Samples, recipe
 from holdfast.contact import STABLE, UNSTABLE, ContactState
 from holdfast.errors import TrainingError
 from holdfast.features import Tare, parse_features
-from holdfast.metrics import score_recording, summarise
+from holdfast.metrics import summarise
 from holdfast.recordings import Recording
 from holdfast.training import Setting, compute_decisions, train, trainer
 from holdfast.training.dataset_scan import scan_dataset
@@ -136,12 +136,13 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
     given_decisions = []
+    score = trainer.score_recording
 
-    def score(decisions, *, slip_curves):
+    def keep(decisions, **options):
         given_decisions.append(decisions)
-        return score_recording(decisions)
+        return score(decisions, **options)
 
-    monkeypatch.setattr(trainer, "score_recording", score)
+    monkeypatch.setattr(trainer, "score_recording", keep)
     monkeypatch.setattr(trainer, "summarise_results", lambda each, seed: list(each) and _some())
     train(grasps, replace(SETTING, split="random"))
     for place, decisions in enumerate(given_decisions):

@@ -5,7 +5,8 @@ import pytest
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions, summarise
-from holdfast.training.verdict import LoadedTares, verdict, verdict_of_events
+from holdfast.metrics.slips import SlipMetrics
+from holdfast.training.verdict import LoadedTares, verdict, verdict_of_events, verdict_of_slips
 
 TIMES = np.arange(12_000) * 0.01
 LABELS = np.where(np.arange(12_000) % 1000 < 800, STABLE, UNSTABLE)
@@ -122,3 +123,42 @@ def test_tares_under_load_are_named():
 )
 def test_events_alone(states, text):
     assert verdict_of_events(metrics(states).events.hand) == text
+
+
+def slips(n=40, found=95.0, rate=1.0, onsets="truth"):
+    shares = {"before": 0.0, "0.03": 0.0, "0.05": 0.0, "0.1": found if n else None}
+    known = onsets == "truth" and n
+    return SlipMetrics(
+        n=n, n_over_1mm=n if known else 0, n_gross=0, incipient=shares, gross={}, over_1mm=shares,
+        before_1mm=found if known else None, before_3mm=None, raised_quiet=0.0,
+        false_alarms_per_minute={"quiet": 0.0, "held": rate}, auc=0.9, quiet_minutes=5.0,
+        held_minutes=9.0, onsets=onsets,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("metrics", "use"),
+    [
+        (slips(), "good for an automatic reaction to slips"),
+        (slips(found=90.0, rate=1.5), "good for an automatic reaction to slips"),
+        (slips(rate=1.6), "not good enough"),
+        (slips(found=89.0), "not good enough"),
+        (slips(n=19), "too few to judge an automatic reaction (19 of 20 needed)"),
+        (slips(onsets="labels"), "good for an automatic reaction to slips"),
+        (slips(found=80.0, onsets="labels"), "not good enough"),
+    ],
+)
+def test_what_slips_are_good_for(metrics, use):
+    assert verdict_of_slips(metrics).split("; ")[1].startswith(use)
+
+
+def test_the_sentence_about_slips():
+    assert verdict_of_slips(slips(found=35.0)) == (
+        "Slips: 35 % of 40 slips of fingers found within 0.1 s at 1 false alarms a minute of held "
+        "time; not good enough for an automatic reaction to slips (before 1 mm: 35 %, 90 % needed "
+        "at 1.5 false alarms a minute)."
+    )
+    assert " (by labels) found within 0.1 s" in verdict_of_slips(slips(onsets="labels"))
+    assert verdict_of_slips(slips(n=0)) == (
+        "Slips: none in these recordings, at 1 false alarms a minute of held time."
+    )

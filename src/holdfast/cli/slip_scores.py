@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from holdfast.metrics.slips import SlipMetrics
     from holdfast.metrics.statistics import Interval
 
-NO_RULE_LINE = "slips of fingers: the model has no slip rule"
+NO_RULE = "slips of fingers: the model has no slip rule"
 UNKNOWN_SLIPS = "slips of fingers: not known in these recordings; the slip rule is not scored"
 KEPT_RULE = "slips of fingers: the slip rule of --init is kept; holdfast evaluate scores it"
 SHARES_NOTE = (
@@ -36,7 +36,7 @@ def print_slips(
     """
     print_line()
     if not has_rule or summary is None:
-        print_line(unscored if has_rule else NO_RULE_LINE)
+        print_line(unscored if has_rule else NO_RULE)
         return
     print_line(f"slips of fingers ({slips_origin(summary.pooled)})")
     rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]

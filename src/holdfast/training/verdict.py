@@ -15,11 +15,11 @@ SLIP_REACTION = (1.5, 90.0)
 """Maximum false alarms per minute of held time, and minimum share of slips over 1 mm found before
 they slid 1 mm [%], to react to slips by itself.
 
-Thresholds are set for 1 false alarm a minute, and vary by half on other recordings. A grip that is
+Thresholds are set for 1 false alarm a minute; 1.5 leaves room for other recordings. A grip that is
 tightened before 1 mm still holds the object; one slip of ten may be too fast for that, as in
 `REACTION`."""
 MIN_JUDGED_SLIPS = 20
-"""Fewer slips are not judged: if 20 of 20 are found, the true share is still above 86 % only."""
+"""Fewer slips are not judged: with 20 of 20 found, the true share may be 86 % (95 % confidence)."""
 
 
 class LoadedTares(NamedTuple):
