@@ -13,7 +13,7 @@ from holdfast.model import Model
 from holdfast.plots.slips import (
     DECIDED_ALPHA,
     SLIP_COLOUR,
-    SlipSeries,
+    SlipDecisionSeries,
     draw_slip_decisions,
     draw_slip_speed,
     slip_series,
@@ -111,7 +111,7 @@ def _since(series: FingerSeries, origin: float) -> FingerSeries:
     return series._replace(times=series.times - origin, slip=slip)
 
 
-def _decisions(model: Model, recording: Recording, origin: float) -> dict[str, SlipSeries]:
+def _decisions(model: Model, recording: Recording, origin: float) -> dict[str, SlipDecisionSeries]:
     """Return the decisions about slips with times since an origin [s]."""
     if not model.has_slip_rule:
         raise ValueError(f"{model.name or 'the model'} has no slip rule, whose decisions to draw")
