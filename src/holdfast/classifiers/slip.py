@@ -44,7 +44,8 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         s(k) = s(k-1) + (1 - exp(-T / smoothing)) (z(k) - s(k-1))
 
     The probability of a slip is 1 / (1 + exp(-s)). The finger slides from the threshold of the
-    classifier on, and for the hold time after that.
+    classifier on, and for the hold time after that. Compare the probability with the threshold
+    only: it is not calibrated where the rule was trained on some of the samples.
 
     Attributes:
         classifier: maps features to a probability that the finger slides, with the threshold.
