@@ -46,7 +46,7 @@ COLUMN_HEIGHT = 4.3
 OVERVIEW_COLUMNS = 2
 OVERVIEW_ROW_HEIGHT = 2.1
 """Height of a row of panels in the figure of several slips [inch]."""
-MIN_PROBABILITY = 1e-4
+LOWEST_SHOWN_PROBABILITY = 1e-4
 """Lower end of the logarithmic axis of the probability; less is drawn there."""
 MARGIN_TIME = 0.5
 """Time that is drawn before the first and after the last slip [s]."""
@@ -270,10 +270,10 @@ def _draw_distance(axes: Axes, series: SlipSeries) -> None:
 
 def _draw_probability(axes: Axes, series: SlipSeries) -> None:
     shown = _shown(series.decided_at, series.end)
-    probability = np.maximum(series.probability[shown], MIN_PROBABILITY)
+    probability = np.maximum(series.probability[shown], LOWEST_SHOWN_PROBABILITY)
     axes.plot(series.decided_at[shown], probability, color=SCORE_COLOUR, linewidth=1.0)
     axes.axhline(series.threshold, **THRESHOLD_STYLE)
-    _set_log_scale(axes, (0.8 * MIN_PROBABILITY, 1.3), (1e-4, 1e-2, 1.0))
+    _set_log_scale(axes, (0.8 * LOWEST_SHOWN_PROBABILITY, 1.3), (1e-4, 1e-2, 1.0))
     add_labels(axes, y="slip\nprobability")
 
 

@@ -107,4 +107,4 @@ def test_a_figure_of_several_slips_has_a_panel_for_each_and_a_legend(model, reco
 def test_a_low_probability_is_drawn_at_the_lower_end(model, recording):
     axes = slip_figure(model, recording, "weight").axes[2]
     assert axes.get_yscale() == "log"
-    assert min(axes.lines[-2].get_ydata()) >= slips.MIN_PROBABILITY
+    assert min(axes.lines[-2].get_ydata()) >= slips.LOWEST_SHOWN_PROBABILITY
