@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.io import save_recording
-from holdfast.twin.randomized.drawing import MEASURED
+from holdfast.twin.randomized.drawing import MEASURED, SENSOR_KINDS
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 from holdfast_lab.skin.readout import ReadoutFigures, readout_figures
 from holdfast_lab.skin.situations import (
@@ -60,7 +60,7 @@ def main(arguments: argparse.Namespace) -> None:
     pools = {name: pooled(marked) for name, marked in real.items()}
     with tempfile.TemporaryDirectory() as place:
         folders = arguments.twin or [
-            simulated(Path(place), name, mechanisms)
+            simulated(Path(place), name, mechanisms, arguments.kind)
             for name, mechanisms in (("plain", ()), ("measured", MEASURED))
         ]
         holds = {folder.name: list(twin_holds(folder, arguments.largest)) for folder in folders}
@@ -76,12 +76,12 @@ def main(arguments: argparse.Namespace) -> None:
         write_pictures(arguments.picture, pools, twins, lines)
 
 
-def simulated(place: Path, name: str, mechanisms: tuple[str, ...]) -> Path:
-    """Simulate a small set of randomized hands."""
+def simulated(place: Path, name: str, mechanisms: tuple[str, ...], kind: str | None) -> Path:
+    """Simulate a small set of randomized hands, all with one kind of sensor if it is given."""
     folder = place / name
     folder.mkdir()
     for number in range(N_SMALL):
-        recording = simulate_random(RandomHold(number, measured=mechanisms))
+        recording = simulate_random(RandomHold(number, kind=kind, measured=mechanisms))
         save_recording(recording, folder / f"{recording.name}.parquet")
     return folder
 
@@ -147,7 +147,7 @@ def family_table(table: Table, twins: Sequence[str]) -> Iterator[str]:
 
 
 def shown(values: Iterable[float]) -> str:
-    return ", ".join(f"{value:.2f}" for value in values)
+    return ", ".join("-" if np.isnan(value) else f"{value:.2f}" for value in values)
 
 
 def readout_table(sets: Mapping[str, Sequence[Marked]]) -> Iterator[str]:
@@ -155,9 +155,10 @@ def readout_table(sets: Mapping[str, Sequence[Marked]]) -> Iterator[str]:
     yield ""
     yield (
         "| set | fingers | change over 2, 4, 8 samples to 1 | second to first difference "
-        "| normal to shear | neighbours x, y, z | samples repeated % | taxels repeated % |"
+        "| normal to shear | neighbours x, y, z | taxels 4, 8 apart in number "
+        "| samples repeated % | taxels repeated % |"
     )
-    yield "|---|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|---|"
     for name, marked in sets.items():
         for situation in ("quiet", "moving", "pushed"):
             figures = readout_figures(marked, situation)
@@ -168,7 +169,7 @@ def readout_table(sets: Mapping[str, Sequence[Marked]]) -> Iterator[str]:
 def readout_row(title: str, figures: ReadoutFigures) -> str:
     return (
         f"| {title} | {figures.n_fingers} | {shown(figures.by_lag[1:])} | {figures.second:.2f} "
-        f"| {figures.normal:.2f} | {shown(figures.neighbours)} "
+        f"| {figures.normal:.2f} | {shown(figures.neighbours)} | {shown(figures.in_turn)} "
         f"| {100 * figures.repeated:.1f} | {100 * figures.stale:.1f} |"
     )
 
@@ -233,6 +234,7 @@ if __name__ == "__main__":
     parser.add_argument("twin", type=Path, nargs="*", help="Folders of randomized hands.")
     default = os.environ.get("HOLDFAST_DATA", "../shared/data")
     parser.add_argument("--data", type=Path, default=Path(default))
+    parser.add_argument("--kind", choices=SENSOR_KINDS, help="Sensor of the small set.")
     parser.add_argument("--largest", type=int, help="Maximum number of recordings of a folder.")
     parser.add_argument("--picture", type=Path, help="Folder for a page of pictures.")
     main(parser.parse_args())

@@ -17,9 +17,9 @@ STEPS = (0.017, 0.033, 0.067, 0.133)
 """Times between the three samples of a second difference [s]."""
 LAGS = (0.017, 0.067, 0.267)
 """Lags of the changes of families B and D [s]."""
-WINDOWS = (0.067, 0.267)
+RMS_WINDOWS = (0.067, 0.267)
 """Windows of root mean squares [s]."""
-LEAST_SHARE = 1e-3
+CHANGE_FLOOR_SHARE = 1e-3
 """Changes below this share of the load hardly count."""
 NOISE_WEIGHT, LOAD_DECAY, NOISE_BLOCK = 100.0, 5.0, 0.2
 """Noise in a load, time constant [s] of the largest load, and block of a noise [s]: as in
@@ -124,7 +124,7 @@ def family_features(finger: Finger) -> dict[str, Array]:
 
 
 def _logged(values: Array) -> Array:
-    return np.log(np.abs(values) + LEAST_SHARE)
+    return np.log(np.abs(values) + CHANGE_FLOOR_SHARE)
 
 
 def _lagged(values: Array, step: int) -> Array:
@@ -176,7 +176,7 @@ def _roughness(finger: Finger) -> Iterator[Named]:
     for order in (1, 2, 3):
         difference = _lagged(difference, 1)
         size = np.linalg.norm(difference, axis=1)
-        for window in WINDOWS:
+        for window in RMS_WINDOWS:
             value = _rms(size, finger.steps(window)) / finger.load
             yield f"C log d{order}F/L [{1e3 * window:g} ms]", _logged(value)
 
@@ -198,7 +198,7 @@ def _taxel_motion(finger: Finger) -> Iterator[Named]:
         title = f"[{1e3 * lag:g} ms]"
         yield f"D log |dg - w dF|/L {title}", _logged(rest / finger.taxel_load)
         ratio = rest / (np.linalg.norm(change, axis=1) + finger.noise)
-        yield f"D log |dg - w dF|/|dF| {title}", np.log(ratio + LEAST_SHARE)
+        yield f"D log |dg - w dF|/|dF| {title}", np.log(ratio + CHANGE_FLOOR_SHARE)
         yield f"D shift of centre along t {title}", _lagged(centre[:, 0] / size, step)
         yield (
             f"D load from trailing to leading {title}",
@@ -240,7 +240,7 @@ def _weighted(finger: Finger) -> Iterator[Named]:
             size = np.sqrt(n_taxels * (finger.weights * part).sum(axis=1)) / finger.taxel_load
             yield f"W9 log {name}/L {title}", _logged(size)
         whole = np.sqrt(n_taxels * (finger.weights * squares).sum(axis=1)) / finger.taxel_load
-        for window in WINDOWS:
+        for window in RMS_WINDOWS:
             value = _rms(whole, finger.steps(window))
             yield f"W9 log rms {1e3 * window:g} ms/L {title}", _logged(value)
         loaded = np.where(finger.weights > LOADED_TAXEL, squares, 0.0)

@@ -29,6 +29,9 @@ class ReadoutFigures(NamedTuple):
         second: rms of second differences over that of first ones; white noise has sqrt 3.
         normal: rms of second differences along the normal over that of one axis across it.
         neighbours: correlation of second differences of the nearest taxels, by axis x, y, z.
+        in_turn: the same correlation, all axes, of taxels 4 and 8 apart in number. Where taxels are
+            read in turn on lines of 8, those 8 apart are read together; on a 4 x 4 patch, those 4
+            apart are neighbours.
         repeated: share of samples that repeat the last one whole.
         stale: share of the readings of single taxels that repeat, in the other samples.
     """
@@ -38,6 +41,7 @@ class ReadoutFigures(NamedTuple):
     second: float
     normal: float
     neighbours: tuple[float, float, float]
+    in_turn: tuple[float, float]
     repeated: float
     stale: float
 
@@ -54,12 +58,13 @@ def readout_figures(recordings: Iterable[Marked], situation: str) -> ReadoutFigu
     ]
     if not rows:
         return None
-    middle = np.nanmedian(np.array(rows), axis=0)
-    n_lags = len(NOISE_LAGS)
-    x, y, z = middle[n_lags + 2 : n_lags + 5]
+    columns = np.array(rows).T
+    known = [column[~np.isnan(column)] for column in columns]
+    middle = [float(np.median(values)) if len(values) else math.nan for values in known]
+    lags, rest = middle[: len(NOISE_LAGS)], middle[len(NOISE_LAGS) :]
+    second, normal, x, y, z, near, far, repeated, stale = rest
     return ReadoutFigures(
-        len(rows), tuple(middle[:n_lags]), float(middle[n_lags]), float(middle[n_lags + 1]),
-        (float(x), float(y), float(z)), float(middle[-2]), float(middle[-1]),
+        len(rows), tuple(lags), second, normal, (x, y, z), (near, far), repeated, stale
     )  # fmt: skip
 
 
@@ -79,6 +84,7 @@ def _row(readings: Array, positions: Array, mask: Flags) -> list[float] | None:
         _rms([second]) / max(by_lag[0], 1e-12),
         along / max(across, 1e-12),
         *_neighbours(second, positions),
+        *(_apart(second, number) for number in (4, 8)),
         float(whole.mean()),
         float(unchanged[~whole].mean()) if not whole.all() else math.nan,
     ]
@@ -103,3 +109,15 @@ def _neighbours(second: Array, positions: Array) -> list[float]:
         else:
             means.append(math.nan)
     return means
+
+
+def _apart(second: Array, number: int) -> float:
+    """Return the mean correlation of taxels whose numbers differ by a number, over all axes."""
+    first, last = second[:, :-number].reshape(len(second), -1), second[:, number:]
+    if not first.shape[1]:
+        return math.nan
+    products = (first * last.reshape(len(second), -1)).mean(axis=0)
+    sizes = np.sqrt((second**2).mean(axis=0))
+    scale = (sizes[:-number] * sizes[number:]).ravel()
+    known = scale > 0
+    return float((products[known] / scale[known]).mean()) if known.any() else math.nan

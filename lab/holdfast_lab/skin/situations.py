@@ -25,9 +25,9 @@ from holdfast_lab.skin.families import family_features, finger_of
 SITUATIONS = ("quiet", "moving", "pushed", "slip")
 """The object is held and nothing moves; the arm moves it; a person acts on it but the finger
 does not slide; the finger slides."""
-MAX_SAMPLES = 150
+MAX_SAMPLES_SHOWN = 150
 """Samples of one finger and situation that are kept, evenly over time."""
-MIN_SAMPLES = 60
+MIN_HOLD_SAMPLES = 60
 """A shorter hold is left out."""
 ARM_STILL, ARM_MOVES = 0.005, 0.02
 """Speed of a real arm below which it is still, and above which it moves [m/s]."""
@@ -83,8 +83,8 @@ def values_of(marked: Marked) -> Iterator[FingerValues]:
         own |= family_features(finger_of(module, recording.rate))
         for situation, mask in marked.masks[name].items():
             places = np.flatnonzero(mask & np.isfinite(own[names[0]]))
-            if len(places) > MAX_SAMPLES:
-                places = places[np.linspace(0, len(places) - 1, MAX_SAMPLES).astype(int)]
+            if len(places) > MAX_SAMPLES_SHOWN:
+                places = places[np.linspace(0, len(places) - 1, MAX_SAMPLES_SHOWN).astype(int)]
             if len(places):
                 values = {feature: column[places] for feature, column in own.items()}
                 yield FingerValues(f"{recording.name}/{name}", situation, values)
@@ -115,7 +115,7 @@ def twin_holds(folder: Path, largest: int | None = None) -> Iterator[Marked]:
         modules = {
             name: cut
             for name, module in recording.modules.items()
-            if (cut := _between(module, start, stop)).n_samples > MIN_SAMPLES
+            if (cut := _between(module, start, stop)).n_samples > MIN_HOLD_SAMPLES
         }
         if modules:
             held = replace(recording, modules=modules)

@@ -43,6 +43,14 @@ def test_neighbours_that_move_together_are_correlated():
     np.testing.assert_allclose(figures.neighbours, [0.5, 0.0, 0.9], atol=0.03)
 
 
+def test_taxels_that_are_read_together_are_correlated():
+    place = np.arange(16) % 8
+    readings = noise() + noise(2, (N, 8, 3))[:, place]
+    figures = readout_figures(marked(readings), "quiet")
+    np.testing.assert_allclose(figures.in_turn, [0.0, 0.5], atol=0.03)
+    assert abs(figures.neighbours[0]) < 0.03
+
+
 def test_repeats_of_samples_and_of_single_taxels_are_counted_apart():
     readings = noise()
     readings[1::2, 3] = readings[::2, 3]  # one taxel of 16, in every second sample

@@ -7,7 +7,7 @@ from holdfast.io import save_recording
 from holdfast.metrics.slip_truth import SLIDING, slip_truth
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 from holdfast_lab.skin.situations import (
-    MAX_SAMPLES,
+    MAX_SAMPLES_SHOWN,
     SITUATIONS,
     real_sets,
     twin_grasps,
@@ -59,7 +59,7 @@ def test_values_of_a_finger_are_few_and_of_all_features(folder):
     assert {finger.situation for finger in fingers} <= set(SITUATIONS)
     for finger in fingers:
         assert len({len(values) for values in finger.values.values()}) == 1
-        assert len(finger.values["any relative(residual[0.067 s])"]) <= MAX_SAMPLES
+        assert len(finger.values["any relative(residual[0.067 s])"]) <= MAX_SAMPLES_SHOWN
         assert len(finger.values) == 92
 
 
