@@ -33,6 +33,7 @@ from holdfast_lab.skin.readout import ReadoutFigures, readout_figures
 from holdfast_lab.skin.situations import (
     SITUATIONS,
     Marked,
+    distribution_distance,
     real_sets,
     twin_grasps,
     twin_holds,
@@ -100,13 +101,6 @@ def pooled(recordings: Iterable[Marked]) -> Pools:
     }
 
 
-def distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Return the distance of Kolmogorov and Smirnov of two samples."""
-    both = np.concatenate([a, b])
-    shares = [np.searchsorted(np.sort(x), both, side="right") / max(len(x), 1) for x in (a, b)]
-    return float(np.abs(shares[0] - shares[1]).max())
-
-
 Table = dict[str, dict[tuple[str, str], list[float]]]
 """Distances to each folder of the twin, by feature, set and situation."""
 
@@ -116,14 +110,14 @@ def distances(real: Mapping[str, Pools], twins: Mapping[str, tuple[Pools, Pools]
     for name, situation in COMPARED:
         for feature, values in real[name][situation].items():
             table.setdefault(feature, {})[name, situation] = [
-                distance(values, twin_values(twin, name, situation, feature))
+                distribution_distance(values, twin_values(twin, name, situation, feature))
                 for twin in twins.values()
             ]
     return table
 
 
 def twin_values(twin: tuple[Pools, Pools], name: str, situation: str, feature: str) -> np.ndarray:
-    return twin[name == FROM_OPEN_HAND][situation][feature]
+    return twin[name == FROM_OPEN_HAND][situation].get(feature, np.empty(0))
 
 
 def feature_table(table: Table, twins: Sequence[str]) -> Iterator[str]:

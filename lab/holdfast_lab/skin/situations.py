@@ -1,6 +1,7 @@
 """Recordings of the twin and of real hands, cut into situations: quiet, moving, pushed, slip."""
 
 import csv
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -88,6 +89,18 @@ def values_of(marked: Marked) -> Iterator[FingerValues]:
             if len(places):
                 values = {feature: column[places] for feature, column in own.items()}
                 yield FingerValues(f"{recording.name}/{name}", situation, values)
+
+
+def distribution_distance(a: Array, b: Array) -> float:
+    """Return the distance of Kolmogorov and Smirnov of two samples, 0 to 1; NaN if one is empty.
+
+    It is the largest difference of their cumulative distributions.
+    """
+    if not (len(a) and len(b)):
+        return math.nan
+    both = np.concatenate([a, b])
+    shares = [np.searchsorted(np.sort(x), both, side="right") / len(x) for x in (a, b)]
+    return float(np.abs(shares[0] - shares[1]).max())
 
 
 def real_sets(data: Path) -> dict[str, Iterator[Marked]]:

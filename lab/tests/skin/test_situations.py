@@ -2,6 +2,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from scipy.stats import ks_2samp
 
 from holdfast.io import save_recording
 from holdfast.metrics.slip_truth import SLIDING, slip_truth
@@ -9,6 +10,7 @@ from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 from holdfast_lab.skin.situations import (
     MAX_SAMPLES_SHOWN,
     SITUATIONS,
+    distribution_distance,
     real_sets,
     twin_grasps,
     twin_holds,
@@ -61,6 +63,16 @@ def test_values_of_a_finger_are_few_and_of_all_features(folder):
         assert len({len(values) for values in finger.values.values()}) == 1
         assert len(finger.values["any relative(residual[0.067 s])"]) <= MAX_SAMPLES_SHOWN
         assert len(finger.values) == 92
+
+
+def test_the_distance_is_that_of_scipy_and_has_no_scale():
+    generator = np.random.default_rng(0)
+    a, b = generator.normal(size=300), np.round(generator.normal(0.5, 2.0, size=200), 1)
+    assert distribution_distance(a, b) == pytest.approx(ks_2samp(a, b).statistic)
+    assert distribution_distance(np.exp(a), np.exp(b)) == distribution_distance(a, b)
+    assert distribution_distance(a, a) == 0.0
+    assert distribution_distance(a, a + 100.0) == 1.0
+    assert np.isnan(distribution_distance(a, a[:0]))
 
 
 def test_real_sets_have_the_situations_that_their_labels_allow(data_folder):
