@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled, compiled_inside
 from holdfast.sensors.types import Array, Integers
 from holdfast.twin.skin import Three
 
@@ -315,11 +315,15 @@ def _read_out(
         numbers[_TIME], numbers[_RATE] = times[0], constants.spread * drawn[0, 0]
         _rest(forces[0], state)
     passed = np.empty_like(state.force)
+    at_once = constants.scan == 0.0 and constants.n_averaged == 1
     for k in range(len(times)):
         step = times[k] - numbers[_TIME]
         _advance_warming(constants, step, drawn[k, 0], numbers)
         _low_pass(constants, forces[k], step, state, passed)
-        _write_counts(constants, passed, times[k], drawn[k, 1:], state, out[k])
+        if at_once:
+            _write_counts(constants, passed, numbers[_WARMTH], drawn[k, 1:], out[k])
+        else:
+            _write_last_counts(constants, passed, times[k], drawn[k, 1:], state, out[k])
         numbers[_TIME] = times[k]
 
 
@@ -372,26 +376,42 @@ def _low_pass(
 
 @compiled
 def _write_counts(
+    constants: _Constants, forces: Array, warmth: float, drawn: Array, out: Counts
+) -> None:
+    """Write the counts of a packet whose taxels are all read when it is sent."""
+    n_taxels, n_axes = forces.shape
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            value = _reading(constants, forces, i, axis, warmth, drawn[i * n_axes + axis])
+            out[i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)
+
+
+@compiled
+def _write_last_counts(
     constants: _Constants, forces: Array, time: float, drawn: Array, state: _State, out: Counts
 ) -> None:
     """Write the counts of a packet: the mean of the last readings of each taxel, rounded.
 
-    A taxel that was not read since the last packet shows the same counts again.
+    A taxel that was not read since the last packet shows the same counts again. Between two
+    packets forces are linear.
     """
     n_taxels, n_axes = forces.shape
+    warmth = state.numbers[_WARMTH]
     for i in range(n_taxels):
         share = _share_of_step(constants, i, time, state)
         if share > 0.0:
+            for axis in range(n_axes):
+                before = state.passed[i, axis]
+                state.passed[i, axis] = before + share * (forces[i, axis] - before)
             place = state.n_read[i] % constants.n_averaged
             state.n_read[i] += 1
             n_known = min(state.n_read[i], constants.n_averaged)
-            _read_taxel(constants, forces, share, i, drawn, state, state.readings[place])
             for axis in range(n_axes):
-                total = 0.0
-                for reading in range(n_known):
-                    total += state.readings[reading, i, axis]
-                value = total if n_known == 1 else total / n_known
-                state.shown[i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)
+                random = drawn[i * n_axes + axis]
+                reading = _reading(constants, state.passed, i, axis, warmth, random)
+                state.readings[place, i, axis] = reading
+                mean = state.readings[:n_known, i, axis].sum() / n_known
+                state.shown[i, axis] = min(max(np.rint(mean), 0.0), UINT16_MAX)
         for axis in range(n_axes):
             out[i, axis] = state.shown[i, axis]
             state.passed[i, axis] = forces[i, axis]
@@ -413,27 +433,16 @@ def _share_of_step(constants: _Constants, i: int, time: float, state: _State) ->
     return share
 
 
-@compiled
-def _read_taxel(
-    constants: _Constants,
-    forces: Array,
-    share: float,
-    i: int,
-    drawn: Array,
-    state: _State,
-    out: Array,
-) -> None:
-    """Write a reading: cross-talk and gain, range, baseline, temperature, noise [count]."""
-    taxels, warmth = constants.taxels, state.numbers[_WARMTH]
-    n_axes = forces.shape[1]
-    for axis in range(n_axes):
-        newtons = 0.0
-        for other in range(n_axes):
-            force = forces[i, other]
-            if share < 1.0:
-                force = state.passed[i, other] + share * (force - state.passed[i, other])
-            newtons += taxels.mixing[i, axis, other] * force
-        value = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
-        value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
-        value += constants.noise[axis] * drawn[i * n_axes + axis]
-        out[i, axis] = value
+@compiled_inside
+def _reading(
+    constants: _Constants, forces: Array, i: int, axis: int, warmth: float, random: float
+) -> float:
+    """Compute a reading: cross-talk and gain, range, baseline, temperature, noise [count]."""
+    taxels = constants.taxels
+    newtons = 0.0
+    for other in range(forces.shape[1]):
+        newtons += taxels.mixing[i, axis, other] * forces[i, other]
+    value: float = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
+    value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
+    value += constants.noise[axis] * random
+    return value
