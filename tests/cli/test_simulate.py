@@ -289,6 +289,12 @@ class TestRandomizedHands:
                 ("--grasps", 2),
                 "--grasps is for the hands of --randomize, 2 given; --repeats repeats grasps",
             ),
+            (("--measured", "scan"), "--measured is for the hands of --randomize"),
+            (
+                ("--randomize", "--measured", "scan,glue"),
+                "--measured: unknown mechanism 'glue'; there are scan, filter, noise, vibration, "
+                "all",
+            ),
         ],
     )
     def test_their_grasps_are_checked(self, capsys, out, words, message):
@@ -301,6 +307,19 @@ class TestRandomizedHands:
             f"{out / 'hand0000.parquet'} has profile randomized, seed 0; profile randomized, seed "
             "9 given: choose another folder, or overwrite it with --force"
         )
+
+    def test_with_and_without_measured_mechanisms_are_different_recordings(self, capsys, out):
+        words = ("--randomize", "--repeats", 1, "--jobs", 1)
+        run(capsys, out, *words, "--measured", "noise,scan")
+        (recording,) = load_dataset(out)
+        assert recording.metadata["measured"] == ["scan", "noise"]
+        told = refusal(capsys, out, *words)
+        assert told.startswith(
+            f"{out / 'hand0000.parquet'} has profile randomized, seed 0, measured ['scan', 'noise']"
+            "; profile randomized, seed 0 given"
+        )
+        code, _, err = run(capsys, out, *words, "--measured", "scan, noise")
+        assert (code, "1 of 1 recordings exist already" in err) == (0, True)
 
     def test_their_number_is_checked(self, capsys, out):
         told = refusal(capsys, out, "--randomize", "--repeats", 0)

@@ -277,20 +277,72 @@ def test_drift_is_smooth_at_the_scale_of_a_sample():
     assert np.abs(counts[14:] - counts[:-14]).max() <= 1
 
 
+READ_IN_TURN = replace(REAL, n_averaged=3, scan_time=0.012, noise_by_axis=(1.0, 1.0, 2.0))
+
+
 @settings(deadline=None)
-@given(st.lists(st.integers(1, 40), min_size=1, max_size=8), st.integers(0, 1000))
-def test_fed_in_pieces_it_sends_the_same(pieces, seed):
+@given(
+    st.lists(st.integers(1, 40), min_size=1, max_size=8),
+    st.integers(0, 1000),
+    st.sampled_from([REAL, READ_IN_TURN]),
+)
+def test_fed_in_pieces_it_sends_the_same(pieces, seed, parameters):
     n = sum(pieces)
     generator = np.random.default_rng(seed)
     forces = generator.normal(size=(n, 30, 3))
     times = np.cumsum(generator.uniform(1e-3, 2e-2, n))
-    whole = tip(seed=seed).counts(forces, times)
-    run = tip(seed=seed).readout()
+    whole = tip(parameters, seed=seed).counts(forces, times)
+    run = tip(parameters, seed=seed).readout()
     cuts = np.cumsum(pieces)[:-1]
     parts = [
         run.counts(*p) for p in zip(np.split(forces, cuts), np.split(times, cuts), strict=True)
     ]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+@pytest.mark.parametrize("n_averaged", [2, 6])
+def test_averaged_noise_has_its_own_floor_at_each_lag(n_averaged):
+    """A mean of N readings has the noise asked for, and grows with the root of the lag up to N."""
+    counts = tip(replace(IDEAL, noise_counts=3.0, n_averaged=n_averaged)).counts(
+        np.zeros((20000, 30, 3)), np.arange(20000) / RATE
+    )
+    values = counts[n_averaged:].astype(float)
+    assert values.std(axis=0).mean() == pytest.approx(3.0, rel=0.03)
+    for lag in range(1, n_averaged + 3):
+        change = np.sqrt(((values[lag:] - values[:-lag]) ** 2).mean() / 2)
+        expected = 3.0 * np.sqrt(min(lag, n_averaged) / n_averaged)
+        assert change == pytest.approx(expected, rel=0.04)
+
+
+def test_noise_of_each_axis_is_that_asked_for():
+    skin = tip(replace(IDEAL, noise_counts=2.0, noise_by_axis=(1.0, 0.5, 3.0)))
+    counts = skin.counts(np.zeros((9000, 30, 3)), np.arange(9000) / RATE)
+    np.testing.assert_allclose(counts.std(axis=(0, 1)), [2.0, 1.0, 6.0], rtol=0.03)
+
+
+def test_taxels_that_are_read_in_turn_show_a_ramp_one_after_the_other():
+    """Taxel i of a line of n was read (i + 1/2) / n of the scan after the scan began."""
+    scan, line = 1 / RATE, 5
+    times = clock(0.5)
+    skin = tip(replace(IDEAL, scan_time=scan, scan_line=line, limits=(1e3, 1e3, 1e3)))
+    at_once = tip(replace(IDEAL, limits=(1e3, 1e3, 1e3)))
+    ramp = on_z(20.0 * times)
+    late = at_once.counts(ramp, times).astype(float) - skin.counts(ramp, times)
+    ages = late[10:, :, 2].mean(axis=0) / (20.0 * IDEAL.counts_per_newton[2])
+    expected = scan * (1 - (np.arange(TIP.n_taxels) % line + 0.5) / line)
+    np.testing.assert_allclose(ages, expected, atol=1e-4)
+    assert (late[1:, :, 2] > 0).all()
+    assert not late[:, :, :2].any()
+
+
+def test_a_slow_scan_repeats_single_taxels_and_no_noise_with_them():
+    """A scan of 1.5 packets leaves a third of the taxels of each packet as they were."""
+    parameters = replace(IDEAL, noise_counts=30.0, scan_time=1.5 / RATE, scan_line=6)
+    counts = tip(parameters).counts(np.zeros((3000, 30, 3)), np.arange(3000) / RATE)
+    same = (np.diff(counts.astype(int), axis=0) == 0).all(axis=2)
+    assert same.mean() == pytest.approx(1 / 3, abs=0.01)
+    assert not same.all(axis=1).any()
+    np.testing.assert_array_equal(same[:, :6], same[:, 6:12])  # lines are read at the same time
 
 
 def test_same_seed_same_bytes_and_another_seed_another_sensor():
@@ -372,6 +424,9 @@ def test_node_forces_of_another_skin_are_refused():
         ("limits", (1.0, float("nan"), 1.0), "limits: finite, not negative expected"),
         ("limits", (1.0, 1.0), "limits: numbers like .* expected"),
         ("lag_shares", (0.6, 0.5), "lag_shares: at most 1 in sum expected, .* given"),
+        ("n_averaged", 0, "n_averaged: above 0 expected, 0.0 given"),
+        ("n_averaged", 1.5, "n_averaged and scan_line: integers expected, 1.5 given"),
+        ("scan_time", -0.01, "scan_time: finite, not negative expected"),
     ],
 )
 def test_bad_parameters_are_refused(field, value, message):

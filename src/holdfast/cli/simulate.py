@@ -60,6 +60,13 @@ class GraspOptions:
     grasps: Annotated[
         int, typer.Option(help="Number of grasps of each --randomize hand, of other objects.")
     ] = 1
+    measured: Annotated[
+        str,
+        typer.Option(
+            help="Mechanisms of real skins and arms for --randomize hands, separated by commas: "
+            "scan, filter, noise, vibration; or all."
+        ),
+    ] = ""
     server: Annotated[
         bool,
         typer.Option(
@@ -73,6 +80,8 @@ class GraspOptions:
         Raises:
             ValueError: an unknown object, case or profile, or a number out of range.
         """
+        if self.measured:
+            raise ValueError("--measured is for the hands of --randomize")
         if self.grasps != 1:
             raise ValueError(
                 f"--grasps is for the hands of --randomize, {self.grasps} given; --repeats "
@@ -176,16 +185,37 @@ def simulate_hands(out: Path, options: GraspOptions, *, engine: "Engine", force:
     _check_numbers(options.repeats, seed)
     if n_grasps < 1:
         raise ValueError(f"--grasps of at least 1 expected, {n_grasps} given")
+    mechanisms = mechanisms_of(options.measured)
     out.mkdir(parents=True, exist_ok=True)
     numbers = [None] if n_grasps == 1 else range(1, n_grasps + 1)
     holds = [
-        RandomHold(hand, seed, grasp=grasp) for hand in range(options.repeats) for grasp in numbers
+        RandomHold(hand, seed, grasp=grasp, measured=mechanisms)
+        for hand in range(options.repeats)
+        for grasp in numbers
     ]
-    expected: dict[str, object] = {"profile": "randomized", "seed": seed}
+    expected: dict[str, object] = {
+        "profile": "randomized", "seed": seed, "measured": list(mechanisms) or None
+    }  # fmt: skip
     missing = [
         hold for hold in holds if force or not _is_recorded(_path_of(hold.name, out), expected)
     ]
     return _simulate_all(simulate_hand, missing, len(holds), out, engine=engine, force=force)
+
+
+def mechanisms_of(text: str) -> tuple[str, ...]:
+    """Return the mechanisms of `--measured`, in a fixed order.
+
+    Raises:
+        ValueError: a name is unknown.
+    """
+    from holdfast.twin.randomized.drawing import MEASURED
+
+    names = {name.strip() for name in text.split(",") if name.strip()}
+    if unknown := sorted(names - {*MEASURED, "all"}):
+        raise ValueError(
+            f"--measured: unknown mechanism {unknown[0]!r}; there are {', '.join(MEASURED)}, all"
+        )
+    return tuple(name for name in MEASURED if name in names or "all" in names)
 
 
 def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> list[str]:
@@ -354,7 +384,8 @@ def _is_recorded(path: Path, expected: "dict[str, object]") -> bool:
 
 
 def _list(settings: "dict[str, object]") -> str:
-    return ", ".join(f"{name} {value}" for name, value in settings.items())
+    shown = {name: value for name, value in settings.items() if value is not None}
+    return ", ".join(f"{name} {value}" for name, value in shown.items())
 
 
 def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
-from holdfast.sensors.types import Array
+from holdfast.compiled import compiled, compiled_inside
+from holdfast.sensors.types import Array, Integers
 from holdfast.twin.skin import Three
 
 
@@ -49,10 +49,18 @@ class UskinParameters:
             conduct heat in about 100 s, so the temperature is smooth from sample to sample.
         noise_counts: rms noise of a reading at rest, with rounding [count]. Data sheet: mean
             square 0.8 (x, y) and 0.9 (z).
+        noise_by_axis: factor on the noise of each axis.
+        n_averaged: number of readings of a taxel that the sensor averages; `noise_counts` is the
+            noise after it.
+        scan_time: time in which the taxels are read one after the other [s]; a packet has the
+            last reading of each. With 0 they are all read when the packet is sent.
+        scan_line: number of taxels that share a line and are read in turn; lines are read at the
+            same time.
 
     Raises:
         ValueError: a parameter has another number of values, is not finite or is negative; a
-            limit, scale or time is 0; or the lag shares add up to more than 1.
+            limit, scale or time is 0; the lag shares add up to more than 1; or a number of
+            readings or taxels is no integer.
     """
 
     spread: float = 2.8e-3
@@ -70,6 +78,10 @@ class UskinParameters:
     warming_time: float = 3000.0
     thermal_time: float = 100.0
     noise_counts: float = 0.9
+    noise_by_axis: Three = (1.0, 1.0, 1.0)
+    n_averaged: int = 1
+    scan_time: float = 0.0
+    scan_line: int = 8
 
     def __post_init__(self) -> None:
         for part in fields(self):
@@ -83,6 +95,9 @@ class UskinParameters:
                 raise ValueError(f"{part.name}: finite, not negative expected, {values} given")
             if positive and not (values > 0).all():
                 raise ValueError(f"{part.name}: above 0 expected, {values} given")
+        for number in (self.n_averaged, self.scan_line):
+            if number != int(number):
+                raise ValueError(f"n_averaged and scan_line: integers expected, {number} given")
         if sum(self.lag_shares) > 1:
             raise ValueError(f"lag_shares: at most 1 in sum expected, {self.lag_shares} given")
 
@@ -105,6 +120,8 @@ _ABOVE_ZERO = (
     "counts_per_newton",
     "warming_time",
     "thermal_time",
+    "n_averaged",
+    "scan_line",
 )
 
 
@@ -139,7 +156,10 @@ class _Constants(NamedTuple):
         shares: (n_lags,) shares of a force that the silicone delays.
         taus: (n_lags,) time constant of each [s].
         prompt: share of a force without delay.
-        noise: standard deviation of the noise before rounding [count].
+        noise: (3,) standard deviation of the noise of a reading before rounding [count].
+        n_averaged: number of readings that are averaged.
+        scan: time in which the taxels of a line are read [s]; 0: all with the packet.
+        line: number of taxels on a line.
         spread: standard deviation of the rate of warming [K/s].
         thermal_time: its correlation time [s].
     """
@@ -150,7 +170,10 @@ class _Constants(NamedTuple):
     shares: Array
     taus: Array
     prompt: float
-    noise: float
+    noise: Array
+    n_averaged: int
+    scan: float
+    line: int
     spread: float
     thermal_time: float
 
@@ -163,11 +186,19 @@ class _State(NamedTuple):
         delayed: (n_lags, n_taxels, 3) delayed parts of the force [N].
         numbers: (3,) time of the last sample [s], NaN before; rate of warming [K/s];
             temperature above that at the start [K].
+        passed: (n_taxels, 3) forces after the silicone at the last sample [N].
+        readings: (n_averaged, n_taxels, 3) last readings of each taxel [count].
+        n_read: (n_taxels,) number of readings so far.
+        shown: (n_taxels, 3) counts of the last sample.
     """
 
     force: Array
     delayed: Array
     numbers: Array
+    passed: Array
+    readings: Array
+    n_read: Integers
+    shown: Counts
 
 
 _TIME, _RATE, _WARMTH = range(3)
@@ -183,7 +214,13 @@ class Readout:
         self._generator = generator
         shape = taxels.baseline.shape
         self._state = _State(
-            np.zeros(shape), np.zeros((len(parameters.lag_times), *shape)), np.array([np.nan, 0, 0])
+            force=np.zeros(shape),
+            delayed=np.zeros((len(parameters.lag_times), *shape)),
+            numbers=np.array([np.nan, 0, 0]),
+            passed=np.zeros(shape),
+            readings=np.zeros((int(parameters.n_averaged), *shape)),
+            n_read=np.zeros(len(taxels.baseline), dtype=np.int64),
+            shown=np.zeros(shape, dtype=np.uint16),
         )
 
     @property
@@ -225,10 +262,20 @@ def _constants(parameters: UskinParameters, taxels: Taxels) -> _Constants:
         shares,
         np.array(parameters.lag_times),
         1.0 - float(shares.sum()),
-        math.sqrt(max(parameters.noise_counts**2 - ROUNDING_VARIANCE, 0.0)),
+        _noise_of_reading(parameters),
+        int(parameters.n_averaged),
+        parameters.scan_time,
+        int(parameters.scan_line),
         parameters.warming_rate,
         parameters.thermal_time,
     )
+
+
+def _noise_of_reading(parameters: UskinParameters) -> Array:
+    """Return (3,) the noise of a single reading before rounding; averaging lowers it [count]."""
+    noises = [parameters.noise_counts * factor for factor in parameters.noise_by_axis]
+    before_rounding = [math.sqrt(max(noise**2 - ROUNDING_VARIANCE, 0.0)) for noise in noises]
+    return np.array(before_rounding) * math.sqrt(parameters.n_averaged)
 
 
 @compiled
@@ -268,11 +315,15 @@ def _read_out(
         numbers[_TIME], numbers[_RATE] = times[0], constants.spread * drawn[0, 0]
         _rest(forces[0], state)
     passed = np.empty_like(state.force)
+    at_once = constants.scan == 0.0 and constants.n_averaged == 1
     for k in range(len(times)):
         step = times[k] - numbers[_TIME]
         _advance_warming(constants, step, drawn[k, 0], numbers)
         _low_pass(constants, forces[k], step, state, passed)
-        _write_counts(constants, passed, numbers[_WARMTH], drawn[k, 1:], out[k])
+        if at_once:
+            _write_counts(constants, passed, numbers[_WARMTH], drawn[k, 1:], out[k])
+        else:
+            _write_last_counts(constants, passed, times[k], drawn[k, 1:], state, out[k])
         numbers[_TIME] = times[k]
 
 
@@ -327,15 +378,71 @@ def _low_pass(
 def _write_counts(
     constants: _Constants, forces: Array, warmth: float, drawn: Array, out: Counts
 ) -> None:
-    """Write counts: cross-talk and gain, range, baseline, temperature, noise, rounding."""
-    taxels = constants.taxels
+    """Write the counts of a packet whose taxels are all read when it is sent."""
     n_taxels, n_axes = forces.shape
     for i in range(n_taxels):
         for axis in range(n_axes):
-            newtons = 0.0
-            for other in range(n_axes):
-                newtons += taxels.mixing[i, axis, other] * forces[i, other]
-            value = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
-            value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
-            value += constants.noise * drawn[i * n_axes + axis]
+            value = _reading(constants, forces, i, axis, warmth, drawn[i * n_axes + axis])
             out[i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)
+
+
+@compiled
+def _write_last_counts(
+    constants: _Constants, forces: Array, time: float, drawn: Array, state: _State, out: Counts
+) -> None:
+    """Write the counts of a packet: the mean of the last readings of each taxel, rounded.
+
+    A taxel that was not read since the last packet shows the same counts again. Between two
+    packets forces are linear.
+    """
+    n_taxels, n_axes = forces.shape
+    warmth = state.numbers[_WARMTH]
+    for i in range(n_taxels):
+        share = _share_of_step(constants, i, time, state)
+        if share > 0.0:
+            for axis in range(n_axes):
+                before = state.passed[i, axis]
+                state.passed[i, axis] = before + share * (forces[i, axis] - before)
+            place = state.n_read[i] % constants.n_averaged
+            state.n_read[i] += 1
+            n_known = min(state.n_read[i], constants.n_averaged)
+            for axis in range(n_axes):
+                random = drawn[i * n_axes + axis]
+                reading = _reading(constants, state.passed, i, axis, warmth, random)
+                state.readings[place, i, axis] = reading
+                mean = state.readings[:n_known, i, axis].sum() / n_known
+                state.shown[i, axis] = min(max(np.rint(mean), 0.0), UINT16_MAX)
+        for axis in range(n_axes):
+            out[i, axis] = state.shown[i, axis]
+            state.passed[i, axis] = forces[i, axis]
+
+
+@compiled
+def _share_of_step(constants: _Constants, i: int, time: float, state: _State) -> float:
+    """Return when a taxel was read last, as a share of the step from the last packet to this.
+
+    Readings of taxel i are at (j + (i mod n + 1/2) / n) scan times, for j = 0, 1, ..., with n
+    taxels on a line. The result is at most 0 if there was none in this step.
+    """
+    before = state.numbers[_TIME]
+    if constants.scan == 0.0 or state.n_read[i] == 0 or time <= before:
+        return 1.0
+    phase = (i % constants.line + 0.5) / constants.line
+    last = (math.floor(time / constants.scan - phase) + phase) * constants.scan
+    share: float = (last - before) / (time - before)
+    return share
+
+
+@compiled_inside
+def _reading(
+    constants: _Constants, forces: Array, i: int, axis: int, warmth: float, random: float
+) -> float:
+    """Compute a reading: cross-talk and gain, range, baseline, temperature, noise [count]."""
+    taxels = constants.taxels
+    newtons = 0.0
+    for other in range(forces.shape[1]):
+        newtons += taxels.mixing[i, axis, other] * forces[i, other]
+    value: float = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
+    value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
+    value += constants.noise[axis] * random
+    return value

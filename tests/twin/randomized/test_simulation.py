@@ -5,7 +5,13 @@ from holdfast.contact import ContactState
 from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
 from holdfast.twin.randomized import simulation
-from holdfast.twin.randomized.drawing import SENSOR_KINDS, draw_object, draw_sensor
+from holdfast.twin.randomized.drawing import (
+    MEASURED,
+    SENSOR_KINDS,
+    draw_object,
+    draw_sensor,
+    with_measured,
+)
 from holdfast.twin.randomized.scenario import EVENT_KINDS, draw_events
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 
@@ -84,6 +90,42 @@ def test_several_grasps_of_one_hand_have_its_sensor_and_other_objects():
     assert first == second
     assert grasps[0].metadata["grip"] == grasps[1].metadata["grip"]
     assert grasps[0].metadata["object_mass"] != grasps[1].metadata["object_mass"]
+
+
+def test_a_measured_hand_differs_from_the_plain_one_in_its_readout_alone(hands):
+    """The same physics and times; other readings, and the mechanisms in the metadata."""
+    plain = hands[1]
+    measured = simulate_random(RandomHold(1, seed=3, measured=("scan", "filter", "noise")))
+    expected = {**plain.metadata, "measured": ["scan", "filter", "noise"]}
+    assert "measured" not in plain.metadata
+    assert dict(measured.metadata) == expected
+    for name, array in plain.truth.hand.items():
+        np.testing.assert_array_equal(measured.truth.hand[name], array)
+    for name, module in plain.modules.items():
+        np.testing.assert_array_equal(measured.modules[name].times, module.times)
+        assert (measured.modules[name].readings != module.readings).any()
+
+
+@pytest.mark.parametrize("kind", SENSOR_KINDS)
+def test_each_mechanism_is_drawn_the_same_with_and_without_the_others(kind):
+    plain = draw_sensor(np.random.default_rng(1), kind)
+    for seed in range(20):
+        drawn = [
+            with_measured(plain, kind, names, np.random.default_rng(seed)).parameters
+            for names in [(), *((name,) for name in MEASURED), MEASURED]
+        ]
+        none, scan, filtered, noise, vibration, together = drawn
+        assert none == vibration == plain.parameters
+        assert (scan.scan_time, scan.scan_line) == (together.scan_time, together.scan_line)
+        assert filtered.n_averaged == together.n_averaged
+        assert noise.noise_counts == together.noise_counts >= plain.parameters.noise_counts
+        assert noise.noise_by_axis == together.noise_by_axis
+        assert (scan.scan_time > 0) == (kind != "papillarray")
+
+
+def test_an_unknown_mechanism_is_refused():
+    with pytest.raises(ValueError, match="unknown mechanism 'glue'; there are scan, filter, noise"):
+        RandomHold(0, measured=("glue",))
 
 
 @pytest.mark.parametrize("kind", SENSOR_KINDS)

@@ -1,6 +1,7 @@
 """A hand, a sensor, an object and a hold, drawn from ranges: what one recording is made from."""
 
 import tomllib
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -26,6 +27,15 @@ _SPREAD = {"uskin-4x4": 2.4e-3, "uskin-4x6": 3.0e-3, "anyskin": 6e-3, "papillarr
 beside their pitch; pillars stand alone."""
 
 
+_SCANNED = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin", "grid-3x3")
+"""Sensors of magnetometers, which are read in turn; pillars are read at once."""
+_WEAK = ("anyskin", "grid-3x3")
+"""Single magnetometers, whose noise may be large beside what the skin moves them."""
+MEASURED = ("scan", "filter", "noise", "vibration")
+"""Mechanisms of `measured.toml`: taxels are read in turn; readings are averaged; the noise is that
+of real skins; the arm vibrates more while it moves."""
+
+
 @dataclass(frozen=True)
 class SensorDraw:
     """The sensor of a hand.
@@ -44,6 +54,13 @@ class SensorDraw:
 def ranges() -> dict[str, dict[str, Any]]:
     """Return the ranges of `ranges.toml`, by section."""
     text = resources.files("holdfast.twin.randomized").joinpath("ranges.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+@cache
+def measured_ranges() -> dict[str, dict[str, Any]]:
+    """Return the ranges of `measured.toml`, by mechanism."""
+    text = resources.files("holdfast.twin.randomized").joinpath("measured.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 
@@ -72,6 +89,39 @@ def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
     limits = None if newtons else known.limits
     made = replace(known, rate=rate, unit="N" if newtons else "count", limits=limits)
     return SensorDraw(made, parameters)
+
+
+def with_measured(
+    drawn: SensorDraw, kind: str, mechanisms: Collection[str], generator: np.random.Generator
+) -> SensorDraw:
+    """Draw how a sensor is read: each mechanism takes the same draws, with or without the others.
+
+    Args:
+        drawn: the sensor, as `draw_sensor` returns it.
+        kind: of the sensor.
+        mechanisms: from `MEASURED`.
+        generator: of all that is drawn.
+    """
+    span, period = measured_ranges(), 1 / drawn.sensor.rate
+    time = period * uniform(generator, span["scan"]["time"])
+    line = int(generator.integers(span["scan"]["line"][0], span["scan"]["line"][1] + 1))
+    averages = generator.random() < span["filter"]["share"]
+    n_averaged = max(1, round(uniform(generator, span["filter"]["time"]) / period))
+    normal, weak = (log_uniform(generator, span["noise"][name]) for name in ("normal", "weak"))
+    changes: dict[str, Any] = {}
+    if "scan" in mechanisms and kind in _SCANNED:
+        changes |= {"scan_time": time, "scan_line": line}
+    if "filter" in mechanisms and averages:
+        changes["n_averaged"] = n_averaged
+    if "noise" in mechanisms:
+        noise = drawn.parameters.noise_counts * (weak if kind in _WEAK else 1.0)
+        changes |= {"noise_by_axis": (1.0, 1.0, normal), "noise_counts": noise}
+    return replace(drawn, parameters=replace(drawn.parameters, **changes))
+
+
+def draw_moving_vibration(generator: np.random.Generator) -> float:
+    """Draw the vibration of an arm that moves, rms [m/s^2]."""
+    return log_uniform(generator, measured_ranges()["vibration"]["moving"])
 
 
 def _scaled(values: Three, factor: float) -> Three:

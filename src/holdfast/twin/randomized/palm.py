@@ -19,6 +19,8 @@ GRID_RATE = 1000.0
 """Rate at which a motion is tabulated [Hz]."""
 N_VIBRATIONS = 12
 """Sinusoids that make up the vibration of the arm."""
+VIBRATION_FADE = 0.1
+"""Time in which the vibration of a moving arm rises and fades [s]."""
 PALM_KINDS = ("carry", "swing", "brake", "turn")
 """Motions of an arm: to another place, to and fro, a sudden stop, a turn against gravity."""
 
@@ -101,6 +103,7 @@ def palm_motion(
     orientation: Array,
     vibration: float,
     duration: float,
+    moving_factor: float = 1.0,
 ) -> PalmMotion:
     """Tabulate the motion of the palm.
 
@@ -110,9 +113,11 @@ def palm_motion(
         orientation: (3, 3) rotation from the palm frame to the world at the lock.
         vibration: of the arm, rms of the acceleration [m/s^2].
         duration: of the table [s].
+        moving_factor: on the vibration while the palm moves.
     """
     times = np.arange(int(duration * GRID_RATE) + 1) / GRID_RATE
     acceleration = _vibration(generator, times, vibration)
+    acceleration *= _vibration_factor(segments, times, moving_factor)[:, None]
     spin, turn = np.zeros((2, len(times), 3))
     for segment in segments:
         rows = (times >= segment.start) & (times < segment.start + segment.duration)
@@ -155,6 +160,16 @@ def _vibration(generator: np.random.Generator, times: Array, rms: float) -> Arra
     phases = generator.uniform(0, 2 * math.pi, size=(N_VIBRATIONS, 3))
     waves = np.sin(2 * math.pi * rates * times[:, None, None] + phases)
     return np.asarray(rms * math.sqrt(2.0 / N_VIBRATIONS) * waves.sum(axis=1))
+
+
+def _vibration_factor(segments: list[Segment], times: Array, moving_factor: float) -> Array:
+    """(n,) factor on the vibration: that of motion in a segment, which fades in and out."""
+    factor = np.ones(len(times))
+    for segment in segments:
+        elapsed = times - segment.start
+        edge = np.minimum(elapsed, segment.duration - elapsed) / VIBRATION_FADE
+        factor = np.maximum(factor, 1.0 + (moving_factor - 1.0) * np.clip(edge, 0.0, 1.0))
+    return factor
 
 
 def _down(orientation: Array, spin: Array) -> Array:

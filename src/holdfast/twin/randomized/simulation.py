@@ -16,15 +16,18 @@ from holdfast.twin.operator import draw_tremor, hold_wrench
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.randomized.drawing import (
+    MEASURED,
     SENSOR_KINDS,
     SensorDraw,
     draw_drives,
     draw_layout,
+    draw_moving_vibration,
     draw_object,
     draw_sensor,
     draw_skin,
     random_rotation,
     ranges,
+    with_measured,
 )
 from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
 from holdfast.twin.randomized.palm import log_uniform, palm_motion, uniform
@@ -57,6 +60,11 @@ class RandomHold:
         grasp: from 1 on, for several grasps of one hand: hand, grip, sensor and gains depend on
             the number alone; object, place of the pads and events on the grasp too. None for
             the only grasp of a hand.
+        measured: mechanisms of `drawing.MEASURED` with which the sensor is read and the arm
+            moves as real ones do. All else that is drawn is the same with and without them.
+
+    Raises:
+        ValueError: a mechanism is unknown.
     """
 
     number: int
@@ -64,6 +72,11 @@ class RandomHold:
     kind: str | None = None
     attempt: int = 0
     grasp: int | None = None
+    measured: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.measured if name not in MEASURED]:
+            raise ValueError(f"unknown mechanism {unknown[0]!r}; there are {', '.join(MEASURED)}")
 
     @property
     def name(self) -> str:
@@ -106,6 +119,8 @@ def _run(hold: RandomHold) -> "_Run":
     span = ranges()
     kind = hold.kind or str(generator.choice(SENSOR_KINDS))
     drawn = draw_sensor(hold.hand.generator("sensor"), kind)
+    if hold.measured:
+        drawn = with_measured(drawn, kind, hold.measured, hold.hand.generator("measured"))
     n_pads = int(generator.choice(span["hand"]["pads"]))
     grip = log_uniform(generator, span["hand"]["grip"])
     if hold.grasp is not None:
@@ -164,8 +179,9 @@ class _Run:
         vibration = log_uniform(generator, span["arm"]["vibration"])
         orientation = random_rotation(generator)
         self.palm = palm_motion(
-            generator, segments, orientation, vibration, plan.profile.hold + 1.0
-        )
+            generator, segments, orientation, vibration, plan.profile.hold + 1.0,
+            _moving_factor(hold, vibration),
+        )  # fmt: skip
         self.holder = _Holder(world, self.scenario, tremors[0], plan.profile.tremor)
         uskin = hold.hand.generator("skin")
         nodes = world.layout.surface.nodes
@@ -298,10 +314,18 @@ class _Run:
             "seed": self.hold.seed,
             "hand": f"random-{self.hold.number}",
             **({} if self.hold.grasp is None else {"grasp": self.hold.grasp}),
+            **({"measured": list(self.hold.measured)} if self.hold.measured else {}),
             "source": "twin",
             "locked_at": self.protocol.locked_at,
             "lost_at": self.protocol.lost_at,
         }
+
+
+def _moving_factor(hold: RandomHold, vibration: float) -> float:
+    """Return the factor on the vibration of an arm [m/s^2] while it moves, at least 1."""
+    if "vibration" not in hold.measured:
+        return 1.0
+    return max(1.0, draw_moving_vibration(hold.hand.generator("vibration")) / vibration)
 
 
 class _Holder(OperatorForce):
