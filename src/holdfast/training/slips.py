@@ -97,7 +97,7 @@ class SlipSamples:
             return None
         recipe = LogisticRegression()
         weight = "balanced" if self.own.sensor is None else None
-        fitted = recipe.fit(samples, recipe.reference | {"class_weight": weight}, 0)
+        fitted = recipe.fit(samples, {**recipe.reference, "class_weight": weight}, 0)
         kept = np.count_nonzero(~self.own.samples.stable)
         thinning = np.log(self.n_still / kept)  # odds of sliding fall by the samples left out
         classifier = msgspec.structs.replace(
