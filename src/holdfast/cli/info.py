@@ -308,5 +308,5 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
 
 
 def _shorten(value: object) -> str:
-    text = " ".join(str(value).split())
+    text = f"{value:.6g}" if isinstance(value, float) else " ".join(str(value).split())
     return text if len(text) <= MAX_VALUE_LENGTH else f"{text[: MAX_VALUE_LENGTH - 3]}..."

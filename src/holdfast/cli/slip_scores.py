@@ -20,7 +20,7 @@ SHARES_NOTE = (
 )
 """Explanation of the columns of the scores of slips."""
 SHARES_HEADER = (
-    "by onset", "0.03", "0.05", "0.1", "1 mm: 0.1", "before 1 mm", "quiet", "held",
+    "by onset", "0.03", "0.05", "0.1", "0.1, 1 mm", "before 1 mm", "quiet", "held",
 )  # fmt: skip
 
 
