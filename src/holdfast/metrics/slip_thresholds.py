@@ -1,8 +1,8 @@
 """Counts of slips at many thresholds: choice of a threshold, and intervals that include it."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -78,7 +78,9 @@ def slip_curve(decisions: SlipDecisions) -> Curve:
 
 def total_curve(curves: Sequence[Curve]) -> Curve:
     """Return the counts of all curves together, at each of `THRESHOLDS`."""
-    return tuple(SlipCounts.total(column) for column in zip(*curves, strict=True))
+    totals = [SlipCounts.total(column) for column in zip(*curves, strict=True)]
+    # The probabilities are the same at every threshold: one array for all.
+    return tuple(replace(counts, scores=totals[0].scores) for counts in totals)
 
 
 def choose_threshold(curve: Curve, false_alarms: float) -> int | None:
@@ -92,14 +94,17 @@ def choose_threshold(curve: Curve, false_alarms: float) -> int | None:
         false_alarms: maximum number per minute of held time, of one finger.
 
     Returns:
-        The place in `THRESHOLDS`; None if no threshold fits.
+        The place in `THRESHOLDS`; None if no threshold fits, or nothing is held.
     """
-    rates = np.array([60 * counts.false_held / counts.held_seconds for counts in curve])
-    raised = np.array(
-        [100 * counts.raised_seconds / max(counts.quiet_seconds, 1e-9) for counts in curve]
-    )
-    place = int(_lowest((rates <= false_alarms) & (raised <= MAX_RAISED_QUIET)))
+    rates = [slip_metrics(counts) for counts in curve]
+    fits = [_fits(rate, false_alarms) for rate in rates]
+    place = int(_lowest(np.array(fits)))
     return place if place < len(curve) else None
+
+
+def _fits(metrics: SlipMetrics, false_alarms: float) -> bool:
+    held, raised = metrics.false_alarms_per_minute["held"], metrics.raised_quiet
+    return held is not None and held <= false_alarms and (raised or 0.0) <= MAX_RAISED_QUIET
 
 
 def _lowest(fits: Flags) -> Integers:
@@ -129,9 +134,9 @@ def held_out_places(
         groups: of each recording.
         choice: of the threshold; if no threshold fits, the highest is taken.
     """
-    others = np.array([[group != own for group in groups] for own in groups], dtype=np.float64)
     table = [[_ratios(counts) for counts in curve] for curve in curves]
-    return _chooser(table, choice)(others)
+    places = _held_out(table, choice, groups, np.ones((1, len(curves))))
+    return places.reshape(-1)
 
 
 class _Ratio(NamedTuple):
@@ -171,6 +176,7 @@ def slip_intervals(
     curves: Sequence[Curve],
     choice: ThresholdChoice | None = None,
     *,
+    groups: Sequence[int] = (),
     training: Sequence[Curve] = (),
     n: int = 1000,
     seed: int = 0,
@@ -181,8 +187,9 @@ def slip_intervals(
     Args:
         curves: of each recording, at `THRESHOLDS`; of one threshold each without a choice.
         choice: that is made again in each resample; None for a threshold that is given.
-        training: of the recordings from which the threshold is chosen, resampled too; by default
-            those of `curves`.
+        groups: of each recording: the threshold of a recording is chosen from the recordings of
+            the other groups in the resample; by default each recording is one.
+        training: of other recordings, from which the threshold is chosen, resampled too.
         n: number of resamples.
         seed: of the resamples.
         level: fraction of the resamples within each interval.
@@ -193,12 +200,17 @@ def slip_intervals(
     if len(curves) < 2:
         return None
     table = [[_ratios(counts) for counts in curve] for curve in curves]
-    chosen = _resampled(training, choice, n, seed) if training else _chooser(table, choice)
+    draws = draw_recordings(len(curves), n, seed)
+    if choice is None:
+        places = np.zeros((n, 1), dtype=np.int64)
+    elif training:
+        places = _resampled(training, choice, n, seed)[:, None]
+    else:
+        places = _held_out(table, choice, groups or range(len(curves)), draws)
     intervals: dict[str, dict[str, Interval | None]] = {}
     for name, limit in table[0][0]:
-        ratios = [[row[name, limit] for row in curve] for curve in table]
         intervals.setdefault(name, {})[limit] = bootstrap_interval(
-            _statistic(ratios, chosen), len(curves), n=n, seed=seed, level=level
+            _statistic(table, (name, limit), places), len(curves), n=n, seed=seed, level=level
         )
     return SlipIntervals(
         incipient=intervals["incipient"],
@@ -211,55 +223,100 @@ def slip_intervals(
     )
 
 
-def _resampled(
-    training: Sequence[Curve], choice: ThresholdChoice | None, n: int, seed: int
-) -> Callable[[Array], Integers]:
-    """Return a function that gives the thresholds of n resamples of the training recordings."""
-    table = [[_ratios(counts) for counts in curve] for curve in training]
-    places = _chooser(table, choice)(draw_recordings(len(training), n, seed + 1))
-    return lambda draws: places[: len(draws)]
-
-
 Table = Sequence[Sequence[Mapping[tuple[str, str], _Ratio]]]
 """Metrics of each recording at each threshold."""
 
 
-def _chooser(table: Table, choice: ThresholdChoice | None) -> Callable[[Array], Integers]:
-    """Return a function from draws (n, n_recordings) to the place of the threshold (n,)."""
-    if choice is None:
-        return lambda draws: np.zeros(len(draws), dtype=np.int64)
-    limits = {("false_alarms", "held"): choice.false_alarms, ("raised_quiet", ""): MAX_RAISED_QUIET}
-    rates = {name: _rates([[row[name] for row in curve] for curve in table]) for name in limits}
+def _resampled(training: Sequence[Curve], choice: ThresholdChoice, n: int, seed: int) -> Integers:
+    """Return the place of the threshold in n resamples of the training recordings, (n,)."""
+    table = [[_ratios(counts) for counts in curve] for curve in training]
+    draws = draw_recordings(len(training), n, seed + 1)
+    sums = [_Sums.of(table, name) for name in _limits(choice)]
+    return _places([own.drawn(draws) for own in sums], choice)
 
-    def places(draws: Array) -> Integers:
-        with np.errstate(invalid="ignore"):
-            fits = np.logical_and.reduce(
-                [~(rate(draws) > limits[name]) for name, rate in rates.items()]
-            )
-        return np.minimum(_lowest(fits), len(table[0]) - 1)
 
+def _held_out(
+    table: Table, choice: ThresholdChoice, groups: Sequence[int], draws: Array
+) -> Integers:
+    """Return the place of the threshold of each recording, chosen without its group.
+
+    Args:
+        table: of the recordings.
+        choice: of the threshold; if no threshold fits, the highest is taken.
+        groups: of each recording.
+        draws: (n, n_recordings) how often each is drawn.
+
+    Returns:
+        (n, n_recordings) places.
+    """
+    own = np.array(groups)
+    sums = [_Sums.of(table, name) for name in _limits(choice)]
+    places = np.empty(draws.shape, dtype=np.int64)
+    for group in np.unique(own):
+        others = np.where(own == group, 0.0, draws)
+        chosen = _places([total.drawn(others) for total in sums], choice)
+        places[:, own == group] = chosen[:, None]
     return places
 
 
-def _rates(ratios: Sequence[Sequence[_Ratio]]) -> Callable[[Array], Array]:
-    """Return a function from draws (n, n_recordings) to the pooled ratios (n, n_thresholds)."""
-    parts = np.array([[ratio.factor * ratio.part for ratio in row] for row in ratios])
-    wholes = np.array([row[0].whole for row in ratios], dtype=np.float64)
+def _limits(choice: ThresholdChoice) -> dict[tuple[str, str], float]:
+    """Return the limits of the metrics by which a threshold is chosen."""
+    return {("false_alarms", "held"): choice.false_alarms, ("raised_quiet", ""): MAX_RAISED_QUIET}
+
+
+def _places(drawn: Sequence[tuple[Array, Array]], choice: ThresholdChoice) -> Integers:
+    """Return the lowest threshold within the limits, (n,), of parts and wholes of each metric."""
+    fits = [
+        (parts <= limit * wholes) & ((wholes > 0) | (name[0] == "raised_quiet"))
+        for (parts, wholes), (name, limit) in zip(drawn, _limits(choice).items(), strict=True)
+    ]
+    highest = fits[0].shape[-1] - 1
+    return np.asarray(np.minimum(_lowest(np.logical_and.reduce(fits)), highest))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Parts and wholes of a metric of each recording.
+
+    Attributes:
+        parts: (n_recordings, n_thresholds).
+        wholes: (n_recordings,).
+    """
+
+    parts: Array
+    wholes: Array
+
+    @classmethod
+    def of(cls, table: Table, name: tuple[str, str]) -> Self:
+        """Return those of one metric of a table."""
+        ratios = [[row[name] for row in curve] for curve in table]
+        parts = np.array([[ratio.factor * ratio.part for ratio in row] for row in ratios])
+        return cls(parts, np.array([row[0].whole for row in ratios], dtype=np.float64))
+
+    def drawn(self, draws: Array) -> tuple[Array, Array]:
+        """Return the sums of resamples: parts (n, n_thresholds) and wholes (n, 1)."""
+        return draws @ self.parts, (draws @ self.wholes)[:, None]
+
+
+def _statistic(table: Table, name: tuple[str, str], places: Integers) -> Statistic:
+    """Return the statistic of a metric, each recording at its threshold.
+
+    Args:
+        table: of the recordings.
+        name: of the metric.
+        places: (n, n_recordings), or (n, 1) for one threshold of all.
+    """
+    sums = _Sums.of(table, name)
+    parts = sums.parts[
+        np.arange(len(sums.parts)), np.broadcast_to(places, (len(places), len(sums.parts)))
+    ]
 
     def rates(draws: Array) -> Array:
-        whole = (draws @ wholes)[:, None]
-        out = np.full((len(draws), parts.shape[1]), np.nan)
-        np.divide(draws @ parts, whole, out=out, where=whole > 0)
+        out, whole = np.full(len(draws), np.nan), draws @ sums.wholes
+        np.divide((draws * parts).sum(axis=1), whole, out=out, where=whole > 0)
         return out
 
     return rates
-
-
-def _statistic(
-    ratios: Sequence[Sequence[_Ratio]], chosen: Callable[[Array], Integers]
-) -> Statistic:
-    rates = _rates(ratios)
-    return lambda draws: rates(draws)[np.arange(len(draws)), chosen(draws)]
 
 
 def slip_summary(

@@ -13,7 +13,6 @@ from holdfast.contact import TIME_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.samples import N_BINS, bins_of
 from holdfast.metrics.slip_truth import (
-    CREEPING,
     DISTANCES,
     SLIDING,
     STILL,
@@ -32,6 +31,8 @@ LATEST_ALARM = 0.25
 """Time after the end of a slip in which a raised decision is no false alarm [s]."""
 FALSE_ALARM_DURATION = 0.5
 """Each begun part of this length of a decision that is wrongly raised is one false alarm [s]."""
+GAP_PERIODS = 3.0
+"""A longer step between samples is a gap; no more than so many periods of it count."""
 FOUND_WITHIN = (0.03, 0.05, 0.1)
 """Times after the onset within which the slips are counted that are found [s]."""
 
@@ -48,8 +49,8 @@ class SlipCounts:
         n_reached: (n_distances,) slips that slid each of `DISTANCES`.
         false_quiet: false alarms in quiet hold.
         false_held: false alarms in all held time.
-        quiet_seconds: duration of quiet hold [s].
-        held_seconds: duration of all held time [s].
+        quiet_seconds: duration of the quiet hold among it [s].
+        held_seconds: duration of all held time in which an alarm is wrong [s].
         raised_seconds: duration of quiet hold in which the decision is raised [s].
         scores: (2, N_BINS) histograms of the probabilities of STILL and SLIDING samples.
         onsets: where the slips come from.
@@ -104,7 +105,9 @@ def count_slips(decisions: SlipDecisions) -> SlipCounts:
         [onset - 0.5 s, end + 0.25 s]
 
     of all slips is wrong: each begun 0.5 s of it is one false alarm. Only samples count in which
-    the finger holds the object and does not creep.
+    the finger holds the object and is still: creep, and sliding that is too short for a slip, are
+    neither right nor wrong. Rates are of the time that counts. An alarm that comes before the end
+    of a slip does not belong to the next one.
 
     Args:
         decisions: with a truth.
@@ -125,6 +128,7 @@ class SlipCounter:
         times: (n,) of the decisions [s].
         slips: (n_slips, 4) of each slip: first and last time of its alarms, its onset and its
             gross onset [s]; the last NaN if it never becomes gross.
+        away: (n,) True outside the time of the slips and their alarms.
         reached: (n_slips, n_distances) times at which each of `DISTANCES` was slid [s].
         quiet: (n + 1,) duration of quiet hold outside the slips before each sample [s].
         outside: (n + 1,) the same of all held time outside the slips.
@@ -133,6 +137,7 @@ class SlipCounter:
 
     times: Array
     slips: Array
+    away: Mask
     reached: Array
     quiet: Array
     outside: Array
@@ -148,19 +153,22 @@ class SlipCounter:
         truth = decisions.truth
         if truth is None:
             raise ValueError("decisions with a truth of the slips expected; it is not known")
-        times, slips, steps = decisions.times, truth.slips, sample_durations(decisions.times)
-        held = (truth.codes >= STILL) & (truth.codes != CREEPING)
-        outside = held & _outside(slips, times)
+        times, slips = decisions.times, truth.slips
+        steps = sample_durations(times)
+        steps = np.minimum(steps, GAP_PERIODS * np.median(steps)) if len(steps) else steps
+        away = _outside(slips, times)
+        outside = away & (truth.codes == STILL)
         quiet = outside & truth.quiet
         return cls(
             times,
-            np.array([(*_alarm_times(slip), slip.onset, slip.gross) for slip in slips]).reshape(
-                -1, 4
-            ),
+            _slip_times(slips),
+            away,
             np.array([slip.reached for slip in slips]).reshape(-1, len(DISTANCES)),
             _elapsed(steps, quiet),
             _elapsed(steps, outside),
-            _without_alarms(decisions, truth, float(steps[quiet].sum()), float(steps[held].sum())),
+            _without_alarms(
+                decisions, truth, float(steps[quiet].sum()), float(steps[outside].sum())
+            ),
         )
 
     def count(self, raised: Mask) -> SlipCounts:
@@ -171,7 +179,8 @@ class SlipCounter:
         first = alarms[np.searchsorted(alarms, earliest)]
         first = np.where(first <= latest, first, np.inf)
         reached = (first[:, None] <= self.reached + TIME_TOLERANCE).sum(axis=0)
-        quiet, outside = (_lengths(elapsed, spans) for elapsed in (self.quiet, self.outside))
+        wrong = runs(raised & self.away)
+        quiet, outside = (_lengths(elapsed, wrong) for elapsed in (self.quiet, self.outside))
         return replace(
             self.silent,
             delays=first - onset,
@@ -208,6 +217,15 @@ def _without_alarms(
         scores=np.array(histograms),
         onsets=frozenset({truth.onsets}),
     )
+
+
+def _slip_times(slips: Sequence[Slip]) -> Array:
+    """Return (n_slips, 4) first and last time of the alarms, onset and gross onset [s]."""
+    rows = np.array([(*_alarm_times(slip), slip.onset, slip.gross) for slip in slips])
+    rows = rows.reshape(-1, 4)
+    ends = np.array([slip.end for slip in slips])
+    rows[1:, 0] = np.maximum(rows[1:, 0], ends[:-1] - TIME_TOLERANCE)
+    return rows
 
 
 def _alarm_times(slip: Slip) -> tuple[float, float]:
@@ -256,8 +274,8 @@ class SlipMetrics(msgspec.Struct, frozen=True):
         raised_quiet: share of quiet hold in which the decision is raised [%].
         false_alarms_per_minute: of one finger, of `quiet` hold and of all `held` time.
         auc: sliding samples against held samples that do not slide.
-        quiet_minutes: of one finger [min].
-        held_minutes: of one finger, without creep [min].
+        quiet_minutes: quiet among it [min].
+        held_minutes: of one finger, without creep, slips and the time of their alarms [min].
         onsets: `truth`, `labels`, or `mixed`.
     """
 

@@ -228,6 +228,12 @@ class ChosenThreshold:
         if self.place is not None:
             return ""
         minutes = self.counts.held_seconds / 60
+        if not _supports(self.counts, SLIP_FALSE_ALARMS):
+            return (
+                f"{minutes:.2g} min of held time given; a threshold of slips for "
+                f"{SLIP_FALSE_ALARMS:g} false alarms a minute needs at least "
+                f"{1 / SLIP_FALSE_ALARMS:.2g} min; the model gets no slip rule"
+            )
         return (
             f"no threshold of slips has at most {SLIP_FALSE_ALARMS:g} false alarms a minute in "
             f"{minutes:.2g} min of held time; the model gets no slip rule"
@@ -251,20 +257,29 @@ def choose_slip_threshold(
     if not used:
         return None
     by_recording = [total_curve(list(fingers.values())) for fingers, _ in used]
-    choice = ThresholdChoice(SLIP_FALSE_ALARMS)
     own = [group for _, group in used]
-    places = held_out_places(by_recording, own, choice).tolist()
+    pooled, highest = total_curve(by_recording), len(THRESHOLDS) - 1
+    place = choose_threshold(pooled, SLIP_FALSE_ALARMS)
+    places, intervals = [highest if place is None else place] * len(used), None
+    if has_others := len(set(own)) > 1:
+        choice = ThresholdChoice(SLIP_FALSE_ALARMS)
+        places = held_out_places(by_recording, own, choice).tolist()
+        intervals = slip_intervals(by_recording, choice, groups=own, seed=seed)
     counts = [
         {name: curve[place] for name, curve in fingers.items()}
         for (fingers, _), place in zip(used, places, strict=True)
     ]
-    pooled = total_curve(by_recording)
-    place = choose_threshold(pooled, SLIP_FALSE_ALARMS)
-    intervals = slip_intervals(by_recording, choice, seed=seed)
-    metrics = slip_summary(counts, intervals, threshold_chosen=True)
+    metrics = slip_summary(counts, intervals, threshold_chosen=has_others)
     if metrics is None:
         return None
-    return ChosenThreshold(place, pooled[-1 if place is None else place], metrics)
+    supported = _supports(pooled[0], SLIP_FALSE_ALARMS)
+    shown = pooled[highest if place is None else place]
+    return ChosenThreshold(place if supported else None, shown, metrics)
+
+
+def _supports(counts: SlipCounts, false_alarms: float) -> bool:
+    """Return whether the held time is long enough for one false alarm at the rate."""
+    return counts.held_seconds / 60 * false_alarms >= 1
 
 
 def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
@@ -384,7 +399,7 @@ def _supported(curve: Curve, false_alarms: float) -> int:
         TrainingError: the data do not support the rate, or no threshold has it.
     """
     minutes = curve[0].held_seconds / 60
-    if minutes * false_alarms < 1:
+    if not _supports(curve[0], false_alarms):
         raise TrainingError(
             f"{minutes:.2g} min of held time given; {false_alarms:g} false alarms a minute need "
             f"at least {1 / false_alarms:.2g} min"

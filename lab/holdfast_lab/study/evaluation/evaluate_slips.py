@@ -149,7 +149,7 @@ def _out_of_fold(curves: Curves, groups: Sequence[int], split: str, seed: int) -
     """Return the scores of recordings, each at the threshold of the other folds."""
     pooled = _pooled(curves)
     places = held_out_places(pooled, groups, CHOICE).tolist()
-    intervals = slip_intervals(pooled, CHOICE, seed=seed)
+    intervals = slip_intervals(pooled, CHOICE, groups=groups, seed=seed)
     return _evaluation(split, curves, places, intervals)
 
 
