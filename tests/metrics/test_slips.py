@@ -262,7 +262,7 @@ class TestThresholds:
             probability=random_recording(5, 9).probability,
             hold=0.2,
         )
-        for place in (20, 30, 40, 45):
+        for place in (40, 60, 80, 90):
             raised = raised_at(made.times, made.probability, THRESHOLDS[place], made.hold)
             expected = vars(count_slips(replace(made, raised=raised)))
             counts = vars(slip_curve(made)[place])
@@ -307,7 +307,7 @@ class TestThresholds:
         assert choose_threshold(slip_curve(decisions([], codes=codes)), 1.0) is None
 
     def test_intervals_without_a_choice_are_those_of_the_threshold(self):
-        single = [(curve[30],) for curve in self.curves]
+        single = [(curve[60],) for curve in self.curves]
         found = slip_intervals(single, n=200)
         summary = slip_summary([{"thumb": curve[0]} for curve in single], found)
         low, high = found.incipient["0.1"]

@@ -25,7 +25,7 @@ from holdfast.metrics.statistics import (
 )
 from holdfast.sensors.types import Array, Flags, Integers
 
-THRESHOLD_LOG_ODDS = np.arange(-40, 81) * 0.1
+THRESHOLD_LOG_ODDS = np.arange(-80, 161) * 0.05
 """Log odds of the thresholds that are tried."""
 THRESHOLDS = 1.0 / (1.0 + np.exp(-THRESHOLD_LOG_ODDS))
 """Thresholds of the probability of a slip that are tried, lowest first."""
