@@ -9,7 +9,8 @@ Prints the table `slips` of the study as Markdown: every method is fitted to TRA
 threshold is chosen there out of fold, and it is scored on TEST_FOLDER. A model has two lines: at
 its own threshold, and at the threshold that is chosen on TRAIN_FOLDER by the same rule. Below it,
 for the models, the causes by sample. `--picture` draws truth beside decisions of the first model,
-for one grasp of each kind of slip event in TEST_FOLDER.
+of the first grasp with each kind of slip event in TEST_FOLDER in which a finger slides over 1 mm:
+each in a file, and all in `slips.png`.
 
 Recordings on which a model was trained are no test of it: use seeds that it has not seen.
 """
@@ -22,11 +23,13 @@ from typing import NamedTuple
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
 from holdfast.metrics.slip_thresholds import Curve, slip_intervals, slip_summary
+from holdfast.metrics.slip_truth import DISTANCES
 from holdfast.metrics.slips import SlipCounts
 from holdfast.model import Model
+from holdfast.recordings import Recording
 from holdfast.sensors.types import Integers
 from holdfast.training import compute_decisions
-from holdfast_lab.figures.slips import event_kinds, slip_figure
+from holdfast_lab.figures.slips import KIND_TITLES, event_kinds, slip_figure, slips_figure
 from holdfast_lab.report.images import png_of
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.report.table_layouts import to_markdown
@@ -112,16 +115,18 @@ def cause_counts(name: str, folder: Path) -> list[Integers]:
 
 
 def draw(name: str, folder: Path, out: Path) -> None:
-    """Write a picture of the first recording with each kind of slip event."""
+    """Write a picture of the first slip of each kind over 1 mm, and one of them all."""
     out.mkdir(parents=True, exist_ok=True)
-    model, drawn = Model.load(name), set[str]()
+    model, events = Model.load(name), dict[str, Recording]()
     for recording in load_dataset(folder):
-        for kind in event_kinds(recording):
-            if kind not in drawn:
-                path = out / f"{kind}.png"
-                path.write_bytes(png_of(slip_figure(model, recording, kind)))
-                drawn.add(kind)
-                print(path)
+        for kind in event_kinds(recording, DISTANCES[0]):
+            events.setdefault(kind, recording)
+    figures = {kind: slip_figure(model, events[kind], kind) for kind in events}
+    shown = [(events[kind], kind) for kind in KIND_TITLES if kind in events]
+    for title, figure in {**figures, "slips": slips_figure(model, shown)}.items():
+        path = out / f"{title}.png"
+        path.write_bytes(png_of(figure))
+        print(path)
 
 
 def main() -> None:

@@ -3,12 +3,13 @@
     holdfast simulate hands/ --randomize --repeats 300 --seed 0
     python benchmarks/train_any.py hands/ -o src/holdfast/models/any.json
 
+`train_slips.py` and `train_causes.py` add the rules of slip and of causes.
+
 Nothing here reads a real recording. Samples labelled no contact are left out: the threshold on
 the load separates them.
 """
 
 import argparse
-from collections import Counter
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -19,7 +20,6 @@ from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.metrics import roc_auc_score
 
-from holdfast.classifiers.cause import CauseClassifier, fit_causes
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.features import Tare, parse_features
@@ -37,9 +37,6 @@ LOAD_TO_NOISE_OF_CONTACT = 10.0
 """Threshold of contact, in multiples of the noise of the force: 6 standard deviations."""
 HOLD = 0.1
 N_FOLDS = 5
-CAUSES = (Cause.CLOSING, Cause.DISTURBANCE, Cause.GLITCH, Cause.LOST, Cause.SLIP)
-NAMED_AS = {Cause.RELEASED: Cause.LOST}
-"""Causes that look alike to a finger: it loses contact."""
 
 
 class HandSamples(NamedTuple):
@@ -71,7 +68,6 @@ def main(folder: Path, out: Path | None) -> None:
         chosen = kinds == kind
         report(f"{kind}, of a fifth of the hands", hands, by_hand, chosen)
         report(f"{kind}, all hands with it", hands, np.where(chosen, 0, -1), chosen)
-    report_causes(hands, by_hand)
     if out is not None:
         save(hands, digests, pooled, out)
 
@@ -90,7 +86,7 @@ def samples_of(recording: Recording) -> HandSamples:
         causes = np.full(len(states), "", dtype="U12")
         for label in module.labels:
             inside = slice(*np.searchsorted(module.times, (label.start, label.end)))
-            causes[inside] = NAMED_AS.get(label.cause, label.cause) or ""
+            causes[inside] = label.cause or ""
         kept = np.arange(len(states)) % step == 1 % step
         kept &= (states != UNKNOWN) & (states != NO_CONTACT)
         kept &= np.isfinite(finger.features).all(axis=1)
@@ -128,32 +124,6 @@ def fit(hands: list[HandSamples], chosen: np.ndarray) -> LinearClassifier:
     return LinearClassifier(tuple(mean), tuple(scale), tuple(found.x[1:]), found.x[0])
 
 
-def rule_of_causes(hands: list[HandSamples], chosen: np.ndarray) -> CauseClassifier:
-    """Fit the rule of causes to the unstable samples whose cause is known."""
-    used = [hands[k] for k in np.flatnonzero(chosen)]
-    causes = np.concatenate([hand.cause for hand in used])
-    known = np.isin(causes, CAUSES)
-    return fit_causes(np.concatenate([hand.features for hand in used])[known], causes[known], C)
-
-
-def report_causes(hands: list[HandSamples], folds: np.ndarray) -> None:
-    """Print the confusion of causes on single samples of hands left out, in percent of a row."""
-    counts = {cause: Counter[str]() for cause in CAUSES}
-    for fold in sorted(set(folds)):
-        model = rule_of_causes(hands, folds != fold)
-        weights = model.weights()[model.codes() - 1]
-        for k in np.flatnonzero(folds == fold):
-            scores = hands[k].features @ weights[:, 1:].T + weights[:, 0]
-            for true, place in zip(hands[k].cause, scores.argmax(axis=1), strict=True):
-                if true in counts:
-                    counts[true][model.causes[place]] += 1
-    print(f"\n| cause | samples | {' | '.join(CAUSES)} |\n|---|---|{'---|' * len(CAUSES)}")
-    for cause, found in counts.items():
-        shares = " | ".join(f"{100 * found[c] / max(found.total(), 1):.0f}" for c in CAUSES)
-        print(f"| {cause} | {found.total()} | {shares} |")
-    print(flush=True)
-
-
 def report(
     title: str, hands: list[HandSamples], folds: np.ndarray, shown: np.ndarray | None = None
 ) -> dict[str, float]:
@@ -186,12 +156,11 @@ def out_of_fold(hands, folds, shown) -> Iterator[tuple[np.ndarray, np.ndarray, n
                 yield classifier.probability(hands[k].features), hands[k].stable, hands[k].slip
 
 
-def model_of(classifier, training: Training | None = None, causes=None) -> Model:
+def model_of(classifier, training: Training | None = None) -> Model:
     finger = FingerModel(
         features=FEATURES,
         classifier=classifier,
         contact_load=LOAD_TO_NOISE_OF_CONTACT,
-        causes=causes,
     )
     return Model(
         fingers={"*": finger},
@@ -216,9 +185,7 @@ def save(
         figures=figures,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )
-    model_of(classifier, training, rule_of_causes(hands, np.ones(len(hands), dtype=bool))).save(
-        out, force=True
-    )
+    model_of(classifier, training).save(out, force=True)
     print(f"{out} written")
 
 

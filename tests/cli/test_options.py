@@ -8,6 +8,7 @@ from holdfast.cli import app
 
 OTHER_MEANING = {
     "--hand": "the hand that play stands for is driven by another program",
+    "--model": "the detector of trials, and a model whose decisions a figure shows",
     "--rate": "of a sensor, and of a source against its model",
     "--set": "metadata of a recording, and parameters of a rule",
     "--speed": "play cannot send as fast as possible",

@@ -170,9 +170,23 @@ def test_json_and_info_of_slips(capsys, sliding, tmp_path):
     text = " ".join(run(capsys, "info", out)[1].split())
     assert f"slides from a probability of {rule['threshold']:.3g} on" in text
     assert "threshold of slips from 4 recordings (slips-20, " in text
+    assert "tuned on 4 recordings (slips-20, slips-21, slips-22, ...) for slips, see above" in text
     text = " ".join(run(capsys, "info", sliding / "model.json")[1].split())
     assert "threshold of slips from the training, out of fold: " in text
+    assert text.endswith("tuned on nothing")
     assert "no slip rule" in run(capsys, "info", "builtin:noise-floor")[1]
+
+
+def test_info_of_a_model_that_is_tuned_for_both(capsys, sliding, tmp_path):
+    first, second = tmp_path / "slip.json", tmp_path / "both.json"
+    tune(capsys, sliding, first, "--false-alarms", 5, "--for", "slip")
+    run(capsys, "tune", first, sliding / "data", "-o", second, "--false-alarms", 1000)
+    lines = run(capsys, "info", second)[1].splitlines()
+    place = next(k for k, line in enumerate(lines) if line.startswith("tuned on "))
+    text = " ".join(" ".join(lines[place:]).split())
+    assert text.startswith("tuned on 4 recordings (slips-20, ")
+    assert "false alarms a minute" in text
+    assert text.endswith(") for slips, see above")
 
 
 def refused(capsys, model, data, out, rate="1"):

@@ -18,6 +18,8 @@ from holdfast.sensors import sensor
 from . import build
 from .test_session import wait_for
 
+pytestmark = pytest.mark.slow  # servers and sockets
+
 EPOCH = 1.7e9
 NAMES = "fingers=1:thumb,2:index,3:middle"
 

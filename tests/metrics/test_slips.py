@@ -1,6 +1,7 @@
 """Score of decisions about slips: the protocol of DESIGN, by hand and by a slow twin."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -223,6 +224,22 @@ class TestThresholds:
         assert rates[place] <= 1.0
         assert rates[place - 1] > 1.0
         assert all(rate <= 1.0 for rate in rates[place:])
+
+    def test_a_curve_is_the_counts_at_each_threshold(self):
+        slips = [slip(), slip(8.0, 8.3, gross=8.1, reached=(8.05, math.nan))]
+        made = replace(
+            decisions([], slips, seconds=20),
+            probability=random_recording(5, 9).probability,
+            hold=0.2,
+        )
+        for place in (20, 30, 40, 45):
+            raised = raised_at(made.times, made.probability, THRESHOLDS[place], made.hold)
+            expected = vars(count_slips(replace(made, raised=raised)))
+            counts = vars(slip_curve(made)[place])
+            assert raised.any()
+            assert {name: np.asarray(value).tolist() for name, value in counts.items()} == {
+                name: np.asarray(value).tolist() for name, value in expected.items()
+            }
 
     def test_none_if_no_threshold_fits(self):
         probability = np.ones(1000)

@@ -98,7 +98,7 @@ class TestTraining:
         model.save(tmp_path / "model.json")
         loaded = Model.load(tmp_path / "model.json")
         assert loaded.fingers == model.fingers
-        assert loaded.training.sliding_samples == {"*": 6 * 2 * 4 * 40}
+        assert loaded.training.sliding_samples == {"*": 6 * 2 * 4 * 10}  # the first 0.1 s
 
     def test_every_finger_has_its_own_rule(self, recordings):
         separate = train(recordings, replace(SETTING, shared=False)).model

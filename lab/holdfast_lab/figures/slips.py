@@ -1,14 +1,15 @@
-"""Figure of one slip: truth beside the decisions of a model, over time."""
+"""Figures of slips: truth beside the decisions of a model, over time."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import MaxNLocator
 
 from holdfast.classifiers.cause import ALL_CAUSES
 from holdfast.contact import SLIP_SPEED, Cause
@@ -26,6 +27,7 @@ from holdfast.model import Model
 from holdfast.plots.style import (
     COLOURS,
     FAINT,
+    FONT_SIZE,
     GREY,
     INK,
     add_labels,
@@ -41,6 +43,11 @@ COLUMN_WIDTH = 3.5
 """Width of the figure [inch]: one column of a page with two."""
 COLUMN_HEIGHT = 4.3
 """Height of the figure [inch]."""
+OVERVIEW_COLUMNS = 2
+OVERVIEW_ROW_HEIGHT = 2.1
+"""Height of a row of panels in the figure of several slips [inch]."""
+LOWEST_SHOWN_PROBABILITY = 1e-4
+"""Lower end of the logarithmic axis of the probability; less is drawn there."""
 MARGIN_TIME = 0.5
 """Time that is drawn before the first and after the last slip [s]."""
 MAX_SHOWN_TIME = 3.0
@@ -51,8 +58,20 @@ MILLIMETRES_PER_METRE = 1e3
 SPEED_COLOUR, SCORE_COLOUR, RAISED_COLOUR = COLOURS[0], COLOURS[2], COLOURS[3]
 INCIPIENT_STYLE: dict[str, Any] = {"color": COLOURS[5], "linestyle": "-", "linewidth": 1.0}
 GROSS_STYLE: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.0}
+SPEED_STYLE: dict[str, Any] = {"color": GREY, "linestyle": ":", "linewidth": 0.8}
+THRESHOLD_STYLE: dict[str, Any] = {"color": INK, "linestyle": "--", "linewidth": 0.8}
 EVENTS_KEY = "slip_events"
 """Key of the metadata with the slip events of a recording."""
+KIND_TITLES = {
+    "weight": "weight is added",
+    "grip": "the grip relaxes",
+    "friction": "friction falls",
+    "creep": "the object is drawn slowly",
+    "twist": "a torque grows",
+    "turn": "the object is turned",
+    "roll": "the object is rolled",
+}
+"""Words for the kinds of slip events."""
 
 
 class SlipSeries(NamedTuple):
@@ -85,10 +104,16 @@ class SlipSeries(NamedTuple):
     end: float
 
 
-def event_kinds(recording: Recording) -> list[str]:
-    """Return the kinds of the slip events of a recording in which a finger slips."""
+def event_kinds(recording: Recording, distance: float = 0.0) -> list[str]:
+    """Return the kinds of the slip events of a recording in which a finger slips.
+
+    Args:
+        recording: with a truth and slip events.
+        distance: that a finger slides at least in the first event of a kind [m].
+    """
     events = recording.metadata.get(EVENTS_KEY) or []
-    return [event["kind"] for event in events if _slipping_finger(recording, event["kind"])[1]]
+    slips = {event["kind"]: _slipping_finger(recording, event["kind"])[1] for event in events}
+    return [kind for kind, made in slips.items() if made and _slid(made) >= distance]
 
 
 def slip_figure(model: Model, recording: Recording, kind: str) -> Figure:
@@ -116,12 +141,58 @@ def slip_figure(model: Model, recording: Recording, kind: str) -> Figure:
     _draw_strips(rows[3], series)
     rows[3].set_xlim(-MARGIN_TIME, series.end)
     add_labels(rows[3], "time from the first onset [s]")
-    add_title(
-        rows[0], f"{kind}: {recording.metadata.get('object', recording.name)}, {series.finger}"
-    )
+    add_title(rows[0], _title(recording, kind, series))
     figure.align_ylabels(rows)
-    add_legend(figure, _handles(series), per_row=3)
+    add_legend(figure, _handles([series]), per_row=2)
     return figure
+
+
+def slips_figure(model: Model, events: Sequence[tuple[Recording, str]]) -> Figure:
+    """Draw the slips of several events, each in a panel: truth above, decisions below.
+
+    Args:
+        model: with a slip rule.
+        events: recordings with a truth, and the kind of the event of each.
+
+    Raises:
+        ValueError: as `slip_figure`.
+    """
+    n_rows = len(events) // OVERVIEW_COLUMNS + 1  # one place is for the legend
+    figure = page_figure(n_rows * OVERVIEW_ROW_HEIGHT)
+    places = figure.subfigures(n_rows, OVERVIEW_COLUMNS, squeeze=False).ravel()
+    drawn = []
+    for place, (recording, kind) in zip(places, events, strict=False):
+        series = _series(model, recording, kind)
+        _draw_panel(place, series, _title(recording, kind, series))
+        drawn.append(series)
+    places[-1].legend(
+        handles=_handles(drawn), loc="center", fontsize=FONT_SIZE, frameon=False, handlelength=2.8
+    )
+    return figure
+
+
+def _draw_panel(place: SubFigure, series: SlipSeries, title: str) -> None:
+    rows = place.subplots(3, 1, sharex=True, height_ratios=(1.2, 1.0, 0.55))
+    for axes in rows:
+        style_axes(axes)
+        _mark_onsets(axes, series)
+    _draw_speed(rows[0], series)
+    _draw_probability(rows[1], series)
+    _draw_strips(rows[2], series)
+    rows[2].set_xlim(-MARGIN_TIME, series.end)
+    add_labels(rows[2], "time from the first onset [s]")
+    add_title(rows[0], title)
+    place.align_ylabels(rows)
+
+
+def _title(recording: Recording, kind: str, series: SlipSeries) -> str:
+    item = str(recording.metadata.get("object", recording.name))
+    return f"{KIND_TITLES.get(kind, kind)}: {item.replace('_', ' ')}, {series.finger}"
+
+
+def _slid(slips: Sequence[Slip]) -> float:
+    """Return the distance that a finger slides in all slips [m]."""
+    return sum(slip.distance for slip in slips)
 
 
 def _slipping_finger(recording: Recording, kind: str) -> tuple[str, tuple[Slip, ...]]:
@@ -139,7 +210,7 @@ def _slipping_finger(recording: Recording, kind: str) -> tuple[str, tuple[Slip, 
                 for slip in finger_slips(truth, finger)
                 if event["start"] <= slip.onset < event["end"]
             )
-            if sum(slip.distance for slip in slips) > sum(slip.distance for slip in best[1]):
+            if _slid(slips) > _slid(best[1]):
                 best = (finger, slips)
     return best
 
@@ -183,11 +254,9 @@ def _draw_speed(axes: Axes, series: SlipSeries) -> None:
     shown = _shown(series.times, series.end)
     speed = np.maximum(series.speed[shown] * MILLIMETRES_PER_METRE, MIN_SPEED)
     axes.plot(series.times[shown], speed, color=SPEED_COLOUR, linewidth=1.0)
-    axes.axhline(SLIP_SPEED * MILLIMETRES_PER_METRE, color=GREY, linestyle=":", linewidth=0.8)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_ylim(MIN_SPEED, max(20.0, 1.5 * float(speed.max())))
-    axes.minorticks_off()
+    axes.axhline(SLIP_SPEED * MILLIMETRES_PER_METRE, **SPEED_STYLE)
+    highest = max(20.0, 1.5 * float(speed.max()))
+    _set_log_scale(axes, (MIN_SPEED, highest), [t for t in (0.1, 1.0, 10.0, 100.0) if t < highest])
     add_labels(axes, y="slip speed\n[mm/s]")
 
 
@@ -201,12 +270,18 @@ def _draw_distance(axes: Axes, series: SlipSeries) -> None:
 
 def _draw_probability(axes: Axes, series: SlipSeries) -> None:
     shown = _shown(series.decided_at, series.end)
-    times, probability = series.decided_at[shown], series.probability[shown]
-    axes.plot(times, probability, color=SCORE_COLOUR, linewidth=1.0)
-    axes.axhline(series.threshold, color=INK, linestyle="--", linewidth=0.8)
-    highest = max(float(np.nanmax(probability, initial=0.0)), series.threshold)
-    axes.set_ylim(-0.03 * highest, min(1.3 * highest, 1.03))
+    probability = np.maximum(series.probability[shown], LOWEST_SHOWN_PROBABILITY)
+    axes.plot(series.decided_at[shown], probability, color=SCORE_COLOUR, linewidth=1.0)
+    axes.axhline(series.threshold, **THRESHOLD_STYLE)
+    _set_log_scale(axes, (0.8 * LOWEST_SHOWN_PROBABILITY, 1.3), (1e-4, 1e-2, 1.0))
     add_labels(axes, y="slip\nprobability")
+
+
+def _set_log_scale(axes: Axes, limits: tuple[float, float], ticks: Sequence[float]) -> None:
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
 
 
 def _draw_strips(axes: Axes, series: SlipSeries) -> None:
@@ -220,8 +295,9 @@ def _draw_strips(axes: Axes, series: SlipSeries) -> None:
         ]
         axes.axhline(height, color=FAINT, linewidth=0.8, zorder=0)
         axes.broken_barh(spans, (height - 0.35, 0.7), color=colour, linewidth=0)
-    axes.set_yticks((1.0, 0.0), ("slides", "decision"))
+    axes.set_yticks((1.0, 0.0), ("slides", "reported"))
     axes.set_ylim(-0.5, 1.5)
+    axes.xaxis.set_major_locator(MaxNLocator(6))
     axes.tick_params(axis="y", length=0)
 
 
@@ -229,9 +305,13 @@ def _shown(times: Array, end: float) -> Mask:
     return np.asarray((times >= -MARGIN_TIME) & (times <= end))
 
 
-def _handles(series: SlipSeries) -> list[Artist]:
-    handles: list[Artist] = [Line2D([], [], label="incipient", **INCIPIENT_STYLE)]
-    if any(not math.isnan(slip.gross) for slip in series.slips):
-        handles.append(Line2D([], [], label="gross", **GROSS_STYLE))
-    handles.append(Line2D([], [], color=INK, linestyle="--", linewidth=0.8, label="threshold"))
-    return handles
+def _handles(drawn: Sequence[SlipSeries]) -> list[Artist]:
+    """Return the handles of the legend of all lines that are drawn."""
+    handles: list[Artist] = [Line2D([], [], label="a slip begins", **INCIPIENT_STYLE)]
+    if any(not math.isnan(slip.gross) for series in drawn for slip in series.slips):
+        handles.append(Line2D([], [], label="it becomes gross", **GROSS_STYLE))
+    return [
+        *handles,
+        Line2D([], [], label="1 mm/s: faster is sliding", **SPEED_STYLE),
+        Line2D([], [], label="threshold of the model", **THRESHOLD_STYLE),
+    ]

@@ -8,7 +8,7 @@ import pytest
 from holdfast.classifiers.cause import ALL_CAUSES
 from holdfast.contact import Cause
 from holdfast_lab.figures import slips
-from holdfast_lab.figures.slips import COLUMN_WIDTH, event_kinds, slip_figure
+from holdfast_lab.figures.slips import COLUMN_WIDTH, event_kinds, slip_figure, slips_figure
 from study.example_recordings import SLIPS, recording_with_truth
 
 EVENTS = [
@@ -46,6 +46,9 @@ def model(monkeypatch, recording):
 
 def test_kinds_of_events_in_which_a_finger_slips(recording):
     assert event_kinds(recording) == ["weight"]
+    slid = 0.01 * sum(b - a for a, b in SLIPS)
+    assert event_kinds(recording, 0.9 * slid) == ["weight"]
+    assert event_kinds(recording, 1.1 * slid) == []
     assert event_kinds(replace(recording, metadata={})) == []
     assert event_kinds(replace(recording, truth=None)) == []
 
@@ -58,7 +61,7 @@ def test_a_figure_shows_truth_and_decisions_from_the_first_onset(model, recordin
     assert slid[0] == 0
     assert slid[-1] == pytest.approx(1e3 * 0.01 * sum(b - a for a, b in SLIPS), rel=0.02)
     assert 0.3 in probability.lines[-1].get_ydata()
-    assert speed.get_title(loc="left").startswith("weight: ")
+    assert speed.get_title(loc="left").startswith("weight is added: ")
     first = SLIPS[0][0]
     sliding, raised = (
         [path.get_extents() for path in bars.get_paths()] for bars in strips.collections
@@ -83,3 +86,25 @@ def test_an_event_without_a_slip_cannot_be_drawn(model, recording):
     without = SimpleNamespace(name="mine", finger=lambda _: SimpleNamespace(slip=None))
     with pytest.raises(ValueError, match="mine has no slip rule of the thumb"):
         slip_figure(without, recording, "weight")
+
+
+def test_a_figure_of_several_slips_has_a_panel_for_each_and_a_legend(model, recording):
+    figure = slips_figure(model, [(recording, "weight")] * 3)
+    panels = [place for place in figure.subfigs if place.axes]
+    assert len(panels) == 3
+    for panel in panels:
+        speed, probability, strips = panel.axes
+        assert speed.get_title(loc="left").startswith("weight is added: ")
+        assert 0.3 in probability.lines[-1].get_ydata()
+        assert len(strips.collections) == 2
+    (legend,) = figure.subfigs[-1].legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "a slip begins", "it becomes gross", "1 mm/s: faster is sliding", "threshold of the model",
+    ]  # fmt: skip
+    figure.savefig(io.BytesIO())
+
+
+def test_a_low_probability_is_drawn_at_the_lower_end(model, recording):
+    axes = slip_figure(model, recording, "weight").axes[2]
+    assert axes.get_yscale() == "log"
+    assert min(axes.lines[-2].get_ydata()) >= slips.LOWEST_SHOWN_PROBABILITY

@@ -256,7 +256,8 @@ def test_a_reader_that_stops_ends_detect_quietly(folder):
         child.stdout.close()
     shown = terminal.text()
     assert child.returncode == 0
-    (line,) = [text for text in CONTROL.sub("", shown).splitlines() if "slip rule" in text]
-    rest = CONTROL.sub("", shown).replace(line, "")
+    text = " ".join(CONTROL.sub("", shown).split())  # the terminal breaks long lines
+    rest, n_messages = re.subn(r"builtin:noise-floor has no slip rule: .* adds one\)", "", text)
+    assert n_messages == 1
     assert re.sub(r"[^a-zA-Z]", "", rest).replace("detecting", "") == ""
     assert shown.rindex("\x1b[?25h") > shown.rindex("\x1b[?25l")

@@ -1,6 +1,7 @@
 """Rule that decides whether a finger slides: a probability, smoothed, with its own threshold."""
 
 import math
+from collections.abc import Iterable, Iterator
 
 import msgspec
 import numpy as np
@@ -43,7 +44,8 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         s(k) = s(k-1) + (1 - exp(-T / smoothing)) (z(k) - s(k-1))
 
     The probability of a slip is 1 / (1 + exp(-s)). The finger slides from the threshold of the
-    classifier on, and for the hold time after that.
+    classifier on, and for the hold time after that. Compare the probability with the threshold
+    only: it is not calibrated where the rule was trained on some of the samples.
 
     Attributes:
         classifier: maps features to a probability that the finger slides, with the threshold.
@@ -96,11 +98,20 @@ def raised_at(times: Array, probability: Array, threshold: float, hold: float) -
     Returns:
         (n,) True where the finger is reported to slide.
     """
+    return next(raised_at_each(times, probability, (threshold,), hold))
+
+
+def raised_at_each(
+    times: Array, probability: Array, thresholds: Iterable[float], hold: float
+) -> Iterator[Flags]:
+    """Yield where a slip is reported at each threshold, as `raised_at`."""
     with np.errstate(invalid="ignore"):
-        over = probability >= threshold
         ended = ~(probability > 0)
-    last = np.maximum.accumulate(np.where(over, times, -np.inf))
     end = np.maximum.accumulate(np.where(ended, times, -np.inf))
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    held = (times - last + 0.5 * period < hold) & (last > end)
-    return np.asarray((over | held) & ~ended)
+    for threshold in thresholds:
+        with np.errstate(invalid="ignore"):
+            over = probability >= threshold
+        last = np.maximum.accumulate(np.where(over, times, -np.inf))
+        held = (times - last + 0.5 * period < hold) & (last > end)
+        yield np.asarray((over | held) & ~ended)

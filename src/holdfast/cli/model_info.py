@@ -102,9 +102,10 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "", f"features {_few(part['features'])}"
         yield "", f"STABLE from a probability of {part['threshold']:.3g} on; {_contact(part)}"
         yield from (("", line) for line in _slip_lines(part["slip"]))
-    training, tuning = document["training"], document["tuning"]
+    training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
-    yield "tuned on", "nothing" if tuning is None else _tuned(tuning)
+    tuned = list(_tuned_lines(document))
+    yield from zip(("tuned on", *[""] * len(tuned)), tuned or ["nothing"], strict=False)
 
 
 def _contact(part: dict[str, Any]) -> str:
@@ -150,6 +151,16 @@ def _trained(training: dict[str, Any]) -> str:
     figure = "" if auc is None else f"; {name} {auc:.3f} out of fold, by {training['split']}"
     names = training["recordings"]
     return f"{len(names)} recordings ({_few(names)}){figure}"
+
+
+def _tuned_lines(document: dict[str, Any]) -> Iterator[str]:
+    """Yield on what the threshold of stability was tuned, and on what those of slips were."""
+    if document["tuning"] is not None:
+        yield _tuned(document["tuning"])
+    rules = [part["slip"] for part in document["fingers"].values() if part["slip"] is not None]
+    chosen = [rule["chosen_on"]["recordings"] for rule in rules if rule["chosen_on"] is not None]
+    for names in dict.fromkeys(tuple(names) for names in chosen if names):
+        yield f"{len(names)} recordings ({_few(list(names))}) for slips, see above"
 
 
 def _tuned(tuning: dict[str, Any]) -> str:

@@ -1,20 +1,20 @@
 """Counts of slips at many thresholds: choice of a threshold, and intervals that include it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from holdfast.classifiers.slip import raised_at
+from holdfast.classifiers.slip import raised_at_each
 from holdfast.contact import TIME_TOLERANCE
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.slips import (
     FOUND_WITHIN,
+    SlipCounter,
     SlipCounts,
     SlipMetrics,
-    count_slips,
     slip_metrics,
 )
 from holdfast.metrics.statistics import (
@@ -71,8 +71,9 @@ def slip_curve(decisions: SlipDecisions) -> Curve:
         decisions: with a truth; where it is raised is not used.
     """
     times, probability, hold = decisions.times, decisions.probability, decisions.hold
-    raised = (raised_at(times, probability, threshold, hold) for threshold in THRESHOLDS)
-    return tuple(count_slips(replace(decisions, raised=mask)) for mask in raised)
+    counter = SlipCounter.of(decisions)
+    masks = raised_at_each(times, probability, THRESHOLDS.tolist(), hold)
+    return tuple(counter.count(raised) for raised in masks)
 
 
 def total_curve(curves: Sequence[Curve]) -> Curve:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import msgspec
@@ -19,6 +19,7 @@ from holdfast.metrics.slip_truth import (
     STILL,
     Slip,
     SlipDecisions,
+    SlipTruth,
     sample_durations,
 )
 from holdfast.metrics.statistics import percent
@@ -111,65 +112,131 @@ def count_slips(decisions: SlipDecisions) -> SlipCounts:
     Raises:
         ValueError: the truth is not known.
     """
-    truth = decisions.truth
-    if truth is None:
-        raise ValueError("decisions with a truth of the slips expected; it is not known")
-    times, raised, slips = decisions.times, decisions.raised, truth.slips
-    before = np.concatenate([[False], raised[:-1]])
-    alarms = times[raised & ~before]
-    first = np.array([_first_alarm(alarms, slip) for slip in slips]).reshape(len(slips))
-    gross = np.array([not math.isnan(slip.gross) for slip in slips], dtype=bool)
-    reached = np.array([slip.reached for slip in slips]).reshape(-1, len(DISTANCES))
-    steps = sample_durations(times)
-    outside = (truth.codes >= STILL) & (truth.codes != CREEPING) & _outside(slips, times)
-    quiet = outside & truth.quiet
-    held = truth.codes >= STILL
+    return SlipCounter.of(decisions).count(decisions.raised)
+
+
+@dataclass(frozen=True, eq=False)
+class SlipCounter:
+    """Counter of the slips and alarms of one finger in one recording, at any threshold.
+
+    What the truth alone determines is computed once.
+
+    Attributes:
+        times: (n,) of the decisions [s].
+        slips: (n_slips, 4) of each slip: first and last time of its alarms, its onset and its
+            gross onset [s]; the last NaN if it never becomes gross.
+        reached: (n_slips, n_distances) times at which each of `DISTANCES` was slid [s].
+        quiet: (n + 1,) duration of quiet hold outside the slips before each sample [s].
+        outside: (n + 1,) the same of all held time outside the slips.
+        silent: counts without an alarm.
+    """
+
+    times: Array
+    slips: Array
+    reached: Array
+    quiet: Array
+    outside: Array
+    silent: SlipCounts
+
+    @classmethod
+    def of(cls, decisions: SlipDecisions) -> Self:
+        """Return the counter of decisions; where they are raised is not used.
+
+        Raises:
+            ValueError: the truth is not known.
+        """
+        truth = decisions.truth
+        if truth is None:
+            raise ValueError("decisions with a truth of the slips expected; it is not known")
+        times, slips, steps = decisions.times, truth.slips, sample_durations(decisions.times)
+        held = (truth.codes >= STILL) & (truth.codes != CREEPING)
+        outside = held & _outside(slips, times)
+        quiet = outside & truth.quiet
+        return cls(
+            times,
+            np.array([(*_alarm_times(slip), slip.onset, slip.gross) for slip in slips]).reshape(
+                -1, 4
+            ),
+            np.array([slip.reached for slip in slips]).reshape(-1, len(DISTANCES)),
+            _elapsed(steps, quiet),
+            _elapsed(steps, outside),
+            _without_alarms(decisions, truth, float(steps[quiet].sum()), float(steps[held].sum())),
+        )
+
+    def count(self, raised: Mask) -> SlipCounts:
+        """Return the counts of decisions that are raised at some samples (n,)."""
+        spans = runs(raised)
+        alarms = np.append(self.times[spans[:, 0]], np.inf)
+        earliest, latest, onset, gross = self.slips.T
+        first = alarms[np.searchsorted(alarms, earliest)]
+        first = np.where(first <= latest, first, np.inf)
+        reached = (first[:, None] <= self.reached + TIME_TOLERANCE).sum(axis=0)
+        quiet, outside = (_lengths(elapsed, spans) for elapsed in (self.quiet, self.outside))
+        return replace(
+            self.silent,
+            delays=first - onset,
+            gross_delays=(first - gross)[~np.isnan(gross)],
+            found_before=reached,
+            false_quiet=_count_false(quiet),
+            false_held=_count_false(outside),
+            raised_seconds=float(quiet.sum()),
+        )
+
+
+def _without_alarms(
+    decisions: SlipDecisions, truth: SlipTruth, quiet_seconds: float, held_seconds: float
+) -> SlipCounts:
+    """Return the counts of decisions that are never raised."""
+    reached = np.array([slip.reached for slip in truth.slips]).reshape(-1, len(DISTANCES))
+    n_gross = sum(not math.isnan(slip.gross) for slip in truth.slips)
     known = ~np.isnan(decisions.probability)
+    histograms = [
+        np.bincount(bins_of(decisions.probability[known & (truth.codes == code)]), minlength=N_BINS)
+        for code in (STILL, SLIDING)
+    ]
     return SlipCounts(
-        delays=first - np.array([slip.onset for slip in slips]),
-        gross_delays=(first - np.array([slip.gross for slip in slips]))[gross],
-        distances=np.array([slip.distance for slip in slips]),
-        found_before=(first[:, None] <= reached + TIME_TOLERANCE).sum(axis=0),
+        delays=np.full(len(truth.slips), np.inf),
+        gross_delays=np.full(n_gross, np.inf),
+        distances=np.array([slip.distance for slip in truth.slips]),
+        found_before=np.zeros(len(DISTANCES), dtype=np.int64),
         n_reached=(~np.isnan(reached)).sum(axis=0),
-        false_quiet=_count_false(raised, quiet, steps),
-        false_held=_count_false(raised, outside, steps),
-        quiet_seconds=float(steps[quiet].sum()),
-        held_seconds=float(steps[held & (truth.codes != CREEPING)].sum()),
-        raised_seconds=float(steps[quiet & raised].sum()),
-        scores=np.array(
-            [
-                np.bincount(
-                    bins_of(decisions.probability[known & (truth.codes == code)]), minlength=N_BINS
-                )
-                for code in (STILL, SLIDING)
-            ]
-        ),
+        false_quiet=0,
+        false_held=0,
+        quiet_seconds=quiet_seconds,
+        held_seconds=held_seconds,
+        raised_seconds=0.0,
+        scores=np.array(histograms),
         onsets=frozenset({truth.onsets}),
     )
 
 
-def _first_alarm(alarms: Array, slip: Slip) -> float:
-    """Return the time of the first alarm that belongs to a slip [s]; infinite without one."""
-    place = int(np.searchsorted(alarms, slip.onset - EARLIEST_ALARM - TIME_TOLERANCE))
-    latest = slip.end + LATEST_ALARM + TIME_TOLERANCE
-    return float(alarms[place]) if place < len(alarms) and alarms[place] <= latest else math.inf
+def _alarm_times(slip: Slip) -> tuple[float, float]:
+    """Return the first and the last time of an alarm that belongs to a slip [s]."""
+    first, last = slip.onset - EARLIEST_ALARM, slip.end + LATEST_ALARM
+    return first - TIME_TOLERANCE, last + TIME_TOLERANCE
 
 
 def _outside(slips: Sequence[Slip], times: Array) -> Mask:
     """Return (n,) True outside the time of every slip and its alarms."""
     outside = np.ones(len(times), dtype=bool)
     for slip in slips:
-        first = slip.onset - EARLIEST_ALARM - TIME_TOLERANCE
-        last = slip.end + LATEST_ALARM + TIME_TOLERANCE
+        first, last = _alarm_times(slip)
         outside[np.searchsorted(times, first) : np.searchsorted(times, last, side="right")] = False
     return outside
 
 
-def _count_false(raised: Mask, counted: Mask, steps: Array) -> int:
-    """Return the false alarms: of each raised run, the counted time in begun parts of 0.5 s."""
-    wrong = np.concatenate([[0.0], np.cumsum(np.where(raised & counted, steps, 0.0))])
-    spans = runs(raised)
-    lengths = wrong[spans[:, 1]] - wrong[spans[:, 0]]
+def _elapsed(steps: Array, counted: Mask) -> Array:
+    """Return the counted time before each sample, and in all, (n + 1,) [s]."""
+    return np.concatenate([[0.0], np.cumsum(np.where(counted, steps, 0.0))])
+
+
+def _lengths(elapsed: Array, spans: Integers) -> Array:
+    """Return the counted time in each span of samples, (n_spans,) [s]."""
+    return np.asarray(elapsed[spans[:, 1]] - elapsed[spans[:, 0]])
+
+
+def _count_false(lengths: Array) -> int:
+    """Return the false alarms of raised runs: of each, its counted time in begun parts of 0.5 s."""
     return int(np.ceil(lengths / FALSE_ALARM_DURATION - TIME_TOLERANCE).clip(min=0).sum())
 
 

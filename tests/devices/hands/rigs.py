@@ -1,7 +1,5 @@
 """Hands for the tests of the contract: each with what tells which forces it has."""
 
-import itertools
-import os
 import sys
 from contextlib import contextmanager
 
@@ -11,11 +9,11 @@ import pytest
 from holdfast.devices.hands import open_hand
 from holdfast.devices.live_twin import LiveTwin
 from holdfast.grip import GripCommand
+from ros.domains import new_domain
 
 from .ros.drivers import ROS1, ROS2, Ros2Driver
 
 taken = []
-_numbers = itertools.count()
 LOCAL = ["twin", "log", "call"]
 WITH_STATES = [
     f"{scheme}:{name}"
@@ -24,11 +22,6 @@ WITH_STATES = [
     if driver.states is not None
 ]
 NAMES = [*LOCAL, *(f"ros2:{name}" for name in ROS2), *(f"ros1:{name}" for name in ROS1)]
-
-
-def new_domain():
-    """A ROS domain of one test of this process."""
-    return 1 + (os.getpid() * 7 + next(_numbers)) % 200
 
 
 class TwinRig:

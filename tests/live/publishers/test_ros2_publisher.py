@@ -1,5 +1,4 @@
 import json
-import os
 import subprocess
 import sys
 import time
@@ -11,15 +10,16 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from holdfast.live.publishers.ros_publisher import Ros2Publisher
 from live.estimates import UNITS, FakeGrip, check_received, estimate
+from ros.domains import new_domain
 
 PEER = Path(__file__).parents[2] / "devices" / "sources" / "ros2_peer.py"
 
 
 @pytest.fixture
 def domain(monkeypatch):
-    """A ROS domain for this test process only, on this machine only."""
+    """A ROS domain of this test alone, on this machine only."""
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    number = 201 + os.getpid() % 30
+    number = new_domain()
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
     return number
 

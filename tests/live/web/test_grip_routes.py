@@ -11,6 +11,7 @@ from live.estimates import FakeGrip
 from live.web.test_service import kernels, patient, run, served, wait_for
 
 __all__ = ["kernels"]
+pytestmark = pytest.mark.slow  # servers and sockets
 
 STOP, RESET = "/api/v1/grip/stop", "/api/v1/grip/reset"
 

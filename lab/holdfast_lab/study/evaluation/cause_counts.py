@@ -70,13 +70,17 @@ def cause_table(models: dict[str, Sequence[Integers]], seed: int = 0) -> ResultT
         seed: of the bootstrap.
     """
     rows: list[Row] = []
-    for name, recordings in models.items():
-        table = np.array(recordings).reshape(-1, len(TRUE_CAUSES), len(ESTIMATED))
+    tables = {
+        name: np.array(recordings).reshape(-1, len(TRUE_CAUSES), len(ESTIMATED))
+        for name, recordings in models.items()
+    }
+    is_given = np.any([table.any(axis=(0, 1)) for table in tables.values()], axis=0)
+    for name, table in tables.items():
         for k, true_cause in enumerate(TRUE_CAUSES):
             keys: dict[str, Key] = {"model": name, "true cause": true_cause}
             whole = table[:, k].sum(axis=1)
             for j, estimated in enumerate(ESTIMATED):
-                if table[:, :, j].any():
+                if is_given[j]:
                     figure = {"figure": f"{estimated} [%]"}
                     rows.append(ratio_row(keys | figure, table[:, k, j], whole, seed))
             n_samples = Row(keys | {"figure": "samples"}, float(whole.sum()), None, len(whole))

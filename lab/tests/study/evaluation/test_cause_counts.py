@@ -80,3 +80,15 @@ def test_the_table_has_shares_of_each_true_cause():
     assert values["slip", "samples"] == 8
     assert values["neither", "slip [%]"] is None
     assert ("slip", "glitch [%]") not in values
+
+
+def test_a_cause_that_only_another_model_gives_has_a_share_of_none():
+    rare = np.zeros((len(TRUE_CAUSES), len(ESTIMATED)), dtype=np.int64)
+    rare[0, SLIP] = 4
+    full = rare.copy()
+    full[1, DISTURBANCE] = 2
+    table = cause_table({"rare": [rare], "full": [full]})
+    values = {(r.keys["model"], r.keys["true cause"], r.keys["figure"]): r.ours for r in table.rows}
+    assert values["rare", "slip", "disturbance [%]"] == 0
+    assert values["full", "disturbance", "disturbance [%]"] == 100
+    assert [r.keys["figure"] for r in table.rows[:3]] == ["disturbance [%]", "slip [%]", "samples"]

@@ -5,7 +5,6 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from devices.hands.rigs import new_domain
 from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.hands.ros.driven_twin import DrivenTwin
@@ -13,6 +12,7 @@ from holdfast.devices.ros import dds
 from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.topic_messages import FLOAT_ARRAY, array_message, topic_definition
+from ros.domains import new_domain
 
 PATIENCE = 60.0
 SCALES = {"thumb": 1.4, "index": 1.1, "middle": 1.2, "ring": 1.3}

@@ -10,13 +10,13 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from devices.hands.rigs import new_domain
 from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE
 from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
 from holdfast.live.loop.watchdog import Watchdog
+from ros.domains import new_domain
 
 from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, POSITIONS, ROS2, V4, Ros2Driver, home
 

@@ -1,5 +1,4 @@
 import itertools
-import os
 import subprocess
 import sys
 import time
@@ -21,17 +20,17 @@ from holdfast.errors import MissingExtra, SourceError, install_command
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
+from ros.domains import new_domain
 
 PEER = Path(__file__).parents[1] / "ros2_peer.py"
 N = 300
-_numbers = itertools.count()
 
 
 @pytest.fixture
 def domain(monkeypatch):
     """A domain of this test alone, on this machine alone."""
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    number = 1 + (os.getpid() * 7 + next(_numbers)) % 200
+    number = new_domain()
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
     return number
 
