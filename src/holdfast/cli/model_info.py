@@ -78,7 +78,9 @@ def _slip(rule: "SlipRule") -> dict[str, Any]:
     if rule.thresholds is not None:
         chosen = msgspec.to_builtins(rule.thresholds)
         chosen["recordings"] = list(rule.thresholds.recordings)
+    features = () if rule.features is msgspec.UNSET else rule.features
     return {
+        "features": [str(spec) for spec in features] or None,
         "threshold": rule.classifier.threshold,
         "smoothing": rule.smoothing,
         "hold": rule.hold,
