@@ -12,6 +12,7 @@ from holdfast.features.motion import AVERAGE_SECONDS
 from holdfast.features.specs import (
     ANY_FEATURES,
     ANY_LAGS,
+    MEAN_SECOND_KINDS,
     RELATIVE_KINDS,
     SECOND_KINDS,
     SLIP_FEATURES,
@@ -61,7 +62,7 @@ def naive(readings, given, rate=RATE):
     norm = lambda vectors: np.sqrt((vectors**2).sum())  # noqa: E731
     peak = peak_taxels = 0.0
     ratios = np.zeros(len(f))
-    averages = np.full((len(ANY_LAGS), 4), np.nan)
+    averages = np.full((len(ANY_LAGS), 5), np.nan)
     least = math.inf, math.inf
     block, began = [], 0.0
     rows = np.full((len(f), len(RELATIVE_KINDS) * len(ANY_LAGS)), np.nan)
@@ -110,7 +111,8 @@ def naive(readings, given, rate=RATE):
                 relative(turned**2, math.sqrt(1 / 3) * taxel_noise, whole),
                 whole / noise,
             ]
-            squares = second_squares(f, k, min(max(1, round(seconds * rate)), k // 2), weights[k])
+            back = min(max(1, round(seconds * rate)), k // 2)
+            squares = second_squares(f, k, back, weights[k], normal)
             share = 1 - math.exp(-1 / rate / AVERAGE_SECONDS)
             is_first = np.isnan(averages[i, 0])
             averages[i] = squares if is_first else averages[i] + share * (squares - averages[i])
@@ -122,15 +124,16 @@ def naive(readings, given, rate=RATE):
     return rows
 
 
-def second_squares(forces, k, back, pressed):
+def second_squares(forces, k, back, pressed, normal):
     """Squared second differences: of all taxels, by load, against the common motion, largest."""
     d = forces[k] - 2 * forces[k - back] + forces[k - 2 * back]
     n = len(d)
     shares = pressed / pressed.sum() if pressed.sum() else np.zeros(n)
     squares = (d**2).sum(axis=1)
+    shear = ((d - (d @ normal)[:, None] * normal) ** 2).sum(axis=1)
     own = d - shares[:, None] * d.sum(axis=0)
     top = max(squares[pressed > pressed.mean()], default=0.0)
-    return np.array([squares.sum(), n * shares @ squares, (own**2).sum(), n * top])
+    return np.array([squares.sum(), n * shares @ squares, n * shares @ shear, (own**2).sum(), n * top])
 
 
 def walk(given, n=150, seed=0, scale=300.0):
@@ -227,11 +230,11 @@ def test_a_second_difference_does_not_see_a_steady_motion_but_a_jolt():
     readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
     readings[40:] += np.linspace(0, 1, 50)[:, None, None]
     readings[80:, 4] += 0.01
-    found = features_of(readings, given, specs=of_kinds(SECOND_KINDS))
-    assert (np.abs(found[60:80, :4]) < 1.5).all()
-    assert (found[80, [0, 2]] > 2.5).all()
-    assert (found[80, [4, 6]] < found[80, [0, 2]]).all()
-    assert (found[86, [4, 6]] > found[86, [0, 2]]).all()  # the averages remember it
+    found = features_of(readings, given, specs=of_kinds((*SECOND_KINDS, *MEAN_SECOND_KINDS)))
+    assert (np.abs(found[60:80, :5]) < 1.5).all()
+    assert (found[80, [0, 3]] > 2.5).all()
+    assert (found[80, [5, 8]] < found[80, [0, 3]]).all()
+    assert (found[86, [5, 8]] > found[86, [0, 3]]).all()  # the averages remember it
 
 
 def test_the_own_second_difference_leaves_out_a_common_jolt():
@@ -264,10 +267,10 @@ def test_a_stream_computes_only_the_kinds_that_it_needs():
     given = sensor("uskin-4x4")
     plan = StreamPlan({"a": given}, {"a": SLIP_FEATURES}, 14, Tare.parse("first"), 150.0)
     layout = FeatureStream(plan).layout
-    assert layout.lags.tolist() == [1, 4, 16]
-    assert layout.families.tolist() == [[0, 1, 1], [0, 0, 1], [0, 0, 1]]
+    assert layout.lags.tolist() == [1, 2, 4, 16]
+    assert layout.families.tolist() == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     plan = StreamPlan({"a": given}, {"a": ANY_FEATURES}, 14, Tare.parse("first"), 150.0)
-    assert FeatureStream(plan).layout.families.tolist() == [[1, 0, 0]] * 5
+    assert FeatureStream(plan).layout.families.tolist() == [[1, 0, 0, 0]] * 5
 
 
 def test_a_gap_begins_anew_but_the_load_stays():
@@ -308,7 +311,7 @@ def test_specifications_that_contradict_themselves_are_refused(fields, message):
 
 
 def test_the_list_for_slips():
-    assert len(SLIP_FEATURES) == 32
+    assert len(SLIP_FEATURES) == 39
     assert str(SLIP_FEATURES[15]) == "relative(second_all[0.0067 s])"
     assert str(SLIP_FEATURES[-1]) == "relative(ratio_gain[0.107 s])"
 

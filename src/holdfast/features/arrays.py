@@ -142,11 +142,16 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     MOTION_WIDTH,
 ) = range(24)  # fmt: skip
 
-# Layout.families: which relative kinds a lag needs. LAG_KINDS, SECOND_KINDS and RATIO_KINDS of
-# holdfast.features.specs.
-LAGS, SECONDS, RATIOS, FAMILIES_WIDTH = range(4)
+# Layout.families: which relative kinds a lag needs, of those lists of holdfast.features.specs.
+(
+    LAGS,  # LAG_KINDS
+    SECONDS,  # SECOND_KINDS, or their averages
+    MEAN_SECONDS,  # MEAN_SECOND_KINDS
+    RATIOS,  # RATIO_KINDS
+    FAMILIES_WIDTH,
+) = range(5)
 
-N_SECONDS = 4  # sums of second differences: of all taxels, shared, own and top
+N_SECONDS = 5  # sums of second differences: of all taxels, shared, shear, own and top
 
 # Output.status.
 (
@@ -173,6 +178,7 @@ class Layout(NamedTuple):
     period: float
     lags: Integers1  # (n_lags,) of relative features [samples], ascending; empty without any
     average_gain: float  # share of a new sample in averages of second differences
+    has_centres: bool  # whether a lag needs the centre of pressure and the moment
     families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0
     places: Floats2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Floats2  # (n_fingers, 3)

@@ -18,8 +18,8 @@ from holdfast.sensors.types import Array, Integers
 (
     FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL,
     PRESSURE_SHIFT, MOMENT_CHANGE, LOAD_TO_NOISE,
-    SECOND_ALL, SECOND_SHARED, SECOND_OWN, SECOND_TOP,
-    MEAN_SECOND, _, _, _,  # in the same order
+    SECOND, _, _, _, _,  # of all taxels, shared, shear, own and top
+    MEAN_SECOND, _, _, _, _,  # in the same order
     SHEAR_GAIN, NORMAL_GAIN, RATIO_GAIN,
 ) = range(len(RELATIVE_KINDS))  # fmt: skip
 
@@ -53,21 +53,19 @@ NORMAL_NOISE_WEIGHT = 10.0
 
 
 @inlined
-def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time: float) -> None:
-    """Take a sample of a finger, and compute its relative features.
+def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
+    """Compute the relative features of a finger after `append_taxels`.
 
-    The sample is already counted in N_STRETCH and has a force in the history.
+    The sample is already counted in N_STRETCH.
 
     Args:
         layout: of the stream.
         memory: is changed; `memory.relative` holds the features.
-        readings: (n_taxels, 3) of all fingers.
         f: the finger.
         time: of the sample [s].
     """
     n, length = memory.counts[f, at.N_STRETCH], len(memory.taxel_forces)
     now = (n - 1) % length
-    _append_sample(layout, memory, readings, f, now, n > 1)
     _update_noise(layout, memory.motion, memory.counts, f, time)
     _update_load(layout, memory, f, now)
     _update_movement(layout, memory, f, now, time)
@@ -104,25 +102,33 @@ def _forget_features(memory: Memory, f: int) -> None:
 
 
 @inlined
-def _append_sample(
-    layout: Layout, memory: Memory, readings: Array, f: int, now: int, has_previous: bool
-) -> None:
-    """Append taxel forces, centre of pressure and moment of a sample to the history."""
+def append_taxels(
+    layout: Layout, memory: Memory, readings: Array, f: int
+) -> tuple[float, float, float, float]:
+    """Append taxel forces, centre of pressure and moment of a sample to the history.
+
+    The sample is not counted in N_STRETCH yet.
+
+    Returns:
+        F_tip, with the bits of `sum_taxels`, and the sum of the normal readings.
+    """
     first, last = layout.offsets[f], layout.offsets[f + 1]
     forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
-    length = len(forces)
-    before = (now - 1) % length
+    n_before, length = memory.counts[f, at.N_STRETCH], len(forces)
+    now, has_previous = n_before % length, n_before > 0
+    before = _place(now, 1, length)
     # g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|:
     # centre c = sum p_i r_i / sum p_i, moment = n . sum r_i x g_i, taxel load = sqrt(sum |h_i|^2),
     # moved = sum |g_i(k) - g_i(k-1)|^2.
     fx, fy, fz, weight, squares, moved = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    pressure_squares = 0.0
+    pressure_squares, normal = 0.0, 0.0
     cx, cy, cz, moment = 0.0, 0.0, 0.0, 0.0
     for i in range(np.uint64(first), np.uint64(last)):
         x = readings[i, 0] - memory.baseline[i, 0]
         y = readings[i, 1] - memory.baseline[i, 1]
         z = readings[i, 2] - memory.baseline[i, 2]
+        normal += z
         turn = layout.rotations[i]
         gx = turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z
         gy = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
@@ -131,7 +137,6 @@ def _append_sample(
             sx, sy, sz = forces[before, i, 0], forces[before, i, 1], forces[before, i, 2]
             moved += (gx - sx) * (gx - sx) + (gy - sy) * (gy - sy) + (gz - sz) * (gz - sz)
         forces[now, i, 0], forces[now, i, 1], forces[now, i, 2] = gx, gy, gz
-        px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         hx, hy, hz = gx - reference[i, 0], gy - reference[i, 1], gz - reference[i, 2]
         pressed = abs(hx * nx + hy * ny + hz * nz)
@@ -139,8 +144,10 @@ def _append_sample(
         weight += pressed
         pressure_squares += pressed * pressed
         squares += hx * hx + hy * hy + hz * hz
-        cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
-        moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
+        if layout.has_centres:
+            px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
+            cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
+            moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
     weight = max(weight, 1e-300)
     # step = |F(k) - F(k-1)|^2.
     step = 0.0
@@ -165,6 +172,7 @@ def _append_sample(
             f, at.BLOCK_STEPS
         ] = 0.0
         motion[f, at.BLOCK_START] = math.nan
+    return fx, fy, fz, normal
 
 
 @inlined
@@ -227,7 +235,7 @@ def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: flo
     track, motion, length = memory.track, memory.motion, memory.track.shape[2]
     # |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
     back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, at.N_STRETCH] - 1, length - 1)
-    then = (now - back) % length
+    then = _place(now, back, length)
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
@@ -339,11 +347,12 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
         memory.averages,
     )
     motion, length = memory.motion, len(memory.taxel_forces)
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     before, first = _place(now, back, length), _place(now, 2 * back, length)
     total, n_used = motion[f, at.PRESSURE], layout.constants[f, at.N_USED]
-    # d_i = g_i(k) - 2 g_i(k-s) + g_i(k-2s); sum |d_i|^2, sum p_i |d_i|^2, sum p_i d_i, and the
-    # largest |d_i|^2 of the taxels with p_i > sum p / n.
-    squares, shared, top, mean_pressure = 0.0, 0.0, 0.0, total / n_used
+    # d_i = g_i(k) - 2 g_i(k-s) + g_i(k-2s); sum |d_i|^2, sum p_i |d_i|^2, sum p_i (d_i . n)^2,
+    # sum p_i d_i, and the largest |d_i|^2 of the taxels with p_i > sum p / n.
+    squares, shared, along, top, mean_pressure = 0.0, 0.0, 0.0, 0.0, total / n_used
     share = 1.0 / total
     px, py, pz = 0.0, 0.0, 0.0
     for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
@@ -351,8 +360,10 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
         y = forces[now, i, 1] - 2.0 * forces[before, i, 1] + forces[first, i, 1]
         z = forces[now, i, 2] - 2.0 * forces[before, i, 2] + forces[first, i, 2]
         square, pressed = x * x + y * y + z * z, memory.pressed[i]
+        pushed = x * nx + y * ny + z * nz
         squares += square
         shared += pressed * square
+        along += pressed * (pushed * pushed)
         px, py, pz = px + pressed * x, py + pressed * y, pz + pressed * z
         if pressed > mean_pressure and square > top:
             top = square
@@ -364,27 +375,27 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
     common = (x * x + y * y + z * z) * (motion[f, at.PRESSURE_SQUARES] * share) * share
     own = squares - 2.0 * (x * px + y * py + z * pz) * share + common
     noise, gain = motion[f, at.TAXEL_NOISE_NOW], layout.average_gain
-    _fill_second(out[f], averages[f], 0, lag, squares, noise, gain)
-    _fill_second(out[f], averages[f], 1, lag, n_used * shared * share, noise, gain)
-    _fill_second(out[f], averages[f], 2, lag, max(own, 0.0), noise, gain)
-    _fill_second(out[f], averages[f], 3, lag, n_used * top, noise, gain)
+    noise_share = 1.0 / (noise * noise)
+    shear = max(n_used * (shared - along) * share, 0.0)
+    found = (squares, n_used * shared * share, shear, max(own, 0.0), n_used * top)
+    for place in range(at.N_SECONDS):
+        out[f, SECOND + place, lag] = _beyond_noise(found[place] * noise_share)
+    if layout.families[lag, at.MEAN_SECONDS]:
+        for place in range(at.N_SECONDS):
+            # a(k) = a(k-1) + gain (v(k)^2 - a(k-1)).
+            average = averages[f, place, lag]
+            if math.isnan(average):
+                average = found[place]
+            average += gain * (found[place] - average)
+            averages[f, place, lag] = average
+            out[f, MEAN_SECOND + place, lag] = _beyond_noise(average * noise_share)
 
 
 @compiled_step
-def _fill_second(
-    out: Array, averages: Array, place: int, lag: int, square: float, noise: float, gain: float
-) -> None:
-    """Fill a squared second difference and its average, in multiples of the noise."""
-    # a(k) = a(k-1) + gain (v(k)^2 - a(k-1)); log sqrt(max(v^2 / noise^2 - 6, 0) + 6 / 16).
-    share, average = 1.0 / (noise * noise), averages[place, lag]
-    average = square if math.isnan(average) else average + gain * (square - average)
-    averages[place, lag] = average
-    out[SECOND_ALL + place, lag] = 0.5 * math.log(
-        max(square * share - SECOND_NOISE, 0.0) + SECOND_FLOOR
-    )
-    out[MEAN_SECOND + place, lag] = 0.5 * math.log(
-        max(average * share - SECOND_NOISE, 0.0) + SECOND_FLOOR
-    )
+def _beyond_noise(square: float) -> float:
+    """Return log v of a second difference, given v^2 in squared noise, beyond that of noise."""
+    # log sqrt(max(v^2 - 6, 0) + 6 / 16).
+    return 0.5 * math.log(max(square - SECOND_NOISE, 0.0) + SECOND_FLOOR)
 
 
 @inlined

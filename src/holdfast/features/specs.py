@@ -29,14 +29,13 @@ CHANGE_KINDS = (
 )
 LAG_KINDS = (*CHANGE_KINDS, "load_to_noise")
 """Kinds over a lag in seconds that a stream computes together."""
-SECOND_KINDS = (
-    *("second_all", "second_shared", "second_own", "second_top"),
-    *("mean_second_all", "mean_second_shared", "mean_second_own", "mean_second_top"),
-)
+SECOND_KINDS = ("second_all", "second_shared", "second_shear", "second_own", "second_top")
 """Kinds of second differences of the taxels, at a spacing in seconds."""
+MEAN_SECOND_KINDS = tuple(f"mean_{kind}" for kind in SECOND_KINDS)
+"""The same, averaged over the last samples."""
 RATIO_KINDS = ("shear_gain", "normal_gain", "ratio_gain")
 """Kinds of the change of the ratio of tangential to normal force, and of either force."""
-RELATIVE_KINDS = (*LAG_KINDS, *SECOND_KINDS, *RATIO_KINDS)
+RELATIVE_KINDS = (*LAG_KINDS, *SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
 """Kinds that look back by a lag in seconds, relative to load or noise; see `features.motion`."""
 
 FEATURE_KINDS = (*VALUE_KINDS, *RELATIVE_KINDS)
@@ -67,8 +66,8 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             taxels move against their mean; `pressure_shift`, how far the centre of pressure
             moves; `moment_change`, the change of the moment about the normal; `load_to_noise`, the
             load itself. Second differences of the taxels at a spacing of `seconds`: `second_all`,
-            of all; `second_shared`, weighted by their share of the load; `second_own`, against
-            their common motion; `second_top`, the largest of loaded taxels; the same after
+            of all; `second_shared`, weighted by their share of the load, and `second_shear`, its
+            part across the normal; `second_own`, against their common motion; `second_top`, the largest of loaded taxels; the same after
             `mean_`, averaged over the last samples. `ratio_gain`, the change of the ratio of
             tangential to normal force; `shear_gain` and `normal_gain`, the signed change of either
             force, as a share of the normal force.
@@ -163,14 +162,22 @@ ANY_FEATURES = (
 """Features that carry over between hands, sensors, units and rates, named `any`."""
 
 
-SLIP_SPACING = 0.0067
-"""Spacing of second differences of the taxels [s]: one sample at 150 Hz."""
+SLIP_SPACINGS = (0.0067, 0.0133)
+"""Spacings of second differences of the taxels [s]: one and two samples at 150 Hz."""
 SLIP_LAGS = (0.0067, 0.0267, 0.107)
 """Lags of changes of the ratio of forces [s]."""
 
 SLIP_FEATURES = (
     *HOLDFAST_FEATURES,
-    *(FeatureSpec(kind, transform="relative", seconds=SLIP_SPACING) for kind in SECOND_KINDS),
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in SECOND_KINDS
+        for seconds in SLIP_SPACINGS
+    ),
+    *(
+        FeatureSpec(kind, transform="relative", seconds=SLIP_SPACINGS[0])
+        for kind in MEAN_SECOND_KINDS
+    ),
     *(
         FeatureSpec(kind, transform="relative", seconds=seconds)
         for kind in RATIO_KINDS

@@ -17,6 +17,7 @@ from holdfast.features.motion import AVERAGE_SECONDS
 from holdfast.features.specs import (
     FEATURE_KINDS,
     LAG_KINDS,
+    MEAN_SECOND_KINDS,
     OF_COMPONENTS,
     RATIO_KINDS,
     RELATIVE_KINDS,
@@ -275,6 +276,7 @@ def _layout(plan: StreamPlan) -> Layout:
         period=1.0 / plan.rate,
         lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
         average_gain=-float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
+        has_centres=any(spec.kind in LAG_KINDS for specs in features for spec in specs),
         families=_families([spec for specs in features for spec in specs], lags),
         places=np.concatenate([_places(s, i) for s, i in zip(sensors, ignored, strict=True)]),
         normals=np.array([sensor.normal for sensor in sensors], dtype=np.float64),
@@ -284,7 +286,8 @@ def _layout(plan: StreamPlan) -> Layout:
 
 def _families(specs: Sequence[FeatureSpec], lags: Sequence[float]) -> Integers:
     """Return `Layout.families` for the lags of some features [s]."""
-    families = (LAG_KINDS, SECOND_KINDS, RATIO_KINDS)
+    seconds = (*SECOND_KINDS, *MEAN_SECOND_KINDS)
+    families = (LAG_KINDS, seconds, MEAN_SECOND_KINDS, RATIO_KINDS)
     needed = [
         [any(x.kind in kinds and x.seconds == lag for x in specs) for kinds in families]
         for lag in lags
