@@ -133,7 +133,9 @@ def second_squares(forces, k, back, pressed, normal):
     shear = ((d - (d @ normal)[:, None] * normal) ** 2).sum(axis=1)
     own = d - shares[:, None] * d.sum(axis=0)
     top = max(squares[pressed > pressed.mean()], default=0.0)
-    return np.array([squares.sum(), n * shares @ squares, n * shares @ shear, (own**2).sum(), n * top])
+    return np.array(
+        [squares.sum(), n * shares @ squares, n * shares @ shear, (own**2).sum(), n * top]
+    )
 
 
 def walk(given, n=150, seed=0, scale=300.0):

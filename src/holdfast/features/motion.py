@@ -159,11 +159,20 @@ def append_taxels(
     track[f, at.TRACK_PRESSURE + 1, now] = cy / weight
     track[f, at.TRACK_PRESSURE + 2, now] = cz / weight
     track[f, at.TRACK_MOMENT, now] = moment
+    memory.motion[f, at.PRESSURE], memory.motion[f, at.PRESSURE_SQUARES] = weight, pressure_squares
+    memory.motion[f, at.TAXEL_LOAD] = math.sqrt(squares)
+    is_new = memory.counts[f, at.N_UNCHANGED] == 0
+    _add_to_block(memory.motion, f, step, moved, is_new, has_previous)
+    return fx, fy, fz, normal
+
+
+@inlined
+def _add_to_block(
+    motion: Array, f: int, step: float, moved: float, is_new: bool, has_previous: bool
+) -> None:
+    """Add the squares of a step to the block over which the noise is measured."""
     # Sums over the block: squares of steps of F and of all g_i. Repeated samples do not count.
-    motion = memory.motion
-    motion[f, at.PRESSURE], motion[f, at.PRESSURE_SQUARES] = weight, pressure_squares
-    motion[f, at.TAXEL_LOAD] = math.sqrt(squares)
-    if memory.counts[f, at.N_UNCHANGED] == 0 and has_previous:
+    if is_new and has_previous:
         motion[f, at.BLOCK_SQUARES] += step
         motion[f, at.BLOCK_TAXEL_SQUARES] += moved
         motion[f, at.BLOCK_STEPS] += 1.0
@@ -172,7 +181,6 @@ def append_taxels(
             f, at.BLOCK_STEPS
         ] = 0.0
         motion[f, at.BLOCK_START] = math.nan
-    return fx, fy, fz, normal
 
 
 @inlined

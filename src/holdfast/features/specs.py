@@ -67,10 +67,10 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             moves; `moment_change`, the change of the moment about the normal; `load_to_noise`, the
             load itself. Second differences of the taxels at a spacing of `seconds`: `second_all`,
             of all; `second_shared`, weighted by their share of the load, and `second_shear`, its
-            part across the normal; `second_own`, against their common motion; `second_top`, the largest of loaded taxels; the same after
-            `mean_`, averaged over the last samples. `ratio_gain`, the change of the ratio of
-            tangential to normal force; `shear_gain` and `normal_gain`, the signed change of either
-            force, as a share of the normal force.
+            part across the normal; `second_own`, against their common motion; `second_top`, the
+            largest of loaded taxels; the same after `mean_`, averaged over the last samples.
+            `ratio_gain`, the change of the ratio of tangential to normal force; `shear_gain` and
+            `normal_gain`, the signed change of either force, as a share of the normal force.
         window: number of samples in the window, for the last four kinds; 0 for the others.
         seconds: lag of a relative kind [s]; while a stretch is shorter, the longest that there
             is, from two samples on.
