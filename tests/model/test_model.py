@@ -30,6 +30,7 @@ from holdfast.contact import NO_CONTACT
 from holdfast.detector import detect
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import FeatureSpec, parse_features
+from holdfast.features.specs import SLIP_FEATURES
 from holdfast.model import ANY_FINGER, Debounce, FingerModel, Model, Training
 from holdfast.model.files import encode
 from holdfast.sensors import sensor as built_in_sensor
@@ -406,7 +407,7 @@ class TestTwin:
         assert list(hand_model.fingers) == [ANY_FINGER]
         part = hand_model.fingers[ANY_FINGER]
         assert part.features == parse_features("holdfast")
-        assert part.slip.features == parse_features("slip")
+        assert part.slip.features == SLIP_FEATURES
         assert len(part.slip.squares) == len(part.all_features) == 39
         assert part.sensor == "uskin-curved"
         assert hand_model.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}

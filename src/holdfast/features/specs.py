@@ -184,10 +184,10 @@ SLIP_FEATURES = (
         for seconds in SLIP_LAGS
     ),
 )
-"""Features of the slip rule of `builtin:twin`, named `slip`."""
+"""Features of the slip rule of `builtin:twin`."""
 
 
-NAMED_FEATURES = {"holdfast": HOLDFAST_FEATURES, "any": ANY_FEATURES, "slip": SLIP_FEATURES}
+NAMED_FEATURES = {"holdfast": HOLDFAST_FEATURES, "any": ANY_FEATURES}
 """Lists of features by name."""
 
 
