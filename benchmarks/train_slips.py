@@ -48,7 +48,10 @@ N_FOLDS = 5
 
 def main(options: argparse.Namespace) -> None:
     model, engine, out = Model.load(options.model), Engine(options.jobs), options.out
-    features = SLIP_FEATURES if options.own_features else None
+    features = None
+    if options.own_features:
+        left_out = tuple(options.without)
+        features = [x for x in SLIP_FEATURES if not any(text in str(x) for text in left_out)]
     recordings = [recording for folder in options.folders for recording in named(folder)]
     plan = plan_of(model, recordings, features or model.finger("*").features)
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
@@ -141,4 +144,6 @@ if __name__ == "__main__":
     parser.add_argument("-o", "--out", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--own-features", action="store_true", help="SLIP_FEATURES, with squares")
+    parser.add_argument("--without", nargs="*", default=[], metavar="TEXT",
+                        help="leave out those of them whose names contain it")  # fmt: skip
     main(parser.parse_args())
