@@ -3,11 +3,12 @@
 The models run in turns. The time is that from four arrays of counts to the estimates of the hand
 and of its fingers.
 
-    python benchmarks/rich_update.py [UPDATES]
+    python benchmarks/rich_update.py [UPDATES] [--model FILE ...]
 """
 
 import argparse
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -34,12 +35,12 @@ def paper_model() -> Model:
     return Model(fingers={"*": finger}, rate=RATE)
 
 
-def main(n_updates: int) -> None:
+def main(n_updates: int, files: Sequence[str]) -> None:
     tip = sensor("uskin-curved")
     rng = np.random.default_rng(0)
     readings = rng.integers(32000, 34000, size=(1024, len(FINGERS), 30, 3)).astype(np.uint16)
     samples = [dict(zip(FINGERS, hand, strict=True)) for hand in readings]
-    shipped = ("builtin:twin", "builtin:any")
+    shipped = ("builtin:twin", "builtin:any", *files)
     models = {"model of the paper": paper_model(), **{name: Model.load(name) for name in shipped}}
     detectors = {
         name: Detector(model, dict.fromkeys(FINGERS, tip)) for name, model in models.items()
@@ -63,4 +64,6 @@ if __name__ == "__main__":
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("updates", type=int, nargs="?", default=20_000)
-    main(parser.parse_args().updates)
+    parser.add_argument("--model", nargs="*", default=[], metavar="FILE", help="other models")
+    given = parser.parse_args()
+    main(given.updates, given.model)

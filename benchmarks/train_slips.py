@@ -1,27 +1,34 @@
 """Add a slip rule to a model: trained on true sliding, with the threshold from folds.
 
     holdfast simulate twin/ --seed 0
-    python benchmarks/train_slips.py builtin:twin twin/ -o src/holdfast/models/twin.json
+    holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
+    python benchmarks/train_slips.py builtin:twin twin/ slips/ --own-features \
+        -o src/holdfast/models/twin.json
     holdfast simulate hands/ --randomize --repeats 300 --seed 0
     python benchmarks/train_slips.py builtin:any hands/ -o src/holdfast/models/any.json
 
-The features and the classifier of stability stay. The rule is fitted without a fifth of the
-objects (or hands), five times; the threshold is the lowest with at most one false alarm a minute
-of all held time in the decisions about what was left out. Nothing here reads a real recording.
+The features and the classifier of stability stay. With --own-features, the rule gets the list
+`SLIP_FEATURES` and squares; else it has the features of that classifier. It is fitted without a
+fifth of the objects (or hands), five times; the threshold is the lowest with at most one false
+alarm a minute of all held time in the decisions about what was left out. Below the metrics of all
+recordings, by thresholds that were chosen without them, are those of each folder at the threshold
+of the model. Nothing here reads a real recording.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 
 from holdfast.classifiers.slip import SlipRule
-from holdfast.features import Tare
+from holdfast.features import FeatureSpec, Tare
+from holdfast.features.specs import SLIP_FEATURES
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
-from holdfast.metrics.slips import SlipMetrics
+from holdfast.metrics.slip_thresholds import Curve, total_curve
+from holdfast.metrics.slips import SlipMetrics, slip_metrics
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
@@ -29,7 +36,6 @@ from holdfast.training.dataset_scan import scan_dataset, show_nothing
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.setting import Setting
 from holdfast.training.slips import (
-    SlipSamples,
     choose_slip_threshold,
     gather_slip_samples,
     with_slip_threshold,
@@ -40,14 +46,19 @@ from holdfast.training.training_samples import SamplesPlan
 N_FOLDS = 5
 
 
-def main(name: str, folders: Sequence[Path], out: Path | None, n_jobs: int) -> None:
-    model, engine = Model.load(name), Engine(n_jobs)
-    recordings = [recording for folder in folders for recording in named(folder)]
-    plan = plan_of(model, recordings)
+def main(options: argparse.Namespace) -> None:
+    model, engine, out = Model.load(options.model), Engine(options.jobs), options.out
+    features = None
+    if options.own_features:
+        left_out = tuple(options.without)
+        features = [x for x in SLIP_FEATURES if not any(text in str(x) for text in left_out)]
+    recordings = [recording for folder in options.folders for recording in named(folder)]
+    plan = plan_of(model, recordings, features or model.finger("*").features)
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
     print(f"{len(recordings)} recordings, {samples.own.samples.stable.sum()} sliding samples")
     groups = [int(group) for group in plan.data_split.group_of]
-    models = [with_rule(model, samples, fold, max(groups) + 1) for fold in range(N_FOLDS)]
+    held = [range(fold, max(groups) + 1, N_FOLDS) for fold in range(N_FOLDS)]
+    models = [replaced(model, samples.fit(units, features)) for units in held]
     calls = (
         (models[group % N_FOLDS], recording)
         for group, recording in zip(groups, recordings, strict=True)
@@ -57,7 +68,9 @@ def main(name: str, folders: Sequence[Path], out: Path | None, n_jobs: int) -> N
     if chosen is None or chosen.place is None:
         raise SystemExit(chosen.reason if chosen else "no slips are known")
     print_metrics(chosen.metrics.pooled)
-    complete = with_slip_threshold(with_rule(model, samples, None, 0), chosen)
+    for folder in options.folders:
+        print_folder(folder.name, recordings, curves, chosen.place)
+    complete = with_slip_threshold(replaced(model, samples.fit([], features)), chosen)
     print(msgspec.json.encode(complete.finger("*").slip.thresholds).decode())
     if out is not None:
         save(complete, recordings, out)
@@ -68,22 +81,17 @@ def named(folder: Path) -> list[Recording]:
     return [replace(item, name=f"{folder.name}/{item.name}") for item in load_dataset(folder)]
 
 
-def plan_of(model: Model, recordings: Sequence[Recording]) -> SamplesPlan:
-    """Return what the samples depend on: the features and the tare of the model."""
-    part = model.finger("*")
-    relative = any(spec.seconds for spec in part.features)
+def plan_of(
+    model: Model, recordings: Sequence[Recording], features: Sequence[FeatureSpec]
+) -> SamplesPlan:
+    """Return what the samples depend on: the features, and the tare of the model."""
+    relative = all(spec.seconds for spec in features)
     setting = Setting(
-        features=part.features, window=model.window, tare=Tare.parse(model.tare), shared=True,
+        features=tuple(features), window=model.window, tare=Tare.parse(model.tare), shared=True,
         split="recording" if relative else "object", hold=model.debounce.hold,
     )  # fmt: skip
     scan = scan_dataset(recordings, model.rate, relative=relative)
     return SamplesPlan(scan, setting, split_data(scan.recordings, setting.split, 0))
-
-
-def with_rule(model: Model, samples: SlipSamples, fold: int | None, n_units: int) -> Model:
-    """Return the model with a rule fitted without a fold of units; with all of them for None."""
-    held = [] if fold is None else range(fold, n_units, N_FOLDS)
-    return replaced(model, samples.fit(held))
 
 
 def replaced(model: Model, rule: SlipRule | None) -> Model:
@@ -91,7 +99,23 @@ def replaced(model: Model, rule: SlipRule | None) -> Model:
     return msgspec.structs.replace(model, fingers={"*": part})
 
 
-def curves_of(model: Model, recording: Recording) -> object:
+def print_folder(
+    folder: str,
+    recordings: Sequence[Recording],
+    curves: Sequence[Mapping[str, Curve]],
+    place: int,
+) -> None:
+    """Print the metrics out of fold of the recordings of one folder, at the chosen threshold."""
+    own = [
+        total_curve(list(fingers.values()))
+        for item, fingers in zip(recordings, curves, strict=True)
+        if fingers and item.name.startswith(f"{folder}/")
+    ]
+    print(folder)
+    print_metrics(slip_metrics(total_curve(own)[place]))
+
+
+def curves_of(model: Model, recording: Recording) -> Mapping[str, Curve]:
     return score_recording(compute_decisions(model, recording), slip_curves=True).slip_curves
 
 
@@ -119,5 +143,7 @@ if __name__ == "__main__":
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("-o", "--out", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
-    given = parser.parse_args()
-    main(given.model, given.folders, given.out, given.jobs)
+    parser.add_argument("--own-features", action="store_true", help="SLIP_FEATURES, with squares")
+    parser.add_argument("--without", nargs="*", default=[], metavar="TEXT",
+                        help="leave out those of them whose names contain it")  # fmt: skip
+    main(parser.parse_args())

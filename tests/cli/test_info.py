@@ -246,6 +246,15 @@ def test_refusals(capsys, path):
     assert refusal(capsys, path) == f"{path} is damaged: its content does not match its checksum"
 
 
+def test_features_of_the_slip_rule_are_shown(capsys):
+    assert main(["info", "builtin:twin"]) == 0
+    out = re.sub(r"\s+", " ", capsys.readouterr().out)
+    assert "slips by 39 features, of them new relative(second_all[0.0067 s])," in out
+    slip = info_json(capsys, "builtin:twin")["fingers"]["*"]["slip"]
+    assert len(slip["features"]) == 39
+    assert info_json(capsys, "builtin:any")["fingers"]["*"]["slip"]["features"] is None
+
+
 def test_a_model_without_a_figure_is_refused(capsys, path):
     assert refusal(capsys, path, "--model", "builtin:twin") == (
         "--model is for the figure; --plot FILE expected beside it"

@@ -3,10 +3,12 @@
 import itertools
 
 import numpy as np
+from msgspec.structs import replace
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.classifiers.slip import SlipRule
 from holdfast.features import FeatureSpec, parse_features
+from holdfast.features.specs import MEAN_SECOND_KINDS, RATIO_KINDS, SECOND_KINDS
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
@@ -51,20 +53,49 @@ def finger_model(features=None, seed=0, **options):
     return FingerModel(features=features, **options)
 
 
+SLIP_OWN = (
+    FeatureSpec("change", 12, "log", "finger", 0.5),
+    FeatureSpec("F_x"),
+    FeatureSpec("sigma_xyz", 4, "log", "hand", 0.5),
+)
+"""Features of a slip rule; the second is one of the classifier of stability, too."""
+TAXELS = tuple(
+    FeatureSpec(kind, transform="relative", seconds=0.02)
+    for kind in (*SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
+)
+"""Features of a slip rule that need the taxels."""
+
+
 def slip_rule(n_features, seed=0, smoothing=0.02, hold=0.05):
     return SlipRule(classifier(n_features, 90 + seed), smoothing, hold)
 
 
+def squared_rule(features, seed=0, scale=20.0):
+    """Return a slip rule with features of its own and squares."""
+    rng = np.random.default_rng([seed, 7])
+    linear = classifier(len(features), 90 + seed)
+    linear = replace(linear, scale=tuple(scale / value for value in linear.scale), slope=0.4)
+    squares = tuple((0.2 * rng.normal(size=len(features))).tolist())
+    return SlipRule(linear, 0.02, 0.05, features=tuple(features), squares=squares)
+
+
 def model(
-    fingers=("thumb", "index"), features=None, which=None, threshold=None, slips=(), **options
+    fingers=("thumb", "index"),
+    features=None,
+    which=None,
+    threshold=None,
+    slips=(),
+    own=(),
+    **options,
 ):
-    """Return a model; the fingers in `slips` have a slip rule."""
+    """Return a model; the fingers in `slips` have a slip rule, with own features if given."""
     which = sensor() if which is None else which
     n_features = 5 if features is None else len(features)
+    rule = (lambda _, seed: squared_rule(own, seed)) if own else slip_rule
     parts = {
         name: finger_model(
             features, seed, sensor=which.name, contact_threshold=threshold,
-            slip=slip_rule(n_features, seed) if name in slips else None,
+            slip=rule(n_features, seed) if name in slips else None,
         )
         for seed, name in enumerate(fingers)
     }  # fmt: skip

@@ -76,7 +76,8 @@ class Finger:
         self.above = "under"
         self.sensor, self.part, self.window, self.period = sensor, part, window, period
         self.kind, self.seconds = tare.kind, tare.seconds
-        self.longest = max([window, *(spec.window for spec in part.features)])
+        slip = part.slip.features if part.slip and part.slip.features else ()
+        self.longest = max([window, *(spec.window for spec in (*part.features, *slip))])
         self.samples = []  # every finite sample: (time, readings)
         self.stretch = []  # forces since the last interruption
         self.last = None
@@ -306,14 +307,14 @@ class Finger:
         elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
             state = "UNSTABLE"
         self.debounce(state, time, debounce.min_duration)
-        self.decide_slip(features, time)
+        self.decide_slip(features, fingers, time)
         if state == "NO_CONTACT":
             self.rest += min(1, self.period / 3) * (np.array(self.force) - self.rest)
 
     def end_slip(self, probability):
         self.slip, self.odds, self.slid, self.slides = probability, None, -math.inf, False
 
-    def decide_slip(self, features, time):
+    def decide_slip(self, features, fingers, time):
         """Smoothed log odds; it slides from the threshold on, and for the hold time after it."""
         rule = self.part.slip
         if rule is None:
@@ -321,12 +322,16 @@ class Finger:
         if self.empty:
             self.end_slip(0.0)
             return
+        if rule.features:
+            features = [self.feature(spec, fingers) for spec in rule.features]
         linear = rule.classifier
         z = linear.intercept
-        for value, c, mean, scale in zip(
-            features, linear.coefficients, linear.mean, linear.scale, strict=True
+        squares = rule.squares or [0.0] * len(features)
+        for value, c, mean, scale, square in zip(
+            features, linear.coefficients, linear.mean, linear.scale, squares, strict=True
         ):
-            z += c * (value - mean) / scale
+            u = (value - mean) / scale
+            z += c * u + square * min(abs(u), 5.0) ** 2
         odds = linear.slope * z + linear.offset
         gain = 1 - math.exp(-self.period / rule.smoothing) if rule.smoothing else 1
         self.odds = odds if self.odds is None else self.odds + gain * (odds - self.odds)

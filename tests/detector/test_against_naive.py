@@ -7,7 +7,7 @@ from holdfast.features import Tare
 from holdfast.model import ANY_FINGER, Debounce, Model
 
 from . import naive
-from .build import RATE, RICH, finger_model, model, sensor, tactile
+from .build import RATE, RICH, SLIP_OWN, finger_model, model, sensor, tactile
 
 pytestmark = pytest.mark.slow
 
@@ -65,6 +65,12 @@ MODELS = {
     "held": {"tare": "0.1", "debounce": Debounce(0.02, 0.05, 0.12), "threshold": 30.0},
     "long window": {"tare": "0.3", "window": 20},
     "slips": {"tare": "0.1", "threshold": 30.0, "slips": ("thumb", "index", "ring")},
+    "slips by features of their own": {
+        "tare": "0.1",
+        "threshold": 30.0,
+        "slips": ("thumb", "ring"),
+        "own": SLIP_OWN,
+    },
     "slips of some": {"tare": "first", "features": RICH, "slips": ("index",)},
 }
 

@@ -18,7 +18,18 @@ from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 
-from .build import RATE, RICH, broken, finger_model, model, recording, sensor, tactile
+from .build import (
+    RATE,
+    RICH,
+    SLIP_OWN,
+    TAXELS,
+    broken,
+    finger_model,
+    model,
+    recording,
+    sensor,
+    tactile,
+)
 
 STATES = tuple(ContactState)
 
@@ -198,6 +209,29 @@ class TestSlip:
         assert_same(found, list(feed(Detector(hand_model), made)))
         for name, trace in found.fingers.items():
             assert (trace.slip_probability is None) == (name not in slips)
+
+    @pytest.mark.parametrize("own", [SLIP_OWN, TAXELS], ids=["force", "taxels"])
+    @pytest.mark.parametrize("clock", CLOCKS)
+    def test_detect_equals_update_with_features_of_the_rule(self, clock, own):
+        made = recording(**CLOCKS[clock])
+        hand_model = model(features=RICH, threshold=20.0, slips=("index",), own=own)
+        found = detect(hand_model, made)
+        assert_same(found, list(feed(Detector(hand_model), made)))
+        probability = found.fingers["index"].slip_probability
+        assert clock != "one clock" or np.nanstd(probability) > 0.01
+
+    def test_features_of_the_rule_do_not_change_the_rest(self):
+        made = recording(**CLOCKS["one clock"])
+        with_rule = model(features=RICH, threshold=20.0, slips=("index",), own=TAXELS)
+        plain = model(features=RICH, threshold=20.0)
+        one, two = detect(with_rule, made), detect(plain, made)
+        for name, trace in two.fingers.items():
+            found = one.fingers[name].stable_probability
+            assert np.isfinite(found).sum() > 30
+            assert np.array_equal(found, trace.stable_probability, equal_nan=True)
+        first, second = with_rule.predict_proba(made), plain.predict_proba(made)
+        for name, probability in second.items():
+            assert np.array_equal(first[name], probability, equal_nan=True)
 
     @pytest.mark.parametrize("clock", ["one clock", "two rates", "since 1970", "broken"])
     def test_the_decision_is_that_of_raised_at(self, clock):

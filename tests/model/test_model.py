@@ -1,4 +1,5 @@
 import json
+import math
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -9,13 +10,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from detector.build import RATE, RICH, classifier, finger_model, model, recording, sensor, tactile
+from detector.build import (
+    RATE,
+    RICH,
+    SLIP_OWN,
+    TAXELS,
+    classifier,
+    finger_model,
+    model,
+    recording,
+    sensor,
+    slip_rule,
+    squared_rule,
+    tactile,
+)
 from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers.slip import add_squares
 from holdfast.contact import NO_CONTACT
 from holdfast.detector import detect
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import FeatureSpec, parse_features
+from holdfast.features.specs import SLIP_FEATURES
 from holdfast.model import ANY_FINGER, Debounce, FingerModel, Model, Training
+from holdfast.model.files import encode
 from holdfast.sensors import sensor as built_in_sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import evaluate
@@ -33,13 +50,18 @@ FULL = model(
 )
 
 
+WITH_SQUARES = model(features=RICH, slips=("thumb",), own=TAXELS)
+
+
 def saved(hand_model, path):
     hand_model.save(path)
     return path
 
 
 class TestSaveAndLoad:
-    @pytest.mark.parametrize("hand_model", [FULL, Model.load("builtin:noise-floor"), model()])
+    @pytest.mark.parametrize(
+        "hand_model", [FULL, Model.load("builtin:noise-floor"), model(), WITH_SQUARES]
+    )
     def test_it_is_the_same(self, hand_model, tmp_path):
         assert Model.load(saved(hand_model, tmp_path / "m.json")) == hand_model
 
@@ -51,6 +73,11 @@ class TestSaveAndLoad:
         )
         hand_model = Model(fingers={ANY_FINGER: part}, rate=1 / 3)
         assert msgspec.json.decode(msgspec.json.encode(hand_model), type=Model) == hand_model
+
+    def test_a_slip_rule_without_features_has_the_bytes_of_older_files(self):
+        document = json.loads(encode(model(slips=("thumb",))))
+        fields = {"classifier", "smoothing", "hold", "thresholds"}
+        assert document["fingers"]["thumb"]["slip"].keys() == fields
 
     def test_numbers_of_numpy(self, tmp_path):
         rule = LinearClassifier((np.float64(1.5),), (2.0,), (3.0,), np.float64(0.25))
@@ -307,6 +334,51 @@ class TestPredictProba:
         assert list(model().predict_proba(recording(index=tactile()))) == ["index"]
 
 
+class TestSlipRule:
+    """Slip rules with features of their own, and squares."""
+
+    def test_all_features_are_those_of_both_classifiers_once(self):
+        part = model(features=RICH, slips=("thumb",), own=SLIP_OWN).finger("thumb")
+        assert part.all_features == (*RICH, SLIP_OWN[0], SLIP_OWN[2])
+        assert model(features=RICH, slips=("thumb",)).finger("thumb").all_features == RICH
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"features": SLIP_OWN[:2]}, "2 features given, the slip rule expects 3"),
+            ({"squares": (1.0,)}, "1 squares given, the slip rule expects 3"),
+            ({"squares": (1.0, 2.0, math.nan)}, "a number of the squares is not finite"),
+            ({"features": (SLIP_OWN[0],) * 3}, "a feature of the slip rule is given twice"),
+            ({"features": msgspec.UNSET}, "squares given without features; a slip rule with both"),
+        ],
+    )
+    def test_fields_that_contradict_each_other_are_refused(self, changes, message):
+        with pytest.raises(ModelError, match=message):
+            msgspec.structs.replace(squared_rule(SLIP_OWN), **changes)
+
+    def test_a_rule_for_other_features_is_refused(self):
+        with pytest.raises(ModelError, match="5 features given, the slip rule expects 3"):
+            finger_model(slip=slip_rule(3))
+
+    def test_long_windows_of_its_features_are_refused(self):
+        rule = squared_rule((FeatureSpec("change", 1 << 17),))
+        with pytest.raises(ModelError, match="at most 65536 samples in a window expected"):
+            finger_model(slip=rule)
+
+    def test_squares_by_hand(self):
+        rule = squared_rule(SLIP_OWN)
+        linear, phi = rule.classifier, np.array([3.0, -900.0, 1.0])
+        u = (phi - np.array(linear.mean)) / np.array(linear.scale)
+        assert abs(u[1]) > 5
+        expected = linear.slope * np.array(rule.squares) @ np.minimum(np.abs(u), 5.0) ** 2
+        assert add_squares(0.5, phi, rule.square_weights()) == pytest.approx(0.5 + expected)
+
+    def test_relative_features_of_a_rule_need_a_rate_for_which_they_are_made(self):
+        part = finger_model(slip=squared_rule(TAXELS))
+        with pytest.raises(ModelError, match="10 Hz given, the model expects 30 to 500 Hz"):
+            Model(fingers={ANY_FINGER: part}).plan({"thumb": sensor()}, 10.0)
+
+
 def test_the_noise_floor():
     hand_model = Model.load("builtin:noise-floor")
     part = hand_model.fingers[ANY_FINGER]
@@ -325,7 +397,7 @@ class TestTwin:
         assert (
             len(hand_model.training.recordings)
             == len(set(hand_model.training.recordings.values()))
-            == 121  # 60 of the stability, 61 of the slip rule
+            == 145  # 60 of the stability, 85 of the slip rule
         )
         assert all(len(digest) == 32 for digest in hand_model.training.recordings.values())
         assert hand_model.training.figures["accuracy"] > 90
@@ -335,6 +407,8 @@ class TestTwin:
         assert list(hand_model.fingers) == [ANY_FINGER]
         part = hand_model.fingers[ANY_FINGER]
         assert part.features == parse_features("holdfast")
+        assert part.slip.features == SLIP_FEATURES
+        assert len(part.slip.squares) == len(part.all_features) == 39
         assert part.sensor == "uskin-curved"
         assert hand_model.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}
         assert hand_model.rate == pytest.approx(150.0, rel=1e-3)

@@ -6,6 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from holdfast.classifiers.fitting import Samples
+from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.classifiers.slip import add_squares
 from holdfast.contact import ContactState
 from holdfast.errors import ModelError, TrainingError
 from holdfast.features import parse_features
@@ -21,12 +24,14 @@ from holdfast.training.slips import (
     SLIP_FALSE_ALARMS,
     SLIP_RULE_HOLD,
     SLIP_SMOOTHING,
+    SlipSamples,
     choose_slip_threshold,
     tune_slips,
     with_slip_threshold,
 )
+from holdfast.training.training_samples import FingerSamples
 
-from .build import sliding_recording, tiny_recording
+from .build import TINY, sliding_recording, tiny_recording
 
 pytestmark = pytest.mark.slow
 
@@ -53,6 +58,14 @@ def model(trained):
 @pytest.fixture(scope="module")
 def others():
     return [sliding_recording(seed) for seed in range(20, 26)]
+
+
+def finger_samples(features, slides):
+    """Samples of a finger, all of one group and one unit."""
+    n = len(slides)
+    zeros = np.zeros(n, dtype=np.int64)
+    samples = Samples(features, slides, zeros)
+    return FingerSamples(TINY, samples, zeros, zeros, np.arange(n) / 100, np.zeros((1, 3)), n)
 
 
 def rule_of(model):
@@ -121,6 +134,29 @@ class TestTraining:
         assert rules["thumb"].classifier.coefficients != rules["index"].classifier.coefficients
         assert rules["thumb"].classifier.threshold == rules["index"].classifier.threshold
         assert rules["thumb"].thresholds == rules["index"].thresholds
+
+    def test_a_rule_with_squares_is_the_logistic_regression_of_features_and_squares(self):
+        rng = np.random.default_rng(0)
+        features = 3.0 + 2.0 * rng.normal(size=(4000, 2))
+        features[0, 1] = 40.0  # more than five standard deviations
+        slides = rng.random(4000) < 1 / (1 + np.exp(3 - np.abs(features[:, 0] - 3.0)))
+        own = finger_samples(features, slides)
+        rule = SlipSamples(own, int(np.count_nonzero(~slides))).fit((), FEATURES[:2])
+        deviation = (features - features.mean(axis=0)) / features.std(axis=0)
+        squares = np.minimum(np.abs(deviation), 5.0) ** 2
+        rows = Samples(np.hstack([deviation, squares]), slides, np.zeros(4000, dtype=np.int64))
+        expected = LogisticRegression().fit(rows, {"C": 1.0, "class_weight": None}, 0)
+        weights, table = rule.classifier.weights(), rule.square_weights()
+        found = [add_squares(weights[0] + weights[1:] @ row, row, table) for row in features]
+        expected_odds = expected.slope * expected.decision(rows.features) + expected.offset
+        np.testing.assert_allclose(found, expected_odds, atol=1e-9)
+        assert rule.squares[0] > 0.3  # it slides on either side of the mean
+        assert rule.features == FEATURES[:2]
+        assert rule.classifier.threshold == 0.5
+
+    def test_without_a_list_the_rule_has_the_features_of_the_classifier(self, model):
+        assert rule_of(model).features is msgspec.UNSET
+        assert rule_of(model).squares is msgspec.UNSET
 
     def test_slips_may_come_from_labels(self, recordings):
         labelled = [replace(made, truth=None) for made in recordings]

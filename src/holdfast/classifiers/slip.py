@@ -9,10 +9,14 @@ import numpy as np
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.compiled import compiled_step
 from holdfast.errors import ModelError
+from holdfast.features import FeatureSpec
 from holdfast.sensors.types import Array, Flags
 
 MAX_SLIP_DURATION = 10.0
 """Maximum smoothing and hold time of a slip rule [s]."""
+MAX_DEVIATION = 5.0
+"""Squares are of values of at most this many standard deviations: a larger one is no stronger sign
+of a slip, nor of a glitch."""
 
 
 class SlipThresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -37,11 +41,14 @@ class SlipThresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Decision whether a finger slides, from the features of its classifier of stability.
+    """Decision whether a finger slides, from features of its own or of the classifier of stability.
 
     The log odds z(k) of the classifier are smoothed over time, with the period T of the samples:
 
         s(k) = s(k-1) + (1 - exp(-T / smoothing)) (z(k) - s(k-1))
+
+    With squares q_j, slope sum_j q_j min(|u_j|, 5)^2 is added to z, of the standardised features
+    u_j = (phi_j - mean_j) / scale_j: a moderate jolt of the taxels is a slip, a huge one a glitch.
 
     The probability of a slip is 1 / (1 + exp(-s)). The finger slides from the threshold of the
     classifier on, and for the hold time after that. Compare the probability with the threshold
@@ -52,15 +59,19 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         smoothing: time constant [s]; 0 for none.
         hold: time for which a slip is still reported [s].
         thresholds: how the threshold was chosen; None if it was given.
+        features: input of the classifier; those of the classifier of stability if there are none.
+        squares: coefficients of the squares of the standardised features, if there are any.
 
     Raises:
-        ModelError: a duration is out of range.
+        ModelError: a duration is out of range, or the fields contradict each other.
     """
 
     classifier: LinearClassifier
     smoothing: float = 0.0
     hold: float = 0.0
     thresholds: SlipThresholds | None = None
+    features: tuple[FeatureSpec, ...] | msgspec.UnsetType = msgspec.UNSET
+    squares: tuple[float, ...] | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         for name, seconds in (("smoothing", self.smoothing), ("hold", self.hold)):
@@ -68,10 +79,50 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ModelError(
                     f"a {name} of slips from 0 to {MAX_SLIP_DURATION:g} s expected, {seconds} given"
                 )
+        expected = self.classifier.n_features
+        for name in ("features", "squares"):
+            given = getattr(self, name)
+            if given is not msgspec.UNSET and len(given) != expected:
+                raise ModelError(f"{len(given)} {name} given, the slip rule expects {expected}")
+        if self.features is not msgspec.UNSET and len(set(self.features)) < expected:
+            raise ModelError("a feature of the slip rule is given twice")
+        if self.squares is not msgspec.UNSET and self.features is msgspec.UNSET:
+            raise ModelError("squares given without features; a slip rule with both expected")
+        if not np.isfinite(self.square_weights()).all():
+            raise ModelError("a number of the squares is not finite")
+
+    def used_features(self, others: tuple[FeatureSpec, ...]) -> tuple[FeatureSpec, ...]:
+        """Return the features of the rule, which are the others without a list of its own."""
+        return others if self.features is msgspec.UNSET else self.features
+
+    def square_weights(self) -> Array:
+        """Return (3, n_features) mean, 1 / scale and weight of the squares; zeros without them."""
+        linear = self.classifier
+        if self.squares is msgspec.UNSET:
+            return np.zeros((3, linear.n_features))
+        weights = linear.slope * np.array(self.squares)
+        return np.array([linear.mean, 1.0 / np.array(linear.scale), weights])
 
     def gain(self, rate: float) -> float:
         """Return the share of a new sample in the smoothed log odds at a rate [Hz]."""
         return 1.0 if self.smoothing == 0 else -math.expm1(-1.0 / (rate * self.smoothing))
+
+
+@compiled_step
+def add_squares(value: float, features: Array, squares: Array) -> float:
+    """Return log odds with the squares of standardised features.
+
+    Args:
+        value: log odds without them.
+        features: (n_features,) or more.
+        squares: (3, n_features) as of `SlipRule.square_weights`.
+    """
+    # z + sum_j q_j min(|u_j|, 5)^2, u_j = (phi_j - mean_j) / scale_j.
+    for j in range(squares.shape[1]):
+        deviation = abs((features[j] - squares[0, j]) * squares[1, j])
+        deviation = min(deviation, MAX_DEVIATION)
+        value += squares[2, j] * (deviation * deviation)
+    return value
 
 
 @compiled_step

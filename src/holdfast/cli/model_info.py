@@ -78,7 +78,9 @@ def _slip(rule: "SlipRule") -> dict[str, Any]:
     if rule.thresholds is not None:
         chosen = msgspec.to_builtins(rule.thresholds)
         chosen["recordings"] = list(rule.thresholds.recordings)
+    features = () if rule.features is msgspec.UNSET else rule.features
     return {
+        "features": [str(spec) for spec in features] or None,
         "threshold": rule.classifier.threshold,
         "smoothing": rule.smoothing,
         "hold": rule.hold,
@@ -101,7 +103,7 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield finger, f"sensor {sensor}; {part['classifier']}"
         yield "", f"features {_few(part['features'])}"
         yield "", f"STABLE from a probability of {part['threshold']:.3g} on; {_contact(part)}"
-        yield from (("", line) for line in _slip_lines(part["slip"]))
+        yield from (("", line) for line in _slip_lines(part))
     training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
     tuned = list(_tuned_lines(document))
@@ -120,8 +122,9 @@ def _contact(part: dict[str, Any]) -> str:
     return "no threshold of contact"
 
 
-def _slip_lines(slip: dict[str, Any] | None) -> Iterator[str]:
+def _slip_lines(part: dict[str, Any]) -> Iterator[str]:
     """Yield the slip rule of a finger, and on what its threshold was chosen."""
+    slip = part["slip"]
     if slip is None:
         yield "no slip rule"
         return
@@ -129,6 +132,9 @@ def _slip_lines(slip: dict[str, Any] | None) -> Iterator[str]:
         f"slides from a probability of {slip['threshold']:.3g} on; smoothing "
         f"{slip['smoothing']:g} s, hold {slip['hold']:g} s"
     )
+    if slip["features"] is not None:
+        added = [name for name in slip["features"] if name not in part["features"]]
+        yield f"slips by {len(slip['features'])} features, of them new {_few(added)}"
     chosen = slip["chosen_on"]
     if chosen is None:
         yield "threshold of slips given, not chosen on recordings"

@@ -74,6 +74,7 @@ class DecisionRule(NamedTuple):
     causes: Floats3  # (n_fingers, n_causes, n_features + 1); n_causes is 0 without them
     slips: Floats2  # (n_fingers, n_features + 1)
     n_slip_weights: Integers1  # (n_fingers,)
+    squares: Floats3  # (n_fingers, 3, n_features) of `SlipRule.square_weights`, or n_features is 0
     slip_limits: Floats2  # (n_fingers, SLIP_LIMITS_WIDTH)
     limits: Floats2  # (n_fingers, LIMITS_WIDTH)
     hysteresis: float

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers.cause import ALL_CAUSES, add_scores
 from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
-from holdfast.classifiers.slip import probability_of, smooth
+from holdfast.classifiers.slip import add_squares, probability_of, smooth
 from holdfast.compiled import compiled_step, inlined
 from holdfast.contact import (
     NO_CONTACT,
@@ -124,15 +124,16 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         )
         for part in parts
     ]
-    slips, slip_limits = _slip_rules(parts, width, plan.rate)
+    slips, squares = _slip_weights(parts)
     any_finger = ANY_FINGER in model.fingers
     return DecisionRule(
         weights=weights,
         n_weights=np.array([_n_weights(part) for part in parts]),
         causes=_cause_weights(parts, width),
         slips=slips,
-        n_slip_weights=np.array([len(part.features) + 1 for part in parts]),
-        slip_limits=slip_limits,
+        n_slip_weights=np.array([len(part.all_features) + 1 for part in parts]),
+        squares=squares,
+        slip_limits=_slip_limits(parts, plan.rate),
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
         min_duration=float(model.debounce.min_duration),
@@ -161,16 +162,30 @@ def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
     return weights
 
 
-def _slip_rules(parts: Sequence[FingerModel], width: int, rate: float) -> tuple[Array, Array]:
-    """Return the weights and the limits of the slip rules; NaN without a rule."""
-    weights = np.zeros((len(parts), width))
+def _slip_weights(parts: Sequence[FingerModel]) -> tuple[Array, Array]:
+    """Return the weights of the slip rules, and of their squares, at the places of all features."""
+    width = max(len(part.all_features) for part in parts)
+    has_squares = any(part.slip is not None and part.slip.squares for part in parts)
+    weights = np.zeros((len(parts), width + 1))
+    squares = np.zeros((len(parts), 3, width if has_squares else 0))
+    for row, square, part in zip(weights, squares, parts, strict=True):
+        if part.slip is not None:
+            features = part.slip.used_features(part.features)
+            places = np.array([part.all_features.index(spec) for spec in features])
+            np.add.at(row, np.append(0, places + 1), part.slip.classifier.weights())
+            if has_squares:
+                square[:, places] = part.slip.square_weights()
+    return weights, squares
+
+
+def _slip_limits(parts: Sequence[FingerModel], rate: float) -> Array:
+    """Return the limits of the slip rules; NaN without a rule."""
     limits = np.full((len(parts), rule_at.SLIP_LIMITS_WIDTH), np.nan)
-    for row, limit, part in zip(weights, limits, parts, strict=True):
+    for limit, part in zip(limits, parts, strict=True):
         if part.slip is not None:
             rule = part.slip
-            row[: rule.classifier.n_features + 1] = rule.classifier.weights()
             limit[:] = rule.classifier.threshold, rule.gain(rate), rule.hold
-    return weights, limits
+    return limits
 
 
 class ProbabilityFeeder:
@@ -360,8 +375,10 @@ def _decide(
     if unloaded:
         end_slip(codes, decided, 0.0)
     elif decided[rule_at.SLIP_PROBABILITY] != rule_at.NO_SLIP_RULE:
-        # z = w . Phi + w_0, by the weights of the slip rule.
+        # z = w . Phi + w_0, by the weights of the slip rule, and its squares.
         value = log_odds(output.features[f], rule.slips[f, : rule.n_slip_weights[f]])
+        if rule.squares.shape[2] > 0:
+            value = add_squares(value, output.features[f], rule.squares[f])
         decide_slip(codes, decided, rule.slip_limits[f], value, time, period)
     debounce(codes, decided, state, rule.min_duration, time, period)
 

@@ -114,8 +114,9 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     _, _, _,  # F_tip
     TRACK_PRESSURE, _, _,  # centre of pressure, in radii of the patch, in three axes
     TRACK_MOMENT,  # moment about the normal, divided by the radius
+    TRACK_RATIO,  # of tangential to normal force, beyond the reference
     TRACK_WIDTH,
-) = range(8)  # fmt: skip
+) = range(9)  # fmt: skip
 
 # Memory.motion.
 (
@@ -134,8 +135,23 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     BLOCK_START,  # time [s]; NaN before the first sample
     REFERENCE, _, _,  # F_tip at the least normal force, in three components
     MOVED_AT,  # when the force last moved by much more than its noise [s]
+    PRESSURE,  # sum over the taxels of |h . n|, beyond the reference
+    PRESSURE_SQUARES,  # sum of their squares
+    NORMAL_FLOOR,  # |normal force| beyond the reference and ten times its noise
+    TANGENT, _, _,  # direction of the tangential force, in three components
     MOTION_WIDTH,
-) = range(18)  # fmt: skip
+) = range(24)  # fmt: skip
+
+# Layout.families: which relative kinds a lag needs, of those lists of holdfast.features.specs.
+(
+    LAGS,  # LAG_KINDS
+    SECONDS,  # SECOND_KINDS, or their averages
+    MEAN_SECONDS,  # MEAN_SECOND_KINDS
+    RATIOS,  # RATIO_KINDS
+    FAMILIES_WIDTH,
+) = range(5)
+
+N_SECONDS = 5  # sums of second differences: of all taxels, shared, shear, own and top
 
 # Output.status.
 (
@@ -161,6 +177,9 @@ class Layout(NamedTuple):
     tare_seconds: float
     period: float
     lags: Integers1  # (n_lags,) of relative features [samples], ascending; empty without any
+    average_gain: float  # share of a new sample in averages of second differences
+    has_centres: bool  # whether a lag needs the centre of pressure and the moment
+    families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0
     places: Floats2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Floats2  # (n_fingers, 3)
     n_levels: int  # sizes of blocks of pairs, see holdfast.features.haar
@@ -181,6 +200,8 @@ class Memory(NamedTuple):
     track: Floats3  # (n_fingers, TRACK_WIDTH, longest lag + 1), a ring
     motion: Floats2  # (n_fingers, MOTION_WIDTH)
     relative: Floats3  # (n_fingers, n_kinds, n_lags) relative features of the last sample
+    pressed: Floats1  # (n_taxels,) |h . n| of the last sample
+    averages: Floats3  # (n_fingers, N_SECONDS, n_lags) smoothed squares of second differences
     blocks: Floats3  # (n_fingers, longest, n_channels * n_levels * 3) sums of blocks, a ring
 
 

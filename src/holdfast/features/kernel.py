@@ -28,7 +28,7 @@ from holdfast.features.faults import (
 )
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
-from holdfast.features.motion import update_motion
+from holdfast.features.motion import append_taxels, update_motion
 from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
 from holdfast.sensors.types import Array, Flags, Integers
@@ -175,11 +175,14 @@ def _process_force(
     counts, levels, windows = memory.counts, memory.levels, layout.windows
     first, last = layout.offsets[f], layout.offsets[f + 1]
     # F_tip = sum_i R_i (f_i - b_i).
-    x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
+    if len(layout.lags):
+        x, y, z, normal = append_taxels(layout, memory, readings, f)
+    else:
+        x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
     _append(memory.history, counts, values, f, x, y, z)
     _append_blocks(memory.history, memory.blocks, counts, f, layout.n_levels)
     if len(layout.lags):
-        update_motion(layout, memory, readings, f, levels[f, at.LAST_TIME])
+        update_motion(layout, memory, f, levels[f, at.LAST_TIME])
     if is_stuck(counts, f, layout.period):
         faults |= STUCK
     if faults & SERIOUS:

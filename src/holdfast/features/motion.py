@@ -1,4 +1,4 @@
-"""Relative features: how force and taxels move, as a share of the load. Compiled, no objects.
+"""Relative features: how force and taxels move, relative to load or noise. Compiled, no objects.
 
 They look back by a lag in seconds, and have no unit: counts, newtons, gains and grips cancel, so
 that they carry over from one hand to another. `docs/training.md` has the equations.
@@ -18,6 +18,9 @@ from holdfast.sensors.types import Array, Integers
 (
     FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL,
     PRESSURE_SHIFT, MOMENT_CHANGE, LOAD_TO_NOISE,
+    SECOND, _, _, _, _,  # of all taxels, shared, shear, own and top
+    MEAN_SECOND, _, _, _, _,  # in the same order
+    SHEAR_GAIN, NORMAL_GAIN, RATIO_GAIN,
 ) = range(len(RELATIVE_KINDS))  # fmt: skip
 
 LOAD_DECAY_SECONDS = 5.0
@@ -39,56 +42,93 @@ NOISE_SQUARES = 4.0
 as much again, because the noise is the least that was measured."""
 LEAST_CHANGE = 0.005
 """A change by less than this share of the load counts as none."""
+SECOND_NOISE = 6.0
+"""Squared noise of a second difference, of three samples: 1 + 4 + 1 times that of a sample."""
+SECOND_FLOOR = SECOND_NOISE / 16.0
+"""Squared second difference that counts as none, in squared noise: a quarter of its noise."""
+AVERAGE_SECONDS = 0.02
+"""Time constant of averages of squared second differences [s]."""
+NORMAL_NOISE_WEIGHT = 10.0
+"""Noise in the denominator of the ratio of forces: a light touch has no large ratio."""
 
 
 @inlined
-def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time: float) -> None:
-    """Take a sample of a finger, and compute its relative features.
+def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
+    """Compute the relative features of a finger after `append_taxels`.
 
-    The sample is already counted in N_STRETCH and has a force in the history.
+    The sample is already counted in N_STRETCH.
 
     Args:
         layout: of the stream.
         memory: is changed; `memory.relative` holds the features.
-        readings: (n_taxels, 3) of all fingers.
         f: the finger.
         time: of the sample [s].
     """
     n, length = memory.counts[f, at.N_STRETCH], len(memory.taxel_forces)
     now = (n - 1) % length
-    _append_sample(layout, memory, readings, f, now, n > 1)
     _update_noise(layout, memory.motion, memory.counts, f, time)
     _update_load(layout, memory, f, now)
     _update_movement(layout, memory, f, now, time)
+    _update_ratio(layout, memory, f, now)
     if n < 2:
-        for kind in range(memory.relative.shape[1]):
-            for lag in range(len(layout.lags)):
-                memory.relative[f, kind, lag] = math.nan
+        _forget_features(memory, f)
         return
     for lag in range(len(layout.lags)):
-        back = min(layout.lags[lag], n - 1)
-        _fill_lag(layout, memory, f, now, (n - 1 - back) % length, lag)
+        families = layout.families[lag]
+        then = _place(now, min(layout.lags[lag], n - 1), length)
+        if families[at.LAGS]:
+            _fill_lag(layout, memory, f, now, then, lag)
+        if families[at.SECONDS]:
+            _fill_seconds(layout, memory, f, now, min(layout.lags[lag], (n - 1) // 2), lag)
+        if families[at.RATIOS]:
+            _fill_ratios(layout, memory, f, now, then, lag)
+
+
+@compiled_step
+def _place(now: int, back: int, length: int) -> int:
+    """Return the place in a ring of the sample before that of `now` by `back`."""
+    place = now - back
+    return place if place >= 0 else place + length
 
 
 @inlined
-def _append_sample(
-    layout: Layout, memory: Memory, readings: Array, f: int, now: int, has_previous: bool
-) -> None:
-    """Append taxel forces, centre of pressure and moment of a sample to the history."""
+def _forget_features(memory: Memory, f: int) -> None:
+    """Set the relative features of a finger, and their averages, to NaN."""
+    for lag in range(memory.relative.shape[2]):
+        for kind in range(memory.relative.shape[1]):
+            memory.relative[f, kind, lag] = math.nan
+        for place in range(at.N_SECONDS):
+            memory.averages[f, place, lag] = math.nan
+
+
+@inlined
+def append_taxels(
+    layout: Layout, memory: Memory, readings: Array, f: int
+) -> tuple[float, float, float, float]:
+    """Append taxel forces, centre of pressure and moment of a sample to the history.
+
+    The sample is not counted in N_STRETCH yet.
+
+    Returns:
+        F_tip, with the bits of `sum_taxels`, and the sum of the normal readings.
+    """
     first, last = layout.offsets[f], layout.offsets[f + 1]
     forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
-    length = len(forces)
-    before = (now - 1) % length
+    n_before, length = memory.counts[f, at.N_STRETCH], len(forces)
+    now, has_previous = n_before % length, n_before > 0
+    before = _place(now, 1, length)
     # g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|:
     # centre c = sum p_i r_i / sum p_i, moment = n . sum r_i x g_i, taxel load = sqrt(sum |h_i|^2),
     # moved = sum |g_i(k) - g_i(k-1)|^2.
     fx, fy, fz, weight, squares, moved = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    pressure_squares, normal = 0.0, 0.0
     cx, cy, cz, moment = 0.0, 0.0, 0.0, 0.0
     for i in range(np.uint64(first), np.uint64(last)):
         x = readings[i, 0] - memory.baseline[i, 0]
         y = readings[i, 1] - memory.baseline[i, 1]
         z = readings[i, 2] - memory.baseline[i, 2]
+        normal += z
         turn = layout.rotations[i]
         gx = turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z
         gy = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
@@ -97,14 +137,17 @@ def _append_sample(
             sx, sy, sz = forces[before, i, 0], forces[before, i, 1], forces[before, i, 2]
             moved += (gx - sx) * (gx - sx) + (gy - sy) * (gy - sy) + (gz - sz) * (gz - sz)
         forces[now, i, 0], forces[now, i, 1], forces[now, i, 2] = gx, gy, gz
-        px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         hx, hy, hz = gx - reference[i, 0], gy - reference[i, 1], gz - reference[i, 2]
         pressed = abs(hx * nx + hy * ny + hz * nz)
+        memory.pressed[i] = pressed
         weight += pressed
+        pressure_squares += pressed * pressed
         squares += hx * hx + hy * hy + hz * hz
-        cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
-        moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
+        if layout.has_centres:
+            px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
+            cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
+            moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
     weight = max(weight, 1e-300)
     # step = |F(k) - F(k-1)|^2.
     step = 0.0
@@ -116,10 +159,20 @@ def _append_sample(
     track[f, at.TRACK_PRESSURE + 1, now] = cy / weight
     track[f, at.TRACK_PRESSURE + 2, now] = cz / weight
     track[f, at.TRACK_MOMENT, now] = moment
+    memory.motion[f, at.PRESSURE], memory.motion[f, at.PRESSURE_SQUARES] = weight, pressure_squares
+    memory.motion[f, at.TAXEL_LOAD] = math.sqrt(squares)
+    is_new = memory.counts[f, at.N_UNCHANGED] == 0
+    _add_to_block(memory.motion, f, step, moved, is_new, has_previous)
+    return fx, fy, fz, normal
+
+
+@inlined
+def _add_to_block(
+    motion: Array, f: int, step: float, moved: float, is_new: bool, has_previous: bool
+) -> None:
+    """Add the squares of a step to the block over which the noise is measured."""
     # Sums over the block: squares of steps of F and of all g_i. Repeated samples do not count.
-    motion = memory.motion
-    motion[f, at.TAXEL_LOAD] = math.sqrt(squares)
-    if memory.counts[f, at.N_UNCHANGED] == 0 and has_previous:
+    if is_new and has_previous:
         motion[f, at.BLOCK_SQUARES] += step
         motion[f, at.BLOCK_TAXEL_SQUARES] += moved
         motion[f, at.BLOCK_STEPS] += 1.0
@@ -164,12 +217,33 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
 
 
 @inlined
+def _update_ratio(layout: Layout, memory: Memory, f: int, now: int) -> None:
+    """Update the tangent, and the ratio of tangential to normal force."""
+    track, motion = memory.track, memory.motion
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    x = track[f, 0, now] - motion[f, at.REFERENCE]
+    y = track[f, 1, now] - motion[f, at.REFERENCE + 1]
+    z = track[f, 2, now] - motion[f, at.REFERENCE + 2]
+    # With F beyond the reference: F_t = F - (F . n) n, N = |F . n| + 10 noise, r = |F_t| / N,
+    # t = F_t / |F_t|.
+    normal = x * nx + y * ny + z * nz
+    x, y, z = x - normal * nx, y - normal * ny, z - normal * nz
+    size = math.sqrt(x * x + y * y + z * z)
+    motion[f, at.NORMAL_FLOOR] = abs(normal) + NORMAL_NOISE_WEIGHT * motion[f, at.NOISE_NOW]
+    track[f, at.TRACK_RATIO, now] = size / motion[f, at.NORMAL_FLOOR]
+    share = 1.0 / max(size, 1e-300)
+    motion[f, at.TANGENT] = share * x
+    motion[f, at.TANGENT + 1] = share * y
+    motion[f, at.TANGENT + 2] = share * z
+
+
+@inlined
 def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: float) -> None:
     """Note the time if the force moves: by much more than its noise, and more than an echo."""
     track, motion, length = memory.track, memory.motion, memory.track.shape[2]
     # |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
     back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, at.N_STRETCH] - 1, length - 1)
-    then = (now - back) % length
+    then = _place(now, back, length)
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
@@ -269,3 +343,80 @@ def _relative(square: float, noise_square: float, load: float) -> float:
     # log sqrt(max(v^2 - 4 noise^2, 0) / L^2 + LEAST_CHANGE^2).
     square = max(square - NOISE_SQUARES * noise_square, 0.0)
     return 0.5 * math.log(square / (load * load) + LEAST_CHANGE * LEAST_CHANGE)
+
+
+@inlined
+def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, lag: int) -> None:
+    """Fill the second differences of the taxels at one spacing, and their averages."""
+    forces, track, out, averages = (
+        memory.taxel_forces,
+        memory.track,
+        memory.relative,
+        memory.averages,
+    )
+    motion, length = memory.motion, len(memory.taxel_forces)
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    before, first = _place(now, back, length), _place(now, 2 * back, length)
+    total, n_used = motion[f, at.PRESSURE], layout.constants[f, at.N_USED]
+    # d_i = g_i(k) - 2 g_i(k-s) + g_i(k-2s); sum |d_i|^2, sum p_i |d_i|^2, sum p_i (d_i . n)^2,
+    # sum p_i d_i, and the largest |d_i|^2 of the taxels with p_i > sum p / n.
+    squares, shared, along, top, mean_pressure = 0.0, 0.0, 0.0, 0.0, total / n_used
+    share = 1.0 / total
+    px, py, pz = 0.0, 0.0, 0.0
+    for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
+        x = forces[now, i, 0] - 2.0 * forces[before, i, 0] + forces[first, i, 0]
+        y = forces[now, i, 1] - 2.0 * forces[before, i, 1] + forces[first, i, 1]
+        z = forces[now, i, 2] - 2.0 * forces[before, i, 2] + forces[first, i, 2]
+        square, pressed = x * x + y * y + z * z, memory.pressed[i]
+        pushed = x * nx + y * ny + z * nz
+        squares += square
+        shared += pressed * square
+        along += pressed * (pushed * pushed)
+        px, py, pz = px + pressed * x, py + pressed * y, pz + pressed * z
+        if pressed > mean_pressure and square > top:
+            top = square
+    # With w_i = p_i / sum p and D = sum d_i:
+    # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.
+    x = track[f, 0, now] - 2.0 * track[f, 0, before] + track[f, 0, first]
+    y = track[f, 1, now] - 2.0 * track[f, 1, before] + track[f, 1, first]
+    z = track[f, 2, now] - 2.0 * track[f, 2, before] + track[f, 2, first]
+    common = (x * x + y * y + z * z) * (motion[f, at.PRESSURE_SQUARES] * share) * share
+    own = squares - 2.0 * (x * px + y * py + z * pz) * share + common
+    noise, gain = motion[f, at.TAXEL_NOISE_NOW], layout.average_gain
+    noise_share = 1.0 / (noise * noise)
+    shear = max(n_used * (shared - along) * share, 0.0)
+    found = (squares, n_used * shared * share, shear, max(own, 0.0), n_used * top)
+    for place in range(at.N_SECONDS):
+        out[f, SECOND + place, lag] = _beyond_noise(found[place] * noise_share)
+    if layout.families[lag, at.MEAN_SECONDS]:
+        for place in range(at.N_SECONDS):
+            # a(k) = a(k-1) + gain (v(k)^2 - a(k-1)).
+            average = averages[f, place, lag]
+            if math.isnan(average):
+                average = found[place]
+            average += gain * (found[place] - average)
+            averages[f, place, lag] = average
+            out[f, MEAN_SECOND + place, lag] = _beyond_noise(average * noise_share)
+
+
+@compiled_step
+def _beyond_noise(square: float) -> float:
+    """Return log v of a second difference, given v^2 in squared noise, beyond that of noise."""
+    # log sqrt(max(v^2 - 6, 0) + 6 / 16).
+    return 0.5 * math.log(max(square - SECOND_NOISE, 0.0) + SECOND_FLOOR)
+
+
+@inlined
+def _fill_ratios(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int) -> None:
+    """Fill the changes of tangential and normal force, and of their ratio, over one lag."""
+    track, motion, out = memory.track, memory.motion, memory.relative
+    x = track[f, 0, now] - track[f, 0, then]
+    y = track[f, 1, now] - track[f, 1, then]
+    z = track[f, 2, now] - track[f, 2, then]
+    # dF . t / N, dF . n / N and r(k) - r(k-l).
+    scale = 1.0 / motion[f, at.NORMAL_FLOOR]
+    tx, ty, tz = motion[f, at.TANGENT], motion[f, at.TANGENT + 1], motion[f, at.TANGENT + 2]
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    out[f, SHEAR_GAIN, lag] = scale * (x * tx + y * ty + z * tz)
+    out[f, NORMAL_GAIN, lag] = scale * (x * nx + y * ny + z * nz)
+    out[f, RATIO_GAIN, lag] = track[f, at.TRACK_RATIO, now] - track[f, at.TRACK_RATIO, then]

@@ -27,8 +27,16 @@ CHANGE_KINDS = (
     "pressure_shift",
     "moment_change",
 )
-RELATIVE_KINDS = (*CHANGE_KINDS, "load_to_noise")
-"""Kinds that look back by a lag in seconds, relative to the load; see `features.motion`."""
+LAG_KINDS = (*CHANGE_KINDS, "load_to_noise")
+"""Kinds over a lag in seconds that a stream computes together."""
+SECOND_KINDS = ("second_all", "second_shared", "second_shear", "second_own", "second_top")
+"""Kinds of second differences of the taxels, at a spacing in seconds."""
+MEAN_SECOND_KINDS = tuple(f"mean_{kind}" for kind in SECOND_KINDS)
+"""The same, averaged over the last samples."""
+RATIO_KINDS = ("shear_gain", "normal_gain", "ratio_gain")
+"""Kinds of the change of the ratio of tangential to normal force, and of either force."""
+RELATIVE_KINDS = (*LAG_KINDS, *SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
+"""Kinds that look back by a lag in seconds, relative to load or noise; see `features.motion`."""
 
 FEATURE_KINDS = (*VALUE_KINDS, *RELATIVE_KINDS)
 """All kinds. The code of a kind is its position."""
@@ -57,13 +65,19 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             of F_tip and its part across the normal; `residual` and `shear_residual`, how far the
             taxels move against their mean; `pressure_shift`, how far the centre of pressure
             moves; `moment_change`, the change of the moment about the normal; `load_to_noise`, the
-            load itself.
+            load itself. Second differences of the taxels at a spacing of `seconds`: `second_all`,
+            of all; `second_shared`, weighted by their share of the load, and `second_shear`, its
+            part across the normal; `second_own`, against their common motion; `second_top`, the
+            largest of loaded taxels; the same after `mean_`, averaged over the last samples.
+            `ratio_gain`, the change of the ratio of tangential to normal force; `shear_gain` and
+            `normal_gain`, the signed change of either force, as a share of the normal force.
         window: number of samples in the window, for the last four kinds; 0 for the others.
         seconds: lag of a relative kind [s]; while a stretch is shorter, the longest that there
             is, from two samples on.
         transform: `none`; `log`, log(sqrt(value^2 + floor^2)); or `noise`, the logarithm of the
             ratio of sigma to the sigma of the sensor's noise alone; or, for the relative kinds
-            only, `relative`, the logarithm of the ratio to the load.
+            only, `relative`: the logarithm of the ratio to the load, that of the ratio to the
+            noise for second differences, or the share itself for the last three.
         scope: `finger`; or `hand`, the largest value of all fingers of the hand.
         floor: value that keeps the logarithm of `log` finite [unit of the readings].
 
@@ -146,6 +160,31 @@ ANY_FEATURES = (
     FeatureSpec("load_to_noise", transform="relative", seconds=ANY_LAGS[0]),
 )
 """Features that carry over between hands, sensors, units and rates, named `any`."""
+
+
+SLIP_SPACINGS = (0.0067, 0.0133)
+"""Spacings of second differences of the taxels [s]: one and two samples at 150 Hz."""
+SLIP_LAGS = (0.0067, 0.0267, 0.107)
+"""Lags of changes of the ratio of forces [s]."""
+
+SLIP_FEATURES = (
+    *HOLDFAST_FEATURES,
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in SECOND_KINDS
+        for seconds in SLIP_SPACINGS
+    ),
+    *(
+        FeatureSpec(kind, transform="relative", seconds=SLIP_SPACINGS[0])
+        for kind in MEAN_SECOND_KINDS
+    ),
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in RATIO_KINDS
+        for seconds in SLIP_LAGS
+    ),
+)
+"""Features of the slip rule of `builtin:twin`."""
 
 
 NAMED_FEATURES = {"holdfast": HOLDFAST_FEATURES, "any": ANY_FEATURES}

@@ -13,17 +13,22 @@ from holdfast.features import arrays as at
 from holdfast.features import kernel
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.haar import N_SUMS, n_levels
+from holdfast.features.motion import AVERAGE_SECONDS
 from holdfast.features.specs import (
     FEATURE_KINDS,
+    LAG_KINDS,
+    MEAN_SECOND_KINDS,
     OF_COMPONENTS,
+    RATIO_KINDS,
     RELATIVE_KINDS,
+    SECOND_KINDS,
     FeatureSpec,
     spec_codes,
 )
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array, Flags
+from holdfast.sensors.types import Array, Flags, Integers
 
 TARE_KINDS = {
     "seconds": at.TARE_SECONDS,
@@ -270,10 +275,24 @@ def _layout(plan: StreamPlan) -> Layout:
         tare_seconds=plan.tare.seconds,
         period=1.0 / plan.rate,
         lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
+        average_gain=-float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
+        has_centres=any(spec.kind in LAG_KINDS for specs in features for spec in specs),
+        families=_families([spec for specs in features for spec in specs], lags),
         places=np.concatenate([_places(s, i) for s, i in zip(sensors, ignored, strict=True)]),
         normals=np.array([sensor.normal for sensor in sensors], dtype=np.float64),
         n_levels=n_levels(max(longest)),
     )
+
+
+def _families(specs: Sequence[FeatureSpec], lags: Sequence[float]) -> Integers:
+    """Return `Layout.families` for the lags of some features [s]."""
+    seconds = (*SECOND_KINDS, *MEAN_SECOND_KINDS)
+    families = (LAG_KINDS, seconds, MEAN_SECOND_KINDS, RATIO_KINDS)
+    needed = [
+        [any(x.kind in kinds and x.seconds == lag for x in specs) for kinds in families]
+        for lag in lags
+    ]
+    return np.array(needed, dtype=np.int64).reshape(len(lags), len(families))
 
 
 def _places(sensor: Sensor, ignored: Flags) -> Array:
@@ -305,7 +324,9 @@ def _memory(layout: Layout) -> Memory:
     longest = int(layout.windows[:, at.LONGEST_WINDOW].max())
     levels = np.zeros((n_fingers, at.LEVELS_WIDTH))
     levels[:, [at.FIRST_TIME, at.LAST_TIME, at.NOISE]] = np.nan
-    length = int(layout.lags.max()) + 1 if len(layout.lags) else 1
+    # A second difference looks back by two lags.
+    reaches = layout.lags * (1 + layout.families[:, at.SECONDS])
+    length = int(reaches.max()) + 1 if len(reaches) else 1
     motion = np.zeros((n_fingers, at.MOTION_WIDTH))
     motion[:, [at.LEAST_NOISE, at.LEAST_TAXEL_NOISE]] = np.inf
     motion[:, at.BLOCK_START] = np.nan
@@ -327,6 +348,8 @@ def _memory(layout: Layout) -> Memory:
         track=np.zeros((n_fingers, at.TRACK_WIDTH, length)),
         motion=motion,
         relative=np.full((n_fingers, len(RELATIVE_KINDS), len(layout.lags)), np.nan),
+        pressed=np.zeros(n_taxels),
+        averages=np.full((n_fingers, at.N_SECONDS, len(layout.lags)), np.nan),
         blocks=np.zeros((n_fingers, longest, n_channels * layout.n_levels * N_SUMS)),
     )
 

@@ -174,7 +174,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`.
         """
-        relative = any(spec.seconds for name in sensors for spec in self.finger(name).features)
+        features = {name: self.finger(name).all_features for name in sensors}
+        relative = any(spec.seconds for specs in features.values() for spec in specs)
         low, high = RELATIVE_RATES
         rate = self.rate or source_rate
         if relative and not low * (1 - EXACT_RATE) <= rate <= high * (1 + EXACT_RATE):
@@ -184,7 +185,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             )
         return StreamPlan(
             sensors=sensors,
-            features={name: self.finger(name).features for name in sensors},
+            features=features,
             window=self.window,
             tare=Tare.parse(self.tare),
             rate=rate,
@@ -209,9 +210,12 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         sensors = self.fingers_of({n: m.sensor for n, m in recording.modules.items()})
         present = {name: sensor for name, sensor in sensors.items() if name in recording.modules}
         found = extract(self.plan(present, recording.rate), recording)
-        return {
-            name: self.finger(name).classifier.probability(found[name].features) for name in present
-        }
+        probabilities = {}
+        for name in present:
+            part = self.finger(name)
+            features = found[name].features[:, : len(part.features)]
+            probabilities[name] = part.classifier.probability(features)
+        return probabilities
 
     def _any_fingers(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
         wanted = self.fingers[ANY_FINGER].sensor

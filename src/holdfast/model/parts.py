@@ -33,7 +33,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
             for relative features; used instead of the others if it is given.
         causes: tells the causes of an unstable contact apart; None for none.
-        slip: decides from the same features whether the finger slides; None for none.
+        slip: decides whether the finger slides, from the same features or its own; None for none.
 
     Raises:
         ModelError: the fields contradict each other.
@@ -53,15 +53,14 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             raise ModelError(
                 f"{len(self.features)} features given, the causes expect {self.causes.n_features}"
             )
-        if self.slip is not None and self.slip.classifier.n_features != len(self.features):
+        n_slip = 0 if self.slip is None else len(self.slip.used_features(self.features))
+        if self.slip is not None and self.slip.classifier.n_features != n_slip:
             raise ModelError(
-                f"{len(self.features)} features given, the slip rule expects "
-                f"{self.slip.classifier.n_features}"
+                f"{n_slip} features given, the slip rule expects {self.slip.classifier.n_features}"
             )
-        check_limit("features of a finger", len(self.features), MAX_FEATURES)
-        check_limit(
-            "samples in a window", max((x.window for x in self.features), default=0), MAX_WINDOW
-        )
+        every = self.all_features
+        check_limit("features of a finger", len(every), MAX_FEATURES)
+        check_limit("samples in a window", max((x.window for x in every), default=0), MAX_WINDOW)
         if self.contact_load is not None and not any(spec.seconds for spec in self.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
         if len(self.features) != self.classifier.n_features:
@@ -72,6 +71,12 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         for value in (self.contact_threshold, self.contact_noise, self.contact_load):
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ModelError(f"a contact threshold of at least 0 expected, {value} given")
+
+    @property
+    def all_features(self) -> tuple[FeatureSpec, ...]:
+        """Features of the classifier in their order, and then those of the slip rule alone."""
+        slip = () if self.slip is None else self.slip.used_features(self.features)
+        return (*self.features, *(spec for spec in slip if spec not in self.features))
 
 
 class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

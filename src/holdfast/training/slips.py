@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from holdfast.classifiers.fitting import Samples, standardise
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.slip import SlipRule, SlipThresholds
+from holdfast.classifiers.slip import MAX_DEVIATION, SlipRule, SlipThresholds
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.errors import ModelError, TrainingError
+from holdfast.features import FeatureSpec
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.metrics import RecordingResults, score_recording
 from holdfast.metrics.slip_thresholds import (
@@ -83,11 +85,18 @@ class SlipSamples:
         """Number of samples that slide."""
         return int(self.own.samples.stable.sum())
 
-    def fit(self, held: Collection[int]) -> SlipRule | None:
+    def fit(
+        self, held: Collection[int], features: Sequence[FeatureSpec] | None = None
+    ) -> SlipRule | None:
         """Fit a rule to the samples that are not in held units, with a threshold of 0.5.
 
         For a model of one hand all samples weigh alike: balanced classes fit the middle, and the
         threshold lies far in the tail. On real recordings that made a model of any hand worse.
+
+        Args:
+            held: units whose samples are left out.
+            features: of the samples, for a rule with features of its own and with squares; those
+                of the classifier of stability, without squares, by default.
 
         Returns:
             The rule; None with too few sliding samples, or none that hold still.
@@ -95,15 +104,38 @@ class SlipSamples:
         samples = self.own.without(held)
         if samples.one_class or samples.stable.sum() < MIN_SLIDING_SAMPLES:
             return None
-        recipe = LogisticRegression()
         weight = "balanced" if self.own.sensor is None else None
-        fitted = recipe.fit(samples, {**recipe.reference, "class_weight": weight}, 0)
+        rule = _fitted_rule(samples, weight, None if features is None else tuple(features))
         kept = np.count_nonzero(~self.own.samples.stable)
         thinning = np.log(self.n_still / kept)  # odds of sliding fall by the samples left out
-        classifier = msgspec.structs.replace(
-            fitted, offset=fitted.offset - float(thinning), threshold=0.5
-        )
-        return SlipRule(classifier, SLIP_SMOOTHING, SLIP_RULE_HOLD)
+        offset = rule.classifier.offset - float(thinning)
+        classifier = msgspec.structs.replace(rule.classifier, offset=offset, threshold=0.5)
+        return msgspec.structs.replace(rule, classifier=classifier)
+
+
+def _fitted_rule(
+    samples: Samples, class_weight: str | None, features: tuple[FeatureSpec, ...] | None
+) -> SlipRule:
+    """Return a rule fitted to samples; with squares if it gets features of its own."""
+    recipe = LogisticRegression()
+    parameters = {**recipe.reference, "class_weight": class_weight}
+    if features is None:
+        return SlipRule(recipe.fit(samples, parameters, 0), SLIP_SMOOTHING, SLIP_RULE_HOLD)
+    # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
+    mean, scale, standard = standardise(samples.features)
+    squares = np.minimum(np.abs(standard), MAX_DEVIATION) ** 2
+    fitted = recipe.fit(samples._replace(features=np.hstack([standard, squares])), parameters, 0)
+    weights, n = np.array(fitted.coefficients) / np.array(fitted.scale), len(features)
+    linear = msgspec.structs.replace(
+        fitted,
+        mean=tuple(mean.tolist()),
+        scale=tuple(scale.tolist()),
+        coefficients=tuple(weights[:n].tolist()),
+        intercept=fitted.intercept - float(weights @ np.array(fitted.mean)),
+    )
+    return SlipRule(
+        linear, SLIP_SMOOTHING, SLIP_RULE_HOLD, None, features, tuple(weights[n:].tolist())
+    )
 
 
 def gather_slip_samples(
