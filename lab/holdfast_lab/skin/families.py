@@ -15,7 +15,7 @@ from holdfast.sensors.types import Array
 
 STEPS = (0.017, 0.033, 0.067, 0.133)
 """Times between the three samples of a second difference [s]."""
-LAGS = (0.017, 0.067, 0.267)
+SKIN_LAGS = (0.017, 0.067, 0.267)
 """Lags of the changes of families B and D [s]."""
 RMS_WINDOWS = (0.067, 0.267)
 """Windows of root mean squares [s]."""
@@ -156,7 +156,7 @@ def _levels(finger: Finger) -> Iterator[Named]:
 def _changes(finger: Finger) -> Iterator[Named]:
     """Yield family B: changes of the force along the normal, the shear and across it."""
     shear = np.linalg.norm(finger.across, axis=1)
-    for lag in LAGS:
+    for lag in SKIN_LAGS:
         step = finger.steps(lag)
         change = _lagged(finger.force, step)
         normal = change @ finger.axis
@@ -187,7 +187,7 @@ def _taxel_motion(finger: Finger) -> Iterator[Named]:
     side = (finger.positions @ finger.along.T).T
     centre = (finger.weights * side).sum(axis=1, keepdims=True)
     trailing = side < centre
-    for lag in LAGS:
+    for lag in SKIN_LAGS:
         step = finger.steps(lag)
         moved, change = _lagged(finger.taxels, step), _lagged(finger.force, step)
         own = moved - finger.weights[:, :, None] * change[:, None]
