@@ -61,9 +61,11 @@ def main(name: str, folder: Path, out: Path | None) -> None:
 def samples_of(model: Model, recording: Recording) -> UnstableSamples:
     """Return the unstable samples of a recording, of all fingers."""
     sensors = model.fingers_of({name: item.sensor for name, item in recording.modules.items()})
-    rows = extract(model.plan(sensors, recording.rate), recording)
+    found = extract(model.plan(sensors, recording.rate), recording)
+    n_features = len(model.finger("*").features)  # the slip rule may have more
+    rows = {finger: part.features[:, :n_features] for finger, part in found.items()}
     step = max(1, round(recording.rate / MAX_RATE))
-    features, causes = [np.empty((0, len(model.finger("*").features)))], [np.empty(0, "U12")]
+    features, causes = [np.empty((0, n_features))], [np.empty(0, "U12")]
     for finger, labels in labels_by_truth(recording, LabelRule(margin=0.0)).items():
         if finger not in rows:
             continue
@@ -73,9 +75,9 @@ def samples_of(model: Model, recording: Recording) -> UnstableSamples:
             if label.state == "UNSTABLE" and label.cause is not None:
                 inside = slice(*np.searchsorted(times, (label.start, label.end)))
                 cause[inside] = NAMED_AS.get(label.cause, label.cause)
-        kept = np.isin(cause, CAUSES) & np.isfinite(rows[finger].features).all(axis=1)
+        kept = np.isin(cause, CAUSES) & np.isfinite(rows[finger]).all(axis=1)
         kept &= np.arange(len(times)) % step == 1 % step
-        features.append(rows[finger].features[kept])
+        features.append(rows[finger][kept])
         causes.append(cause[kept])
     group = str(recording.metadata.get("object") or recording.name)
     return UnstableSamples(

@@ -179,6 +179,7 @@ class Layout(NamedTuple):
     lags: Integers1  # (n_lags,) of relative features [samples], ascending; empty without any
     average_gain: float  # share of a new sample in averages of second differences
     has_centres: bool  # whether a lag needs the centre of pressure and the moment
+    has_ratios: bool  # whether a lag needs the ratio of tangential to normal force
     families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0
     places: Floats2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Floats2  # (n_fingers, 3)

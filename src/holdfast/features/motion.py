@@ -69,7 +69,8 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
     _update_noise(layout, memory.motion, memory.counts, f, time)
     _update_load(layout, memory, f, now)
     _update_movement(layout, memory, f, now, time)
-    _update_ratio(layout, memory, f, now)
+    if layout.has_ratios:
+        _update_ratio(layout, memory, f, now)
     if n < 2:
         _forget_features(memory, f)
         return

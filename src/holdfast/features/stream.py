@@ -248,6 +248,7 @@ def _layout(plan: StreamPlan) -> Layout:
     width = max(1, *(len(specs) for specs in features))
     longest = [max([plan.window, *(spec.window for spec in specs)]) for specs in features]
     lags = sorted({spec.seconds for specs in features for spec in specs if spec.seconds})
+    families = _families([spec for specs in features for spec in specs], lags)
     ready = [
         2 if all(spec.seconds for spec in specs) else most
         for specs, most in zip(features, longest, strict=True)
@@ -276,8 +277,9 @@ def _layout(plan: StreamPlan) -> Layout:
         period=1.0 / plan.rate,
         lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
         average_gain=-float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
-        has_centres=any(spec.kind in LAG_KINDS for specs in features for spec in specs),
-        families=_families([spec for specs in features for spec in specs], lags),
+        has_centres=bool(families[:, at.LAGS].any()),
+        has_ratios=bool(families[:, at.RATIOS].any()),
+        families=families,
         places=np.concatenate([_places(s, i) for s, i in zip(sensors, ignored, strict=True)]),
         normals=np.array([sensor.normal for sensor in sensors], dtype=np.float64),
         n_levels=n_levels(max(longest)),
