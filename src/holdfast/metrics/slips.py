@@ -106,8 +106,7 @@ def count_slips(decisions: SlipDecisions) -> SlipCounts:
 
     of all slips is wrong: each begun 0.5 s of it is one false alarm. Only samples count in which
     the finger holds the object and is still: creep, and sliding that is too short for a slip, are
-    neither right nor wrong. Rates are of the time that counts. An alarm that comes before the end
-    of a slip does not belong to the next one.
+    neither right nor wrong. Rates are of the time that counts.
 
     Args:
         decisions: with a truth.
@@ -221,11 +220,8 @@ def _without_alarms(
 
 def _slip_times(slips: Sequence[Slip]) -> Array:
     """Return (n_slips, 4) first and last time of the alarms, onset and gross onset [s]."""
-    rows = np.array([(*_alarm_times(slip), slip.onset, slip.gross) for slip in slips])
-    rows = rows.reshape(-1, 4)
-    ends = np.array([slip.end for slip in slips])
-    rows[1:, 0] = np.maximum(rows[1:, 0], ends[:-1] - TIME_TOLERANCE)
-    return rows
+    rows = [(*_alarm_times(slip), slip.onset, slip.gross) for slip in slips]
+    return np.array(rows).reshape(-1, 4)
 
 
 def _alarm_times(slip: Slip) -> tuple[float, float]:
