@@ -61,9 +61,9 @@ def main(name: str, folder: Path, out: Path | None) -> None:
 def samples_of(model: Model, recording: Recording) -> UnstableSamples:
     """Return the unstable samples of a recording, of all fingers."""
     sensors = model.fingers_of({name: item.sensor for name, item in recording.modules.items()})
-    found = extract(model.plan(sensors, recording.rate), recording)
+    extracted = extract(model.plan(sensors, recording.rate), recording)
     n_features = len(model.finger("*").features)  # the slip rule may have more
-    rows = {finger: part.features[:, :n_features] for finger, part in found.items()}
+    rows = {finger: part.features[:, :n_features] for finger, part in extracted.items()}
     step = max(1, round(recording.rate / MAX_RATE))
     features, causes = [np.empty((0, n_features))], [np.empty(0, "U12")]
     for finger, labels in labels_by_truth(recording, LabelRule(margin=0.0)).items():

@@ -50,6 +50,7 @@ FULL = model(
 )
 
 
+STEEP = msgspec.structs.replace(squared_rule(SLIP_OWN).classifier, slope=1e3)
 WITH_SQUARES = model(features=RICH, slips=("thumb",), own=TAXELS)
 
 
@@ -348,6 +349,7 @@ class TestSlipRule:
             ({"features": SLIP_OWN[:2]}, "2 features given, the slip rule expects 3"),
             ({"squares": (1.0,)}, "1 squares given, the slip rule expects 3"),
             ({"squares": (1.0, 2.0, math.nan)}, "a number of the squares is not finite"),
+            ({"squares": (1.0, 2.0, 1e308), "classifier": STEEP}, "a number of the squares is not"),
             ({"features": (SLIP_OWN[0],) * 3}, "a feature of the slip rule is given twice"),
             ({"features": msgspec.UNSET}, "squares given without features; a slip rule with both"),
         ],

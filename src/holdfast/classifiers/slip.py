@@ -81,14 +81,16 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 )
         expected = self.classifier.n_features
         for name in ("features", "squares"):
-            given = getattr(self, name)
-            if given is not msgspec.UNSET and len(given) != expected:
-                raise ModelError(f"{len(given)} {name} given, the slip rule expects {expected}")
+            values = getattr(self, name)
+            if values is not msgspec.UNSET and len(values) != expected:
+                raise ModelError(f"{len(values)} {name} given, the slip rule expects {expected}")
         if self.features is not msgspec.UNSET and len(set(self.features)) < expected:
             raise ModelError("a feature of the slip rule is given twice")
         if self.squares is not msgspec.UNSET and self.features is msgspec.UNSET:
             raise ModelError("squares given without features; a slip rule with both expected")
-        if not np.isfinite(self.square_weights()).all():
+        with np.errstate(over="ignore", invalid="ignore"):
+            is_finite = np.isfinite(self.square_weights()).all()
+        if not is_finite:
             raise ModelError("a number of the squares is not finite")
 
     def used_features(self, others: tuple[FeatureSpec, ...]) -> tuple[FeatureSpec, ...]:

@@ -386,16 +386,16 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
     noise, gain = motion[f, at.TAXEL_NOISE_NOW], layout.average_gain
     noise_share = 1.0 / (noise * noise)
     shear = max(n_used * (shared - along) * share, 0.0)
-    found = (squares, n_used * shared * share, shear, max(own, 0.0), n_used * top)
+    sums = (squares, n_used * shared * share, shear, max(own, 0.0), n_used * top)
     for place in range(at.N_SECONDS):
-        out[f, SECOND + place, lag] = _beyond_noise(found[place] * noise_share)
+        out[f, SECOND + place, lag] = _beyond_noise(sums[place] * noise_share)
     if layout.families[lag, at.MEAN_SECONDS]:
         for place in range(at.N_SECONDS):
             # a(k) = a(k-1) + gain (v(k)^2 - a(k-1)).
             average = averages[f, place, lag]
             if math.isnan(average):
-                average = found[place]
-            average += gain * (found[place] - average)
+                average = sums[place]
+            average += gain * (sums[place] - average)
             averages[f, place, lag] = average
             out[f, MEAN_SECOND + place, lag] = _beyond_noise(average * noise_share)
 

@@ -58,9 +58,10 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             raise ModelError(
                 f"{n_slip} features given, the slip rule expects {self.slip.classifier.n_features}"
             )
-        every = self.all_features
-        check_limit("features of a finger", len(every), MAX_FEATURES)
-        check_limit("samples in a window", max((x.window for x in every), default=0), MAX_WINDOW)
+        features = self.all_features
+        check_limit("features of a finger", len(features), MAX_FEATURES)
+        longest = max((spec.window for spec in features), default=0)
+        check_limit("samples in a window", longest, MAX_WINDOW)
         if self.contact_load is not None and not any(spec.seconds for spec in self.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
         if len(self.features) != self.classifier.n_features:
