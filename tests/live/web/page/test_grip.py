@@ -77,7 +77,7 @@ def test_each_event_is_listed_once(visit, holding):
     holding.grip["events"] = [*holding.grip["events"], {"time": 4.4, "text": "grip RELAX"}]
     shows(page, "#events", "RELAX")
     wait_for_samples(page)
-    texts = page.locator("#events .marked + .change").all_inner_texts()
+    texts = page.locator("#events b:text-is('grip') + .change").all_inner_texts()
     assert texts == ["RELAX", "REACT: index rises from 1.000 (unstable)", "HOLD"]
 
 
