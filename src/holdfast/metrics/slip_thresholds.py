@@ -96,15 +96,9 @@ def choose_threshold(curve: Curve, false_alarms: float) -> int | None:
     Returns:
         The place in `THRESHOLDS`; None if no threshold fits, or nothing is held.
     """
-    rates = [slip_metrics(counts) for counts in curve]
-    fits = [_fits(rate, false_alarms) for rate in rates]
-    place = int(_lowest(np.array(fits)))
+    table, choice = [[_ratios(counts) for counts in curve]], ThresholdChoice(false_alarms)
+    place = int(_places(_limited(table, choice), choice, np.ones((1, 1)))[0])
     return place if place < len(curve) else None
-
-
-def _fits(metrics: SlipMetrics, false_alarms: float) -> bool:
-    held, raised = metrics.false_alarms_per_minute["held"], metrics.raised_quiet
-    return held is not None and held <= false_alarms and (raised or 0.0) <= MAX_RAISED_QUIET
 
 
 def _lowest(fits: Flags) -> Integers:
@@ -231,8 +225,8 @@ def _resampled(training: Sequence[Curve], choice: ThresholdChoice, n: int, seed:
     """Return the place of the threshold in n resamples of the training recordings, (n,)."""
     table = [[_ratios(counts) for counts in curve] for curve in training]
     draws = draw_recordings(len(training), n, seed + 1)
-    sums = [_Sums.of(table, name) for name in _limits(choice)]
-    return _places([own.drawn(draws) for own in sums], choice)
+    places = _places(_limited(table, choice), choice, draws)
+    return np.minimum(places, len(table[0]) - 1)
 
 
 def _held_out(
@@ -250,13 +244,12 @@ def _held_out(
         (n, n_recordings) places.
     """
     own = np.array(groups)
-    sums = [_Sums.of(table, name) for name in _limits(choice)]
+    limited = _limited(table, choice)
     places = np.empty(draws.shape, dtype=np.int64)
     for group in np.unique(own):
         others = np.where(own == group, 0.0, draws)
-        chosen = _places([total.drawn(others) for total in sums], choice)
-        places[:, own == group] = chosen[:, None]
-    return places
+        places[:, own == group] = _places(limited, choice, others)[:, None]
+    return np.minimum(places, len(table[0]) - 1)
 
 
 def _limits(choice: ThresholdChoice) -> dict[tuple[str, str], float]:
@@ -264,14 +257,27 @@ def _limits(choice: ThresholdChoice) -> dict[tuple[str, str], float]:
     return {("false_alarms", "held"): choice.false_alarms, ("raised_quiet", ""): MAX_RAISED_QUIET}
 
 
-def _places(drawn: Sequence[tuple[Array, Array]], choice: ThresholdChoice) -> Integers:
-    """Return the lowest threshold within the limits, (n,), of parts and wholes of each metric."""
-    fits = [
-        (parts <= limit * wholes) & ((wholes > 0) | (name[0] == "raised_quiet"))
-        for (parts, wholes), (name, limit) in zip(drawn, _limits(choice).items(), strict=True)
-    ]
-    highest = fits[0].shape[-1] - 1
-    return np.asarray(np.minimum(_lowest(np.logical_and.reduce(fits)), highest))
+def _limited(table: Table, choice: ThresholdChoice) -> "list[_Sums]":
+    """Return the metrics by which a threshold is chosen, in the order of `_limits`."""
+    return [_Sums.of(table, name) for name in _limits(choice)]
+
+
+def _places(limited: "Sequence[_Sums]", choice: ThresholdChoice, draws: Array) -> Integers:
+    """Return the lowest threshold within the limits in each resample.
+
+    Args:
+        limited: metrics as of `_limited`.
+        choice: of the threshold.
+        draws: (n, n_recordings) how often each is drawn.
+
+    Returns:
+        (n,) places; the number of thresholds where none fits, or nothing is held.
+    """
+    fits = []
+    for sums, (name, limit) in zip(limited, _limits(choice).items(), strict=True):
+        parts, wholes = sums.drawn(draws)
+        fits.append((parts <= limit * wholes) & ((wholes > 0) | (name[0] == "raised_quiet")))
+    return _lowest(np.logical_and.reduce(fits))
 
 
 @dataclass(frozen=True, eq=False)
