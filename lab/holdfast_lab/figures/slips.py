@@ -11,8 +11,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from holdfast.classifiers.cause import ALL_CAUSES
-from holdfast.contact import SLIP_SPEED, Cause
+from holdfast.classifiers.cause import SLIP_CODE
+from holdfast.contact import SLIP_SPEED
 from holdfast.detector import detect
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_truth import (
@@ -233,7 +233,7 @@ def _series(model: Model, recording: Recording, kind: str) -> SlipSeries:
         distance=np.cumsum(counted * sample_durations(truth.times)),
         decided_at=trace.times - onset,
         probability=trace.slip_probability,
-        raised=trace.cause == ALL_CAUSES.index(Cause.SLIP) + 1,
+        raised=trace.cause == SLIP_CODE,
         sliding=known.codes == SLIDING,
         threshold=rule.classifier.threshold,
         slips=tuple(

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from holdfast.classifiers.cause import ALL_CAUSES
-from holdfast.contact import Cause
+from holdfast.classifiers.cause import SLIP_CODE
 from holdfast_lab.figures import slips
 from holdfast_lab.figures.slips import COLUMN_WIDTH, event_kinds, slip_figure, slips_figure
 from study.example_recordings import SLIPS, recording_with_truth
@@ -15,7 +14,6 @@ EVENTS = [
     {"kind": "weight", "start": 5.5, "end": 6.3, "slid": 5e-3},
     {"kind": "grip", "start": 7.0, "end": 8.0, "slid": 0.0},
 ]
-CODE = ALL_CAUSES.index(Cause.SLIP) + 1
 
 
 @pytest.fixture
@@ -36,7 +34,7 @@ def model(monkeypatch, recording):
     trace = SimpleNamespace(
         times=times,
         slip_probability=np.where(decided, 0.4, 0.01),
-        cause=np.where(decided, CODE, 0),
+        cause=np.where(decided, SLIP_CODE, 0),
     )
     detection = SimpleNamespace(fingers=dict.fromkeys(recording.modules, trace))
     monkeypatch.setattr(slips, "detect", lambda *_: detection)

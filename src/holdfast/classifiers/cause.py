@@ -15,6 +15,8 @@ from holdfast.sensors.types import Array
 
 ALL_CAUSES = tuple(Cause)
 """Causes in the order of their codes, which begin at 1; 0 is no cause."""
+SLIP_CODE = ALL_CAUSES.index(Cause.SLIP) + 1
+"""Code of the cause slip."""
 
 
 class CauseClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -7,7 +7,7 @@ from typing import NamedTuple, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.cause import ALL_CAUSES, add_scores
+from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE, add_scores
 from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
 from holdfast.classifiers.slip import add_squares, probability_of, smooth
 from holdfast.compiled import compiled_step, inlined
@@ -16,7 +16,6 @@ from holdfast.contact import (
     STABLE,
     UNKNOWN,
     UNSTABLE,
-    Cause,
     hand_state,
     is_held,
 )
@@ -40,8 +39,6 @@ from holdfast.sensors.types import Array, Flags, Integers
 
 _hand_state = compiled_step(hand_state)
 _is_held = compiled_step(is_held)
-SLIP_CODE = ALL_CAUSES.index(Cause.SLIP) + 1
-"""Code of the cause slip."""
 CodeT = TypeVar("CodeT", int, Integers)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FormatStrFormatter, MaxNLocator, PercentFormatter
 
-from holdfast.classifiers.cause import ALL_CAUSES
-from holdfast.contact import SLIP_SPEED, Cause
+from holdfast.classifiers.cause import SLIP_CODE
+from holdfast.contact import SLIP_SPEED
 from holdfast.detector import detect
 from holdfast.metrics import Decisions
 from holdfast.metrics.masks import Mask, runs
@@ -59,14 +59,13 @@ def slip_series(model: Model, recording: Recording) -> dict[str, SlipDecisionSer
     Raises:
         ModelError: the recording has other fingers or sensors.
     """
-    code = ALL_CAUSES.index(Cause.SLIP) + 1
     series: dict[str, SlipDecisionSeries] = {}
     for name, trace in detect(model, recording).fingers.items():
         rule = model.finger(name).slip
         if rule is None or trace.slip_probability is None:
             continue
         series[name] = SlipDecisionSeries(
-            trace.times, trace.slip_probability, trace.cause == code, rule.classifier.threshold
+            trace.times, trace.slip_probability, trace.cause == SLIP_CODE, rule.classifier.threshold
         )
     return series
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from holdfast.classifiers.cause import ALL_CAUSES
-from holdfast.contact import SIGNAL_FAULTS, STABLE, UNKNOWN, Cause, Fault
+from holdfast.classifiers.cause import SLIP_CODE
+from holdfast.contact import SIGNAL_FAULTS, STABLE, UNKNOWN, Fault
 from holdfast.detector import FingerTrace, detect
 from holdfast.metrics import (
     Decisions,
@@ -86,7 +86,7 @@ def _slip_decisions(
     return SlipDecisions(
         trace.times,
         trace.slip_probability,
-        trace.cause == ALL_CAUSES.index(Cause.SLIP) + 1,
+        trace.cause == SLIP_CODE,
         rule.hold,
         slip_truth(recording, finger, trace.times, quiet),
     )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from holdfast.classifiers.cause import ALL_CAUSES
+from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE
 from holdfast.contact import CONTACT_FORCE, UNSTABLE, Cause
 from holdfast.detector import detect
 from holdfast.metrics.slip_truth import (
@@ -56,7 +56,7 @@ def count_causes(model: Model, recording: Recording) -> Integers:
             [0, 1, 2],
             default=NOT_HELD,
         )
-        raised = (trace.state == UNSTABLE) | (trace.cause == ALL_CAUSES.index(Cause.SLIP) + 1)
+        raised = (trace.state == UNSTABLE) | (trace.cause == SLIP_CODE)
         counted = raised & (causes != NOT_HELD)
         np.add.at(counts, (causes[counted], trace.cause[counted]), 1)
     return counts

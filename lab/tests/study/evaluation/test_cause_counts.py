@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.classifiers.cause import ALL_CAUSES
+from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE
 from holdfast.contact import STABLE, UNSTABLE, Cause
 from holdfast_lab.study.evaluation import cause_counts
 from holdfast_lab.study.evaluation.cause_counts import (
@@ -14,7 +14,6 @@ from holdfast_lab.study.evaluation.cause_counts import (
 )
 from study.example_recordings import SLIPS, recording_with_truth
 
-SLIP = ALL_CAUSES.index(Cause.SLIP) + 1
 DISTURBANCE = ALL_CAUSES.index(Cause.DISTURBANCE) + 1
 
 
@@ -60,18 +59,18 @@ def test_samples_count_that_are_unstable_or_decided_to_slide(counted):
         return lambda times: np.where((times > 5.6) & (times < 5.8), code, 0).astype(np.int8)
 
     assert counted(everywhere(STABLE), everywhere(0)).sum() == 0
-    counts = counted(everywhere(STABLE), in_slip(SLIP))
+    counts = counted(everywhere(STABLE), in_slip(SLIP_CODE))
     assert counts[0, ESTIMATED.index("slip")] == counts.sum() == pytest.approx(30, abs=1)
 
 
 def test_without_a_truth_there_are_no_counts(counted):
     recording = replace(recording_with_truth("grasp", 0), truth=None)
-    assert not counted(everywhere(UNSTABLE), everywhere(SLIP), recording=recording).any()
+    assert not counted(everywhere(UNSTABLE), everywhere(SLIP_CODE), recording=recording).any()
 
 
 def test_the_table_has_shares_of_each_true_cause():
     counts = np.zeros((len(TRUE_CAUSES), len(ESTIMATED)), dtype=np.int64)
-    counts[0, SLIP], counts[0, DISTURBANCE], counts[1, DISTURBANCE] = 3, 1, 10
+    counts[0, SLIP_CODE], counts[0, DISTURBANCE], counts[1, DISTURBANCE] = 3, 1, 10
     table = cause_table({"mine": [counts, counts]})
     values = {(r.keys["true cause"], r.keys["figure"]): r.ours for r in table.rows}
     assert values["slip", "slip [%]"] == 75
@@ -84,7 +83,7 @@ def test_the_table_has_shares_of_each_true_cause():
 
 def test_a_cause_that_only_another_model_gives_has_a_share_of_none():
     rare = np.zeros((len(TRUE_CAUSES), len(ESTIMATED)), dtype=np.int64)
-    rare[0, SLIP] = 4
+    rare[0, SLIP_CODE] = 4
     full = rare.copy()
     full[1, DISTURBANCE] = 2
     table = cause_table({"rare": [rare], "full": [full]})
