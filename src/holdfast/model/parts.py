@@ -156,15 +156,17 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         return location, scale
 
     def for_sensor(self, sensor_name: str) -> "FingerModel":
-        """Return the model with the own handling of a sensor, if it has any, in its classifiers.
+        """Return the model with the own handling of a sensor, if it has any, in its classifiers."""
+        handling = self.own_handling.get(sensor_name)
+        return self if handling is None else self.with_handling(handling)
+
+    def with_handling(self, handling: Handling) -> "FingerModel":
+        """Return the model with own handling in its classifiers.
 
         With location l_j and scale s_j of the sensor, u_j = (phi_j - l_j) / s_j takes the place of
         (phi_j - mean_j) / scale_j. All is linear, so the weights of the features change, and
         nothing else.
         """
-        handling = self.own_handling.get(sensor_name)
-        if handling is None:
-            return self
         replace = msgspec.structs.replace
         own = dict(
             zip(self.all_features, zip(handling.location, handling.scale, strict=True), strict=True)

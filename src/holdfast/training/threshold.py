@@ -91,12 +91,13 @@ class ThresholdReplay:
     def hand(self, threshold: float) -> FingerDecisions:
         """Return the decisions about the hand at a threshold."""
         fingers = {
-            name: replace(finger, states=self._states(finger, threshold))
+            name: replace(finger, states=self.states(finger, threshold))
             for name, finger in self.raw.fingers.items()
         }
         return hand_decisions(fingers, self.n_model_fingers)
 
-    def _states(self, finger: FingerDecisions, threshold: float) -> Codes:
+    def states(self, finger: FingerDecisions, threshold: float) -> Codes:
+        """Return the states of a finger at a threshold."""
         out = np.zeros(len(finger.times), dtype=np.int8)
         rule = self.debounce
         memory = new_decision_memory(1)
