@@ -87,8 +87,9 @@ def tug_figures(
 ) -> tuple[float, float]:
     """Return the AUC over sequences, and the share of quiet samples below the threshold."""
     largest, quiet = [], []
-    rule = model.finger("*").slip
     for recording, _ in sequences:
+        sensor = next(iter(recording.modules.values())).sensor
+        rule = model.finger("*", sensor).slip
         traces = detect(model, recording).fingers.values()
         values = np.array([score(trace) for trace in traces])
         times = np.arange(values.shape[1]) / TUG_RATE

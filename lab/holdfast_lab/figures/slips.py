@@ -219,7 +219,8 @@ def _series(model: Model, recording: Recording, kind: str) -> SlipSeries:
     finger, slips = _slipping_finger(recording, kind)
     if not slips or recording.truth is None:
         raise ValueError(f"{recording.name} has no slip event {kind!r} in which a finger slips")
-    rule, trace = model.finger(finger).slip, detect(model, recording).fingers[finger]
+    rule = model.finger(finger, recording.modules[finger].sensor).slip
+    trace = detect(model, recording).fingers[finger]
     known = slip_truth(recording, finger, trace.times)
     if rule is None or trace.slip_probability is None or known is None:
         raise ValueError(f"{model.name or 'the model'} has no slip rule of the {finger}")

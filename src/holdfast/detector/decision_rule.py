@@ -106,7 +106,7 @@ def fill_report(
 
 def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     """Return the constants of a model for the fingers of a plan, in its order."""
-    parts = [model.finger(name) for name in plan.fingers]
+    parts = [model.finger(name, sensor) for name, sensor in plan.sensors.items()]
     width = max(part.classifier.n_features for part in parts) + 1
     weights = np.zeros((len(parts), width))
     for row, part in zip(weights, parts, strict=True):

@@ -119,7 +119,7 @@ class Detector:
 
     def _start(self, model: Model, stream: FeatureStream) -> None:
         self._rule = rule_of(model, stream.plan)
-        self._parts = [model.finger(name) for name in stream.plan.fingers]
+        self._parts = [model.finger(*finger) for finger in stream.plan.sensors.items()]
         n_fingers = len(stream.plan.fingers)
         self._names = (*stream.plan.fingers, HAND)
         self._readings = np.zeros((len(stream.layout.rotations), 3))

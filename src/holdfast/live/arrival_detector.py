@@ -274,7 +274,10 @@ class ArrivalDetector:
         self.thresholds = wanted
 
     def _own_thresholds(self) -> dict[str, float]:
-        return {name: self.model.finger(name).classifier.threshold for name in self.fingers}
+        return {
+            name: self.model.finger(name, sensor).classifier.threshold
+            for name, sensor in self.fingers.items()
+        }
 
     def subtract_tare(self, samples: ModuleSamples) -> dict[str, npt.NDArray[np.float64]]:
         """Return (n_taxels, 3) minus the tare, for the fingers whose tare is complete."""

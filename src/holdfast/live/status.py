@@ -191,7 +191,7 @@ def _source_notices(updates: list[tuple[float, StreamUpdate]]) -> list[schema.No
 
 
 def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
-    part = model.finger(name)
+    part = model.finger(name, sensor)
     return schema.FingerInfo(
         sensor=sensor.name,
         unit=sensor.unit,

@@ -1,7 +1,7 @@
 """The model of a hand: features, classifiers and decision rule."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from hashlib import sha256
 from importlib import resources
@@ -130,17 +130,42 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Whether the model decides of any finger whether it slides."""
         return any(part.slip is not None for part in self.fingers.values())
 
-    def finger(self, name: str) -> FingerModel:
+    def finger(self, name: str, sensor: Sensor | None = None) -> FingerModel:
         """Return the model of a finger.
+
+        Args:
+            name: of the finger.
+            sensor: on which it is used. With it, own handling of that sensor is in the classifiers
+                of the model (see `FingerModel.for_sensor`).
 
         Raises:
             ModelError: the model does not have that finger.
         """
-        if ANY_FINGER in self.fingers:
-            return self.fingers[ANY_FINGER]
-        if name not in self.fingers:
+        part = self.fingers.get(ANY_FINGER) or self.fingers.get(name)
+        if part is None:
             raise ModelError(f"the model has no finger {name!r}; it has {', '.join(self.fingers)}")
-        return self.fingers[name]
+        return part if sensor is None else part.for_sensor(sensor.name)
+
+    def with_handling_of(self, sensors: Mapping[str, Sensor]) -> Self:
+        """Return the model with own handling in its classifiers, for the sensors of some fingers.
+
+        Fingers of one classifier that have several sensors are left with default handling.
+
+        Args:
+            sensors: sensor of each finger; `"*"` or any finger of a model of any finger.
+        """
+        fingers = {}
+        for name, part in self.fingers.items():
+            used = {s.name for finger, s in sensors.items() if name in (ANY_FINGER, finger)}
+            own = part.for_sensor(used.pop()) if len(used) == 1 else part
+            fingers[name] = msgspec.structs.replace(own, handling=msgspec.UNSET)
+        return msgspec.structs.replace(self, fingers=fingers)
+
+    def without_handling(self, sensors: Iterable[Sensor]) -> list[str]:
+        """Return the names of those sensors that lack own handling, while the model has others."""
+        known = {name for part in self.fingers.values() for name in part.own_handling}
+        names = dict.fromkeys(sensor.name for sensor in sensors)
+        return [name for name in names if known and name not in known]
 
     def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
         """Return the fingers that the model estimates on a hand, and their sensors.
@@ -212,7 +237,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         found = extract(self.plan(present, recording.rate), recording)
         probabilities = {}
         for name in present:
-            part = self.finger(name)
+            part = self.finger(name, sensors[name])
             features = found[name].features[:, : len(part.features)]
             probabilities[name] = part.classifier.probability(features)
         return probabilities

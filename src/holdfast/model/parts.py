@@ -1,14 +1,18 @@
 """Parts of a model: finger, debouncing, provenance and tuning, as plain validated data."""
 
 import math
+from collections.abc import Mapping
+from typing import Literal
 
 import msgspec
+import numpy as np
 
-from holdfast.classifiers import ModelClassifier
+from holdfast.classifiers import LinearClassifier, ModelClassifier
 from holdfast.classifiers.cause import CauseClassifier
 from holdfast.classifiers.slip import SlipRule
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
+from holdfast.sensors.types import Array
 
 MAX_WINDOW = 1 << 16
 """Maximum length of a window [samples]."""
@@ -18,6 +22,44 @@ MAX_FINGERS = 256
 """Maximum number of fingers, and of sensors, in a model."""
 MAX_TAXELS = 4096
 """Maximum number of taxels of a sensor in a model."""
+
+
+class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Own handling: what the features of a sensor are while its user holds objects, without slip.
+
+    Attributes:
+        location: of each feature of `FingerModel.all_features`.
+        scale: of each of them, above 0.
+        seconds: held time of one finger on which it rests [s].
+        threshold: probability of stability from which a contact is stable; None for the model's.
+        slip_threshold: probability from which a finger slides; None for the model's.
+        recordings: content digest of each recording, by name.
+
+    Raises:
+        ModelError: lengths differ, a number is not finite, a scale or the time is not above 0, or
+            a threshold is not from 0 to 1.
+    """
+
+    location: tuple[float, ...]
+    scale: tuple[float, ...]
+    seconds: float
+    threshold: float | None = None
+    slip_threshold: float | None = None
+    recordings: dict[str, str] = {}
+
+    def __post_init__(self) -> None:
+        if len(self.location) != len(self.scale):
+            raise ModelError(
+                f"{len(self.location)} locations and {len(self.scale)} scales of own handling "
+                "given; the same number of both expected"
+            )
+        if not all(math.isfinite(x) for x in (*self.location, *self.scale, self.seconds)):
+            raise ModelError("a number of the own handling is not finite")
+        if min((*self.scale, self.seconds)) <= 0:
+            raise ModelError("scales and held time above 0 expected for own handling")
+        for threshold in (self.threshold, self.slip_threshold):
+            if threshold is not None and not 0 <= threshold <= 1:
+                raise ModelError(f"a threshold from 0 to 1 expected, {threshold} given")
 
 
 class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -34,6 +76,10 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             for relative features; used instead of the others if it is given.
         causes: tells the causes of an unstable contact apart; None for none.
         slip: decides whether the finger slides, from the same features or its own; None for none.
+        normalised: the classifiers work on features that are normalised by own handling. Mean and
+            scale of `classifier`, and of the features that only `slip` has, are then those of
+            default handling; `for_sensor` replaces them.
+        handling: own handling by the name of the sensor, of a model that is normalised.
 
     Raises:
         ModelError: the fields contradict each other.
@@ -47,6 +93,8 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     contact_load: float | None = None
     causes: CauseClassifier | None = None
     slip: SlipRule | None = None
+    normalised: bool | msgspec.UnsetType = msgspec.UNSET
+    handling: dict[str, Handling] | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         if self.causes is not None and self.causes.n_features != len(self.features):
@@ -72,12 +120,123 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         for value in (self.contact_threshold, self.contact_noise, self.contact_load):
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ModelError(f"a contact threshold of at least 0 expected, {value} given")
+        self._check_handling()
+
+    def _check_handling(self) -> None:
+        if self.normalised and not isinstance(self.classifier, LinearClassifier):
+            raise ModelError("a linear classifier expected where features are normalised")
+        if self.own_handling and not self.normalised:
+            raise ModelError("own handling given; it needs a model with normalised features")
+        check_limit("sensors with own handling", len(self.own_handling), MAX_FINGERS)
+        n_features = len(self.all_features)
+        for name, handling in self.own_handling.items():
+            if len(handling.location) != n_features:
+                raise ModelError(
+                    f"own handling of {len(handling.location)} features given for {name!r}, "
+                    f"{n_features} expected"
+                )
+            if handling.slip_threshold is not None and self.slip is None:
+                raise ModelError(f"a slip threshold given for {name!r}; there is no slip rule")
+
+    @property
+    def own_handling(self) -> Mapping[str, Handling]:
+        """Own handling by the name of the sensor; empty if there is none."""
+        return {} if self.handling is msgspec.UNSET else self.handling
+
+    @property
+    def default_handling(self) -> tuple[Array, Array]:
+        """Location and scale of `all_features` without own handling, of a linear classifier."""
+        values: dict[FeatureSpec, tuple[float, float]] = {}
+        if self.slip is not None:
+            rule, features = self.slip.classifier, self.slip.used_features(self.features)
+            values.update(_moments(features, rule))
+        if isinstance(self.classifier, LinearClassifier):
+            values.update(_moments(self.features, self.classifier))
+        location, scale = np.array([values[spec] for spec in self.all_features]).T
+        return location, scale
+
+    def for_sensor(self, sensor_name: str) -> "FingerModel":
+        """Return the model with the own handling of a sensor, if it has any, in its classifiers."""
+        handling = self.own_handling.get(sensor_name)
+        return self if handling is None else self.with_handling(handling)
+
+    def with_handling(self, handling: Handling) -> "FingerModel":
+        """Return the model with own handling in its classifiers.
+
+        With location l_j and scale s_j of the sensor, u_j = (phi_j - l_j) / s_j takes the place of
+        (phi_j - mean_j) / scale_j. All is linear, so the weights of the features change, and
+        nothing else.
+        """
+        replace = msgspec.structs.replace
+        own = dict(
+            zip(self.all_features, zip(handling.location, handling.scale, strict=True), strict=True)
+        )
+        slip = self.slip
+        if slip is not None:
+            linear = _normalised_by(
+                slip.classifier, slip.used_features(self.features), own, handling.slip_threshold
+            )
+            slip = replace(slip, classifier=linear)
+        classifier = self.classifier
+        if isinstance(classifier, LinearClassifier):
+            classifier = _normalised_by(classifier, self.features, own, handling.threshold)
+        return replace(
+            self, classifier=classifier, slip=slip, causes=self._causes_for(handling),
+            handling=msgspec.UNSET,
+        )  # fmt: skip
+
+    def without_thresholds(self, field: Literal["threshold", "slip_threshold"]) -> "FingerModel":
+        """Return the model whose own handling does not set a threshold."""
+        if self.handling is msgspec.UNSET:
+            return self
+        replace = msgspec.structs.replace
+        handling = {name: replace(own, **{field: None}) for name, own in self.handling.items()}
+        return replace(self, handling=handling)
+
+    def _causes_for(self, handling: Handling) -> CauseClassifier | None:
+        """Return the causes with own handling.
+
+        Their mean and scale are of unstable samples, so they move as the default handling does.
+        """
+        if self.causes is None:
+            return None
+        n = len(self.features)
+        location, scale = (values[:n] for values in self.default_handling)
+        ratio = np.array(handling.scale[:n]) / scale
+        mean = handling.location[:n] + ratio * (np.array(self.causes.mean) - location)
+        return msgspec.structs.replace(
+            self.causes,
+            mean=tuple(mean.tolist()),
+            scale=tuple((ratio * self.causes.scale).tolist()),
+        )
 
     @property
     def all_features(self) -> tuple[FeatureSpec, ...]:
         """Features of the classifier in their order, and then those of the slip rule alone."""
         slip = () if self.slip is None else self.slip.used_features(self.features)
         return (*self.features, *(spec for spec in slip if spec not in self.features))
+
+
+def _moments(
+    features: tuple[FeatureSpec, ...], linear: LinearClassifier
+) -> dict[FeatureSpec, tuple[float, float]]:
+    """Return mean and scale of each feature of a classifier."""
+    return dict(zip(features, zip(linear.mean, linear.scale, strict=True), strict=True))
+
+
+def _normalised_by(
+    linear: LinearClassifier,
+    features: tuple[FeatureSpec, ...],
+    own: Mapping[FeatureSpec, tuple[float, float]],
+    threshold: float | None,
+) -> LinearClassifier:
+    """Return a classifier with another location and scale of each feature, and a threshold."""
+    return msgspec.structs.replace(
+        linear,
+        mean=tuple(own[spec][0] for spec in features),
+        scale=tuple(own[spec][1] for spec in features),
+        threshold=linear.threshold if threshold is None else threshold,
+    )
 
 
 class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

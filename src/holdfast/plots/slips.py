@@ -61,7 +61,7 @@ def slip_series(model: Model, recording: Recording) -> dict[str, SlipDecisionSer
     """
     series: dict[str, SlipDecisionSeries] = {}
     for name, trace in detect(model, recording).fingers.items():
-        rule = model.finger(name).slip
+        rule = model.finger(name, recording.modules[name].sensor).slip
         if rule is None or trace.slip_probability is None:
             continue
         series[name] = SlipDecisionSeries(

@@ -323,10 +323,12 @@ def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
 
 
 def _with_rules(model: Model, change: Callable[[SlipRule], SlipRule | None]) -> Model:
-    """Return the model with changed slip rules."""
+    """Return the model with changed slip rules, whose thresholds are for all sensors."""
     replace = msgspec.structs.replace
     fingers = {
-        name: replace(part, slip=part.slip and change(part.slip))
+        name: replace(
+            part.without_thresholds("slip_threshold"), slip=part.slip and change(part.slip)
+        )
         for name, part in model.fingers.items()
     }
     return replace(model, fingers=fingers)

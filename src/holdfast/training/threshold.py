@@ -49,10 +49,11 @@ N_SHOWN = 3
 
 
 def with_threshold(model: Model, threshold: float) -> Model:
-    """Return the model with another threshold of the probability for all fingers."""
+    """Return the model with another threshold of the probability for all fingers and sensors."""
     fingers = {
         name: msgspec.structs.replace(
-            part, classifier=msgspec.structs.replace(part.classifier, threshold=threshold)
+            part.without_thresholds("threshold"),
+            classifier=msgspec.structs.replace(part.classifier, threshold=threshold),
         )
         for name, part in model.fingers.items()
     }
@@ -90,12 +91,13 @@ class ThresholdReplay:
     def hand(self, threshold: float) -> FingerDecisions:
         """Return the decisions about the hand at a threshold."""
         fingers = {
-            name: replace(finger, states=self._states(finger, threshold))
+            name: replace(finger, states=self.states(finger, threshold))
             for name, finger in self.raw.fingers.items()
         }
         return hand_decisions(fingers, self.n_model_fingers)
 
-    def _states(self, finger: FingerDecisions, threshold: float) -> Codes:
+    def states(self, finger: FingerDecisions, threshold: float) -> Codes:
+        """Return the states of a finger at a threshold."""
         out = np.zeros(len(finger.times), dtype=np.int8)
         rule = self.debounce
         memory = new_decision_memory(1)
@@ -181,9 +183,10 @@ def tune(
         raise ValueError(f"false alarms per minute of at least 0 expected, {false_alarms:g} given")
     recordings = list(recordings) if not isinstance(recordings, Sequence) else recordings
     digests: dict[str, str] = {}
-    replays = []
+    replays, before = [], 0.0
     for recording in progress(recordings):
         digests[recording.name] = recording.digest
+        before = max(before, _threshold_before(model, recording))
         replays.append(ThresholdReplay.of(model, recording))
     points = _usable([_point(replays, t) for t in _probabilities(LOG_ODDS)])
     first = _best(points, false_alarms)
@@ -191,7 +194,6 @@ def tune(
     every = _in_order(_usable([*points, *fine]))
     chosen = _confirm(model, recordings, _ranked(every, false_alarms), false_alarms)
     tuned = with_threshold(model, chosen.threshold)
-    before = max(part.classifier.threshold for part in model.fingers.values())
     return Tuned(
         msgspec.structs.replace(
             tuned,
@@ -202,6 +204,12 @@ def tune(
         _point(replays, before),
         _around(points, chosen),
     )
+
+
+def _threshold_before(model: Model, recording: Recording) -> float:
+    """Return the highest threshold of the fingers on their sensors."""
+    sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
+    return max(model.finger(*finger).classifier.threshold for finger in sensors.items())
 
 
 def _probabilities(log_odds: npt.NDArray[np.floating[Any]]) -> list[float]:

@@ -168,7 +168,7 @@ class _Trainer:
         scans = engine.map_ordered(_scan_part, parts, shared=(setting.relative,))
         read = progress(scans, "reading", len(recordings))
         self.scan = combine_scans(read, setting.rate, relative=setting.relative)
-        self.setting = setting = self._with_split(setting)
+        self.setting = setting = self._with_split(self._with_handling(setting))
         self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
         self.fingers = gather_samples(
             recordings, self.scan, setting, self.data_split, engine, progress
@@ -179,6 +179,13 @@ class _Trainer:
         )
         self.data = TrainingData(self.scan, self.data_split, self.fingers, slips)
         self.slip_curves: list[tuple[Mapping[str, Curve], int]] = []
+
+    def _with_handling(self, setting: Setting) -> Setting:
+        """Return the setting; own handling of the sensors is in the classifiers to adapt."""
+        init = setting.init
+        if init is None or not any(part.own_handling for part in init.fingers.values()):
+            return setting
+        return replace(setting, init=init.with_handling_of(self.scan.sensors))
 
     def _with_split(self, setting: Setting) -> Setting:
         """Return the setting; a model is adapted to one recording with the split by time."""

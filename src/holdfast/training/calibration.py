@@ -1,0 +1,356 @@
+"""Calibration: location, scale and thresholds of a model from its user's own handling."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from holdfast.errors import ModelError, TrainingError
+from holdfast.features.specs import CHANGE_KINDS
+from holdfast.model import FingerModel, Handling, Model
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array
+from holdfast.training.operating_point import HeldFinger, HeldFingers, choose_operating_point
+from holdfast.training.own_handling import (
+    ENOUGH_HANDLING,
+    MAX_HANDLING,
+    MIN_HANDLING,
+    OwnHandling,
+    Place,
+    held_samples,
+)
+from holdfast.training.threshold import ThresholdReplay
+
+MIN_SCALE = 0.3
+"""Least scale of a feature: a hand that holds still has next to none."""
+CLIP_DEVIATIONS = 1.5
+"""Values further from the location than this many scales count as at this distance."""
+MAX_CLIP_STEPS = 50
+"""Maximum number of steps in which location and scale are found."""
+STILL_CHANGE = 0.03
+"""Median change of the load below which the arm hardly moved, as a share of it."""
+MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
+"""A feature changes if its location moves by this share of its scale, or its scale by this
+factor."""
+MAX_ACTIVITY = 1.4
+"""Own handling is refused as slip above this `activity`. None of 300 randomized hands has more in
+the held samples in which it does not slide; two thirds of them have more while they slide
+(`benchmarks/handling_activity.py`)."""
+SUFFIX = ", calibrated"
+"""End of the name of a calibrated model."""
+
+Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
+
+
+class HandlingSummary(msgspec.Struct, frozen=True):
+    """What a calibration saw of one sensor. Pairs are before and after it.
+
+    Attributes:
+        sensor: its name; with the finger, of a model that has a classifier for each.
+        fingers: held time of each finger [s].
+        seconds: held time of the finger that holds longest [s].
+        load_change: median change of the force within half a second, as a share of it.
+        n_features: number of features.
+        n_changed: number of them whose location or scale differs from the default.
+        activity: how far the features of change are above their default location, in default
+            scales.
+        stable: share of the held samples that are STABLE [%].
+        alarms_per_minute: alarms of all fingers per minute of held time.
+        raised: share of the held samples in which a slip is reported [%].
+        threshold: of the probability of stability.
+        slip_threshold: of the probability of a slip; None without a slip rule.
+    """
+
+    sensor: str
+    fingers: dict[str, float]
+    seconds: float
+    load_change: float
+    n_features: int
+    n_changed: int
+    activity: float
+    stable: tuple[float, float]
+    alarms_per_minute: tuple[float, float]
+    raised: tuple[float, float] | None
+    threshold: tuple[float, float]
+    slip_threshold: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A model with own handling, and what it rests on.
+
+    Attributes:
+        model: with the own handling.
+        sensors: what was seen of each sensor.
+        warnings: for the user.
+    """
+
+    model: Model
+    sensors: tuple[HandlingSummary, ...]
+    warnings: tuple[str, ...]
+
+
+def calibrate(
+    model: Model, recordings: Iterable[Recording], *, false_alarms: float | None = None
+) -> Model:
+    """Return the model with the own handling of some recordings, which need no labels.
+
+    Record a minute of ordinary use without slip: grasp, carry, turn, put down. The features are
+    normalised by what they are there, sensor by sensor, and the thresholds are set by it.
+
+    Args:
+        model: whose features are normalised, such as `builtin:any`.
+        recordings: of ordinary handling; are read more than once.
+        false_alarms: maximum number of alarms a minute of this handling; by default, the share
+            of held samples that is STABLE sets the threshold.
+
+    Raises:
+        ModelError: the features of the model are not normalised, or the sensor is another.
+        TrainingError: too little is held, a finger has faults, most of it seems to be slip, or no
+            threshold gives so few alarms.
+        ValueError: the number of false alarms is negative or not finite.
+
+    Example:
+        ```python
+        from holdfast import Model, calibrate, load_dataset
+
+        mine = calibrate(Model.load("builtin:any"), load_dataset("handling/"))
+        mine.save("mine.json")
+        ```
+    """
+    return calibrate_with_report(model, recordings, false_alarms=false_alarms).model
+
+
+def calibrate_with_report(
+    model: Model,
+    recordings: Iterable[Recording],
+    *,
+    false_alarms: float | None = None,
+    progress: Steps = lambda recordings: recordings,
+) -> Calibrated:
+    """Calibrate a model as `calibrate`, and return what the calibration saw.
+
+    Args:
+        model: as in `calibrate`.
+        recordings: as in `calibrate`.
+        false_alarms: as in `calibrate`.
+        progress: iterates over the recordings.
+
+    Raises:
+        ModelError: as in `calibrate`.
+        TrainingError: as in `calibrate`.
+        ValueError: as in `calibrate`.
+    """
+    if false_alarms is not None and not (math.isfinite(false_alarms) and false_alarms >= 0):
+        raise ValueError(f"false alarms per minute of at least 0 expected, {false_alarms:g} given")
+    check_normalised(model)
+    recordings = recordings if isinstance(recordings, Sequence) else list(recordings)
+    handling = OwnHandling(model)
+    for recording in progress(recordings):
+        handling.add(recording)
+    handling.check()
+    return _Calibration(handling, recordings).result(false_alarms)
+
+
+def check_normalised(model: Model) -> None:
+    """Check that the features of a model are normalised.
+
+    Raises:
+        ModelError: they are not.
+    """
+    if not all(part.normalised for part in model.fingers.values()):
+        raise ModelError(
+            f"{model.name or 'the model'} was not trained on normalised features and cannot be "
+            "calibrated; builtin:any can"
+        )
+
+
+def location_and_scale(features: Array) -> tuple[Array, Array]:
+    """Return location and scale of features over samples of ordinary handling.
+
+    They are mean and standard deviation of the values clipped to the location plus and minus
+    `CLIP_DEVIATIONS` scales, the scale divided by that of clipped normal values (Huber's second
+    proposal), so that a tenth of the samples may be slip. The scale is at least `MIN_SCALE`.
+
+    Args:
+        features: (n, n_features) finite.
+
+    Returns:
+        (n_features,) each.
+    """
+    # E min(z^2, c^2) of a normal z: 1 - 2 (1 - Phi(c)) (1 - c^2) - 2 c phi(c).
+    c = CLIP_DEVIATIONS
+    tails = math.erfc(c / math.sqrt(2))
+    density = math.exp(-0.5 * c * c) / math.sqrt(2 * math.pi)
+    shrinkage = math.sqrt(1 - tails * (1 - c * c) - 2 * c * density)
+    location, scale = np.median(features, axis=0), features.std(axis=0)
+    for _ in range(MAX_CLIP_STEPS):
+        before = location, scale
+        clipped = np.clip(features, location - c * scale, location + c * scale)
+        location, scale = clipped.mean(axis=0), clipped.std(axis=0) / shrinkage
+        if np.allclose(before, (location, scale), rtol=1e-9, atol=1e-9):
+            break
+    return location, np.maximum(scale, MIN_SCALE)
+
+
+def activity(part: FingerModel, features: Array) -> float:
+    """Return how far the features of change are above their default location.
+
+    Args:
+        part: whose features they are.
+        features: (n, n_features) of held samples.
+
+    Returns:
+        The median over the samples of the mean over the features, in default scales; 0 without
+        such features.
+    """
+    columns = [k for k, spec in enumerate(part.all_features) if spec.kind in CHANGE_KINDS]
+    if not columns:
+        return 0.0
+    location, scale = part.default_handling
+    return float(np.median(((features - location) / scale)[:, columns].mean(axis=1)))
+
+
+def n_changed(part: FingerModel, handling: Handling) -> int:
+    """Return the number of features whose location or scale differs from the default."""
+    location, scale = part.default_handling
+    moved = np.abs(handling.location - location) > MOVED_LOCATION * scale
+    stretched = np.abs(np.log(handling.scale / scale)) > math.log(MOVED_SCALE)
+    return int((moved | stretched).sum())
+
+
+class _Calibration:
+    """Location, scale and thresholds of a model from own handling.
+
+    Args:
+        handling: checked.
+        recordings: from which it was taken.
+    """
+
+    def __init__(self, handling: OwnHandling, recordings: Sequence[Recording]) -> None:
+        self.model, self.seen, self.recordings = handling.model, handling, recordings
+        self.places = [p for p in handling.samples if handling.seconds(p) >= MIN_HANDLING]
+
+    def result(self, false_alarms: float | None) -> Calibrated:
+        """Return the calibrated model, with what the calibration saw.
+
+        Raises:
+            TrainingError: most of the handling seems to be slip, or no threshold gives so few
+                alarms.
+        """
+        own = {place: self._normalisation(place) for place in self.places}
+        before = self._decide(self.model)
+        after = self._decide(_with_handling(self.model, own))
+        for place, handling in own.items():
+            part = self.model.finger(place.finger).with_handling(handling)
+            point = choose_operating_point(after[place], part, false_alarms)
+            own[place] = msgspec.structs.replace(handling, **point._asdict())
+        model = _with_handling(self.model, own)
+        name = model.name.removesuffix(SUFFIX)
+        sensors = tuple(self._summary(p, own[p], before[p], after[p]) for p in self.places)
+        return Calibrated(
+            msgspec.structs.replace(model, name=f"{name}{SUFFIX}" if name else ""),
+            sensors,
+            tuple(self._warnings(sensors)),
+        )
+
+    def _normalisation(self, place: Place) -> Handling:
+        """Return location and scale of a place.
+
+        Raises:
+            TrainingError: most of the handling seems to be slip.
+        """
+        features = self.seen.features(place)
+        found = activity(self.model.finger(place.finger), features)
+        if found > MAX_ACTIVITY:
+            raise TrainingError(
+                f"{place}: most of this handling looks like slip (activity {found:.2f}, at most "
+                f"{MAX_ACTIVITY:g} expected); ordinary handling without slip expected"
+            )
+        location, scale = location_and_scale(features)
+        return Handling(
+            location=tuple(location.tolist()),
+            scale=tuple(scale.tolist()),
+            seconds=self.seen.seconds(place),
+            recordings=self.seen.digests,
+        )
+
+    def _decide(self, model: Model) -> dict[Place, HeldFingers]:
+        """Return the decisions of a model about the own handling, for any threshold."""
+        fingers: dict[Place, list[HeldFinger]] = {}
+        for recording in self.recordings:
+            if recording.name not in self.seen.digests:
+                continue
+            replay = ThresholdReplay.of(model, recording)
+            for name, decisions in replay.raw.fingers.items():
+                place = Place.of(model, name, recording.modules[name].sensor)
+                held = held_samples(decisions.times, decisions.states)
+                fingers.setdefault(place, []).append(HeldFinger(name, replay, held))
+        return {place: HeldFingers(held) for place, held in fingers.items()}
+
+    def _summary(
+        self, place: Place, handling: Handling, before: HeldFingers, after: HeldFingers
+    ) -> HandlingSummary:
+        part = self.model.finger(place.finger)
+        given, own = part.for_sensor(place.sensor), part.with_handling(handling)
+        thresholds = given.classifier.threshold, own.classifier.threshold
+        slips = None
+        if given.slip is not None and own.slip is not None:
+            slips = given.slip.classifier.threshold, own.slip.classifier.threshold
+        return HandlingSummary(
+            sensor=str(place),
+            fingers=self.seen.fingers(place),
+            seconds=handling.seconds,
+            load_change=self.seen.load_change(place),
+            n_features=len(handling.location),
+            n_changed=n_changed(part, handling),
+            activity=activity(part, self.seen.features(place)),
+            stable=(
+                100 * before.stable_share(thresholds[0]),
+                100 * after.stable_share(thresholds[1]),
+            ),
+            alarms_per_minute=(
+                before.alarms_per_minute(thresholds[0]),
+                after.alarms_per_minute(thresholds[1]),
+            ),
+            raised=slips
+            and (100 * before.raised_share(slips[0]), 100 * after.raised_share(slips[1])),
+            threshold=thresholds,
+            slip_threshold=slips,
+        )
+
+    def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
+        for summary in sensors:
+            if summary.seconds < ENOUGH_HANDLING:
+                yield (
+                    f"{summary.sensor}: {summary.seconds:.0f} s of holding; {ENOUGH_HANDLING:g} s "
+                    "or more are better"
+                )
+            if summary.load_change < STILL_CHANGE:
+                yield (
+                    f"{summary.sensor}: the arm hardly moved; add handling in which it carries and "
+                    "turns, or its motion will look like slip"
+                )
+        for place in self.seen.samples:
+            if place not in self.places:
+                yield (
+                    f"{place}: {self.seen.seconds(place):.1f} s of holding, at least "
+                    f"{MIN_HANDLING:g} s needed; left as it was"
+                )
+        if self.seen.n_left_out:
+            yield (
+                f"{self.seen.n_left_out} recordings not used: {MAX_HANDLING / 60:g} min of holding "
+                "are enough"
+            )
+
+
+def _with_handling(model: Model, own: Mapping[Place, Handling]) -> Model:
+    """Return the model with own handling of some places; that of other sensors stays."""
+    fingers = {}
+    for name, part in model.fingers.items():
+        new = {place.sensor: own[place] for place in own if place.finger == name}
+        handling = {**part.own_handling, **new}
+        fingers[name] = msgspec.structs.replace(part, handling=handling or msgspec.UNSET)
+    return msgspec.structs.replace(model, fingers=fingers)

@@ -1,0 +1,226 @@
+"""Own handling: the held samples of recordings of ordinary use, which have no labels.
+
+What is held follows from the model's own rule of contact.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from holdfast.contact import STABLE, UNSTABLE, Reason, faults_of
+from holdfast.detector import FingerTrace, detect
+from holdfast.errors import TrainingError
+from holdfast.features.stream import extract
+from holdfast.metrics.decisions import Codes
+from holdfast.metrics.masks import drop_short_runs
+from holdfast.metrics.slip_truth import sample_durations
+from holdfast.model import ANY_FINGER, Debounce, Model
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array, Flags
+from holdfast.training.training_samples import resample_if_needed
+
+MIN_HANDLING = 5.0
+"""Least held time of own handling [s]."""
+ENOUGH_HANDLING = 30.0
+"""Held time of own handling below which the user is warned [s]."""
+MAX_HANDLING = 1800.0
+"""Held time of all fingers after which further recordings are not used [s]."""
+MIN_TOUCH = 0.25
+"""A finger holds something if it touches for this time without a break [s]. A clip of 0.5 s has
+as much after the first samples, which have no features."""
+MAX_FAULTY_SHARE = 0.1
+"""Own handling is refused if a finger is UNKNOWN by faults in more than this share of it."""
+CHANGE_SECONDS = 0.5
+"""Interval over which the change of the load is measured [s]."""
+FAULT_CODE = tuple(Reason).index(Reason.FAULT)
+"""Code of the reason fault."""
+
+
+class Place(NamedTuple):
+    """Where own handling stands in a model: a finger of the model (or `"*"`), and a sensor."""
+
+    finger: str
+    sensor: str
+
+    @classmethod
+    def of(cls, model: Model, finger: str, sensor: Sensor) -> "Place":
+        """Return the place for a finger of a hand."""
+        return cls(ANY_FINGER if ANY_FINGER in model.fingers else finger, sensor.name)
+
+    def __str__(self) -> str:
+        return self.sensor if self.finger == ANY_FINGER else f"{self.finger} ({self.sensor})"
+
+
+@dataclass(frozen=True, eq=False)
+class HeldSamples:
+    """Held samples of one finger of one recording.
+
+    Attributes:
+        finger: its name.
+        sensor: its sensor.
+        features: (n, n_features) finite.
+        load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it.
+        seconds: held time [s].
+    """
+
+    finger: str
+    sensor: Sensor
+    features: Array
+    load_changes: Array
+    seconds: float
+
+
+class _Faults(NamedTuple):
+    n_faulty: int
+    n: int
+    mask: int
+
+
+@dataclass
+class OwnHandling:
+    """Held samples of recordings, which are added one by one.
+
+    Attributes:
+        model: whose rule of contact and features are used.
+        samples: by place.
+        digests: content digest of each recording that is used, by name.
+        n_left_out: number of recordings that were not needed.
+    """
+
+    model: Model
+    samples: dict[Place, list[HeldSamples]] = field(default_factory=dict)
+    digests: dict[str, str] = field(default_factory=dict)
+    n_left_out: int = 0
+    _faults: dict[str, _Faults] = field(default_factory=dict)
+
+    def add(self, recording: Recording) -> None:
+        """Add a recording; leave it out if the held time is long enough already.
+
+        Raises:
+            ModelError: the recording has other fingers or sensors.
+            TrainingError: a sensor differs from that of the same name in an earlier recording.
+        """
+        totals = [sum(self.fingers(place).values()) for place in self.samples]
+        if totals and min(totals) > MAX_HANDLING:
+            self.n_left_out += 1
+            return
+        self.digests[recording.name] = recording.digest
+        if self.model.rate is not None:
+            recording = resample_if_needed(recording, self.model.rate)
+        raw = msgspec.structs.replace(self.model, debounce=Debounce())
+        traces = detect(raw, recording).fingers
+        sensors = {name: recording.modules[name].sensor for name in traces}
+        rows = extract(self.model.plan(sensors, recording.rate), recording)
+        for name, trace in traces.items():
+            self._count_faults(name, trace)
+            self._add_finger(name, sensors[name], trace, rows[name].features)
+
+    def fingers(self, place: Place) -> dict[str, float]:
+        """Return the held time of each finger of a place [s]."""
+        totals: dict[str, float] = {}
+        for part in self.samples[place]:
+            totals[part.finger] = totals.get(part.finger, 0.0) + part.seconds
+        return totals
+
+    def seconds(self, place: Place) -> float:
+        """Return the held time of the finger of a place that holds longest [s]."""
+        return max(self.fingers(place).values())
+
+    def features(self, place: Place) -> Array:
+        """Return (n, n_features) the features of all held samples of a place."""
+        return np.concatenate([part.features for part in self.samples[place]])
+
+    def load_change(self, place: Place) -> float:
+        """Return the median change of the force of a place, as a share of it."""
+        changes = np.concatenate([part.load_changes for part in self.samples[place]])
+        return float(np.median(changes)) if len(changes) else 0.0
+
+    def check(self) -> None:
+        """Check that the fingers have few faults, and that one holds something long enough.
+
+        Raises:
+            TrainingError: they have too many, or none does.
+        """
+        for finger, (n_faulty, n, mask) in self._faults.items():
+            if n_faulty > MAX_FAULTY_SHARE * n:
+                names = ", ".join(fault.value for fault in faults_of(mask))
+                raise TrainingError(
+                    f"{finger}: {100 * n_faulty / n:.0f} % of the handling has faults ({names}); "
+                    f"at most {100 * MAX_FAULTY_SHARE:.0f} % expected, see holdfast info"
+                )
+        longest = max(map(self.seconds, self.samples), default=0.0)
+        if longest == 0:
+            n = len(self.digests)
+            raise TrainingError(
+                f"nothing is held in {n} recording{'s' * (n != 1)}; at least {MIN_HANDLING:g} s of "
+                "ordinary handling expected, in recordings that begin with an open hand"
+            )
+        if longest < MIN_HANDLING:
+            raise TrainingError(
+                f"{longest:.1f} s of holding given, at least {MIN_HANDLING:g} s expected "
+                f"({ENOUGH_HANDLING:g} s or more are better)"
+            )
+
+    def _add_finger(self, name: str, sensor: Sensor, trace: FingerTrace, features: Array) -> None:
+        place = Place.of(self.model, name, sensor)
+        known = self.samples.setdefault(place, [])
+        if known and (known[0].sensor.n_taxels, known[0].sensor.unit) != (
+            sensor.n_taxels, sensor.unit
+        ):  # fmt: skip
+            raise TrainingError(
+                f"{sensor.name}: {sensor.n_taxels} taxels in {sensor.unit} given after "
+                f"{known[0].sensor.n_taxels} in {known[0].sensor.unit}; one sensor of a name "
+                "expected"
+            )
+        held = held_samples(trace.times, trace.state) & np.isfinite(features).all(axis=1)
+        seconds = float(held_durations(trace.times)[held].sum())
+        changes = _load_changes(trace, held)
+        known.append(HeldSamples(name, sensor, features[held], changes, seconds))
+
+    def _count_faults(self, finger: str, trace: FingerTrace) -> None:
+        before = self._faults.get(finger, _Faults(0, 0, 0))
+        faulty = trace.reason == FAULT_CODE
+        mask = int(np.bitwise_or.reduce(trace.faults[faulty].astype(np.int64), initial=0))
+        self._faults[finger] = _Faults(
+            before.n_faulty + int(faulty.sum()), before.n + len(trace), before.mask | mask
+        )
+
+
+def held_samples(times: Array, states: Codes) -> Flags:
+    """Return (n,) where a finger holds something for at least `MIN_TOUCH`.
+
+    Args:
+        times: (n,) [s].
+        states: (n,) codes of its states, without debouncing.
+    """
+    held = np.asarray((states == STABLE) | (states == UNSTABLE))
+    return drop_short_runs(held, math.ceil(MIN_TOUCH / _period(times)))
+
+
+def held_durations(times: Array) -> Array:
+    """Return (n,) the duration of each sample, which is a period before a gap [s]."""
+    return np.minimum(sample_durations(times), 1.5 * _period(times))
+
+
+def _period(times: Array) -> float:
+    """Return the median step in time [s]; `MIN_TOUCH` for a single sample."""
+    return float(np.median(np.diff(times))) if len(times) > 1 else MIN_TOUCH
+
+
+def _load_changes(trace: FingerTrace, held: Flags) -> Array:
+    """Return the change of the force within `CHANGE_SECONDS`, as a share of it, where it is held.
+
+    Samples before which the finger did not hold for so long are left out.
+    """
+    step = max(1, round(CHANGE_SECONDS / _period(trace.times)))
+    if len(trace) <= step:
+        return np.empty(0)
+    n_held = np.cumsum(np.append(0, held))
+    kept = n_held[step + 1 :] - n_held[: -step - 1] == step + 1
+    change = np.linalg.norm(trace.force[step:] - trace.force[:-step], axis=1)[kept]
+    load = np.linalg.norm(trace.force[step:], axis=1)[kept]
+    return np.asarray(change[load > 0] / load[load > 0])
