@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from holdfast.sensors import sensor as sensor
     from holdfast.training import Setting as Setting
     from holdfast.training import StabilityClassifier as StabilityClassifier
+    from holdfast.training import calibrate as calibrate
     from holdfast.training import evaluate as evaluate
     from holdfast.training import train as train
 
@@ -83,7 +84,7 @@ _NAMES = {
     "devices.hands": ("HandDevice",),
     "live.stream_detector": ("StreamDetector",),
     "devices.sources": ("Arrival", "Source", "open_source"),
-    "training": ("Setting", "StabilityClassifier", "evaluate", "train"),
+    "training": ("Setting", "StabilityClassifier", "calibrate", "evaluate", "train"),
     "metrics": ("event_metrics", "sample_metrics"),
     "errors": (
         "EngineError",

@@ -30,6 +30,7 @@ VERBS = {
     "label": "Label recordings on a page or by a rule, and check labels.",
     "train": "Train a model from labelled recordings.",
     "evaluate": "Evaluate a model on labelled recordings.",
+    "calibrate": "Fit a model to a hand by a minute of its ordinary handling, without labels.",
     "tune": "Choose the threshold for a wanted rate of false alarms.",
     "detect": "Detect the contact state of every finger at every sample.",
     "serve": "Show the estimates of a source on a web page, and publish them.",
@@ -48,7 +49,7 @@ LAB_VERBS = ("trial", "study")
 ENTRY_POINTS = "holdfast.verbs"
 """Group of the entry points of verbs of other packages."""
 
-CONFIGURED_VERBS = ("detect", "serve", "record", "hold")
+CONFIGURED_VERBS = ("detect", "serve", "record", "hold", "calibrate")
 """Verbs that read the configuration file of `cli/config.py`."""
 
 HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or

@@ -12,6 +12,7 @@ from holdfast.cli.options import (
     ModelArgument,
     PlotOptions,
     SeedOption,
+    report_other_handling,
     start_engine,
 )
 from holdfast.cli.slip_scores import print_slips
@@ -84,6 +85,9 @@ def evaluate(
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
     warn_about_training(evaluation.trained_on, len(recordings))
+    if loaded.handled_sensors:
+        first = {name: module.sensor for name, module in recordings[0].modules.items()}
+        report_other_handling(loaded, loaded.fingers_of(first).values())
     figure.save(lambda: _draw(evaluation))
     if as_json:
         document = {"trained_on": evaluation.trained_on, "verdict": evaluation.verdict}

@@ -8,7 +8,7 @@ from holdfast.cli.terminal.console import print_json, print_table
 
 if TYPE_CHECKING:
     from holdfast.classifiers.slip import SlipRule
-    from holdfast.model import FingerModel, Model
+    from holdfast.model import FingerModel, Handling, Model
 
 N_NAMES = 3
 """Number of names that are printed of a long list."""
@@ -67,6 +67,18 @@ def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
         "contact_noise": part.contact_noise,
         "contact_load": part.contact_load,
         "slip": None if part.slip is None else _slip(part.slip),
+        "normalised": bool(part.normalised),
+        "handling": {name: _handling(own) for name, own in part.own_handling.items()},
+    }
+
+
+def _handling(own: "Handling") -> dict[str, Any]:
+    """Return the facts about own handling; location and scale are in the model file."""
+    return {
+        "seconds": own.seconds,
+        "threshold": own.threshold,
+        "slip_threshold": own.slip_threshold,
+        "recordings": list(own.recordings),
     }
 
 
@@ -103,7 +115,7 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield finger, f"sensor {sensor}; {part['classifier']}"
         yield "", f"features {_few(part['features'])}"
         yield "", f"STABLE from a probability of {part['threshold']:.3g} on; {_contact(part)}"
-        yield from (("", line) for line in _slip_lines(part))
+        yield from (("", line) for line in (*_slip_lines(part), *_handling_lines(part)))
     training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
     tuned = list(_tuned_lines(document))
@@ -147,6 +159,22 @@ def _slip_lines(part: dict[str, Any]) -> Iterator[str]:
         f"minute (at most {chosen['requested']:g} wanted) in {chosen['held_minutes']:.3g} min of "
         f"held time; {chosen['n_slips']} slips{found}"
     )
+
+
+def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
+    """Yield the own handling of a finger on each sensor."""
+    if part["normalised"] and not part["handling"]:
+        yield "features normalised by default handling (holdfast calibrate: by your own)"
+    for sensor, own in part["handling"].items():
+        names, thresholds = own["recordings"], []
+        if own["threshold"] is not None:
+            thresholds.append(f"STABLE from {own['threshold']:.3g} on")
+        if own["slip_threshold"] is not None:
+            thresholds.append(f"slides from {own['slip_threshold']:.3g} on")
+        yield (
+            f"own handling of {sensor}: {own['seconds']:.3g} s held in {len(names)} recordings "
+            f"({_few(names)}){''.join(f'; {text}' for text in thresholds)}"
+        )
 
 
 def _trained(training: dict[str, Any]) -> str:

@@ -6,7 +6,7 @@ that takes one has all its options (see `spread_groups` of `app.py`).
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -190,6 +190,7 @@ class DetectorOptions:
         strict = self.rate is RatePolicy.STRICT
         stream = StreamDetector(model, source, strict=strict, ignore=taxels)
         report_missing_fingers(model, source.name, source.sensors)
+        report_other_handling(model, stream.fingers.values())
         return stream
 
 
@@ -310,6 +311,15 @@ def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, obje
         print_message(
             f"{name} has {', '.join(modules)}; the model also has {', '.join(missing)}, "
             "which get no estimates"
+        )
+
+
+def report_other_handling(model: "Model", sensors: "Iterable[Sensor]") -> None:
+    """Print the sensors without own handling, if the model has that of other sensors."""
+    if missing := model.without_handling(sensors):
+        print_message(
+            f"{model.name} was calibrated on {', '.join(model.handled_sensors)}, not on "
+            f"{', '.join(missing)}: default handling is used (holdfast calibrate)"
         )
 
 

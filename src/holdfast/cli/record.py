@@ -78,15 +78,52 @@ def record(
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
     path = _output_path(source, out, object_name, force=force)
+    recorder = capture(
+        source, path, metadata, seconds=seconds, speed=speed, fingers_only=fingers_only,
+        force=force, fsync=fsync,
+    )  # fmt: skip
+    _print_result(recorder.path, recorder.status, as_json)
+
+
+def capture(
+    source: str,
+    path: Path,
+    metadata: dict[str, Any] | None = None,
+    *,
+    seconds: float | None,
+    speed: float,
+    fingers_only: bool = False,
+    force: bool = False,
+    fsync: bool = False,
+) -> "Recorder":
+    """Record a source to a file, until `seconds` are over or a person stops it.
+
+    Args:
+        source: URI of a source, or path of a recording.
+        path: of the file.
+        metadata: of the recording.
+        seconds: time to record [s]; None for any.
+        speed: of a recording or the twin.
+        fingers_only: leave out pads and palm.
+        force: replace an existing file.
+        fsync: wait for the disk.
+
+    Returns:
+        The recorder, which is closed.
+
+    Raises:
+        SourceError: the source cannot be opened, or no samples arrived.
+        OutputError: the file cannot be written.
+    """
     from holdfast.devices.sources import open_source
 
     with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
         stop.graceful = True
         recorder = _create_recorder(
-            opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
+            opened, path, metadata or {}, fingers_only=fingers_only, force=force, fsync=fsync
         )
         _record(opened, recorder, stop, _read(opened, seconds, speed))
-    _print_result(recorder.path, recorder.status, as_json)
+    return recorder
 
 
 def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Arrival | None]":

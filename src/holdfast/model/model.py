@@ -161,9 +161,15 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             fingers[name] = msgspec.structs.replace(own, handling=msgspec.UNSET)
         return msgspec.structs.replace(self, fingers=fingers)
 
+    @property
+    def handled_sensors(self) -> tuple[str, ...]:
+        """Names of the sensors whose own handling the model has."""
+        names = (name for part in self.fingers.values() for name in part.own_handling)
+        return tuple(dict.fromkeys(names))
+
     def without_handling(self, sensors: Iterable[Sensor]) -> list[str]:
         """Return the names of those sensors that lack own handling, while the model has others."""
-        known = {name for part in self.fingers.values() for name in part.own_handling}
+        known = self.handled_sensors
         names = dict.fromkeys(sensor.name for sensor in sensors)
         return [name for name in names if known and name not in known]
 

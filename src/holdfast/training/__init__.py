@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from holdfast.training.calibration import Calibrated, calibrate, calibrate_with_report
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import Setting
 from holdfast.training.threshold import ThresholdMetrics, Tuned, tune
@@ -11,11 +12,14 @@ if TYPE_CHECKING:
     from holdfast.training.estimator import StabilityClassifier
 
 __all__ = [
+    "Calibrated",
     "Setting",
     "StabilityClassifier",
     "ThresholdMetrics",
     "Trained",
     "Tuned",
+    "calibrate",
+    "calibrate_with_report",
     "compute_decisions",
     "evaluate",
     "train",

@@ -74,7 +74,7 @@ class HeldFinger:
         states = self.replay.states(self.decisions, threshold)
         spells = runs(states == UNSTABLE)
         inside = [(a, b) for a, b in spells if a > 0 and b < len(states)]
-        return sum(states[a - 1] == STABLE and states[b] == STABLE for a, b in inside)
+        return sum(bool(states[a - 1] == states[b] == STABLE) for a, b in inside)
 
     def raised(self, threshold: float) -> Flags:
         """Return (n,) where a slip is reported at a threshold; nowhere without a slip rule."""
@@ -104,7 +104,8 @@ class HeldFingers:
 
     def alarms_per_minute(self, threshold: float) -> float:
         """Return the number of alarms of all fingers per minute of held time."""
-        return 60 * sum(finger.n_alarms(threshold) for finger in self.fingers) / self.seconds
+        n = sum(finger.n_alarms(threshold) for finger in self.fingers)
+        return 60 * n / self.seconds
 
     def raised_share(self, threshold: float) -> float:
         """Return the share of the held samples in which a slip is reported at a threshold."""

@@ -21,6 +21,7 @@ from holdfast.cli.options import (
     parse_taxels,
     report_missing_fingers,
     report_missing_slip_rules,
+    report_other_handling,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
@@ -149,7 +150,9 @@ def _detect_recording(
             detector = Detector.for_recording(model, part, ignore=taxels)
             report_missing_fingers(model, part.name, part.modules)
             report_missing_slip_rules(model)
-            readings = ReadingsMonitor(model.fingers_of(sensors))
+            used = model.fingers_of(sensors)
+            report_other_handling(model, used.values())
+            readings = ReadingsMonitor(used)
         for notice in readings.update_recording(part):
             print_message(notice)
         yield chunk_from_detection(detector.run(part))

@@ -1,0 +1,158 @@
+"""`holdfast calibrate`: a model with the own handling of a hand, without labels."""
+
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from holdfast.cli.options import (
+    ForceOption,
+    JsonOption,
+    ModelArgument,
+    ModelOutput,
+    SpeedOption,
+    check_seconds,
+    check_speed,
+    complete_source,
+)
+from holdfast.cli.record import capture
+from holdfast.cli.terminal.console import (
+    print_json,
+    print_line,
+    print_message,
+    print_paragraph,
+    print_table,
+)
+from holdfast.cli.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from holdfast.io import Dataset
+    from holdfast.recordings import Recording
+    from holdfast.training.calibration import Calibrated, HandlingSummary
+
+HANDLING_SECONDS = 60.0
+"""Time for which a live source is recorded, unless `--seconds` is given [s]."""
+MAX_FINGERS_SHOWN = 5
+
+
+def calibrate(
+    model: ModelArgument,
+    data: Annotated[
+        str,
+        typer.Argument(
+            help="A recording, a folder of them, URI of a source, or hand (of holdfast.toml).",
+            callback=complete_source,
+        ),
+    ],
+    out: ModelOutput,
+    false_alarms: Annotated[
+        float | None,
+        typer.Option(
+            "--false-alarms",
+            help="Maximum number of alarms per minute of this handling; by default, nine tenths "
+            "of it are STABLE.",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds", help="Time for which a live source is recorded [s].", show_default="60"
+        ),
+    ] = None,
+    speed: SpeedOption = 1.0,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a model to a hand by a minute of its ordinary handling, without labels.
+
+    Write a copy of the model in which every feature is normalised by what it is on this sensor
+    while it is used as usual: grasp, carry, turn, put down, without slip. The thresholds are set
+    by the same handling. Begin with an open hand. A tenth of the handling may be slip.
+
+    DATA are recordings, or a live source such as xela://HOST:PORT or twin:?object=can, which is
+    recorded for --seconds and not kept. At least 5 s of holding are needed, 30 s are better.
+    Models whose features are not normalised are refused: use builtin:any.
+
+    Example:
+      holdfast calibrate builtin:any handling/ -o mine.json
+      holdfast calibrate builtin:any xela://auto -o mine.json --seconds 60
+      holdfast calibrate builtin:any handling/ -o mine.json --false-alarms 1
+    """
+    from holdfast.devices.uri import is_uri
+    from holdfast.files import refuse_overwrite
+    from holdfast.model import Model
+    from holdfast.training.calibration import calibrate_with_report, check_normalised
+
+    refuse_overwrite(out, force=force)
+    check_seconds(seconds)
+    loaded = Model.load(model)
+    check_normalised(loaded)
+    live = is_uri(data)
+    if not live and (seconds is not None or speed != 1.0):
+        raise ValueError(f"--seconds and --speed are for live sources; {data} is a recording")
+    check_speed(data, speed)
+    with _recordings(data, seconds or HANDLING_SECONDS, speed, live=live) as recordings:
+        calibrated = calibrate_with_report(
+            loaded, recordings, false_alarms=false_alarms, progress=_with_progress
+        )
+    calibrated.model.save(out, force=force)
+    for warning in calibrated.warnings:
+        print_message(warning)
+    if as_json:
+        print_json({"model": out, "sensors": calibrated.sensors, "warnings": calibrated.warnings})
+        return
+    _print(calibrated, out)
+
+
+def _with_progress(recordings: "Iterable[Recording]") -> "Iterator[Recording]":
+    return progress(recordings, "reading")
+
+
+@contextmanager
+def _recordings(data: str, seconds: float, speed: float, *, live: bool) -> "Iterator[Dataset]":
+    """Yield the recordings; those of a live source are deleted afterwards."""
+    from holdfast.io import load_dataset
+
+    if not live:
+        yield load_dataset(data, labels=False)
+        return
+    with TemporaryDirectory(prefix="holdfast-") as folder:
+        capture(data, Path(folder) / "handling.mcap", seconds=seconds, speed=speed)
+        yield load_dataset(folder)
+
+
+def _print(calibrated: "Calibrated", out: Path) -> None:
+    for summary in calibrated.sensors:
+        print_paragraph(_seen(summary))
+        rows = [
+            ("STABLE in the held samples [%]", *_pair(summary.stable, 1)),
+            ("alarms per minute of holding", *_pair(summary.alarms_per_minute, 1)),
+            ("threshold of STABLE", *_pair(summary.threshold, 3)),
+        ]
+        if summary.raised is not None and summary.slip_threshold is not None:
+            rows.append(("slip reported in the held samples [%]", *_pair(summary.raised, 1)))
+            rows.append(("threshold of a slip", *_pair(summary.slip_threshold, 3)))
+        print_table(("", "before", "after"), rows)
+        print_line()
+    print_line(f"{out}: {calibrated.model.name or 'the model'}")
+
+
+def _pair(values: tuple[float, float], digits: int) -> tuple[str, str]:
+    before, after = (f"{value:.{digits}f}" for value in values)
+    return before, after
+
+
+def _seen(summary: "HandlingSummary") -> str:
+    """Return what was seen of a sensor, as a text."""
+    held = [f"{name} {seconds:.0f} s" for name, seconds in summary.fingers.items()]
+    more = ", ..." if len(held) > MAX_FINGERS_SHOWN else ""
+    return (
+        f"{summary.sensor}: held {summary.seconds:.0f} s ({', '.join(held[:MAX_FINGERS_SHOWN])}"
+        f"{more}); while it was held, the force changed by {100 * summary.load_change:.0f} % in "
+        f"half a second (median). {summary.n_changed} of {summary.n_features} features differ from "
+        "those of the default."
+    )
