@@ -4,23 +4,26 @@
     holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
     python benchmarks/train_slips.py builtin:twin twin/ slips/ --own-features \
         -o src/holdfast/models/twin.json
-    holdfast simulate hands/ --randomize --repeats 300 --seed 0
-    python benchmarks/train_slips.py builtin:any hands/ -o src/holdfast/models/any.json
+    holdfast simulate hands/ --randomize --measured all --repeats 150 --grasps 3 --seed 0
+    python benchmarks/train_slips.py any.json hands/ -o any.json
 
 The features and the classifier of stability stay. With --own-features, the rule gets the list
 `SLIP_FEATURES` and squares; else it has the features of that classifier. It is fitted without a
 fifth of the objects (or hands), five times; the threshold is the lowest with at most one false
 alarm a minute of all held time in the decisions about what was left out. Below the metrics of all
 recordings, by thresholds that were chosen without them, are those of each folder at the threshold
-of the model. Nothing here reads a real recording.
+of the model. A model of normalised features gets a rule on them: those of a grasp are normalised by
+the other grasps of the same hand. Nothing here reads a real recording.
 """
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
+from hand_handling import moments_of_others, read_grasp
 
 from holdfast.classifiers.slip import SlipRule
 from holdfast.features import FeatureSpec, Tare
@@ -36,6 +39,7 @@ from holdfast.training.dataset_scan import scan_dataset, show_nothing
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.setting import Setting
 from holdfast.training.slips import (
+    SlipSamples,
     choose_slip_threshold,
     gather_slip_samples,
     with_slip_threshold,
@@ -55,22 +59,22 @@ def main(options: argparse.Namespace) -> None:
     recordings = [recording for folder in options.folders for recording in named(folder)]
     plan = plan_of(model, recordings, features or model.finger("*").features)
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
+    if model.finger("*").normalised:
+        samples = normalised_samples(model, samples, recordings)
     print(f"{len(recordings)} recordings, {samples.own.samples.stable.sum()} sliding samples")
-    groups = [int(group) for group in plan.data_split.group_of]
-    held = [range(fold, max(groups) + 1, N_FOLDS) for fold in range(N_FOLDS)]
-    models = [replaced(model, samples.fit(units, features)) for units in held]
-    calls = (
-        (models[group % N_FOLDS], recording)
-        for group, recording in zip(groups, recordings, strict=True)
-    )
+    folds = folds_of_recordings(plan, recordings)
+    units = plan.data_split.group_of
+    held = [units[folds == fold].tolist() for fold in range(N_FOLDS)]
+    models = [replaced(model, fitted(model, samples, left, features)) for left in held]
+    calls = ((models[fold], item) for fold, item in zip(folds, recordings, strict=True))
     curves = list(engine.map_ordered(curves_of, calls))
-    chosen = choose_slip_threshold(curves, [group % N_FOLDS for group in groups], seed=0)
+    chosen = choose_slip_threshold(curves, folds.tolist(), seed=0)
     if chosen is None or chosen.place is None:
         raise SystemExit(chosen.reason if chosen else "no slips are known")
     print_metrics(chosen.metrics.pooled)
     for folder in options.folders:
         print_folder(folder.name, recordings, curves, chosen.place)
-    complete = with_slip_threshold(replaced(model, samples.fit([], features)), chosen)
+    complete = with_slip_threshold(replaced(model, fitted(model, samples, [], features)), chosen)
     print(msgspec.json.encode(complete.finger("*").slip.thresholds).decode())
     if out is not None:
         save(complete, recordings, out)
@@ -92,6 +96,53 @@ def plan_of(
     )  # fmt: skip
     scan = scan_dataset(recordings, model.rate, relative=relative)
     return SamplesPlan(scan, setting, split_data(scan.recordings, setting.split, 0))
+
+
+def folds_of_recordings(plan: SamplesPlan, recordings: Sequence[Recording]) -> np.ndarray:
+    """Return the fold of each recording; those of one object, or of one random hand, share it."""
+    names = [str(unit) for unit in plan.data_split.group_of]
+    if plan.scan.relative:
+        names = [str(item.metadata.get("hand", item.name)) for item in recordings]
+    places = {name: place for place, name in enumerate(dict.fromkeys(names))}
+    return np.array([places[name] % N_FOLDS for name in names])
+
+
+def normalised_samples(
+    model: Model, samples: SlipSamples, recordings: Sequence[Recording]
+) -> SlipSamples:
+    """Return the samples normalised by the other grasps of their hand; by default without."""
+    grasps = [read_grasp(model, recording) for recording in recordings]
+    default, own = model.finger("*").default_handling, samples.own
+    moments = [moments or default for moments in moments_of_others(grasps)]
+    locations, scales = (np.array(values)[own.recordings] for values in zip(*moments, strict=True))
+    features = (own.samples.features - locations) / scales
+    return replace(samples, own=replace(own, samples=own.samples._replace(features=features)))
+
+
+def fitted(
+    model: Model,
+    samples: SlipSamples,
+    held: Collection[int],
+    features: Sequence[FeatureSpec] | None,
+) -> SlipRule | None:
+    """Return a rule fitted without held units, on the raw features.
+
+    Of a model of normalised features, mean and scale of the rule are default handling.
+    """
+    rule, part = samples.fit(held, features), model.finger("*")
+    if rule is None or not part.normalised:
+        return rule
+    linear = rule.classifier
+    location, scale = part.default_handling
+    weights = np.array(linear.coefficients) / np.array(linear.scale)
+    classifier = msgspec.structs.replace(
+        linear,
+        mean=tuple(location.tolist()),
+        scale=tuple(scale.tolist()),
+        coefficients=tuple(weights.tolist()),
+        intercept=linear.intercept - float(weights @ np.array(linear.mean)),
+    )
+    return msgspec.structs.replace(rule, classifier=classifier)
 
 
 def replaced(model: Model, rule: SlipRule | None) -> Model:
