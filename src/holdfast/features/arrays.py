@@ -175,6 +175,8 @@ class Layout(NamedTuple):
     alike: bool  # whether all fingers have the same features
     tare_kind: int
     tare_seconds: float
+    noise_seconds: float  # time over which the noise is measured
+    zero_unknown: bool  # whether it begins in contact, with a load that is not known
     period: float
     lags: Integers1  # (n_lags,) of relative features [samples], ascending; empty without any
     average_gain: float  # share of a new sample in averages of second differences

@@ -44,9 +44,6 @@ OF_HAND = SCOPES.index("hand")
 GAP_LIMIT_PERIODS = 3.0003
 """A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
 
-NOISE_SECONDS = 0.5
-"""Time over which the noise of a sensor is measured, where the tare takes no time [s]."""
-
 
 @compiled_step
 def advance(
@@ -138,8 +135,7 @@ def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapse
     first, last = layout.offsets[f], layout.offsets[f + 1]
     if math.isnan(memory.levels[f, at.NOISE]):
         # noise = sqrt(sum |F(k) - F(k-1)|^2 / (6 n)), over the first n steps.
-        complete = elapsed >= (seconds if kind == at.TARE_SECONDS else NOISE_SECONDS)
-        _measure_noise(layout, memory, readings, f, complete)
+        _measure_noise(layout, memory, readings, f, elapsed >= layout.noise_seconds)
     copy_readings(readings, memory.previous, first, last)
     if counts[f, at.N_TARED] < 0:
         return True
