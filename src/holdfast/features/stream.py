@@ -14,7 +14,11 @@ from holdfast.features import kernel
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.haar import N_SUMS, n_levels
 from holdfast.features.loaded_start import begins_in_contact, declared_baselines, loaded_tare
-from holdfast.features.motion import AVERAGE_SECONDS
+from holdfast.features.motion import (
+    AVERAGE_SECONDS,
+    GAP_LIMIT_PERIODS,
+    MAX_BRIDGED_SECONDS,
+)
 from holdfast.features.specs import (
     FEATURE_KINDS,
     LAG_KINDS,
@@ -284,7 +288,12 @@ def _layout(plan: StreamPlan) -> Layout:
     rotations = [
         np.where(i[:, None, None], 0, s.rotations) for i, s in zip(ignored, sensors, strict=True)
     ]
-    constants = [_constants(s, int((~i).sum())) for i, s in zip(ignored, sensors, strict=True)]
+    bridges = [all(spec.seconds for spec in specs) and bool(specs) for specs in features]
+    steps = [_max_step(plan.rate, bridged=bridged) for bridged in bridges]
+    constants = [
+        (*_constants(s, int((~i).sum())), step)
+        for i, s, step in zip(ignored, sensors, steps, strict=True)
+    ]
     return Layout(
         offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
         rotations=np.concatenate(rotations),
@@ -292,7 +301,8 @@ def _layout(plan: StreamPlan) -> Layout:
         specs=np.stack([spec_codes(specs, width, lags) for specs in features]),
         floors=floors,
         windows=np.array(
-            [(plan.window, *pair) for pair in zip(longest, ready, strict=True)], dtype=np.int64
+            [(plan.window, *parts) for parts in zip(longest, ready, bridges, strict=True)],
+            dtype=np.int64,
         ),
         ignored=np.concatenate(ignored),
         alike=len({tuple(specs) for specs in features}) == 1,
@@ -302,6 +312,7 @@ def _layout(plan: StreamPlan) -> Layout:
         zero_unknown=plan.in_contact is True and tare.kind == "first",
         period=1.0 / plan.rate,
         lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
+        lag_seconds=np.array(lags, dtype=np.float64),
         average_gain=-float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
         has_centres=bool(families[:, at.LAGS].any()),
         has_ratios=bool(families[:, at.RATIOS].any()),
@@ -333,6 +344,12 @@ def _places(sensor: Sensor, ignored: Flags) -> Array:
     return places / radius if radius > 0 else np.zeros_like(places)
 
 
+def _max_step(rate: float, *, bridged: bool) -> float:
+    """Return the longest step in time between samples that is no gap of a finger [s]."""
+    longest = GAP_LIMIT_PERIODS / rate
+    return max(longest, MAX_BRIDGED_SECONDS) if bridged else longest
+
+
 def _noise_seconds(plan: StreamPlan) -> float:
     if plan.in_contact:
         return LOADED_NOISE_SECONDS
@@ -346,7 +363,7 @@ def _ignored(plan: StreamPlan, finger: str) -> Flags:
 
 
 def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
-    """Return a row of `Layout.constants`; each taxel that is used rounds its readings."""
+    """Return the first columns of `Layout.constants`; each used taxel rounds its readings."""
     low, high = sensor.limits or (-np.inf, np.inf)
     noise = COUNT_NOISE if sensor.unit == "count" else NEWTON_NOISE
     rounding = noise if sensor.unit == "count" else np.nan
