@@ -177,7 +177,7 @@ def tugs(folder: Path) -> Iterator[Recording]:
         modules = {
             f"finger{k + 1}": Tactile(EFLESH, times, values[:, k].astype(float)) for k in range(2)
         }
-        yield Recording(path.stem, modules)
+        yield Recording(path.stem, modules, {"starts_loaded": True})
 
 
 def main(arguments: argparse.Namespace) -> None:

@@ -61,7 +61,7 @@ def tugs(folder: Path) -> Iterator[tuple[Recording, bool]]:
         modules = {
             f"finger{k + 1}": Tactile(sensor("anyskin"), times, rows[:, k]) for k in range(2)
         }
-        yield Recording(f"seq_{name}", modules), slipped
+        yield Recording(f"seq_{name}", modules, {"starts_loaded": True}), slipped
 
 
 def box_aucs(model: Model, recordings: list[Recording], score: Score) -> list[float]:

@@ -18,6 +18,10 @@ from holdfast.sensors.types import Array, Unit, rebuilt
 
 GAP_PERIODS = 3.0
 """A step in time of more sample periods is a gap."""
+STARTS_LOADED = "starts_loaded"
+"""Field of the metadata: true if the object is held at the first sample."""
+BASELINES = "baselines"
+"""Field of the metadata: readings without contact by module, for each taxel and axis."""
 MAX_SHOWN_CLOCK = 1e5
 """If a recording starts later than this, times are shown since its start [s]."""
 

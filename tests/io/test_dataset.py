@@ -74,3 +74,12 @@ def test_missing_and_empty_folders(tmp_path):
         f"no recording in {tmp_path} (1 other entries); files *.parquet or *.mcap expected: "
         "`holdfast import` makes them"
     )
+
+
+def test_recordings_can_be_declared_to_begin_in_contact(folder):
+    assert "starts_loaded" not in load_dataset(folder)[0].metadata
+    dataset = load_dataset(folder, in_contact=True)
+    marked, plain = dataset[1:][0], load_dataset(folder)[1]
+    assert marked.metadata == {**plain.metadata, "starts_loaded": True}
+    assert marked.digest == plain.digest
+    assert load_dataset(dataset.paths[0], in_contact=True)[0].metadata["starts_loaded"] is True

@@ -7,6 +7,7 @@ import typer
 
 from holdfast.cli.options import (
     EngineOption,
+    InContactOption,
     JobsOption,
     JsonOption,
     ModelArgument,
@@ -49,6 +50,7 @@ def evaluate(
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     figure: PlotOptions,
+    in_contact: InContactOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Evaluate a model on labelled recordings.
@@ -77,7 +79,7 @@ def evaluate(
     figure.check()
     loaded = Model.load(model)
     started = start_engine(engine, jobs)
-    recordings = load_dataset(started.path(data))
+    recordings = load_dataset(started.path(data), in_contact=in_contact)
     evaluation = evaluate_recordings(
         loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
     )

@@ -19,6 +19,7 @@ from holdfast.cli.grip_options import (
 from holdfast.cli.options import (
     DetectorOptions,
     IgnoreOption,
+    InContactOption,
     JsonOption,
     ModelArgument,
     SecondsOption,
@@ -49,6 +50,7 @@ def hold(
     seconds: SecondsOption = None,
     speed: SpeedOption = 1.0,
     ignore: IgnoreOption = "",
+    in_contact: InContactOption = False,
     as_json: JsonOption = False,
 ) -> None:
     r"""Control the grip force of a hand by the estimates of a source.
@@ -75,7 +77,7 @@ def hold(
 
     settings.check()
     check_seconds(seconds)
-    options = DetectorOptions(ignore=ignore)
+    options = DetectorOptions(ignore=ignore, in_contact=in_contact)
     loaded = options.load_model(model)
     opened, commanded = find_source_and_hand(source, settings.hand, speed=speed)
     check_armed(settings)

@@ -96,6 +96,13 @@ IgnoreOption = Annotated[
     str,
     typer.Option("--ignore", help="Taxels to ignore, counted from 1: index:7,index:12."),
 ]
+InContactOption = Annotated[
+    bool,
+    typer.Option(
+        "--in-contact",
+        help="The object is held at the first sample: it is load, not an open hand.",
+    ),
+]
 SpeedOption = Annotated[
     float,
     typer.Option(
@@ -148,6 +155,7 @@ class DetectorOptions:
         ),
     ] = False
     ignore: IgnoreOption = ""
+    in_contact: InContactOption = False
 
     def load_model(self, name: str) -> "Model":
         """Load a model, and apply `--debounce`, `--hysteresis` and `--raw`.
@@ -188,7 +196,9 @@ class DetectorOptions:
 
         taxels = parse_taxels(self.ignore, source.sensors)
         strict = self.rate is RatePolicy.STRICT
-        stream = StreamDetector(model, source, strict=strict, ignore=taxels)
+        stream = StreamDetector(
+            model, source, strict=strict, ignore=taxels, in_contact=self.in_contact
+        )
         report_missing_fingers(model, source.name, source.sensors)
         report_other_handling(model, stream.fingers.values())
         return stream

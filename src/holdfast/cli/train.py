@@ -11,6 +11,7 @@ from holdfast.cli.options import (
     FittingTareOption,
     ForceOption,
     HysteresisOption,
+    InContactOption,
     JobsOption,
     JsonOption,
     ModelOutput,
@@ -156,6 +157,7 @@ def train(
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     force: ForceOption = False,
+    in_contact: InContactOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Train a model from labelled recordings.
@@ -185,7 +187,7 @@ def train(
     started = start_engine(engine, jobs)
     if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
-    recordings = load_dataset(started.path(data))
+    recordings = load_dataset(started.path(data), in_contact=in_contact)
     report_hidden_labels(recordings.paths, print_message)
     journal = _search_journal(model, resume=resume, force=force)
     trained = _fit(recordings, setting, journal, started)

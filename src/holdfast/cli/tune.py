@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.evaluate import print_verdict, warn_about_training
-from holdfast.cli.options import ForceOption, JsonOption, ModelArgument, ModelOutput
+from holdfast.cli.options import (
+    ForceOption,
+    InContactOption,
+    JsonOption,
+    ModelArgument,
+    ModelOutput,
+)
 from holdfast.cli.slip_scores import print_slip_points, slips_origin
 from holdfast.cli.terminal.console import format_number, print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
@@ -48,6 +54,7 @@ def tune(
         typer.Option("--for", help="Threshold to choose: that of STABLE, or that of a slip."),
     ] = TunedQuestion.STABLE,
     force: ForceOption = False,
+    in_contact: InContactOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Choose the threshold for a wanted rate of false alarms.
@@ -75,7 +82,7 @@ def tune(
 
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
-    recordings = _Recordings(loaded, load_dataset(data))
+    recordings = _Recordings(loaded, load_dataset(data, in_contact=in_contact))
     if question is TunedQuestion.SLIP:
         slips = tune_slips(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
         recordings.warn()

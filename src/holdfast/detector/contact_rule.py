@@ -10,7 +10,7 @@ from holdfast.compiled import compiled_step, inlined
 from holdfast.contact import STABLE, UNSTABLE
 from holdfast.detector import arrays as rule_at
 from holdfast.features import arrays as at
-from holdfast.features.motion import LOAD_DECAY_SECONDS, RELEASED_SHARE
+from holdfast.features.motion import LOAD_DECAY_SECONDS, NOISE_WEIGHT, RELEASED_SHARE
 from holdfast.sensors.types import Array, Integers
 
 DRIFT_SECONDS = 1.0
@@ -37,7 +37,7 @@ def contact_threshold(noise: float, limits: Array) -> float:
 
 
 @compiled_step
-def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
+def is_at_rest(motion: Array, limit: float, latest: int, time: float, zero_unknown: bool) -> bool:
     """Return whether a finger is without contact: its load is small, and its force is at rest.
 
     Args:
@@ -45,11 +45,18 @@ def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
         limit: threshold of contact, as a multiple of the noise.
         latest: the state of the last sample, before debouncing.
         time: of the sample [s].
+        zero_unknown: whether the stream began in contact, with a load that is not known.
     """
     # No contact: 0.2 s without motion, and load < limit noise, or a small share of the peak.
     at_rest = time - motion[at.MOVED_AT] > REST_SECONDS
-    threshold = limit * motion[at.NOISE_NOW]
-    return bool(at_rest and _is_unloaded(motion[at.LOAD], motion[at.PEAK_LOAD], threshold, latest))
+    threshold, peak = limit * motion[at.NOISE_NOW], motion[at.PEAK_LOAD]
+    if zero_unknown:
+        # fall = first F . n - least F . n: the load of the start, once it has gone.
+        fall = -motion[at.LEAST_NORMAL]
+        if fall < NOISE_WEIGHT * motion[at.NOISE_NOW]:
+            return False
+        peak = max(peak, fall)
+    return bool(at_rest and _is_unloaded(motion[at.LOAD], peak, threshold, latest))
 
 
 @inlined
@@ -114,6 +121,28 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
     if not (quiet > 0.0 and values[at.SIGMA] <= CALM_RATIO * quiet):
         decided[rule_at.SHAKEN_AT] = time
     return load
+
+
+@compiled_step
+def update_reference(values: Array, decided: Array, normal: Array) -> None:
+    """Take the force at the least normal force so far as that without contact."""
+    # rest = F at the least F . n; at the start rest = 0, the load of the first sample.
+    least = force = 0.0
+    for axis in range(3):
+        least += decided[rule_at.REST + axis] * normal[axis]
+        force += values[axis] * normal[axis]
+    if force < least:
+        for axis in range(3):
+            decided[rule_at.REST + axis] = values[axis]
+
+
+@compiled_step
+def fall_of(decided: Array, normal: Array) -> float:
+    """Return how far the normal force fell below that of the first sample."""
+    fall = 0.0
+    for axis in range(3):
+        fall -= decided[rule_at.REST + axis] * normal[axis]
+    return fall
 
 
 @compiled_step

@@ -22,17 +22,21 @@ from holdfast.contact import (
 from holdfast.detector import arrays as rule_at
 from holdfast.detector.arrays import DecisionMemory, DecisionRule
 from holdfast.detector.contact_rule import (
+    REST_SECONDS,
     contact_threshold,
+    fall_of,
     follow,
     has_drifted,
     is_at_rest,
     is_empty,
     update_load,
+    update_reference,
 )
 from holdfast.features import arrays as at
 from holdfast.features import kernel
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import TARE_DRIFT
+from holdfast.features.motion import NOISE_WEIGHT
 from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import ANY_FINGER, FingerModel, Model
 from holdfast.sensors.types import Array, Flags, Integers
@@ -293,14 +297,22 @@ def _find_contact(
     if not math.isnan(limits[rule_at.LOAD_LIMIT]):
         # By the load of relative features: load < limit noise, at rest.
         return is_at_rest(
-            memory.motion[f], limits[rule_at.LOAD_LIMIT], codes[rule_at.CANDIDATE], time
-        )
+            memory.motion[f], limits[rule_at.LOAD_LIMIT], codes[rule_at.CANDIDATE], time,
+            layout.zero_unknown,
+        )  # fmt: skip
     # By F_a: load < threshold; a drift of the tare is a fault.
     noise, values = memory.levels[f, at.NOISE], output.values[f]
     threshold = contact_threshold(noise, limits)
     quiet = kernel.noise_sigma(noise, layout.windows[f, at.SIGMA_WINDOW])
+    if layout.zero_unknown:
+        update_reference(values, decided, layout.normals[f])
     load = update_load(values, decided, quiet, time, layout.period)
-    if has_drifted(load, values, codes, decided, threshold, quiet, time, layout.period):
+    if layout.zero_unknown:
+        fall = fall_of(decided, layout.normals[f])
+        if fall < NOISE_WEIGHT * noise or time - decided[rule_at.SHAKEN_AT] <= REST_SECONDS:
+            return False
+        decided[rule_at.PEAK] = max(decided[rule_at.PEAK], fall)
+    elif has_drifted(load, values, codes, decided, threshold, quiet, time, layout.period):
         output.status[f, at.REASON] = at.FAULT
         output.status[f, at.FAULTS] = TARE_DRIFT
     return is_empty(load, decided, threshold, codes[rule_at.CANDIDATE], time)

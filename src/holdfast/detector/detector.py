@@ -37,9 +37,10 @@ from holdfast.detector.fast_step import CHANGED, UNREADABLE, StepArrays, compile
 from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS
+from holdfast.features.loaded_start import declared_baselines
 from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import Model
-from holdfast.recordings import Recording
+from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
@@ -62,6 +63,9 @@ class Detector:
         rate: samples per second of the source [Hz], for a model of any rate; by default the
             rate of the first sensor.
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
+        in_contact: the first samples are load, and not an open hand.
+        baselines: (n_taxels, 3) readings without contact by finger, if `in_contact`; else the
+            load at the first sample is unknown, unless the readings are in newtons.
 
     Raises:
         ModelError: the model is for any finger and `fingers` is missing; a finger has another
@@ -83,10 +87,14 @@ class Detector:
         rate: float | None = None,
         *,
         ignore: IgnoredTaxels | None = None,
+        in_contact: bool = False,
+        baselines: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
         sensors = model.fingers_of(fingers) if fingers is not None else _sensors_of(model)
         first = next(iter(sensors.values()))
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
+        known = declared_baselines({BASELINES: baselines}, sensors)
+        plan = replace(plan, in_contact=in_contact, baselines=known)
         if plan.tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
@@ -96,7 +104,12 @@ class Detector:
 
     @classmethod
     def for_recording(
-        cls, model: Model, recording: Recording, *, ignore: IgnoredTaxels | None = None
+        cls,
+        model: Model,
+        recording: Recording,
+        *,
+        ignore: IgnoredTaxels | None = None,
+        in_contact: bool | None = None,
     ) -> Self:
         """Return a detector for a recording, whose tare may be an interval of it.
 
@@ -105,6 +118,7 @@ class Detector:
             recording: the recording; or its first part, if `run` receives it in parts. A tare by
                 interval then needs that interval in the first part.
             ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
+            in_contact: the first samples are load; None if the metadata say it (`starts_loaded`).
 
         Raises:
             ModelError: the recording has none of the model's fingers, or another sensor.
@@ -114,6 +128,7 @@ class Detector:
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
         plan = _ignoring(model.plan(sensors, recording.rate), ignore)
+        plan = replace(plan, in_contact=in_contact)
         detector._start(model, FeatureStream.for_recording(plan, recording))
         return detector
 
@@ -171,9 +186,15 @@ class Detector:
         """Return (n_taxels, 3) the tare of each finger whose tare is complete [its unit]."""
         return self._stream.baselines()
 
-    def reset(self) -> None:
-        """Discard all samples, events and the tare."""
-        self._use(FeatureStream(self._stream.plan))
+    def reset(self, *, in_contact: bool | None = None) -> None:
+        """Discard all samples, events and the tare.
+
+        Args:
+            in_contact: whether the next samples are load; None for as before.
+        """
+        plan = self._stream.plan
+        loaded = plan.in_contact if in_contact is None else in_contact
+        self._use(FeatureStream(replace(plan, in_contact=loaded)))
 
     def set_thresholds(self, thresholds: Mapping[str, float]) -> None:
         """Change the probability from which a contact is stable, from the next sample on.
@@ -336,13 +357,14 @@ class Detector:
         self._transitions.clear()
 
 
-def detect(model: Model, recording: Recording) -> Detection:
+def detect(model: Model, recording: Recording, *, in_contact: bool | None = None) -> Detection:
     """Return the estimates of a whole recording, the same as `Detector.update` gives.
 
     Args:
         model: features, classifiers and decision rule.
         recording: that has some of the model's fingers. It is resampled first, if its rate is
             not within 20 % of the model's.
+        in_contact: the first samples are load; None if the metadata say it (`starts_loaded`).
 
     Returns:
         The trace of each finger that the recording has, and of the hand.
@@ -360,7 +382,7 @@ def detect(model: Model, recording: Recording) -> Detection:
     """
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
-    return Detector.for_recording(model, recording).run(recording)
+    return Detector.for_recording(model, recording, in_contact=in_contact).run(recording)
 
 
 def check_thresholds(thresholds: Mapping[str, float]) -> None:

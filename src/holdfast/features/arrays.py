@@ -52,8 +52,9 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     TAXEL_FAULTS,  # faults of single taxels at the last sample that changed any reading
     FAULTY_TAXELS,  # bits of those taxels
     LONGEST_REST,  # most successive samples without a change, if long and not by a fault
+    N_MOTION,  # forces since the last gap that is not bridged
     COUNTS_WIDTH,
-) = range(12)
+) = range(13)
 
 # Memory.levels.
 (
@@ -84,8 +85,9 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     MIN_NOISE,  # noise of a force component by the step of the readings alone
     ROUNDING_NOISE,  # noise of a reading by its step; NaN where the step is not known
     N_USED,  # taxels that are not ignored
+    MAX_STEP,  # a longer step in time is a gap of the finger [s]
     CONSTANTS_WIDTH,
-) = range(6)
+) = range(7)
 
 # Layout.specs.
 KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS, SPECS_WIDTH = range(6)
@@ -95,8 +97,9 @@ KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS, SPECS_WIDTH = range(6)
     SIGMA_WINDOW,  # samples in the window that is reported
     LONGEST_WINDOW,  # samples in the longest window
     READY_WINDOW,  # samples of a stretch from which on all features are known
+    BRIDGES,  # 1 if all windows are in seconds, so that short gaps are bridged
     WINDOWS_WIDTH,
-) = range(4)
+) = range(5)
 
 N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
 
@@ -115,8 +118,9 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     TRACK_PRESSURE, _, _,  # centre of pressure, in radii of the patch, in three axes
     TRACK_MOMENT,  # moment about the normal, divided by the radius
     TRACK_RATIO,  # of tangential to normal force, beyond the reference
+    TRACK_TIME,  # of the sample [s]
     TRACK_WIDTH,
-) = range(9)  # fmt: skip
+) = range(10)  # fmt: skip
 
 # Memory.motion.
 (
@@ -175,9 +179,12 @@ class Layout(NamedTuple):
     alike: bool  # whether all fingers have the same features
     tare_kind: int
     tare_seconds: float
+    noise_seconds: float  # time over which the noise is measured
+    zero_unknown: bool  # whether it begins in contact, with a load that is not known
     period: float
     lags: Integers1  # (n_lags,) of relative features [samples], ascending; empty without any
-    average_gain: float  # share of a new sample in averages of second differences
+    lag_seconds: Floats1  # (n_lags,) the same [s]
+    average_gain: float  # share of a new sample in averages of second differences, after a period
     has_centres: bool  # whether a lag needs the centre of pressure and the moment
     has_ratios: bool  # whether a lag needs the ratio of tangential to normal force
     families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0

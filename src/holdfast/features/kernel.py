@@ -28,7 +28,7 @@ from holdfast.features.faults import (
 )
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
-from holdfast.features.motion import append_taxels, update_motion
+from holdfast.features.motion import GAP_LIMIT_PERIODS, append_taxels, update_motion
 from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
 from holdfast.sensors.types import Array, Flags, Integers
@@ -40,12 +40,6 @@ OF_M, OF_SIGMA, OF_SIGMA_XYZ, OF_CHANGE = map(
 )
 NO_TRANSFORM, LOG = map(TRANSFORMS.index, ("none", "log"))
 OF_HAND = SCOPES.index("hand")
-
-GAP_LIMIT_PERIODS = 3.0003
-"""A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
-
-NOISE_SECONDS = 0.5
-"""Time over which the noise of a sensor is measured, where the tare takes no time [s]."""
 
 
 @compiled_step
@@ -65,9 +59,9 @@ def advance(
     """
     counts, status = memory.counts, output.status
     for f in range(len(present)):
-        # A gap: t - t_last > 3 T, with the period T.
+        # A gap: t - t_last > 3 T, with the period T; or > 0.1 s where all windows are in seconds.
         # False while LAST_TIME is NaN.
-        if time - memory.levels[f, at.LAST_TIME] > GAP_LIMIT_PERIODS * layout.period:
+        if time - memory.levels[f, at.LAST_TIME] > layout.constants[f, at.MAX_STEP]:
             counts[f, at.N_STRETCH] = counts[f, at.N_UNCHANGED] = counts[f, at.N_PULLED] = 0
             _clear(memory.own, f)
             memory.relative[f] = math.nan
@@ -108,6 +102,8 @@ def _process(
         values[f, column] = math.nan
     after_gap = time - levels[f, at.LAST_TIME] > GAP_LIMIT_PERIODS * layout.period
     levels[f, at.LAST_TIME] = time
+    if after_gap:
+        counts[f, at.N_STRETCH] = 0
     total, least, most = scan_readings(readings, ignored, first, last)
     if not math.isfinite(total):
         counts[f, at.N_STRETCH] = 0
@@ -138,8 +134,7 @@ def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapse
     first, last = layout.offsets[f], layout.offsets[f + 1]
     if math.isnan(memory.levels[f, at.NOISE]):
         # noise = sqrt(sum |F(k) - F(k-1)|^2 / (6 n)), over the first n steps.
-        complete = elapsed >= (seconds if kind == at.TARE_SECONDS else NOISE_SECONDS)
-        _measure_noise(layout, memory, readings, f, complete)
+        _measure_noise(layout, memory, readings, f, elapsed >= layout.noise_seconds)
     copy_readings(readings, memory.previous, first, last)
     if counts[f, at.N_TARED] < 0:
         return True
@@ -176,7 +171,7 @@ def _process_force(
     first, last = layout.offsets[f], layout.offsets[f + 1]
     # F_tip = sum_i R_i (f_i - b_i).
     if len(layout.lags):
-        x, y, z, normal = append_taxels(layout, memory, readings, f)
+        x, y, z, normal = append_taxels(layout, memory, readings, f, levels[f, at.LAST_TIME])
     else:
         x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
     _append(memory.history, counts, values, f, x, y, z)
@@ -186,7 +181,7 @@ def _process_force(
     if is_stuck(counts, f, layout.period):
         faults |= STUCK
     if faults & SERIOUS:
-        counts[f, at.N_STRETCH] = counts[f, at.N_PULLED] = 0
+        counts[f, at.N_STRETCH] = counts[f, at.N_MOTION] = counts[f, at.N_PULLED] = 0
         return at.FAULT, faults, bits
     # max over k of F_a(k).
     levels[f, at.MAX_AMPLITUDE] = max(levels[f, at.MAX_AMPLITUDE], values[f, at.AMPLITUDE])
@@ -198,7 +193,8 @@ def _process_force(
         faults |= TARE_LOADED
     if faults:
         return at.FAULT, faults, bits
-    if counts[f, at.N_STRETCH] < windows[f, at.READY_WINDOW]:
+    n_known = counts[f, at.N_MOTION if windows[f, at.BRIDGES] else at.N_STRETCH]
+    if n_known < windows[f, at.READY_WINDOW]:
         return at.GAP if counts[f, at.AFTER_GAP] else at.WARM_UP, 0, 0
     counts[f, at.AFTER_GAP] = 0
     return at.READY, 0, 0

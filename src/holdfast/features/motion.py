@@ -23,6 +23,12 @@ from holdfast.sensors.types import Array, Integers
     SHEAR_GAIN, NORMAL_GAIN, RATIO_GAIN,
 ) = range(len(RELATIVE_KINDS))  # fmt: skip
 
+GAP_LIMIT_PERIODS = 3.0003
+"""A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
+MAX_BRIDGED_SECONDS = 0.10001
+"""Longest gap that windows in seconds bridge: 0.1 s, with an allowance for rounding."""
+EVEN_STEPS = 0.02
+"""Difference of two spacings, as a share of their sum, up to which they count as equal."""
 LOAD_DECAY_SECONDS = 5.0
 """Time constant with which the largest load so far is forgotten [s]."""
 NOISE_BLOCK_SECONDS, MIN_BLOCK_STEPS = 0.2, 5
@@ -56,7 +62,7 @@ NORMAL_NOISE_WEIGHT = 10.0
 def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
     """Compute the relative features of a finger after `append_taxels`.
 
-    The sample is already counted in N_STRETCH.
+    The sample is already counted in N_MOTION.
 
     Args:
         layout: of the stream.
@@ -64,25 +70,60 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
         f: the finger.
         time: of the sample [s].
     """
-    n, length = memory.counts[f, at.N_STRETCH], len(memory.taxel_forces)
-    now = (n - 1) % length
+    n, length = memory.counts[f, at.N_MOTION], len(memory.taxel_forces)
+    now, times, period = (n - 1) % length, memory.track[f, at.TRACK_TIME], layout.period
+    n_before = min(n, length) - 1
+    step = period if n < 2 else time - times[_place(now, 1, length)]
     _update_noise(layout, memory.motion, memory.counts, f, time)
-    _update_load(layout, memory, f, now)
+    _update_load(layout, memory, f, now, step)
     _update_movement(layout, memory, f, now, time)
     if layout.has_ratios:
         _update_ratio(layout, memory, f, now)
     if n < 2:
         _forget_features(memory, f)
         return
+    gain = layout.average_gain
+    if abs(step - period) > EVEN_STEPS * period:
+        gain = -math.expm1(-min(step, GAP_LIMIT_PERIODS * period) / AVERAGE_SECONDS)
     for lag in range(len(layout.lags)):
-        families = layout.families[lag]
-        then = _place(now, min(layout.lags[lag], n - 1), length)
-        if families[at.LAGS]:
-            _fill_lag(layout, memory, f, now, then, lag)
+        families, seconds = layout.families[lag], layout.lag_seconds[lag]
+        back = _samples_back(times, now, n_before, time - seconds, layout.lags[lag])
+        if families[at.LAGS] or families[at.RATIOS]:
+            then = _place(now, back, length)
+            # What moved over a gap counts for the time of the lag: v s, s = lag / (t - t_then).
+            elapsed = time - times[then]
+            share = seconds / elapsed if elapsed > seconds + 1.5 * period else 1.0
+            if families[at.LAGS]:
+                _fill_lag(layout, memory, f, now, then, lag, share)
+            if families[at.RATIOS]:
+                _fill_ratios(layout, memory, f, now, then, lag, share)
         if families[at.SECONDS]:
-            _fill_seconds(layout, memory, f, now, min(layout.lags[lag], (n - 1) // 2), lag)
-        if families[at.RATIOS]:
-            _fill_ratios(layout, memory, f, now, then, lag)
+            _fill_seconds(layout, memory, f, now, back, n_before, lag, gain)
+
+
+@compiled_step
+def _samples_back(times: Array, now: int, n_before: int, when: float, likely: int) -> int:
+    """Return how many samples before the newest that lies which is nearest to a time; 1 or more.
+
+    Args:
+        times: of the samples, a ring [s].
+        now: place of the newest sample.
+        n_before: number of samples before it.
+        when: the time [s].
+        likely: the number if the samples come at even times, from which the search begins.
+    """
+    length = len(times)
+    back = max(min(likely, n_before), 1)
+    while back < n_before and times[_place(now, back, length)] > when:
+        back += 1
+    while back > 1 and times[_place(now, back - 1, length)] <= when:
+        back -= 1
+    # t(back) <= when < t(back - 1), as far as there are samples: the nearer; of equals the likely.
+    older, newer = times[_place(now, back, length)], times[_place(now, back - 1, length)]
+    is_newer = newer - when < when - older
+    if abs((newer - when) - (when - older)) <= EVEN_STEPS * (newer - older):
+        is_newer = likely < back
+    return back - 1 if is_newer and back > 1 else back
 
 
 @compiled_step
@@ -102,13 +143,31 @@ def _forget_features(memory: Memory, f: int) -> None:
             memory.averages[f, place, lag] = math.nan
 
 
+@compiled_step
+def _next_place(layout: Layout, memory: Memory, f: int, time: float) -> tuple[int, int, bool, bool]:
+    """Note the time of a sample in the history, which begins anew after a gap not bridged.
+
+    Returns:
+        Places of the sample and of the one before, whether there is one before, and whether their
+        difference shows the noise: over a gap that is bridged the force may move.
+    """
+    times, n_before = memory.track[f, at.TRACK_TIME], memory.counts[f, at.N_MOTION]
+    now, before = n_before % len(times), (n_before - 1) % len(times)
+    step, limit = time - times[before], GAP_LIMIT_PERIODS * layout.period
+    if n_before > 0 and step > max(limit, MAX_BRIDGED_SECONDS):
+        now = n_before = 0
+    memory.counts[f, at.N_MOTION] = n_before + 1
+    times[now] = time
+    return now, before, n_before > 0, n_before > 0 and step <= limit
+
+
 @inlined
 def append_taxels(
-    layout: Layout, memory: Memory, readings: Array, f: int
+    layout: Layout, memory: Memory, readings: Array, f: int, time: float
 ) -> tuple[float, float, float, float]:
     """Append taxel forces, centre of pressure and moment of a sample to the history.
 
-    The sample is not counted in N_STRETCH yet.
+    The history begins anew after a gap that is not bridged.
 
     Returns:
         F_tip, with the bits of `sum_taxels`, and the sum of the normal readings.
@@ -116,9 +175,7 @@ def append_taxels(
     first, last = layout.offsets[f], layout.offsets[f + 1]
     forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
-    n_before, length = memory.counts[f, at.N_STRETCH], len(forces)
-    now, has_previous = n_before % length, n_before > 0
-    before = _place(now, 1, length)
+    now, before, has_previous, shows_noise = _next_place(layout, memory, f, time)
     # g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|:
     # centre c = sum p_i r_i / sum p_i, moment = n . sum r_i x g_i, taxel load = sqrt(sum |h_i|^2),
     # moved = sum |g_i(k) - g_i(k-1)|^2.
@@ -162,7 +219,7 @@ def append_taxels(
     track[f, at.TRACK_MOMENT, now] = moment
     memory.motion[f, at.PRESSURE], memory.motion[f, at.PRESSURE_SQUARES] = weight, pressure_squares
     memory.motion[f, at.TAXEL_LOAD] = math.sqrt(squares)
-    is_new = memory.counts[f, at.N_UNCHANGED] == 0
+    is_new = memory.counts[f, at.N_UNCHANGED] == 0 and shows_noise
     _add_to_block(memory.motion, f, step, moved, is_new, has_previous)
     return fx, fy, fz, normal
 
@@ -185,7 +242,7 @@ def _add_to_block(
 
 
 @inlined
-def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
+def _update_load(layout: Layout, memory: Memory, f: int, now: int, step: float) -> None:
     """Update the reference, and the load beyond it.
 
     A skin can only be pressed. So the least normal force since the start belongs to the least
@@ -208,8 +265,8 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
         y - motion[f, at.REFERENCE + 1],
         z - motion[f, at.REFERENCE + 2],
     )
-    # load = |F - F_ref|, peak(k) = max(load(k), exp(-T / tau) peak(k-1)); the same for taxels.
-    keep = math.exp(-layout.period / LOAD_DECAY_SECONDS)
+    # load = |F - F_ref|, peak(k) = max(load(k), exp(-step / tau) peak(k-1)); the same for taxels.
+    keep = math.exp(-step / LOAD_DECAY_SECONDS)
     motion[f, at.LOAD] = math.sqrt(x * x + y * y + z * z)
     motion[f, at.PEAK_LOAD] = max(motion[f, at.LOAD], keep * motion[f, at.PEAK_LOAD])
     motion[f, at.PEAK_TAXEL_LOAD] = max(
@@ -243,7 +300,11 @@ def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: flo
     """Note the time if the force moves: by much more than its noise, and more than an echo."""
     track, motion, length = memory.track, memory.motion, memory.track.shape[2]
     # |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
-    back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, at.N_STRETCH] - 1, length - 1)
+    n_before = min(memory.counts[f, at.N_MOTION], length) - 1
+    back = min(round(MOVE_SECONDS / layout.period), n_before)
+    if back > 0:
+        times = track[f, at.TRACK_TIME]
+        back = _samples_back(times, now, n_before, time - MOVE_SECONDS, back)
     then = _place(now, back, length)
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
@@ -282,8 +343,10 @@ def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time:
 
 
 @inlined
-def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int) -> None:
-    """Fill the relative features over one lag."""
+def _fill_lag(
+    layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int, share: float
+) -> None:
+    """Fill the relative features over one lag; a share of the changes counts."""
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     noise, taxel_noise = motion[f, at.NOISE_NOW], motion[f, at.TAXEL_NOISE_NOW]
@@ -295,13 +358,15 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
     across = x * nx + y * ny + z * nz
-    square = x * x + y * y + z * z
+    square = share * share * (x * x + y * y + z * z)
     out[f, FORCE_CHANGE, lag] = _relative(square, noise * noise, load)
+    across *= share
     shear = square - across * across
     out[f, SHEAR_CHANGE, lag] = _relative(shear, TWO_AXES * noise * noise, load)
     # v = sqrt(sum |dg_i - mean dg|^2), whole and across the normal, over the taxels' L.
     n_used = layout.constants[f, at.N_USED]
     moved, pressed = _residual(layout, memory, f, now, then, x / n_used, y / n_used, z / n_used)
+    moved, pressed = share * share * moved, share * share * pressed
     echo = taxel_noise * taxel_noise
     out[f, RESIDUAL, lag] = _relative(moved, echo, taxel_load)
     out[f, SHEAR_RESIDUAL, lag] = _relative(moved - pressed, TWO_AXES * echo, taxel_load)
@@ -310,9 +375,9 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     for axis in range(3):
         delta = track[f, at.TRACK_PRESSURE + axis, now] - track[f, at.TRACK_PRESSURE + axis, then]
         shift += delta * delta
-    out[f, PRESSURE_SHIFT, lag] = math.log(math.sqrt(shift) + PRESSURE_FLOOR)
+    out[f, PRESSURE_SHIFT, lag] = math.log(share * math.sqrt(shift) + PRESSURE_FLOOR)
     # v = |d moment|, over L.
-    turned = track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then]
+    turned = share * (track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then])
     out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
     # log(L / noise).
     out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
@@ -347,7 +412,16 @@ def _relative(square: float, noise_square: float, load: float) -> float:
 
 
 @inlined
-def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, lag: int) -> None:
+def _fill_seconds(
+    layout: Layout,
+    memory: Memory,
+    f: int,
+    now: int,
+    back: int,
+    n_before: int,
+    lag: int,
+    gain: float,
+) -> None:
     """Fill the second differences of the taxels at one spacing, and their averages."""
     forces, track, out, averages = (
         memory.taxel_forces,
@@ -355,19 +429,22 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
         memory.relative,
         memory.averages,
     )
-    motion, length = memory.motion, len(memory.taxel_forces)
+    motion = memory.motion
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
-    before, first = _place(now, back, length), _place(now, 2 * back, length)
+    before, first, newest, oldest = _three_places(
+        memory.track[f, at.TRACK_TIME], now, back, n_before
+    )
     total, n_used = motion[f, at.PRESSURE], layout.constants[f, at.N_USED]
-    # d_i = g_i(k) - 2 g_i(k-s) + g_i(k-2s); sum |d_i|^2, sum p_i |d_i|^2, sum p_i (d_i . n)^2,
-    # sum p_i d_i, and the largest |d_i|^2 of the taxels with p_i > sum p / n.
+    # d_i = a g_i(k) - 2 g_i(k-s) + c g_i(k-2s), with a = c = 1 at even times:
+    # sum |d_i|^2, sum p_i |d_i|^2, sum p_i (d_i . n)^2, sum p_i d_i, and the largest
+    # |d_i|^2 of the taxels with p_i > sum p / n.
     squares, shared, along, top, mean_pressure = 0.0, 0.0, 0.0, 0.0, total / n_used
     share = 1.0 / total
     px, py, pz = 0.0, 0.0, 0.0
     for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
-        x = forces[now, i, 0] - 2.0 * forces[before, i, 0] + forces[first, i, 0]
-        y = forces[now, i, 1] - 2.0 * forces[before, i, 1] + forces[first, i, 1]
-        z = forces[now, i, 2] - 2.0 * forces[before, i, 2] + forces[first, i, 2]
+        x = newest * forces[now, i, 0] - 2.0 * forces[before, i, 0] + oldest * forces[first, i, 0]
+        y = newest * forces[now, i, 1] - 2.0 * forces[before, i, 1] + oldest * forces[first, i, 1]
+        z = newest * forces[now, i, 2] - 2.0 * forces[before, i, 2] + oldest * forces[first, i, 2]
         square, pressed = x * x + y * y + z * z, memory.pressed[i]
         pushed = x * nx + y * ny + z * nz
         squares += square
@@ -378,12 +455,12 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
             top = square
     # With w_i = p_i / sum p and D = sum d_i:
     # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.
-    x = track[f, 0, now] - 2.0 * track[f, 0, before] + track[f, 0, first]
-    y = track[f, 1, now] - 2.0 * track[f, 1, before] + track[f, 1, first]
-    z = track[f, 2, now] - 2.0 * track[f, 2, before] + track[f, 2, first]
+    x = newest * track[f, 0, now] - 2.0 * track[f, 0, before] + oldest * track[f, 0, first]
+    y = newest * track[f, 1, now] - 2.0 * track[f, 1, before] + oldest * track[f, 1, first]
+    z = newest * track[f, 2, now] - 2.0 * track[f, 2, before] + oldest * track[f, 2, first]
     common = (x * x + y * y + z * z) * (motion[f, at.PRESSURE_SQUARES] * share) * share
     own = squares - 2.0 * (x * px + y * py + z * pz) * share + common
-    noise, gain = motion[f, at.TAXEL_NOISE_NOW], layout.average_gain
+    noise = motion[f, at.TAXEL_NOISE_NOW]
     noise_share = 1.0 / (noise * noise)
     shear = max(n_used * (shared - along) * share, 0.0)
     sums = (squares, n_used * shared * share, shear, max(own, 0.0), n_used * top)
@@ -401,6 +478,44 @@ def _fill_seconds(layout: Layout, memory: Memory, f: int, now: int, back: int, l
 
 
 @compiled_step
+def _three_places(
+    times: Array, now: int, back: int, n_before: int
+) -> tuple[int, int, float, float]:
+    """Return the places of the second and third sample of a second difference, and two weights.
+
+    The third lies as long before the second as the second before the newest. A gap, or uneven
+    times, move it; the weights then let an even motion cancel, as it does at even times.
+
+    Args:
+        times: of the samples, a ring [s].
+        now: place of the newest sample.
+        back: number of samples from the second to the newest.
+        n_before: number of samples before the newest.
+
+    Returns:
+        Place of the second and of the third, and weights of the newest and of the third.
+    """
+    length = len(times)
+    if n_before < 2:
+        return now, now, 1.0, 1.0  # no difference yet
+    before = _place(now, back, length)
+    mirrored = 2.0 * times[before] - times[now]
+    oldest = times[_place(now, n_before, length)]
+    if mirrored < oldest - 0.5 * (times[now] - times[before]) / back:
+        back = max(1, min(back, n_before // 2))  # the windows are filled in part
+        before = _place(now, back, length)
+        mirrored = 2.0 * times[before] - times[now]
+    further = _samples_back(times, now, n_before, mirrored, 2 * back)
+    first = _place(now, max(further, back + 1), length)
+    # h = t(k) - t(k-s), h' = t(k-s) - t(k-2s): a = 2 h' / (h + h'), c = 2 h / (h + h').
+    later, earlier = times[now] - times[before], times[before] - times[first]
+    whole = later + earlier
+    if abs(later - earlier) <= EVEN_STEPS * whole:
+        return before, first, 1.0, 1.0
+    return before, first, 2.0 * earlier / whole, 2.0 * later / whole
+
+
+@compiled_step
 def _beyond_noise(square: float) -> float:
     """Return log v of a second difference, given v^2 in squared noise, beyond that of noise."""
     # log sqrt(max(v^2 - 6, 0) + 6 / 16).
@@ -408,16 +523,20 @@ def _beyond_noise(square: float) -> float:
 
 
 @inlined
-def _fill_ratios(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int) -> None:
+def _fill_ratios(
+    layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int, share: float
+) -> None:
     """Fill the changes of tangential and normal force, and of their ratio, over one lag."""
     track, motion, out = memory.track, memory.motion, memory.relative
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
     # dF . t / N, dF . n / N and r(k) - r(k-l).
-    scale = 1.0 / motion[f, at.NORMAL_FLOOR]
+    scale = share / motion[f, at.NORMAL_FLOOR]
     tx, ty, tz = motion[f, at.TANGENT], motion[f, at.TANGENT + 1], motion[f, at.TANGENT + 2]
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     out[f, SHEAR_GAIN, lag] = scale * (x * tx + y * ty + z * tz)
     out[f, NORMAL_GAIN, lag] = scale * (x * nx + y * ny + z * nz)
-    out[f, RATIO_GAIN, lag] = track[f, at.TRACK_RATIO, now] - track[f, at.TRACK_RATIO, then]
+    out[f, RATIO_GAIN, lag] = share * (
+        track[f, at.TRACK_RATIO, now] - track[f, at.TRACK_RATIO, then]
+    )

@@ -1,7 +1,7 @@
 """The feature stream of a hand: its plan, arrays and memory, for detectors and recordings."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from itertools import pairwise
 from typing import NamedTuple, Self
@@ -13,7 +13,12 @@ from holdfast.features import arrays as at
 from holdfast.features import kernel
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.haar import N_SUMS, n_levels
-from holdfast.features.motion import AVERAGE_SECONDS
+from holdfast.features.loaded_start import begins_in_contact, declared_baselines, loaded_tare
+from holdfast.features.motion import (
+    AVERAGE_SECONDS,
+    GAP_LIMIT_PERIODS,
+    MAX_BRIDGED_SECONDS,
+)
 from holdfast.features.specs import (
     FEATURE_KINDS,
     LAG_KINDS,
@@ -38,6 +43,9 @@ TARE_KINDS = {
 }
 COUNT_NOISE = float(1 / np.sqrt(12))
 """Standard deviation of rounding to whole counts: the least noise of a reading [count]."""
+NOISE_SECONDS, LOADED_NOISE_SECONDS = 0.5, 0.2
+"""Time over which the noise of a sensor is measured, where the tare takes no time; and where the
+stream begins in contact [s]."""
 NEWTON_NOISE = 1e-6
 """Least noise of a reading in newtons, whose step is not known [N]."""
 CHUNK_SAMPLES = 2048
@@ -55,6 +63,9 @@ class StreamPlan:
         tare: how the baseline is found.
         rate: samples per second [Hz].
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
+        in_contact: whether the first samples are load; None for a recording whose metadata say it.
+        baselines: (n_taxels, 3) readings without contact, by finger, for a stream that begins in
+            contact [unit of the readings].
     """
 
     sensors: Mapping[str, Sensor]
@@ -63,6 +74,15 @@ class StreamPlan:
     tare: Tare
     rate: float
     ignore: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    in_contact: bool | None = None
+    baselines: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def used_tare(self) -> Tare:
+        """The tare, or what takes its place in a stream that begins in contact."""
+        if not self.in_contact:
+            return self.tare
+        return loaded_tare(self.tare, self.sensors, tuple(self.baselines))
 
     @property
     def fingers(self) -> tuple[str, ...]:
@@ -117,16 +137,24 @@ class FeatureStream:
         self.output = _output(self.layout)
         bounds = pairwise(self.layout.offsets.tolist())
         self.slices = dict(zip(plan.fingers, map(slice, *zip(*bounds, strict=True)), strict=True))
+        if plan.in_contact and plan.used_tare.kind == "none":
+            for finger, baseline in plan.baselines.items():
+                self.memory.baseline[self.slices[finger]] = baseline
 
     @classmethod
     def for_recording(cls, plan: StreamPlan, recording: Recording) -> Self:
         """Return the stream for a recording, from which a tare by interval is taken.
 
-        A finger that the recording lacks has no baseline then.
+        A finger that the recording lacks has no baseline then. The metadata of the recording say
+        whether it begins in contact, unless the plan does.
 
         Raises:
-            ValueError: a finger has no finite sample in the interval.
+            ValueError: a finger has no finite sample in the interval, or the metadata declare a
+                baseline of another shape.
         """
+        if begins_in_contact(recording.metadata, plan.in_contact):
+            baselines = dict(plan.baselines) or declared_baselines(recording.metadata, plan.sensors)
+            plan = replace(plan, in_contact=True, baselines=baselines)
         stream = cls(plan)
         if plan.tare.kind == "interval":
             stream._take_baseline(recording)
@@ -256,11 +284,16 @@ def _layout(plan: StreamPlan) -> Layout:
     floors = np.zeros((len(sensors), width))
     for row, specs in zip(floors, features, strict=True):
         row[: len(specs)] = [spec.floor for spec in specs]
-    ignored = [_ignored(plan, finger) for finger in plan.fingers]
+    tare, ignored = plan.used_tare, [_ignored(plan, finger) for finger in plan.fingers]
     rotations = [
         np.where(i[:, None, None], 0, s.rotations) for i, s in zip(ignored, sensors, strict=True)
     ]
-    constants = [_constants(s, int((~i).sum())) for i, s in zip(ignored, sensors, strict=True)]
+    bridges = [all(spec.seconds for spec in specs) and bool(specs) for specs in features]
+    steps = [_max_step(plan.rate, bridged=bridged) for bridged in bridges]
+    constants = [
+        (*_constants(s, int((~i).sum())), step)
+        for i, s, step in zip(ignored, sensors, steps, strict=True)
+    ]
     return Layout(
         offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
         rotations=np.concatenate(rotations),
@@ -268,14 +301,18 @@ def _layout(plan: StreamPlan) -> Layout:
         specs=np.stack([spec_codes(specs, width, lags) for specs in features]),
         floors=floors,
         windows=np.array(
-            [(plan.window, *pair) for pair in zip(longest, ready, strict=True)], dtype=np.int64
+            [(plan.window, *parts) for parts in zip(longest, ready, bridges, strict=True)],
+            dtype=np.int64,
         ),
         ignored=np.concatenate(ignored),
         alike=len({tuple(specs) for specs in features}) == 1,
-        tare_kind=TARE_KINDS[plan.tare.kind],
-        tare_seconds=plan.tare.seconds,
+        tare_kind=TARE_KINDS[tare.kind],
+        tare_seconds=tare.seconds,
+        noise_seconds=_noise_seconds(plan),
+        zero_unknown=plan.in_contact is True and tare.kind == "first",
         period=1.0 / plan.rate,
         lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
+        lag_seconds=np.array(lags, dtype=np.float64),
         average_gain=-float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
         has_centres=bool(families[:, at.LAGS].any()),
         has_ratios=bool(families[:, at.RATIOS].any()),
@@ -307,6 +344,18 @@ def _places(sensor: Sensor, ignored: Flags) -> Array:
     return places / radius if radius > 0 else np.zeros_like(places)
 
 
+def _max_step(rate: float, *, bridged: bool) -> float:
+    """Return the longest step in time between samples that is no gap of a finger [s]."""
+    longest = GAP_LIMIT_PERIODS / rate
+    return max(longest, MAX_BRIDGED_SECONDS) if bridged else longest
+
+
+def _noise_seconds(plan: StreamPlan) -> float:
+    if plan.in_contact:
+        return LOADED_NOISE_SECONDS
+    return plan.tare.seconds if plan.tare.kind == "seconds" else NOISE_SECONDS
+
+
 def _ignored(plan: StreamPlan, finger: str) -> Flags:
     flags = np.zeros(plan.sensors[finger].n_taxels, dtype=np.bool_)
     flags[list(plan.ignore.get(finger, ()))] = True
@@ -314,7 +363,7 @@ def _ignored(plan: StreamPlan, finger: str) -> Flags:
 
 
 def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
-    """Return a row of `Layout.constants`; each taxel that is used rounds its readings."""
+    """Return the first columns of `Layout.constants`; each used taxel rounds its readings."""
     low, high = sensor.limits or (-np.inf, np.inf)
     noise = COUNT_NOISE if sensor.unit == "count" else NEWTON_NOISE
     rounding = noise if sensor.unit == "count" else np.nan

@@ -1,12 +1,13 @@
 """Datasets: folders of recordings, loaded one at a time."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import overload
 
 from holdfast.errors import RecordingError
 from holdfast.io.recording_files import SUFFIXES, is_recording, load_recording
-from holdfast.recordings import Recording
+from holdfast.recordings import STARTS_LOADED, Recording
 
 
 class Dataset(Sequence[Recording]):
@@ -19,11 +20,15 @@ class Dataset(Sequence[Recording]):
     Args:
         paths: paths of the recordings.
         labels: use the labels of `<name>.labels.json` if there is one.
+        in_contact: declare in the metadata that the first samples of all recordings are load.
     """
 
-    def __init__(self, paths: Sequence[Path], *, labels: bool = True) -> None:
+    def __init__(
+        self, paths: Sequence[Path], *, labels: bool = True, in_contact: bool = False
+    ) -> None:
         self._paths = tuple(paths)
         self._labels = labels
+        self._in_contact = in_contact
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -44,23 +49,27 @@ class Dataset(Sequence[Recording]):
     def __getitem__(self, index: slice) -> "Dataset": ...
     def __getitem__(self, index: int | slice) -> "Recording | Dataset":
         if isinstance(index, slice):
-            return Dataset(self._paths[index], labels=self._labels)
-        return load_recording(self._paths[index], labels=self._labels)
+            return Dataset(self._paths[index], labels=self._labels, in_contact=self._in_contact)
+        recording = load_recording(self._paths[index], labels=self._labels)
+        if not self._in_contact:
+            return recording
+        return replace(recording, metadata={**recording.metadata, STARTS_LOADED: True})
 
 
-def load_dataset(folder: str | Path, *, labels: bool = True) -> Dataset:
+def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = False) -> Dataset:
     """Find the recordings in a folder, sorted by name; they are loaded when accessed.
 
     Args:
         folder: path of the folder; the path of one recording gives a dataset of one.
         labels: use the labels of `<name>.labels.json` if there is one.
+        in_contact: declare in the metadata that the first samples of all recordings are load.
 
     Raises:
         RecordingError: the folder does not exist, or has no recording.
     """
     place = Path(folder)
     if place.is_file():
-        return Dataset([place], labels=labels)
+        return Dataset([place], labels=labels, in_contact=in_contact)
     if not place.is_dir():
         raise RecordingError(f"there is no folder {place}; a folder of recordings expected")
     by_name: dict[str, Path] = {}
@@ -73,4 +82,5 @@ def load_dataset(folder: str | Path, *, labels: bool = True) -> Dataset:
             f"{' or '.join('*' + suffix for suffix in SUFFIXES)} expected: "
             "`holdfast import` makes them"
         )
-    return Dataset([by_name[name] for name in sorted(by_name)], labels=labels)
+    paths = [by_name[name] for name in sorted(by_name)]
+    return Dataset(paths, labels=labels, in_contact=in_contact)

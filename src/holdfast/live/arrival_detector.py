@@ -14,6 +14,7 @@ from holdfast.detector.detector import check_thresholds
 from holdfast.devices.sources.base import Arrival, ModuleSamples
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
+from holdfast.features.loaded_start import begins_in_contact, declared_baselines
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
@@ -141,6 +142,8 @@ class ArrivalDetector:
         strict: refuse a rate that is not the model's instead of resampling.
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
         watch_rate: report the fault RATE while a finger has another rate than at the start.
+        in_contact: the first samples are load, and not an open hand.
+        metadata: of the source; they may say that it begins in contact.
 
     Attributes:
         fingers: sensor of each finger that the model uses.
@@ -161,6 +164,8 @@ class ArrivalDetector:
         strict: bool = False,
         ignore: Mapping[str, tuple[int, ...]] | None = None,
         watch_rate: bool = False,
+        in_contact: bool = False,
+        metadata: Mapping[str, Any] | None = None,
     ) -> None:
         tare = Tare.parse(model.tare)
         if tare.kind == "interval":
@@ -175,13 +180,16 @@ class ArrivalDetector:
         self.notices: list[str] = []
         self._watch_rate = watch_rate
         self._monitor: RateMonitor | None = None
-        self._finds_pull = tare.kind != "seconds"
+        metadata = metadata or {}
+        self._loaded = begins_in_contact(metadata, in_contact or None)
+        self._baselines = declared_baselines(metadata, self.fingers) if self._loaded else {}
+        self._finds_pull = tare.kind != "seconds" and not self._loaded
         self._readings = ReadingsMonitor(self.fingers, finds_pull=self._finds_pull)
         self._strict = strict
         self._ignore = ignore
         self._buffer: deque[Arrival] = deque(maxlen=MAX_BUFFERED_ARRIVALS)
         self._detector: Detector | None = None
-        Detector(model, self.fingers, 100.0, ignore=ignore)  # raises for wrong arguments
+        self._new_detector(100.0)  # raises for wrong arguments
         self.thresholds = self._own_thresholds()
         self._resamplers: dict[str, Resampler] = {}
         self._faults: dict[str, tuple[Fault, ...]] = {}
@@ -254,7 +262,7 @@ class ArrivalDetector:
             raise StreamError(
                 f"{', '.join(touching)} in contact: open the hand, then take the tare"
             )
-        self._detector.reset()
+        self._detector.reset(in_contact=False)
         self._readings = ReadingsMonitor(self.fingers, finds_pull=self._finds_pull)
 
     def set_threshold(self, threshold: float | None) -> None:
@@ -307,12 +315,18 @@ class ArrivalDetector:
             self.resampled = True
             self._resamplers = {name: Resampler(rate, model.rate) for name in self.fingers}
         self._monitor = RateMonitor(rate, self.fingers) if self._watch_rate else None
-        detector = Detector(model, self.fingers, rate, ignore=self._ignore)
+        detector = self._new_detector(rate)
         detector.set_thresholds(self.thresholds)
         self._detector = detector
         buffered = list(self._buffer)
         self._buffer.clear()
         return [result for arrival in buffered for result in self._detect(detector, arrival)]
+
+    def _new_detector(self, rate: float) -> Detector:
+        return Detector(
+            self.model, self.fingers, rate,
+            ignore=self._ignore, in_contact=self._loaded, baselines=self._baselines,
+        )  # fmt: skip
 
     def _detect(self, detector: Detector, arrival: Arrival) -> Iterator[StreamEstimate]:
         if self._faults or self._silent_fingers:

@@ -58,6 +58,8 @@ class StreamDetector:
         source: an open source.
         strict: refuse a rate that is not the model's instead of resampling.
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
+        in_contact: the first samples are load, and not an open hand; also if the metadata of the
+            source say so (`starts_loaded`).
 
     Attributes:
         source: the source.
@@ -99,6 +101,7 @@ class StreamDetector:
         *,
         strict: bool = False,
         ignore: Mapping[str, tuple[int, ...]] | None = None,
+        in_contact: bool = False,
     ) -> None:
         self.source = source
         self.silent = False
@@ -106,6 +109,7 @@ class StreamDetector:
         self._detector = ArrivalDetector(
             model, source.sensors, strict=strict, ignore=ignore,
             watch_rate=isinstance(source, DeviceSource),
+            in_contact=in_contact, metadata=source.metadata,
         )  # fmt: skip
         self.fingers = self._detector.fingers
         self._changes = StateChanges((*self.fingers, HAND))

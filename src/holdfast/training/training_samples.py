@@ -13,6 +13,7 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
 from holdfast.features.force import rest_amplitude
+from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
 from holdfast.parallel import Engine
@@ -198,13 +199,13 @@ def _samples_of_part(
     sensors = sensors_of(recording, scan)
     features = dict.fromkeys(sensors, setting.features)
     stream = StreamPlan(sensors, features, setting.window, tare, rate)
-    fingers = {}
+    loaded, fingers = begins_in_contact(recording.metadata), {}
     for finger, rows in extract(stream, recording).items():
         module = recording.modules[finger]
         states = _states_to_learn(module, scan.relative)
         usable = usable_rows(rows.features, states)[:: scan.recordings[place].step]
         kept = usable[-n_seen.get(finger, 0) % step :: step]
-        has_rest = tare.without_contact and not scan.relative
+        has_rest = tare.without_contact and not scan.relative and not loaded
         fingers[finger] = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),

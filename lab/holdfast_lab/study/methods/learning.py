@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import recipe
 from holdfast.errors import TrainingError
-from holdfast.features.kernel import GAP_LIMIT_PERIODS
+from holdfast.features.motion import GAP_LIMIT_PERIODS
 from holdfast.sensors.types import Array
 from holdfast_lab.classifiers.tcn import TemporalConvolution
 from holdfast_lab.study.methods.method import (

@@ -140,6 +140,7 @@ def _detect_recording(
 ) -> Iterator["EstimateChunk"]:
     from holdfast.cli.detect.output import chunk_from_detection
     from holdfast.detector import Detector
+    from holdfast.features.loaded_start import begins_in_contact
     from holdfast.live.readings_monitor import ReadingsMonitor
 
     detector = None
@@ -147,12 +148,15 @@ def _detect_recording(
         if detector is None:
             sensors = {name: module.sensor for name, module in part.modules.items()}
             taxels = parse_taxels(options.ignore, sensors)
-            detector = Detector.for_recording(model, part, ignore=taxels)
+            detector = Detector.for_recording(
+                model, part, ignore=taxels, in_contact=options.in_contact or None
+            )
             report_missing_fingers(model, part.name, part.modules)
             report_missing_slip_rules(model)
             used = model.fingers_of(sensors)
             report_other_handling(model, used.values())
-            readings = ReadingsMonitor(used)
+            loaded = begins_in_contact(part.metadata, options.in_contact or None)
+            readings = ReadingsMonitor(used, finds_pull=not loaded)
         for notice in readings.update_recording(part):
             print_message(notice)
         yield chunk_from_detection(detector.run(part))

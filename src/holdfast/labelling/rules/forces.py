@@ -18,7 +18,7 @@ from holdfast.features.faults import LOADED_SECONDS
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument, baseline_of, offline_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
-from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import contact_threshold, rest_moments
 
@@ -247,8 +247,6 @@ def _moving_mean(values: Array, n: int) -> Array:
 
 DEFAULT_TARE = Tare("seconds", 0.5)
 """Tare of a recording that begins without contact."""
-STARTS_LOADED = "starts_loaded"
-"""Field of the metadata that says whether a recording begins in contact."""
 FALL_OF_NOISE = 20.0
 """Least fall of the normal force below its first value, in standard deviations of its noise."""
 FALL_OF_RANGE = 0.1

@@ -1,0 +1,77 @@
+"""The option --in-contact of the verbs."""
+
+import json
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.detector import detect
+from holdfast.io import load_dataset, save_recording
+from holdfast.model import Model
+from holdfast.synthetic import synthetic_recording
+from holdfast.training import Setting, train
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Grasps of which the first seconds are missing."""
+    path = tmp_path_factory.mktemp("held")
+    for seed in range(3):
+        whole = synthetic_recording(f"grasp{seed}", seed, ("thumb", "index"))
+        start = int(0.4 * whole.modules["thumb"].n_samples)
+        modules = {n: m.slice(start, m.n_samples) for n, m in whole.modules.items()}
+        save_recording(type(whole)(whole.name, modules), path / f"grasp{seed}.parquet")
+    return path
+
+
+@pytest.mark.parametrize("verb", ["detect", "serve", "hold", "evaluate", "train", "tune"])
+def test_the_verbs_have_it(verb, capsys):
+    assert main([verb, "--help"]) == 0
+    assert "--in-contact" in capsys.readouterr().out
+
+
+def test_detect(capsys, folder):
+    path = str(folder / "grasp0.parquet")
+    assert main(["detect", "builtin:noise-floor", path, "--in-contact", "--json"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    states = [line["state"] for line in lines if line["finger"] == "thumb"]
+    (recording,) = load_dataset(path)
+    model = Model.load("builtin:noise-floor")
+    trace = detect(model, recording, in_contact=True).fingers["thumb"]
+    names = ("UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE")
+    assert states == [names[code] for code in trace.state]
+    assert trace.state.tolist() != detect(model, recording).fingers["thumb"].state.tolist()
+
+
+def test_evaluate(capsys, folder):
+    shares = []
+    for options in ([], ["--in-contact"]):
+        command = ["evaluate", "builtin:noise-floor", str(folder), "--json", *options]
+        assert main(command) == 0
+        document = json.loads(capsys.readouterr().out)
+        shares.append(document["pooled"]["without_estimate"])
+    assert shares[1] < shares[0]
+
+
+def test_train_and_tune(capsys, folder, tmp_path):
+    model, tuned = str(tmp_path / "model.json"), str(tmp_path / "tuned.json")
+    options = ["--trials", "0", "--features", "any", "--in-contact"]
+    assert main(["train", str(folder), "-o", model, *options]) == 0
+    command = ["tune", model, str(folder), "-o", tuned, "--false-alarms", "60", "--in-contact"]
+    assert main(command) == 0
+    capsys.readouterr()
+    assert 0 < Model.load(tuned).finger("thumb").classifier.threshold < 1
+
+
+def test_training_takes_no_threshold_of_contact_from_a_held_start(folder):
+    setting = Setting(trials=0)
+    held = train(load_dataset(folder, in_contact=True), setting).model
+    assert held.finger("thumb").contact_threshold is None
+    assert train(load_dataset(folder), setting).model.finger("thumb").contact_threshold > 0
+
+
+def test_a_hold_is_not_the_tare(folder):
+    (recording,) = load_dataset(folder / "grasp0.parquet", in_contact=True)
+    trace = detect(Model.load("builtin:any"), recording).fingers["thumb"]
+    assert np.isfinite(trace.stable_probability[2:40]).all()
