@@ -31,7 +31,7 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import HoldfastError
 from holdfast.model import Model
-from holdfast.recordings import Recording, label_states
+from holdfast.recordings import STARTS_LOADED, Recording, label_states
 from holdfast.training.calibration import calibrate
 
 TUG_START = 0.5
@@ -60,15 +60,16 @@ class Finger(NamedTuple):
 
 
 def main(folder: Path, names: Sequence[str]) -> None:
-    sets = boxes(folder / "uskin_pick_move"), list(tugs(folder / "eflesh_slip"))
-    holds = list(gtac_grasps(folder / "gtac_v2"))
+    carried = [loaded(item) for item in boxes(folder / "uskin_pick_move")]
+    tugged = [(loaded(item), slipped) for item, slipped in tugs(folder / "eflesh_slip")]
+    sets = carried, tugged, [loaded(item) for item in gtac_grasps(folder / "gtac_v2")]
     columns: dict[str, dict[str, float]] = {}
     for name in names:
         model = Model.load(name)
-        columns[f"{name}"] = figures(lambda _, model=model: model, *sets, holds)
+        columns[f"{name}"] = figures(lambda _, model=model: model, *sets)
         if model.finger("*").normalised:
             columns[f"{name}, calibrated"] = figures(
-                lambda handling, model=model: calibrate(model, handling), *sets, holds
+                lambda handling, model=model: calibrate(model, handling), *sets
             )
     rows = list(next(iter(columns.values())))
     print(f"| | {' | '.join(columns)} | goals |\n|---|{'--:|' * (len(columns) + 1)}")
@@ -76,6 +77,11 @@ def main(folder: Path, names: Sequence[str]) -> None:
         values = " | ".join(f"{column[row]:.3f}" for column in columns.values())
         goals = ", ".join(f"{goal:g}" for goal in GOALS.get(row, ()))
         print(f"| {row} | {values} | {goals} |")
+
+
+def loaded(recording: Recording) -> Recording:
+    """Return the recording, which begins in contact: the object is held at the first sample."""
+    return replace(recording, metadata={**recording.metadata, STARTS_LOADED: True})
 
 
 def figures(
