@@ -1,24 +1,44 @@
-"""Leave families of features out of builtin:any, or use one alone: hands left out, and real data.
+"""Ablation of builtin:any: target, normalisation and families of features; twin and real.
 
-    holdfast simulate hands/ --randomize --repeats 300 --seed 0
+    holdfast simulate hands/ --randomize --measured all --repeats 150 --grasps 3 --seed 0
     python benchmarks/ablation_any.py hands/ --real "$HOLDFAST_DATA"
 
-The weights are fitted as in train_any.py, on four fifths of the hands for the simulated figures,
-and on all hands for the real ones. AUC is of stable against slip. The real recordings choose
-nothing: the table is the only thing that is made of them.
+The weights are fitted as in `train_any.py`, on four fifths of the hands for the simulated figures,
+and on all hands for the real ones. On hands: AUC of stable against sliding, with own handling (the
+other grasps of the hand) and with default handling. On real recordings, with own handling and with
+default handling: AUC of stable against slip of the two boxes that slip (own handling: the boxes
+that do not), and AUC by sequence of the largest score of the tugs (own handling: the first half
+second of the other half of the sequences).
 """
 
 import argparse
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import starmap
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from hand_handling import (
+    HandGrasp,
+    Moments,
+    default_handling,
+    folds_of,
+    moments_of_others,
+    read_grasp,
+)
+from real_sets import TUG_START, fingers_of, loaded, slips_in
+from real_slips import auc, boxes, tugs
 from sklearn.metrics import roc_auc_score
-from train_any import FEATURES, N_FOLDS, HandSamples, fit, samples_of
+from train_any import FEATURES, N_FOLDS, fit, model_of, out_of_fold, untrained
 
+from holdfast.classifiers.linear import LinearClassifier
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.features.stream import extract
 from holdfast.io import load_dataset
-from holdfast.io.importers import import_recordings
+from holdfast.model import Model
+from holdfast.recordings import Recording
+from holdfast.training.calibration import location_and_scale
 
 KINDS = np.array([feature.kind for feature in FEATURES])
 LAGS = np.array([feature.seconds for feature in FEATURES])
@@ -31,53 +51,150 @@ FAMILIES = {
     "lags up to 67 ms": (LAGS < 0.1) & (KINDS != "load_to_noise"),
     "lags from 133 ms on": LAGS > 0.1,
 }
-SCALE = KINDS == "load_to_noise"
-"""Kept beside every family that is used alone: what a change means depends on it."""
+COLUMNS = (
+    "hands, own",
+    "hands, default",
+    "boxes, own",
+    "boxes, default",
+    "tugs, own",
+    "tugs, default",
+)
+EVERYTHING = np.ones(len(FEATURES), dtype=bool)
+
+Normalisation = Callable[[Sequence[HandGrasp]], list[Moments | None]]
 
 
-def main(folder: Path, real: Path | None) -> None:
-    hands = [samples_of(recording) for recording in load_dataset(folder)]
-    folds = np.random.default_rng(0).integers(N_FOLDS, size=len(hands))
-    fingers = list(real_fingers(real)) if real else []
-    names = " | ".join(name for name, _, _ in fingers)
-    print(f"| features | hands left out | {names} |")
-    print("|---" * (2 + len(fingers)) + "|")
-    everything = np.ones(len(FEATURES), dtype=bool)
-    row("all", everything, hands, folds, fingers)
-    for name, own in FAMILIES.items():
-        row(f"without {name}", ~own, hands, folds, fingers)
-        if name != "ratio of load to noise":
-            row(f"{name} alone", own | SCALE, hands, folds, fingers)
+class RealFinger(NamedTuple):
+    """Features of one finger of one real recording, and what is known of it."""
+
+    recording: str
+    features: np.ndarray
+    held: np.ndarray
+    stable: np.ndarray
+    slips: np.ndarray
+    times: np.ndarray
 
 
-def row(title: str, used: np.ndarray, hands: list[HandSamples], folds: np.ndarray, fingers) -> None:
-    cut = [hand._replace(features=np.where(used, hand.features, 0.0)) for hand in hands]
-    probability, stable, slip = [], [], []
-    for fold in range(N_FOLDS):
-        classifier = fit(cut, folds != fold)
-        for k in np.flatnonzero(folds == fold):
-            probability.append(classifier.probability(cut[k].features))
-            stable.append(hands[k].stable)
-            slip.append(hands[k].slip)
-    simulated = auc(*map(np.concatenate, (probability, stable, slip)))
-    whole = fit(cut, np.ones(len(hands), dtype=bool))
-    figures = [simulated]
-    figures += [auc(whole.probability(np.where(used, f, 0.0)), s, ~s) for _, f, s in fingers]
-    print(f"| {title} | {' | '.join(f'{each:.3f}' for each in figures)} |", flush=True)
+@dataclass(frozen=True)
+class RealSets:
+    """Features of the real recordings."""
+
+    boxes: list[RealFinger]
+    tugs: list[tuple[list[RealFinger], bool]]
+
+    @classmethod
+    def read(cls, folder: Path, model: Model) -> "RealSets":
+        carried = [loaded(item) for item in boxes(folder / "uskin_pick_move")]
+        sequences = ((loaded(item), slipped) for item, slipped in tugs(folder / "eflesh_slip"))
+        return cls(
+            [finger for item in carried for finger in real_fingers(model, item)],
+            [(real_fingers(model, item), slipped) for item, slipped in sequences],
+        )
+
+    def figures(self, classifier: LinearClassifier, used: np.ndarray) -> list[float]:
+        """Return the AUC of boxes and tugs, each with own and default handling."""
+        slipping = {finger.recording for finger in self.boxes if finger.slips.any()}
+        calm = [finger for finger in self.boxes if finger.recording not in slipping]
+        own = location_and_scale(np.concatenate([x.features[x.held] for x in calm]))
+        figures = []
+        for moments in (own, None):
+            parts = [
+                (score(classifier, x.features, used, moments), x)
+                for x in self.boxes
+                if x.recording in slipping
+            ]
+            aucs = [
+                auc(*(
+                    np.concatenate([values[mask(x)] for values, x in parts if x.recording == name])
+                    for mask in (lambda x: x.slips, lambda x: x.stable)
+                ))
+                for name in sorted(slipping)
+            ]  # fmt: skip
+            figures.append(float(np.mean(aucs)))
+        return [*figures, self.tug_auc(classifier, used, own=True), self.tug_auc(classifier, used)]
+
+    def tug_auc(
+        self, classifier: LinearClassifier, used: np.ndarray, *, own: bool = False
+    ) -> float:
+        largest: tuple[list[float], list[float]] = [], []
+        for half in (0, 1):
+            moments = None
+            if own:
+                starts = [
+                    x.features[x.held & (x.times < TUG_START)]
+                    for fingers, _ in self.tugs[half::2]
+                    for x in fingers
+                ]
+                moments = location_and_scale(np.concatenate(starts))
+            for fingers, slipped in self.tugs[1 - half :: 2]:
+                late = [x.features[x.times >= TUG_START] for x in fingers]
+                values = [score(classifier, rows, used, moments) for rows in late]
+                largest[int(slipped)].append(max(float(np.nanmax(part)) for part in values))
+        held, slips = largest
+        return auc(np.array(slips), np.array(held))
 
 
-def auc(probability: np.ndarray, stable: np.ndarray, slip: np.ndarray) -> float:
-    chosen = stable | slip
-    return float(roc_auc_score(stable[chosen], probability[chosen]))
+def main(folder: Path, real: Path) -> None:
+    reader = model_of(untrained())
+    grasps = list(starmap(read_grasp, ((reader, item) for item in load_dataset(folder))))
+    sets, folds = RealSets.read(real, reader), folds_of(grasps, N_FOLDS)
+    print(f"| {len(grasps)} grasps | {' | '.join(COLUMNS)} |\n|---{'|--:' * len(COLUMNS)}|")
+
+    def row(title: str, moments: list[Moments | None], used: np.ndarray = EVERYTHING) -> None:
+        cut = [grasp._replace(features=np.where(used, grasp.features, 0.0)) for grasp in grasps]
+        parts = (None if own is None else only(own, used) for own in moments)
+        kept = list(parts)
+        own, default, stable = map(np.concatenate, zip(*out_of_fold(cut, kept, folds), strict=True))
+        figures = [float(roc_auc_score(stable, values)) for values in (own, default)]
+        figures += sets.figures(fit(cut, kept), used)
+        print(f"| {title} | {' | '.join(f'{figure:.3f}' for figure in figures)} |", flush=True)
+
+    others = moments_of_others(grasps)
+    row("ships: normalised by the other grasps", others)
+    row("normalised by the grasp itself", [moments_of(grasp) for grasp in grasps])
+    default = default_handling(grasps)
+    row("all by default handling", [None if own is None else default for own in others])
+    for name, family in FAMILIES.items():
+        row(f"without {name}", others, ~family)
 
 
-def real_fingers(folder: Path) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Yield name, features and stable of each finger of the real recordings with a slip."""
-    for recording in import_recordings(folder / "uskin_pick_move"):
-        for name, module in recording.modules.items():
-            found = samples_of(replace(recording, modules={name: module}))
-            if found.stable.any() and not found.stable.all():
-                yield f"{recording.name[-14:]} {name}", found.features, found.stable
+def only(moments: Moments, used: np.ndarray) -> Moments:
+    """Return the moments; 0 and 1 of features that are left out."""
+    return np.where(used, moments[0], 0.0), np.where(used, moments[1], 1.0)
+
+
+def moments_of(grasp: HandGrasp) -> Moments | None:
+    return location_and_scale(grasp.handling) if len(grasp.handling) else None
+
+
+def score(
+    classifier: LinearClassifier, features: np.ndarray, used: np.ndarray, moments: Moments | None
+) -> np.ndarray:
+    """Return one minus the probability of stability, with own or default handling."""
+    if moments is not None:
+        location, scale = moments
+        values = (features - location) / scale * np.array(classifier.scale)
+        features = values + np.array(classifier.mean)
+    return 1.0 - classifier.probability(np.where(used, features, 0.0))
+
+
+def real_fingers(model: Model, recording: Recording) -> list[RealFinger]:
+    sensors = {name: module.sensor for name, module in recording.modules.items()}
+    rows = extract(model.plan(sensors, recording.rate), recording)
+    parts = zip(rows.items(), fingers_of(model, recording), strict=True)
+    return [
+        RealFinger(
+            recording.name,
+            finger.features,
+            np.isfinite(finger.features).all(axis=1)
+            & (known.trace.state != NO_CONTACT)
+            & (known.trace.state != UNKNOWN),
+            known.labels == STABLE,
+            known.slips & slips_in(recording),
+            known.trace.times,
+        )
+        for (_, finger), known in parts
+    ]
 
 
 if __name__ == "__main__":
@@ -85,6 +202,6 @@ if __name__ == "__main__":
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--real", type=Path)
-    given = parser.parse_args()
-    main(given.folder, given.real)
+    parser.add_argument("--real", type=Path, required=True)
+    options = parser.parse_args()
+    main(options.folder, options.real)

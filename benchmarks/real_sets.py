@@ -10,8 +10,8 @@ Three sets, on which nothing was trained:
 - Tugs: 69 sequences in which a person tugs a held object, one label each. Own handling: the first
   half second of every other sequence. AUC by sequence of the largest score after that; share of
   the quiet 0.2 to 0.5 s called STABLE.
-- Holds of a GTac gripper at rest. Own handling: every other hold. Share called STABLE and share
-  without an estimate, of the samples in contact; alarms a minute.
+- Holds of a GTac gripper, after its servos have come to rest. Own handling: every other hold.
+  Share called STABLE and share without an estimate, of the samples in contact; alarms a minute.
 
 Scores: one minus the probability of stability, and the probability of a slip.
 """
@@ -36,6 +36,8 @@ from holdfast.training.calibration import calibrate
 
 TUG_START = 0.5
 """Time after which a sequence is scored [s]; before it nobody tugs."""
+QUIET_FROM = 0.4
+"""Share of a hold of the GTac gripper after which its servos stand still."""
 GOALS = {
     "boxes: stable called STABLE": (0.6, 0.9),
     "boxes: slip not called STABLE": (0.8, 0.7),
@@ -180,7 +182,7 @@ def hold_figures(model_for: Calibrated, recordings: Sequence[Recording]) -> dict
             raise SystemExit(f"GTac: {error}") from error
         for recording in recordings[1 - half :: 2]:
             for trace in detect(model, recording).fingers.values():
-                states = trace.state
+                states = trace.state[int(QUIET_FROM * len(trace)) :]
                 used = states != NO_CONTACT
                 n += int(used.sum())
                 n_stable += int((states == STABLE).sum())
