@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from holdfast.io import Dataset
     from holdfast.recordings import Recording
-    from holdfast.training.calibration import Calibrated, HandlingSummary
+    from holdfast.training.calibration import CalibratedModel, HandlingSummary
 
 HANDLING_SECONDS = 60.0
 """Time for which a live source is recorded, unless `--seconds` is given [s]."""
@@ -125,7 +125,7 @@ def _recordings(data: str, seconds: float, speed: float, *, live: bool) -> "Iter
         yield load_dataset(folder)
 
 
-def _print(calibrated: "Calibrated", out: Path) -> None:
+def _print(calibrated: "CalibratedModel", out: Path) -> None:
     for summary in calibrated.sensors:
         print_paragraph(_seen(summary))
         rows = [

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.evaluate import print_verdict, warn_about_training
-from holdfast.cli.options import ForceOption, JsonOption, ModelArgument, ModelOutput
+from holdfast.cli.options import (
+    ForceOption,
+    JsonOption,
+    ModelArgument,
+    ModelOutput,
+    report_handling,
+)
 from holdfast.cli.slip_scores import print_slip_points, slips_origin
 from holdfast.cli.terminal.console import format_number, print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
@@ -76,6 +82,7 @@ def tune(
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
     recordings = _Recordings(loaded, load_dataset(data))
+    report_handling(loaded, recordings.all)
     if question is TunedQuestion.SLIP:
         slips = tune_slips(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
         recordings.warn()
@@ -142,8 +149,9 @@ def _print_slips(
         print_json(_slip_document(tuned, out, recordings.trained_on))
         return
     recordings.print_verdict(verdict_of_slips(tuned.chosen))
-    rules = [part.slip for part in model.fingers.values() if part.slip is not None]
-    thresholds = sorted({rule.classifier.threshold for rule in rules})
+    first = {name: module.sensor for name, module in recordings.all[0].modules.items()}
+    parts = [model.finger(*finger) for finger in model.fingers_of(first).items()]
+    thresholds = sorted({part.slip.classifier.threshold for part in parts if part.slip})
     points = dict(tuned.points)
     if len(thresholds) == 1:
         points.setdefault(thresholds[0], tuned.before)
