@@ -76,16 +76,16 @@ def test_the_summary_says_what_was_seen(model, calibrated):
     assert summary.seconds == max(summary.fingers.values())
     assert 0.1 < summary.load_change < 0.4
     assert 0 < summary.n_changed <= summary.n_features == 31
-    assert summary.stable[0] < 60 < 89 < summary.stable[1]
-    assert summary.threshold[0] == model.fingers["*"].classifier.threshold
-    assert summary.threshold[1] == handling_of(calibrated.model).threshold
-    assert summary.slip_threshold[1] == handling_of(calibrated.model).slip_threshold
+    assert summary.before.stable < 60 < 89 < summary.after.stable
+    assert summary.before.threshold == model.fingers["*"].classifier.threshold
+    assert summary.after.threshold == handling_of(calibrated.model).threshold
+    assert summary.after.slip_threshold == handling_of(calibrated.model).slip_threshold
 
 
 def test_once_more_gives_the_same_model(calibrated):
     again = calibrate_with_report(calibrated.model, DATA)
     assert again.model.digest == calibrated.model.digest
-    assert again.sensors[0].stable == (calibrated.sensors[0].stable[1],) * 2
+    assert again.sensors[0].before == again.sensors[0].after == calibrated.sensors[0].after
 
 
 def test_labels_have_no_part_in_it(model, calibrated):
@@ -175,8 +175,8 @@ def test_it_warns_of_little_and_of_still_handling(model):
 def test_false_alarms_set_the_threshold(model, calibrated, alarms):
     report = calibrate_with_report(model, DATA, false_alarms=alarms)
     (summary,), (usual,) = report.sensors, calibrated.sensors
-    assert summary.alarms_per_minute[1] <= alarms < usual.alarms_per_minute[1]
-    assert summary.threshold[1] < usual.threshold[1]
+    assert summary.after.alarms_per_minute <= alarms < usual.after.alarms_per_minute
+    assert summary.after.threshold < usual.after.threshold
     assert handling_of(report.model).location == handling_of(calibrated.model).location
 
 

@@ -12,7 +12,12 @@ from holdfast.features.specs import CHANGE_KINDS
 from holdfast.model import FingerModel, Handling, Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
-from holdfast.training.operating_point import HeldFinger, HeldFingers, choose_operating_point
+from holdfast.training.operating_point import (
+    HandlingFigures,
+    HeldFinger,
+    HeldFingers,
+    choose_operating_point,
+)
 from holdfast.training.own_handling import (
     ENOUGH_HANDLING,
     MAX_HANDLING,
@@ -40,7 +45,7 @@ Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
 class HandlingSummary(msgspec.Struct, frozen=True):
-    """What a calibration saw of one sensor. Pairs are before and after it.
+    """What a calibration saw of one sensor.
 
     Attributes:
         sensor: its name; with the finger, of a model that has a classifier for each.
@@ -51,11 +56,8 @@ class HandlingSummary(msgspec.Struct, frozen=True):
         n_changed: number of them whose location or scale differs from the default.
         activity: how far the features of change are above their default location, in default
             scales.
-        stable: share of the held samples that are STABLE [%].
-        alarms_per_minute: alarms of all fingers per minute of held time.
-        raised: share of the held samples in which a slip is reported [%].
-        threshold: of the probability of stability.
-        slip_threshold: of the probability of a slip; None without a slip rule.
+        before: decisions about this handling, by the model that was given.
+        after: the same, by the calibrated model.
     """
 
     sensor: str
@@ -65,11 +67,8 @@ class HandlingSummary(msgspec.Struct, frozen=True):
     n_features: int
     n_changed: int
     activity: float
-    stable: tuple[float, float]
-    alarms_per_minute: tuple[float, float]
-    raised: tuple[float, float] | None
-    threshold: tuple[float, float]
-    slip_threshold: tuple[float, float] | None
+    before: HandlingFigures
+    after: HandlingFigures
 
 
 @dataclass(frozen=True)
@@ -198,7 +197,7 @@ class _Calibration:
 
     def __init__(self, handling: OwnHandling, recordings: Sequence[Recording]) -> None:
         self.model, self.seen, self.recordings = handling.model, handling, recordings
-        self.keys = [p for p in handling.samples if handling.seconds(p) >= MIN_HANDLING]
+        self.keys = [key for key in handling.samples if handling.seconds(key) >= MIN_HANDLING]
 
     def result(self, false_alarms: float | None) -> CalibratedModel:
         """Return the calibrated model, with what the calibration saw.
@@ -207,16 +206,18 @@ class _Calibration:
             TrainingError: most of the handling seems to be slip, or no threshold gives so few
                 alarms.
         """
-        own = {key: self._normalisation(key) for key in self.keys}
+        handling = {key: self._normalisation(key) for key in self.keys}
         before = self._decide(self.model)
-        after = self._decide(_with_handling(self.model, own))
-        for key, handling in own.items():
-            part = self.model.finger(key.finger).with_handling(handling)
-            point = choose_operating_point(after[key], part, false_alarms)
-            own[key] = msgspec.structs.replace(handling, **point._asdict())
-        model = _with_handling(self.model, own)
+        after = self._decide(_with_handling(self.model, handling))
+        for key, normalisation in handling.items():
+            part = self.model.finger(key.finger).with_handling(normalisation)
+            chosen = choose_operating_point(after[key], part, false_alarms)
+            handling[key] = msgspec.structs.replace(normalisation, **chosen._asdict())
+        model = _with_handling(self.model, handling)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)
-        sensors = tuple(self._summary(p, own[p], before[p], after[p]) for p in self.keys)
+        sensors = tuple(
+            self._summary(key, handling[key], before[key], after[key]) for key in self.keys
+        )
         return CalibratedModel(
             msgspec.structs.replace(model, name=f"{name}{CALIBRATED_SUFFIX}" if name else ""),
             sensors,
@@ -230,10 +231,10 @@ class _Calibration:
             TrainingError: most of the handling seems to be slip.
         """
         features = self.seen.features(key)
-        found = activity(self.model.finger(key.finger), features)
-        if found > MAX_ACTIVITY:
+        measured = activity(self.model.finger(key.finger), features)
+        if measured > MAX_ACTIVITY:
             raise TrainingError(
-                f"{key}: most of this handling looks like slip (activity {found:.2f}, at most "
+                f"{key}: most of this handling looks like slip (activity {measured:.2f}, at most "
                 f"{MAX_ACTIVITY:g} expected); ordinary handling without slip expected"
             )
         location, scale = location_and_scale(features)
@@ -261,11 +262,6 @@ class _Calibration:
         self, key: HandlingKey, handling: Handling, before: HeldFingers, after: HeldFingers
     ) -> HandlingSummary:
         part = self.model.finger(key.finger)
-        given, own = part.for_sensor(key.sensor), part.with_handling(handling)
-        thresholds = given.classifier.threshold, own.classifier.threshold
-        slips = None
-        if given.slip is not None and own.slip is not None:
-            slips = given.slip.classifier.threshold, own.slip.classifier.threshold
         return HandlingSummary(
             sensor=str(key),
             fingers=self.seen.fingers(key),
@@ -274,18 +270,8 @@ class _Calibration:
             n_features=len(handling.location),
             n_changed=n_changed(part, handling),
             activity=activity(part, self.seen.features(key)),
-            stable=(
-                100 * before.stable_share(thresholds[0]),
-                100 * after.stable_share(thresholds[1]),
-            ),
-            alarms_per_minute=(
-                before.alarms_per_minute(thresholds[0]),
-                after.alarms_per_minute(thresholds[1]),
-            ),
-            raised=slips
-            and (100 * before.raised_share(slips[0]), 100 * after.raised_share(slips[1])),
-            threshold=thresholds,
-            slip_threshold=slips,
+            before=before.figures(part.for_sensor(key.sensor)),
+            after=after.figures(part.with_handling(handling)),
         )
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
@@ -313,11 +299,11 @@ class _Calibration:
             )
 
 
-def _with_handling(model: Model, own: Mapping[HandlingKey, Handling]) -> Model:
-    """Return the model with own handling of some keys; that of other sensors stays."""
+def _with_handling(model: Model, handling: Mapping[HandlingKey, Handling]) -> Model:
+    """Return the model with more own handling; that of other sensors stays."""
     fingers = {}
     for name, part in model.fingers.items():
-        new = {key.sensor: own[key] for key in own if key.finger == name}
-        handling = {**part.own_handling, **new}
-        fingers[name] = msgspec.structs.replace(part, handling=handling or msgspec.UNSET)
+        new = {key.sensor: value for key, value in handling.items() if key.finger == name}
+        known = {**part.own_handling, **new}
+        fingers[name] = msgspec.structs.replace(part, handling=known or msgspec.UNSET)
     return msgspec.structs.replace(model, fingers=fingers)

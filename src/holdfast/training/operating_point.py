@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import takewhile
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from holdfast.classifiers.slip import raised_at
@@ -40,6 +41,24 @@ class OperatingThresholds(NamedTuple):
 
     threshold: float
     slip_threshold: float | None
+
+
+class HandlingFigures(msgspec.Struct, frozen=True):
+    """Decisions of a model about own handling.
+
+    Attributes:
+        threshold: of the probability of stability.
+        stable: share of the held samples that are STABLE [%].
+        alarms_per_minute: alarms of all fingers per minute of held time.
+        slip_threshold: of the probability of a slip; None without a slip rule.
+        raised: share of the held samples in which a slip is reported [%]; None without one.
+    """
+
+    threshold: float
+    stable: float
+    alarms_per_minute: float
+    slip_threshold: float | None = None
+    raised: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +120,18 @@ class HeldFingers:
         for finger in self.fingers:
             totals[finger.name] = totals.get(finger.name, 0.0) + finger.seconds
         return max(totals.values(), default=0.0)
+
+    def figures(self, part: FingerModel) -> HandlingFigures:
+        """Return the figures at the thresholds of a model, which made the decisions."""
+        stable = part.classifier.threshold
+        slip = None if part.slip is None else part.slip.classifier.threshold
+        return HandlingFigures(
+            threshold=stable,
+            stable=100 * self.stable_share(stable),
+            alarms_per_minute=self.alarms_per_minute(stable),
+            slip_threshold=slip,
+            raised=None if slip is None else 100 * self.raised_share(slip),
+        )
 
     def stable_share(self, threshold: float) -> float:
         """Return the share of the held samples that are STABLE at a threshold."""
