@@ -74,7 +74,7 @@ class HeldSamples:
         sensor: its sensor.
         features: (n, n_features) finite.
         load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it.
-        seconds: held time [s].
+        seconds: held time, with closing and opening [s].
     """
 
     finger: str
@@ -170,8 +170,9 @@ class OwnHandling:
                 "ordinary handling expected, in recordings that begin with an open hand"
             )
         if longest < MIN_HANDLING:
+            rounded = math.floor(10 * longest) / 10
             raise TrainingError(
-                f"{longest:.1f} s of holding given, at least {MIN_HANDLING:g} s expected "
+                f"{rounded:.1f} s of holding given, at least {MIN_HANDLING:g} s expected "
                 f"({ENOUGH_HANDLING:g} s or more are better)"
             )
 
@@ -187,7 +188,8 @@ class OwnHandling:
                 "expected"
             )
         held = held_samples(trace.times, trace.state) & np.isfinite(features).all(axis=1)
-        seconds = float(held_durations(trace.times)[held].sum())
+        touching = held_samples(trace.times, trace.state, edge_seconds=0.0)
+        seconds = float(held_durations(trace.times)[touching].sum())
         changes = _load_changes(trace, held)
         known.append(HeldSamples(name, sensor, features[held], changes, seconds))
 
@@ -228,21 +230,22 @@ def location_and_scale(features: Array) -> tuple[Array, Array]:
     return location, np.maximum(scale, MIN_SCALE)
 
 
-def held_samples(times: Array, states: Codes) -> Flags:
+def held_samples(times: Array, states: Codes, *, edge_seconds: float = EDGE_SECONDS) -> Flags:
     """Return (n,) where a finger holds something for at least `MIN_TOUCH`.
 
     While it closes and opens it does not hold: the samples next to those without contact are left
-    out, see `EDGE_SECONDS`.
+    out.
 
     Args:
         times: (n,) [s].
         states: (n,) codes of its states, without debouncing.
+        edge_seconds: time that is left out [s], but at most `MAX_EDGE_SHARE` of a touch.
     """
     period = _period(times)
     touching = np.asarray((states == STABLE) | (states == UNSTABLE))
     held = np.zeros_like(touching)
     for start, end in runs(touching):
-        edge = min(round(EDGE_SECONDS / period), int(MAX_EDGE_SHARE * (end - start)))
+        edge = min(round(edge_seconds / period), int(MAX_EDGE_SHARE * (end - start)))
         closes = start > 0 and states[start - 1] == NO_CONTACT
         opens = end < len(states) and states[end] == NO_CONTACT
         if end - start >= MIN_TOUCH / period:
