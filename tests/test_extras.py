@@ -17,6 +17,7 @@ from holdfast.errors import (
     require_extras,
 )
 from holdfast.synthetic import synthetic_recording
+from training.build import normalised_model
 
 BLOCK = """
 import json, sys
@@ -45,6 +46,8 @@ CORE = [
     ["record", "grasp.mcap", "again.mcap", "--speed", "0"],
     ["import", "log.csv", "imported", "--sensor", "anyskin"],
     ["detect", "builtin:any", "imported/log.mcap"],
+    ["calibrate", "normalised.json", "grasp.mcap", "-o", "mine.json"],
+    ["detect", "mine.json", "grasp.mcap"],
     ["hold", "builtin:any", "grasp.mcap", "--hand", "log:commands.jsonl", "--speed", "0"],
     ["bench", "--samples", "1000", "--updates", "1000"],
     ["simulate", "--help"],
@@ -97,6 +100,7 @@ def outcomes(tmp_path_factory):
     folder = tmp_path_factory.mktemp("slim")
     recording = synthetic_recording("grasp", seed=0)
     save_recording(recording, folder / "grasp.mcap")
+    normalised_model().save(folder / "normalised.json")
     (folder / "other").mkdir()
     (folder / "other" / "grasp.parquet").write_bytes(b"PAR1")
     (folder / "run.bag").write_bytes(b"#ROSBAG V2.0\n")

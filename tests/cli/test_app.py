@@ -93,7 +93,7 @@ def test_help_names_every_verb_and_loads_nothing_heavy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == ""
     for verb, summary in app.VERBS.items():
-        assert f"{verb:10}{summary}"[:60] in done.stdout
+        assert f"{verb:11}{summary}"[:60] in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,12 @@
 """Small recordings for the tests of training."""
 
+import msgspec
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
+from holdfast.model import Model
 from holdfast.recordings import Label, Recording, Tactile, Truth
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, flat_sensor
 
 TINY = Sensor(
     name="tiny",
@@ -77,3 +79,49 @@ def sliding_recording(seed, fingers=("thumb", "index"), *, slips=(400, 700, 1000
         {name: arrays for name, (_, arrays) in made.items()},
     )
     return Recording(f"slips-{seed}", modules, {"object": f"object {seed % 3}"}, truth)
+
+
+PAD = flat_sensor("pad", 3, 3, 0.005, 100.0, "N")
+"""A sensor in newtons, whose readings have no least step."""
+
+
+def handling_module(
+    seed, held=8.0, *, sensor=PAD, rate=100.0, slip=0.0, sway=0.1, force=4.0, open_for=1.0
+):
+    """Open, closed, held and carried with swaying force, open again.
+
+    Args:
+        seed: of all random numbers.
+        held: time between closing and opening [s].
+        sensor: with any number of taxels.
+        rate: [Hz].
+        slip: share of the held time in which single taxels tremble as over a sliding object.
+        sway: change of the force while it is carried, as a share of it.
+        force: of a taxel; 0 for a hand that stays open.
+        open_for: time before and after [s].
+    """
+    rng = np.random.default_rng(seed)
+    closed, opened = open_for + 0.3, open_for + 0.3 + held
+    times = np.arange(0, opened + 0.3 + open_for, 1 / rate)
+    grip = np.interp(times, [0, open_for, closed, opened, opened + 0.3], [0, 0, 1, 1, 0])
+    phase = rng.uniform(0, 2 * np.pi, size=3)
+    swaying = sway * np.sin(2 * np.pi * np.array([[0.5], [0.9], [1.3]]) * times + phase[:, None])
+    pulls = np.stack([swaying[0], swaying[1], 1 + swaying[2]], axis=1) * grip[:, None]
+    share = 1 + 0.5 * np.cos(np.arange(sensor.n_taxels))
+    readings = force * pulls[:, None] * share[:, None]
+    sliding = (times > closed + 0.5) & (times < closed + 0.5 + slip * held)
+    readings += force * 0.4 * rng.normal(size=readings.shape) * sliding[:, None, None]
+    readings += 0.004 * rng.normal(size=readings.shape)
+    return Tactile(sensor, times, readings)
+
+
+def handling_recording(seed, fingers=("thumb", "index"), name=None, **options):
+    modules = {finger: handling_module([seed, k], **options) for k, finger in enumerate(fingers)}
+    return Recording(name or f"handling-{seed}", modules)
+
+
+def normalised_model():
+    """Return `builtin:any` as a model whose features are normalised."""
+    model = Model.load("builtin:any")
+    part = msgspec.structs.replace(model.fingers["*"], normalised=True)
+    return msgspec.structs.replace(model, fingers={"*": part})

@@ -19,6 +19,7 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.record import capture
 from holdfast.cli.terminal.console import (
+    format_number,
     print_json,
     print_line,
     print_message,
@@ -32,11 +33,20 @@ if TYPE_CHECKING:
 
     from holdfast.io import Dataset
     from holdfast.recordings import Recording
-    from holdfast.training.calibration import Calibrated, HandlingSummary
+    from holdfast.training.calibration import CalibratedModel, HandlingSummary
 
 HANDLING_SECONDS = 60.0
 """Time for which a live source is recorded, unless `--seconds` is given [s]."""
 MAX_FINGERS_SHOWN = 5
+
+ROWS = (
+    ("STABLE in the held samples [%]", "stable", 1),
+    ("alarms per minute of holding", "alarms_per_minute", 1),
+    ("threshold of STABLE", "threshold", 3),
+    ("slip reported in the held samples [%]", "raised", 1),
+    ("threshold of a slip", "slip_threshold", 3),
+)
+"""Text, field of the figures and number of digits of each row of the table."""
 
 
 def calibrate(
@@ -125,25 +135,17 @@ def _recordings(data: str, seconds: float, speed: float, *, live: bool) -> "Iter
         yield load_dataset(folder)
 
 
-def _print(calibrated: "Calibrated", out: Path) -> None:
+def _print(calibrated: "CalibratedModel", out: Path) -> None:
     for summary in calibrated.sensors:
         print_paragraph(_seen(summary))
         rows = [
-            ("STABLE in the held samples [%]", *_pair(summary.stable, 1)),
-            ("alarms per minute of holding", *_pair(summary.alarms_per_minute, 1)),
-            ("threshold of STABLE", *_pair(summary.threshold, 3)),
+            (title, *(format_number(getattr(figures, field), digits) for figures in columns))
+            for title, field, digits in ROWS
+            for columns in [(summary.before, summary.after)]
         ]
-        if summary.raised is not None and summary.slip_threshold is not None:
-            rows.append(("slip reported in the held samples [%]", *_pair(summary.raised, 1)))
-            rows.append(("threshold of a slip", *_pair(summary.slip_threshold, 3)))
         print_table(("", "before", "after"), rows)
         print_line()
     print_line(f"{out}: {calibrated.model.name or 'the model'}")
-
-
-def _pair(values: tuple[float, float], digits: int) -> tuple[str, str]:
-    before, after = (f"{value:.{digits}f}" for value in values)
-    return before, after
 
 
 def _seen(summary: "HandlingSummary") -> str:

@@ -13,7 +13,7 @@ from holdfast.cli.options import (
     ModelArgument,
     PlotOptions,
     SeedOption,
-    report_other_handling,
+    report_handling,
     start_engine,
 )
 from holdfast.cli.slip_scores import print_slips
@@ -80,6 +80,7 @@ def evaluate(
     loaded = Model.load(model)
     started = start_engine(engine, jobs)
     recordings = load_dataset(started.path(data), in_contact=in_contact)
+    report_handling(loaded, recordings)
     evaluation = evaluate_recordings(
         loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
     )
@@ -87,9 +88,6 @@ def evaluate(
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
     warn_about_training(evaluation.trained_on, len(recordings))
-    if loaded.handled_sensors:
-        first = {name: module.sensor for name, module in recordings[0].modules.items()}
-        report_other_handling(loaded, loaded.fingers_of(first).values())
     figure.save(lambda: _draw(evaluation))
     if as_json:
         document = {"trained_on": evaluation.trained_on, "verdict": evaluation.verdict}

@@ -68,17 +68,17 @@ def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
         "contact_load": part.contact_load,
         "slip": None if part.slip is None else _slip(part.slip),
         "normalised": bool(part.normalised),
-        "handling": {name: _handling(own) for name, own in part.own_handling.items()},
+        "handling": {name: _handling(handling) for name, handling in part.own_handling.items()},
     }
 
 
-def _handling(own: "Handling") -> dict[str, Any]:
+def _handling(handling: "Handling") -> dict[str, Any]:
     """Return the facts about own handling; location and scale are in the model file."""
     return {
-        "seconds": own.seconds,
-        "threshold": own.threshold,
-        "slip_threshold": own.slip_threshold,
-        "recordings": list(own.recordings),
+        "seconds": handling.seconds,
+        "threshold": handling.threshold,
+        "slip_threshold": handling.slip_threshold,
+        "recordings": list(handling.recordings),
     }
 
 
@@ -165,15 +165,15 @@ def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
     """Yield the own handling of a finger on each sensor."""
     if part["normalised"] and not part["handling"]:
         yield "features normalised by default handling (holdfast calibrate: by your own)"
-    for sensor, own in part["handling"].items():
-        names, thresholds = own["recordings"], []
-        if own["threshold"] is not None:
-            thresholds.append(f"STABLE from {own['threshold']:.3g} on")
-        if own["slip_threshold"] is not None:
-            thresholds.append(f"slides from {own['slip_threshold']:.3g} on")
+    for sensor, handling in part["handling"].items():
+        names, texts = handling["recordings"], []
+        if handling["threshold"] is not None:
+            texts.append(f"; STABLE from {handling['threshold']:.3g} on")
+        if handling["slip_threshold"] is not None:
+            texts.append(f"; slides from {handling['slip_threshold']:.3g} on")
         yield (
-            f"own handling of {sensor}: {own['seconds']:.3g} s held in {len(names)} recordings "
-            f"({_few(names)}){''.join(f'; {text}' for text in thresholds)}"
+            f"own handling of {sensor}: {handling['seconds']:.3g} s held in {len(names)} "
+            f"recording{'s' * (len(names) != 1)} ({_few(names)}){''.join(texts)}"
         )
 
 

@@ -6,7 +6,7 @@ that takes one has all its options (see `spread_groups` of `app.py`).
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.parallel import Engine
+    from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
 
 TOKEN_VARIABLE = "HOLDFAST_TOKEN"
@@ -331,6 +332,13 @@ def report_other_handling(model: "Model", sensors: "Iterable[Sensor]") -> None:
             f"{model.name} was calibrated on {', '.join(model.handled_sensors)}, not on "
             f"{', '.join(missing)}: default handling is used (holdfast calibrate)"
         )
+
+
+def report_handling(model: "Model", recordings: "Sequence[Recording]") -> None:
+    """Print the sensors of the first recording without own handling, as `report_other_handling`."""
+    if model.handled_sensors and recordings:
+        sensors = {name: module.sensor for name, module in recordings[0].modules.items()}
+        report_other_handling(model, model.fingers_of(sensors).values())
 
 
 def report_missing_slip_rules(model: "Model") -> None:

@@ -13,6 +13,7 @@ from holdfast.cli.options import (
     JsonOption,
     ModelArgument,
     ModelOutput,
+    report_handling,
 )
 from holdfast.cli.slip_scores import print_slip_points, slips_origin
 from holdfast.cli.terminal.console import format_number, print_json, print_line, print_table
@@ -83,6 +84,7 @@ def tune(
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
     recordings = _Recordings(loaded, load_dataset(data, in_contact=in_contact))
+    report_handling(loaded, recordings.all)
     if question is TunedQuestion.SLIP:
         slips = tune_slips(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
         recordings.warn()
@@ -149,8 +151,9 @@ def _print_slips(
         print_json(_slip_document(tuned, out, recordings.trained_on))
         return
     recordings.print_verdict(verdict_of_slips(tuned.chosen))
-    rules = [part.slip for part in model.fingers.values() if part.slip is not None]
-    thresholds = sorted({rule.classifier.threshold for rule in rules})
+    first = {name: module.sensor for name, module in recordings.all[0].modules.items()}
+    parts = [model.finger(*finger) for finger in model.fingers_of(first).items()]
+    thresholds = sorted({part.slip.classifier.threshold for part in parts if part.slip})
     points = dict(tuned.points)
     if len(thresholds) == 1:
         points.setdefault(thresholds[0], tuned.before)

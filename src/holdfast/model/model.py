@@ -157,8 +157,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         fingers = {}
         for name, part in self.fingers.items():
             used = {s.name for finger, s in sensors.items() if name in (ANY_FINGER, finger)}
-            own = part.for_sensor(used.pop()) if len(used) == 1 else part
-            fingers[name] = msgspec.structs.replace(own, handling=msgspec.UNSET)
+            folded = part.for_sensor(used.pop()) if len(used) == 1 else part
+            fingers[name] = msgspec.structs.replace(folded, handling=msgspec.UNSET)
         return msgspec.structs.replace(self, fingers=fingers)
 
     @property

@@ -168,18 +168,16 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         nothing else.
         """
         replace = msgspec.structs.replace
-        own = dict(
-            zip(self.all_features, zip(handling.location, handling.scale, strict=True), strict=True)
-        )
+        values = zip(handling.location, handling.scale, strict=True)
+        moments = dict(zip(self.all_features, values, strict=True))
         slip = self.slip
         if slip is not None:
-            linear = _normalised_by(
-                slip.classifier, slip.used_features(self.features), own, handling.slip_threshold
-            )
+            features, threshold = slip.used_features(self.features), handling.slip_threshold
+            linear = _normalised_by(slip.classifier, features, moments, threshold)
             slip = replace(slip, classifier=linear)
         classifier = self.classifier
         if isinstance(classifier, LinearClassifier):
-            classifier = _normalised_by(classifier, self.features, own, handling.threshold)
+            classifier = _normalised_by(classifier, self.features, moments, handling.threshold)
         return replace(
             self, classifier=classifier, slip=slip, causes=self._causes_for(handling),
             handling=msgspec.UNSET,
@@ -190,7 +188,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         if self.handling is msgspec.UNSET:
             return self
         replace = msgspec.structs.replace
-        handling = {name: replace(own, **{field: None}) for name, own in self.handling.items()}
+        handling = {name: replace(known, **{field: None}) for name, known in self.handling.items()}
         return replace(self, handling=handling)
 
     def _causes_for(self, handling: Handling) -> CauseClassifier | None:
@@ -227,14 +225,14 @@ def _moments(
 def _normalised_by(
     linear: LinearClassifier,
     features: tuple[FeatureSpec, ...],
-    own: Mapping[FeatureSpec, tuple[float, float]],
+    moments: Mapping[FeatureSpec, tuple[float, float]],
     threshold: float | None,
 ) -> LinearClassifier:
     """Return a classifier with another location and scale of each feature, and a threshold."""
     return msgspec.structs.replace(
         linear,
-        mean=tuple(own[spec][0] for spec in features),
-        scale=tuple(own[spec][1] for spec in features),
+        mean=tuple(moments[spec][0] for spec in features),
+        scale=tuple(moments[spec][1] for spec in features),
         threshold=linear.threshold if threshold is None else threshold,
     )
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from holdfast.training.calibration import Calibrated, calibrate, calibrate_with_report
+from holdfast.training.calibration import CalibratedModel, calibrate, calibrate_with_report
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import Setting
 from holdfast.training.threshold import ThresholdMetrics, Tuned, tune
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from holdfast.training.estimator import StabilityClassifier
 
 __all__ = [
-    "Calibrated",
+    "CalibratedModel",
     "Setting",
     "StabilityClassifier",
     "ThresholdMetrics",

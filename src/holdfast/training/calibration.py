@@ -12,23 +12,23 @@ from holdfast.features.specs import CHANGE_KINDS
 from holdfast.model import FingerModel, Handling, Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
-from holdfast.training.operating_point import HeldFinger, HeldFingers, choose_operating_point
+from holdfast.training.operating_point import (
+    HandlingFigures,
+    HeldFinger,
+    HeldFingers,
+    choose_operating_point,
+)
 from holdfast.training.own_handling import (
     ENOUGH_HANDLING,
     MAX_HANDLING,
     MIN_HANDLING,
+    HandlingKey,
     OwnHandling,
-    Place,
     held_samples,
+    location_and_scale,
 )
 from holdfast.training.threshold import ThresholdReplay
 
-MIN_SCALE = 0.3
-"""Least scale of a feature: a hand that holds still has next to none."""
-CLIP_DEVIATIONS = 1.5
-"""Values further from the location than this many scales count as at this distance."""
-MAX_CLIP_STEPS = 50
-"""Maximum number of steps in which location and scale are found."""
 STILL_CHANGE = 0.03
 """Median change of the load below which the arm hardly moved, as a share of it."""
 MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
@@ -38,14 +38,14 @@ MAX_ACTIVITY = 1.4
 """Own handling is refused as slip above this `activity`. None of 300 randomized hands has more in
 the held samples in which it does not slide; two thirds of them have more while they slide
 (`benchmarks/handling_activity.py`)."""
-SUFFIX = ", calibrated"
+CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
 
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
 class HandlingSummary(msgspec.Struct, frozen=True):
-    """What a calibration saw of one sensor. Pairs are before and after it.
+    """What a calibration saw of one sensor.
 
     Attributes:
         sensor: its name; with the finger, of a model that has a classifier for each.
@@ -56,11 +56,8 @@ class HandlingSummary(msgspec.Struct, frozen=True):
         n_changed: number of them whose location or scale differs from the default.
         activity: how far the features of change are above their default location, in default
             scales.
-        stable: share of the held samples that are STABLE [%].
-        alarms_per_minute: alarms of all fingers per minute of held time.
-        raised: share of the held samples in which a slip is reported [%].
-        threshold: of the probability of stability.
-        slip_threshold: of the probability of a slip; None without a slip rule.
+        before: decisions about this handling, by the model that was given.
+        after: the same, by the calibrated model.
     """
 
     sensor: str
@@ -70,15 +67,12 @@ class HandlingSummary(msgspec.Struct, frozen=True):
     n_features: int
     n_changed: int
     activity: float
-    stable: tuple[float, float]
-    alarms_per_minute: tuple[float, float]
-    raised: tuple[float, float] | None
-    threshold: tuple[float, float]
-    slip_threshold: tuple[float, float] | None
+    before: HandlingFigures
+    after: HandlingFigures
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class CalibratedModel:
     """A model with own handling, and what it rests on.
 
     Attributes:
@@ -129,7 +123,7 @@ def calibrate_with_report(
     *,
     false_alarms: float | None = None,
     progress: Steps = lambda recordings: recordings,
-) -> Calibrated:
+) -> CalibratedModel:
     """Calibrate a model as `calibrate`, and return what the calibration saw.
 
     Args:
@@ -165,34 +159,6 @@ def check_normalised(model: Model) -> None:
             f"{model.name or 'the model'} was not trained on normalised features and cannot be "
             "calibrated; builtin:any can"
         )
-
-
-def location_and_scale(features: Array) -> tuple[Array, Array]:
-    """Return location and scale of features over samples of ordinary handling.
-
-    They are mean and standard deviation of the values clipped to the location plus and minus
-    `CLIP_DEVIATIONS` scales, the scale divided by that of clipped normal values (Huber's second
-    proposal), so that a tenth of the samples may be slip. The scale is at least `MIN_SCALE`.
-
-    Args:
-        features: (n, n_features) finite.
-
-    Returns:
-        (n_features,) each.
-    """
-    # E min(z^2, c^2) of a normal z: 1 - 2 (1 - Phi(c)) (1 - c^2) - 2 c phi(c).
-    c = CLIP_DEVIATIONS
-    tails = math.erfc(c / math.sqrt(2))
-    density = math.exp(-0.5 * c * c) / math.sqrt(2 * math.pi)
-    shrinkage = math.sqrt(1 - tails * (1 - c * c) - 2 * c * density)
-    location, scale = np.median(features, axis=0), features.std(axis=0)
-    for _ in range(MAX_CLIP_STEPS):
-        before = location, scale
-        clipped = np.clip(features, location - c * scale, location + c * scale)
-        location, scale = clipped.mean(axis=0), clipped.std(axis=0) / shrinkage
-        if np.allclose(before, (location, scale), rtol=1e-9, atol=1e-9):
-            break
-    return location, np.maximum(scale, MIN_SCALE)
 
 
 def activity(part: FingerModel, features: Array) -> float:
@@ -231,94 +197,81 @@ class _Calibration:
 
     def __init__(self, handling: OwnHandling, recordings: Sequence[Recording]) -> None:
         self.model, self.seen, self.recordings = handling.model, handling, recordings
-        self.places = [p for p in handling.samples if handling.seconds(p) >= MIN_HANDLING]
+        self.keys = [key for key in handling.samples if handling.seconds(key) >= MIN_HANDLING]
 
-    def result(self, false_alarms: float | None) -> Calibrated:
+    def result(self, false_alarms: float | None) -> CalibratedModel:
         """Return the calibrated model, with what the calibration saw.
 
         Raises:
             TrainingError: most of the handling seems to be slip, or no threshold gives so few
                 alarms.
         """
-        own = {place: self._normalisation(place) for place in self.places}
+        handling = {key: self._normalisation(key) for key in self.keys}
         before = self._decide(self.model)
-        after = self._decide(_with_handling(self.model, own))
-        for place, handling in own.items():
-            part = self.model.finger(place.finger).with_handling(handling)
-            point = choose_operating_point(after[place], part, false_alarms)
-            own[place] = msgspec.structs.replace(handling, **point._asdict())
-        model = _with_handling(self.model, own)
-        name = model.name.removesuffix(SUFFIX)
-        sensors = tuple(self._summary(p, own[p], before[p], after[p]) for p in self.places)
-        return Calibrated(
-            msgspec.structs.replace(model, name=f"{name}{SUFFIX}" if name else ""),
+        after = self._decide(_with_handling(self.model, handling))
+        for key, normalisation in handling.items():
+            part = self.model.finger(key.finger).with_handling(normalisation)
+            chosen = choose_operating_point(after[key], part, false_alarms)
+            handling[key] = msgspec.structs.replace(normalisation, **chosen._asdict())
+        model = _with_handling(self.model, handling)
+        name = model.name.removesuffix(CALIBRATED_SUFFIX)
+        sensors = tuple(
+            self._summary(key, handling[key], before[key], after[key]) for key in self.keys
+        )
+        return CalibratedModel(
+            msgspec.structs.replace(model, name=f"{name}{CALIBRATED_SUFFIX}" if name else ""),
             sensors,
             tuple(self._warnings(sensors)),
         )
 
-    def _normalisation(self, place: Place) -> Handling:
-        """Return location and scale of a place.
+    def _normalisation(self, key: HandlingKey) -> Handling:
+        """Return location and scale of a key.
 
         Raises:
             TrainingError: most of the handling seems to be slip.
         """
-        features = self.seen.features(place)
-        found = activity(self.model.finger(place.finger), features)
-        if found > MAX_ACTIVITY:
+        features = self.seen.features(key)
+        measured = activity(self.model.finger(key.finger), features)
+        if measured > MAX_ACTIVITY:
             raise TrainingError(
-                f"{place}: most of this handling looks like slip (activity {found:.2f}, at most "
+                f"{key}: most of this handling looks like slip (activity {measured:.2f}, at most "
                 f"{MAX_ACTIVITY:g} expected); ordinary handling without slip expected"
             )
         location, scale = location_and_scale(features)
         return Handling(
             location=tuple(location.tolist()),
             scale=tuple(scale.tolist()),
-            seconds=self.seen.seconds(place),
+            seconds=self.seen.seconds(key),
             recordings=self.seen.digests,
         )
 
-    def _decide(self, model: Model) -> dict[Place, HeldFingers]:
+    def _decide(self, model: Model) -> dict[HandlingKey, HeldFingers]:
         """Return the decisions of a model about the own handling, for any threshold."""
-        fingers: dict[Place, list[HeldFinger]] = {}
+        fingers: dict[HandlingKey, list[HeldFinger]] = {}
         for recording in self.recordings:
             if recording.name not in self.seen.digests:
                 continue
             replay = ThresholdReplay.of(model, recording)
             for name, decisions in replay.raw.fingers.items():
-                place = Place.of(model, name, recording.modules[name].sensor)
+                key = HandlingKey.of(model, name, recording.modules[name].sensor)
                 held = held_samples(decisions.times, decisions.states)
-                fingers.setdefault(place, []).append(HeldFinger(name, replay, held))
-        return {place: HeldFingers(held) for place, held in fingers.items()}
+                fingers.setdefault(key, []).append(HeldFinger(name, replay, held))
+        return {key: HeldFingers(held) for key, held in fingers.items()}
 
     def _summary(
-        self, place: Place, handling: Handling, before: HeldFingers, after: HeldFingers
+        self, key: HandlingKey, handling: Handling, before: HeldFingers, after: HeldFingers
     ) -> HandlingSummary:
-        part = self.model.finger(place.finger)
-        given, own = part.for_sensor(place.sensor), part.with_handling(handling)
-        thresholds = given.classifier.threshold, own.classifier.threshold
-        slips = None
-        if given.slip is not None and own.slip is not None:
-            slips = given.slip.classifier.threshold, own.slip.classifier.threshold
+        part = self.model.finger(key.finger)
         return HandlingSummary(
-            sensor=str(place),
-            fingers=self.seen.fingers(place),
+            sensor=str(key),
+            fingers=self.seen.fingers(key),
             seconds=handling.seconds,
-            load_change=self.seen.load_change(place),
+            load_change=self.seen.load_change(key),
             n_features=len(handling.location),
             n_changed=n_changed(part, handling),
-            activity=activity(part, self.seen.features(place)),
-            stable=(
-                100 * before.stable_share(thresholds[0]),
-                100 * after.stable_share(thresholds[1]),
-            ),
-            alarms_per_minute=(
-                before.alarms_per_minute(thresholds[0]),
-                after.alarms_per_minute(thresholds[1]),
-            ),
-            raised=slips
-            and (100 * before.raised_share(slips[0]), 100 * after.raised_share(slips[1])),
-            threshold=thresholds,
-            slip_threshold=slips,
+            activity=activity(part, self.seen.features(key)),
+            before=before.figures(part.for_sensor(key.sensor)),
+            after=after.figures(part.with_handling(handling)),
         )
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
@@ -333,10 +286,10 @@ class _Calibration:
                     f"{summary.sensor}: the arm hardly moved; add handling in which it carries and "
                     "turns, or its motion will look like slip"
                 )
-        for place in self.seen.samples:
-            if place not in self.places:
+        for key in self.seen.samples:
+            if key not in self.keys:
                 yield (
-                    f"{place}: {self.seen.seconds(place):.1f} s of holding, at least "
+                    f"{key}: {self.seen.seconds(key):.1f} s of holding, at least "
                     f"{MIN_HANDLING:g} s needed; left as it was"
                 )
         if self.seen.n_left_out:
@@ -346,11 +299,11 @@ class _Calibration:
             )
 
 
-def _with_handling(model: Model, own: Mapping[Place, Handling]) -> Model:
-    """Return the model with own handling of some places; that of other sensors stays."""
+def _with_handling(model: Model, handling: Mapping[HandlingKey, Handling]) -> Model:
+    """Return the model with more own handling; that of other sensors stays."""
     fingers = {}
     for name, part in model.fingers.items():
-        new = {place.sensor: own[place] for place in own if place.finger == name}
-        handling = {**part.own_handling, **new}
-        fingers[name] = msgspec.structs.replace(part, handling=handling or msgspec.UNSET)
+        new = {key.sensor: value for key, value in handling.items() if key.finger == name}
+        known = {**part.own_handling, **new}
+        fingers[name] = msgspec.structs.replace(part, handling=known or msgspec.UNSET)
     return msgspec.structs.replace(model, fingers=fingers)

@@ -1,10 +1,12 @@
 """Thresholds of a model on its user's own handling, which has no labels."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from holdfast.classifiers.slip import raised_at
@@ -14,19 +16,25 @@ from holdfast.metrics import FingerDecisions
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_thresholds import THRESHOLDS
 from holdfast.model import FingerModel
-from holdfast.sensors.types import Flags
-from holdfast.training.own_handling import held_durations
+from holdfast.sensors.types import Array, Flags
+from holdfast.training.own_handling import held_durations, location_and_scale
 from holdfast.training.threshold import ThresholdReplay
 
-STABLE_SHARE = 0.9
-"""Share of the held samples of own handling that is STABLE: a tenth of it may be slip."""
+STABLE_SHARE = 0.95
+"""Share of the held samples of own handling that is STABLE."""
 RAISED_SHARE = 0.05
 """Share of the held samples of own handling in which a slip may be reported."""
-STABLE_THRESHOLDS = 1.0 / (1.0 + np.exp(0.1 * np.arange(60, -61, -1)))
+MAX_DISTANCE = 3.0
+"""A threshold is at most this many scales of the log odds from their location: what is further
+away is taken for slip, and the share is not reached then."""
+EQUAL_ODDS = 0.5
+"""The threshold of stability is at most this, or that of the model: above it a contact is unstable
+that is rather stable."""
+STABLE_THRESHOLDS = 1.0 / (1.0 + np.exp(0.02 * np.arange(300, -301, -1)))
 """Thresholds of the probability of stability that are tried, lowest first."""
 
 
-class OperatingPoint(NamedTuple):
+class OperatingThresholds(NamedTuple):
     """Thresholds of a model on one sensor.
 
     Attributes:
@@ -36,6 +44,24 @@ class OperatingPoint(NamedTuple):
 
     threshold: float
     slip_threshold: float | None
+
+
+class HandlingFigures(msgspec.Struct, frozen=True):
+    """Decisions of a model about own handling.
+
+    Attributes:
+        threshold: of the probability of stability.
+        stable: share of the held samples that are STABLE [%].
+        alarms_per_minute: alarms of all fingers per minute of held time.
+        slip_threshold: of the probability of a slip; None without a slip rule.
+        raised: share of the held samples in which a slip is reported [%]; None without one.
+    """
+
+    threshold: float
+    stable: float
+    alarms_per_minute: float
+    slip_threshold: float | None = None
+    raised: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +99,7 @@ class HeldFinger:
         """
         states = self.replay.states(self.decisions, threshold)
         spells = runs(states == UNSTABLE)
-        inside = [(a, b) for a, b in spells if a > 0 and b < len(states)]
+        inside = [(a, b) for a, b in spells if self.held[a] and a > 0 and b < len(states)]
         return sum(bool(states[a - 1] == states[b] == STABLE) for a, b in inside)
 
     def raised(self, threshold: float) -> Flags:
@@ -98,9 +124,30 @@ class HeldFingers:
             totals[finger.name] = totals.get(finger.name, 0.0) + finger.seconds
         return max(totals.values(), default=0.0)
 
+    def figures(self, part: FingerModel) -> HandlingFigures:
+        """Return the figures at the thresholds of a model, which made the decisions."""
+        stable = part.classifier.threshold
+        slip = None if part.slip is None else part.slip.classifier.threshold
+        return HandlingFigures(
+            threshold=stable,
+            stable=100 * self.stable_share(stable),
+            alarms_per_minute=self.alarms_per_minute(stable),
+            slip_threshold=slip,
+            raised=None if slip is None else 100 * self.raised_share(slip),
+        )
+
     def stable_share(self, threshold: float) -> float:
         """Return the share of the held samples that are STABLE at a threshold."""
         return self._share(lambda finger: finger.stable(threshold))
+
+    def stable_log_odds(self) -> Array:
+        """Return the log odds of stability of the held samples."""
+        return _log_odds([f.decisions.stable_probability[f.held] for f in self.fingers])
+
+    def slip_log_odds(self) -> Array:
+        """Return the log odds of a slip of the held samples; none without a slip rule."""
+        slips = [(finger.decisions.slip, finger.held) for finger in self.fingers]
+        return _log_odds([slip.probability[held] for slip, held in slips if slip is not None])
 
     def alarms_per_minute(self, threshold: float) -> float:
         """Return the number of alarms of all fingers per minute of held time."""
@@ -124,13 +171,13 @@ class HeldFingers:
 
 def choose_operating_point(
     handling: HeldFingers, part: FingerModel, false_alarms: float | None = None
-) -> OperatingPoint:
+) -> OperatingThresholds:
     """Choose the thresholds of a model on own handling.
 
-    They never make the model more suspicious than it is: the threshold of stability is at most
-    that of the model, the threshold of slips at least. Up to there it is the highest (of slips the
-    lowest) at which enough held samples are quiet: `STABLE_SHARE` of them STABLE, a slip reported
-    in at most `RAISED_SHARE`; or at most so many alarms of either kind.
+    The threshold of stability is at most `EQUAL_ODDS` or that of the model, the threshold of slips
+    at least that of the model. Up to there it is the highest (of slips the lowest) at which enough held samples are quiet: `STABLE_SHARE` of them STABLE, a slip reported
+    in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which there are at most
+    so many alarms of either kind.
 
     Args:
         handling: decided with its own location and scale.
@@ -138,42 +185,66 @@ def choose_operating_point(
         false_alarms: maximum number of alarms a minute of held time; None for the shares.
 
     Raises:
-        TrainingError: no threshold gives so few alarms.
+        TrainingError: no threshold gives so few alarms of a kind.
     """
-    alone = false_alarms is None
-    most = math.inf if false_alarms is None else false_alarms
-
-    def is_calm(threshold: float) -> bool:
-        if alone:
-            return handling.stable_share(threshold) >= STABLE_SHARE
-        return handling.alarms_per_minute(threshold) <= most
-
-    def is_silent(threshold: float) -> bool:
-        if alone:
-            return handling.raised_share(threshold) <= RAISED_SHARE
-        return handling.slips_per_minute(threshold) <= most
-
-    usual = part.classifier.threshold
+    usual = max(part.classifier.threshold, EQUAL_ODDS)
     tried = [*(t for t in STABLE_THRESHOLDS.tolist() if t < usual), usual]
-    threshold = _last_of_first(tried, is_calm)
-    if threshold is None and not alone:
-        raise TrainingError(
-            f"no threshold gives at most {most:g} alarms a minute of this handling; the least is "
-            f"{min(map(handling.alarms_per_minute, tried)):.2g}"
-        )
-    slip_threshold = None
+    slips = []
     if part.slip is not None:
         usual = part.slip.classifier.threshold
-        tried = [usual, *(t for t in THRESHOLDS.tolist() if t > usual)]
-        slip_threshold = next(filter(is_silent, tried), tried[-1])
-    return OperatingPoint(threshold or STABLE_THRESHOLDS[0].item(), slip_threshold)
+        slips = [usual, *(t for t in THRESHOLDS.tolist() if t > usual)]
+    if false_alarms is None:
+        return _by_share(handling, tried, slips)
+    return _by_alarms(handling, tried, slips, false_alarms)
 
 
-def _last_of_first(values: Sequence[float], fits: Callable[[float], bool]) -> float | None:
-    """Return the last of the first values that fit without a break; None if the first does not."""
-    last = None
-    for value in values:
-        if not fits(value):
-            break
-        last = value
-    return last
+def _by_share(
+    handling: HeldFingers, tried: Sequence[float], slips: Sequence[float]
+) -> OperatingThresholds:
+    """Return the thresholds by the shares, of those that are tried: the usual one is the last.
+
+    Of slips, the usual one is the first.
+    """
+    lowest = _probability_at(handling.stable_log_odds(), -MAX_DISTANCE)
+    near = [t for t in tried if t >= lowest] or [tried[-1]]
+    calm = list(takewhile(lambda t: handling.stable_share(t) >= STABLE_SHARE, near))
+    threshold = calm[-1] if calm else near[0]
+    if not slips:
+        return OperatingThresholds(threshold, None)
+    highest = _probability_at(handling.slip_log_odds(), MAX_DISTANCE)
+    near = [t for t in slips if t <= highest] or [slips[0]]
+    silent = (t for t in near if handling.raised_share(t) <= RAISED_SHARE)
+    return OperatingThresholds(threshold, next(silent, near[-1]))
+
+
+def _by_alarms(
+    handling: HeldFingers, tried: Sequence[float], slips: Sequence[float], most: float
+) -> OperatingThresholds:
+    """Return the thresholds by the number of alarms a minute, of those that are tried."""
+    calm = list(takewhile(lambda t: handling.alarms_per_minute(t) <= most, tried))
+    silent = (t for t in slips if handling.slips_per_minute(t) <= most)
+    slip_threshold = next(silent, None)
+    if not calm:
+        raise _too_many(most, "alarms", map(handling.alarms_per_minute, tried))
+    if slips and slip_threshold is None:
+        raise _too_many(most, "reported slips", map(handling.slips_per_minute, slips))
+    return OperatingThresholds(calm[-1], slip_threshold)
+
+
+def _too_many(most: float, what: str, rates: Iterable[float]) -> TrainingError:
+    return TrainingError(
+        f"no threshold gives at most {most:g} {what} a minute of this handling; the least is "
+        f"{min(rates):.2g}"
+    )
+
+
+def _log_odds(probabilities: Sequence[Array]) -> Array:
+    """Return (n, 1) the log odds of probabilities, which may be 0 or 1."""
+    bounded = np.clip(np.concatenate([np.empty(0), *probabilities]), 1e-12, 1 - 1e-12)
+    return np.asarray(np.log(bounded / (1 - bounded)))[:, None]
+
+
+def _probability_at(log_odds: Array, distance: float) -> float:
+    """Return the probability at so many scales of log odds from their location."""
+    location, scale = location_and_scale(log_odds)
+    return float(1 / (1 + math.exp(-(location[0] + distance * scale[0]))))

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from holdfast.contact import STABLE, UNSTABLE, Reason, faults_of
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import TrainingError
 from holdfast.features.stream import extract
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.masks import drop_short_runs
+from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
@@ -32,23 +32,33 @@ MAX_HANDLING = 1800.0
 MIN_TOUCH = 0.25
 """A finger holds something if it touches for this time without a break [s]. A clip of 0.5 s has
 as much after the first samples, which have no features."""
+EDGE_SECONDS = 0.5
+"""Time after closing and before opening that is not handling [s]."""
+MAX_EDGE_SHARE = 0.25
+"""It is at most this share of the time from closing to opening."""
 MAX_FAULTY_SHARE = 0.1
 """Own handling is refused if a finger is UNKNOWN by faults in more than this share of it."""
 CHANGE_SECONDS = 0.5
 """Interval over which the change of the load is measured [s]."""
+MIN_SCALE = 0.3
+"""Least scale of a feature: a hand that holds still has next to none."""
+CLIP_DEVIATIONS = 1.5
+"""Values further from the location than this many scales count as at this distance."""
+MAX_CLIP_STEPS = 50
+"""Maximum number of steps in which location and scale are found."""
 FAULT_CODE = tuple(Reason).index(Reason.FAULT)
 """Code of the reason fault."""
 
 
-class Place(NamedTuple):
+class HandlingKey(NamedTuple):
     """Where own handling stands in a model: a finger of the model (or `"*"`), and a sensor."""
 
     finger: str
     sensor: str
 
     @classmethod
-    def of(cls, model: Model, finger: str, sensor: Sensor) -> "Place":
-        """Return the place for a finger of a hand."""
+    def of(cls, model: Model, finger: str, sensor: Sensor) -> "HandlingKey":
+        """Return the key for a finger of a hand."""
         return cls(ANY_FINGER if ANY_FINGER in model.fingers else finger, sensor.name)
 
     def __str__(self) -> str:
@@ -64,7 +74,7 @@ class HeldSamples:
         sensor: its sensor.
         features: (n, n_features) finite.
         load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it.
-        seconds: held time [s].
+        seconds: held time, with closing and opening [s].
     """
 
     finger: str
@@ -86,13 +96,13 @@ class OwnHandling:
 
     Attributes:
         model: whose rule of contact and features are used.
-        samples: by place.
+        samples: by key.
         digests: content digest of each recording that is used, by name.
         n_left_out: number of recordings that were not needed.
     """
 
     model: Model
-    samples: dict[Place, list[HeldSamples]] = field(default_factory=dict)
+    samples: dict[HandlingKey, list[HeldSamples]] = field(default_factory=dict)
     digests: dict[str, str] = field(default_factory=dict)
     n_left_out: int = 0
     _faults: dict[str, _Faults] = field(default_factory=dict)
@@ -104,7 +114,7 @@ class OwnHandling:
             ModelError: the recording has other fingers or sensors.
             TrainingError: a sensor differs from that of the same name in an earlier recording.
         """
-        totals = [sum(self.fingers(place).values()) for place in self.samples]
+        totals = [sum(self.fingers(key).values()) for key in self.samples]
         if totals and min(totals) > MAX_HANDLING:
             self.n_left_out += 1
             return
@@ -119,24 +129,24 @@ class OwnHandling:
             self._count_faults(name, trace)
             self._add_finger(name, sensors[name], trace, rows[name].features)
 
-    def fingers(self, place: Place) -> dict[str, float]:
-        """Return the held time of each finger of a place [s]."""
+    def fingers(self, key: HandlingKey) -> dict[str, float]:
+        """Return the held time of each finger of a key [s]."""
         totals: dict[str, float] = {}
-        for part in self.samples[place]:
+        for part in self.samples[key]:
             totals[part.finger] = totals.get(part.finger, 0.0) + part.seconds
         return totals
 
-    def seconds(self, place: Place) -> float:
-        """Return the held time of the finger of a place that holds longest [s]."""
-        return max(self.fingers(place).values())
+    def seconds(self, key: HandlingKey) -> float:
+        """Return the held time of the finger of a key that holds longest [s]."""
+        return max(self.fingers(key).values())
 
-    def features(self, place: Place) -> Array:
-        """Return (n, n_features) the features of all held samples of a place."""
-        return np.concatenate([part.features for part in self.samples[place]])
+    def features(self, key: HandlingKey) -> Array:
+        """Return (n, n_features) the features of all held samples of a key."""
+        return np.concatenate([part.features for part in self.samples[key]])
 
-    def load_change(self, place: Place) -> float:
-        """Return the median change of the force of a place, as a share of it."""
-        changes = np.concatenate([part.load_changes for part in self.samples[place]])
+    def load_change(self, key: HandlingKey) -> float:
+        """Return the median change of the force of a key, as a share of it."""
+        changes = np.concatenate([part.load_changes for part in self.samples[key]])
         return float(np.median(changes)) if len(changes) else 0.0
 
     def check(self) -> None:
@@ -160,14 +170,15 @@ class OwnHandling:
                 "ordinary handling expected, in recordings that begin with an open hand"
             )
         if longest < MIN_HANDLING:
+            rounded = math.floor(10 * longest) / 10
             raise TrainingError(
-                f"{longest:.1f} s of holding given, at least {MIN_HANDLING:g} s expected "
+                f"{rounded:.1f} s of holding given, at least {MIN_HANDLING:g} s expected "
                 f"({ENOUGH_HANDLING:g} s or more are better)"
             )
 
     def _add_finger(self, name: str, sensor: Sensor, trace: FingerTrace, features: Array) -> None:
-        place = Place.of(self.model, name, sensor)
-        known = self.samples.setdefault(place, [])
+        key = HandlingKey.of(self.model, name, sensor)
+        known = self.samples.setdefault(key, [])
         if known and (known[0].sensor.n_taxels, known[0].sensor.unit) != (
             sensor.n_taxels, sensor.unit
         ):  # fmt: skip
@@ -177,7 +188,8 @@ class OwnHandling:
                 "expected"
             )
         held = held_samples(trace.times, trace.state) & np.isfinite(features).all(axis=1)
-        seconds = float(held_durations(trace.times)[held].sum())
+        touching = held_samples(trace.times, trace.state, edge_seconds=0.0)
+        seconds = float(held_durations(trace.times)[touching].sum())
         changes = _load_changes(trace, held)
         known.append(HeldSamples(name, sensor, features[held], changes, seconds))
 
@@ -190,15 +202,55 @@ class OwnHandling:
         )
 
 
-def held_samples(times: Array, states: Codes) -> Flags:
+def location_and_scale(features: Array) -> tuple[Array, Array]:
+    """Return location and scale of features over samples of ordinary handling.
+
+    They are mean and standard deviation of the values clipped to the location plus and minus
+    `CLIP_DEVIATIONS` scales, the scale divided by that of clipped normal values (Huber's second
+    proposal), so that a tenth of the samples may be slip. The scale is at least `MIN_SCALE`.
+
+    Args:
+        features: (n, n_features) finite.
+
+    Returns:
+        (n_features,) each.
+    """
+    # E min(z^2, c^2) of a normal z: 1 - 2 (1 - Phi(c)) (1 - c^2) - 2 c phi(c).
+    c = CLIP_DEVIATIONS
+    tails = math.erfc(c / math.sqrt(2))
+    density = math.exp(-0.5 * c * c) / math.sqrt(2 * math.pi)
+    shrinkage = math.sqrt(1 - tails * (1 - c * c) - 2 * c * density)
+    location, scale = np.median(features, axis=0), features.std(axis=0)
+    for _ in range(MAX_CLIP_STEPS):
+        before = location, scale
+        clipped = np.clip(features, location - c * scale, location + c * scale)
+        location, scale = clipped.mean(axis=0), clipped.std(axis=0) / shrinkage
+        if np.allclose(before, (location, scale), rtol=1e-9, atol=1e-9):
+            break
+    return location, np.maximum(scale, MIN_SCALE)
+
+
+def held_samples(times: Array, states: Codes, *, edge_seconds: float = EDGE_SECONDS) -> Flags:
     """Return (n,) where a finger holds something for at least `MIN_TOUCH`.
+
+    While it closes and opens it does not hold: the samples next to those without contact are left
+    out.
 
     Args:
         times: (n,) [s].
         states: (n,) codes of its states, without debouncing.
+        edge_seconds: time that is left out [s], but at most `MAX_EDGE_SHARE` of a touch.
     """
-    held = np.asarray((states == STABLE) | (states == UNSTABLE))
-    return drop_short_runs(held, math.ceil(MIN_TOUCH / _period(times)))
+    period = _period(times)
+    touching = np.asarray((states == STABLE) | (states == UNSTABLE))
+    held = np.zeros_like(touching)
+    for start, end in runs(touching):
+        edge = min(round(edge_seconds / period), int(MAX_EDGE_SHARE * (end - start)))
+        closes = start > 0 and states[start - 1] == NO_CONTACT
+        opens = end < len(states) and states[end] == NO_CONTACT
+        if end - start >= MIN_TOUCH / period:
+            held[start + closes * edge : end - opens * edge] = True
+    return held
 
 
 def held_durations(times: Array) -> Array:

@@ -1,0 +1,222 @@
+"""`holdfast calibrate`: what it writes, prints and refuses."""
+
+import json
+
+import msgspec
+import pytest
+
+from holdfast.cli import main
+from holdfast.cli import record as record_verb
+from holdfast.devices import sources
+from holdfast.devices.sources import Arrival
+from holdfast.devices.sources.base import Source
+from holdfast.io import load_recording, save_recording
+from holdfast.model import Model
+from holdfast.training import calibrate
+from training.build import PAD, handling_recording, normalised_model
+
+SECONDS = 32.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A normalised model, and two recordings of handling."""
+    place = tmp_path_factory.mktemp("calibrate")
+    (place / "data").mkdir()
+    normalised_model().save(place / "model.json")
+    for k in range(2):
+        recording = handling_recording(k, held=SECONDS / 2 + 3)
+        save_recording(recording, place / "data" / f"{recording.name}.mcap")
+    return place
+
+
+def run(capsys, *words):
+    code = main([*map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def calibrated(capsys, folder, out, *words, data="data"):
+    return run(capsys, "calibrate", folder / "model.json", folder / data, "-o", out, *words)
+
+
+def test_the_screen(capsys, folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+    code, printed, err = calibrated(capsys, folder, "mine.json")
+    assert (code, err) == (0, "")
+    lines = printed.splitlines()
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    text = " ".join(printed.split())
+    assert text.startswith("pad: held ")
+    assert "(thumb 40 s, index 40 s)" in text
+    assert "of 31 features differ" in text
+    assert "the force changed by " in text
+    assert "threshold of STABLE" in text
+    assert lines[-1] == "mine.json: builtin:any, calibrated"
+    recordings = [load_recording(folder / "data" / f"handling-{k}.mcap") for k in range(2)]
+    assert Model.load("mine.json") == calibrate(Model.load(folder / "model.json"), recordings)
+
+
+def test_json(capsys, folder, tmp_path):
+    out = tmp_path / "mine.json"
+    code, printed, err = calibrated(capsys, folder, out, "--json", "--false-alarms", 4)
+    report = json.loads(printed)
+    assert (code, err) == (0, "")
+    assert set(report) == {"model", "sensors", "warnings"}
+    (seen,) = report["sensors"]
+    assert set(seen) == {
+        "sensor", "fingers", "seconds", "load_change", "n_features", "n_changed", "activity",
+        "before", "after",
+    }  # fmt: skip
+    assert seen["after"]["alarms_per_minute"] <= 4
+    handling = Model.load(out).fingers["*"].handling["pad"]
+    assert handling.threshold == seen["after"]["threshold"]
+
+
+def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    out = tmp_path / "mine.json"
+    assert calibrated(capsys, folder, out)[0] == 0
+    _, printed, _ = run(capsys, "info", out)
+    text = " ".join(printed.split())
+    assert "own handling of pad: 39." in text
+    assert "s held in 2 recordings (handling-0, handling-1); STABLE from" in text
+    document = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["*"]
+    assert document["normalised"] is True
+    assert document["handling"]["pad"]["recordings"] == ["handling-0", "handling-1"]
+    _, printed, _ = run(capsys, "info", folder / "model.json")
+    assert "features normalised by default handling" in " ".join(printed.split())
+
+
+def test_a_single_short_recording_is_a_warning(capsys, folder, tmp_path):
+    save_recording(handling_recording(5), tmp_path / "one.mcap")
+    out = tmp_path / "mine.json"
+    code, _, err = calibrated(capsys, folder, out, data=tmp_path / "one.mcap")
+    assert code == 0
+    assert err == "pad: 9 s of holding; 30 s or more are better\n"
+
+
+class Hand(Source):
+    """Source that sends a recording once."""
+
+    name = "xela://fake"
+    paced = False
+
+    def __init__(self, recording):
+        self.sensors = dict.fromkeys(recording.modules, PAD)
+        thumb, index = recording.modules.values()
+        self._arrivals = [
+            Arrival(float(time), {"thumb": one, "index": two}, received=float(time))
+            for time, one, two in zip(thumb.times, thumb.readings, index.readings, strict=True)
+        ]
+
+    def open(self):
+        pass
+
+    def close(self):
+        pass
+
+    def read(self, timeout):
+        return self._arrivals.pop(0) if self._arrivals else None
+
+    @property
+    def ended(self):
+        return not self._arrivals
+
+
+def test_a_live_source_is_recorded_for_a_time(capsys, folder, tmp_path, monkeypatch):
+    hand = Hand(handling_recording(3, held=20.0))
+    monkeypatch.setattr(sources, "open_source", lambda *_, **__: hand)
+    out = tmp_path / "live.json"
+    code, _, err = run(
+        capsys, "calibrate", folder / "model.json", "xela://auto", "-o", out, "--seconds", 12
+    )
+    assert code == 0, err
+    assert "pad: 11 s of holding; 30 s or more are better" in err
+    assert Model.load(out).fingers["*"].handling["pad"].seconds == pytest.approx(10.8, abs=0.5)
+    assert [path.name for path in tmp_path.iterdir()] == ["live.json"]
+
+
+def test_a_live_source_that_sends_nothing(capsys, folder, tmp_path, monkeypatch):
+    hand = Hand(handling_recording(3))
+    hand._arrivals = []
+    monkeypatch.setattr(sources, "open_source", lambda *_, **__: hand)
+    monkeypatch.setattr(record_verb, "READ_TIMEOUT", 0.01)
+    words = ["calibrate", folder / "model.json", "xela://auto", "-o", tmp_path / "no.json"]
+    code, out, err = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1] == ("holdfast: xela://fake sent no samples: nothing was recorded")
+    assert not list(tmp_path.iterdir())
+
+
+BAD = {
+    "slip": ({"slip": 0.9}, "pad: most of this handling looks like slip"),
+    "empty": ({"force": 0.0}, "nothing is held in 1 recording"),
+    "short": ({"held": 2.5}, "s of holding given, at least 5 s expected"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_handling_is_one_line(capsys, folder, tmp_path, kind):
+    options, message = BAD[kind]
+    save_recording(handling_recording(0, **options), tmp_path / "bad.mcap")
+    code, out, err = calibrated(capsys, folder, tmp_path / "no.json", data=tmp_path / "bad.mcap")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("holdfast: ")
+    assert message in err
+    assert not (tmp_path / "no.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("builtin:twin", "data"), "was not trained on normalised features"),
+        (("model.json", "nothing"), "there is no folder"),
+        (("model.json", "data", "--seconds", "9"), "--seconds and --speed are for live sources"),
+        (("model.json", "xela://auto", "--seconds", "0"), "--seconds: more than 0 s expected"),
+        (("model.json", "data", "--false-alarms", "-1"), "of at least 0 expected, -1 given"),
+        (("model.json", "hand"), "hand is the source of a configuration file"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, folder, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(folder)
+    code, out, err = run(capsys, "calibrate", *words, "-o", tmp_path / "no.json")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert not (tmp_path / "no.json").exists()
+
+
+def test_a_model_is_overwritten_only_by_force(capsys, folder, tmp_path):
+    out = tmp_path / "mine.json"
+    out.write_text("mine")
+    code, _, err = calibrated(capsys, folder, out)
+    assert code == 2
+    assert "mine.json exists" in err
+    assert out.read_text() == "mine"
+    assert calibrated(capsys, folder, out, "--force")[0] == 0
+
+
+@pytest.mark.parametrize("verb", ["detect", "evaluate", "tune"])
+def test_on_another_sensor_it_says_so_and_uses_the_default(capsys, folder, tmp_path, verb):
+    out = tmp_path / "mine.json"
+    assert calibrated(capsys, folder, out)[0] == 0
+    part = Model.load(out).fingers["*"]
+    handling = {"uskin-4x4": part.handling["pad"]}
+    part = msgspec.structs.replace(part, handling=handling)
+    model = msgspec.structs.replace(Model.load(out), fingers={"*": part})
+    model.save(tmp_path / "other.json")
+    data = folder / "data" / "handling-0.mcap"
+    options = {"detect": ["--summary", "--json"], "evaluate": ["--json"]}
+    words = options.get(verb, ["-o", tmp_path / "new.json", "--false-alarms", 1])
+    _, printed, err = run(capsys, verb, tmp_path / "other.json", data, *words)
+    notice = (
+        "builtin:any, calibrated was calibrated on uskin-4x4, not on pad: default handling is used "
+        "(holdfast calibrate)\n"
+    )
+    assert err.count(notice) == 1
+    if verb == "detect":
+        usual = json.loads(run(capsys, verb, folder / "model.json", data, *words)[1])
+        assert json.loads(printed)["fingers"] == usual["fingers"]
+        assert notice not in run(capsys, verb, out, data, *words)[2]

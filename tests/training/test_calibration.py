@@ -1,0 +1,271 @@
+"""Calibration of a model by own handling."""
+
+import dataclasses
+
+import msgspec
+import numpy as np
+import pytest
+
+import holdfast
+from holdfast.contact import STABLE, UNSTABLE, ContactState
+from holdfast.detector import detect
+from holdfast.errors import ModelError, TrainingError
+from holdfast.model import Handling, Model
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.training import Setting, calibrate, calibrate_with_report, train
+from holdfast.training.calibration import CALIBRATED_SUFFIX, activity, n_changed
+from holdfast.training.own_handling import MIN_SCALE, held_samples
+from holdfast.training.threshold import tune, with_threshold
+from training.build import (
+    PAD,
+    TINY,
+    handling_module,
+    handling_recording,
+    normalised_model,
+    tiny_recording,
+)
+
+CUP = dataclasses.replace(PAD, name="cup")
+DATA = [handling_recording(k, held=12.0) for k in range(3)]
+FRESH = handling_recording(77, held=12.0)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return normalised_model()
+
+
+@pytest.fixture(scope="module")
+def calibrated(model):
+    return calibrate_with_report(model, DATA)
+
+
+def handling_of(model, sensor="pad"):
+    return model.fingers["*"].handling[sensor]
+
+
+def stable_share(model, recording):
+    shares = []
+    for trace in detect(model, recording).fingers.values():
+        held = held_samples(trace.times, trace.state)
+        shares.append(np.mean(trace.state[held] == STABLE))
+    return np.mean(shares)
+
+
+def test_the_model_has_the_handling_of_its_sensor(model, calibrated):
+    handling = handling_of(calibrated.model)
+    assert list(calibrated.model.fingers["*"].handling) == ["pad"]
+    assert handling.recordings == {recording.name: recording.digest for recording in DATA}
+    assert min(handling.scale) >= MIN_SCALE
+    assert handling.seconds == pytest.approx(38, abs=2)
+    assert calibrated.model.name == f"builtin:any{CALIBRATED_SUFFIX}"
+    assert calibrated.warnings == ()
+    assert calibrate(model, DATA) == calibrated.model
+    assert holdfast.calibrate is calibrate
+
+
+def test_more_of_a_fresh_recording_is_stable(model, calibrated):
+    before, after = (stable_share(m, FRESH) for m in (model, calibrated.model))
+    assert before < 0.5 < 0.85 < after
+
+
+def test_the_summary_says_what_was_seen(model, calibrated):
+    (summary,) = calibrated.sensors
+    assert summary.sensor == "pad"
+    assert set(summary.fingers) == {"thumb", "index"}
+    assert summary.seconds == max(summary.fingers.values())
+    assert 0.1 < summary.load_change < 0.4
+    assert 0 < summary.n_changed <= summary.n_features == 31
+    assert summary.before.stable < 60 < 89 < summary.after.stable
+    assert summary.before.threshold == model.fingers["*"].classifier.threshold
+    assert summary.after.threshold == handling_of(calibrated.model).threshold
+    assert summary.after.slip_threshold == handling_of(calibrated.model).slip_threshold
+
+
+def test_once_more_gives_the_same_model(calibrated):
+    again = calibrate_with_report(calibrated.model, DATA)
+    assert again.model.digest == calibrated.model.digest
+    assert again.sensors[0].before == again.sensors[0].after == calibrated.sensors[0].after
+
+
+def test_labels_have_no_part_in_it(model, calibrated):
+    labelled = []
+    for recording in DATA:
+        modules = {
+            name: Tactile(
+                PAD, module.times, module.readings, labels=(Label(2.0, 9.0, ContactState.UNSTABLE),)
+            )
+            for name, module in recording.modules.items()
+        }
+        labelled.append(Recording(recording.name, modules))
+    handling, usual = handling_of(calibrate(model, labelled)), handling_of(calibrated.model)
+    assert (handling.location, handling.threshold) == (usual.location, usual.threshold)
+
+
+def scaled(recording, factor):
+    modules = {
+        name: Tactile(PAD, module.times, factor * np.array(module.readings))
+        for name, module in recording.modules.items()
+    }
+    return Recording(recording.name, modules)
+
+
+@pytest.mark.parametrize("factor", [8.0, 0.25, 3.7])
+def test_the_unit_of_the_readings_changes_nothing(model, calibrated, factor):
+    other = handling_of(calibrate(model, [scaled(recording, factor) for recording in DATA]))
+    handling = handling_of(calibrated.model)
+    assert other.location == pytest.approx(handling.location, abs=1e-8)
+    assert other.scale == pytest.approx(handling.scale, rel=1e-8)
+    thresholds = handling.threshold, handling.slip_threshold
+    assert (other.threshold, other.slip_threshold) == pytest.approx(thresholds, rel=1e-12)
+
+
+def test_a_tenth_of_slip_changes_little(model, calibrated):
+    mixed = [handling_recording(k, held=12.0, slip=0.1) for k in range(3)]
+    handling, clean = handling_of(calibrate(model, mixed)), handling_of(calibrated.model)
+    shift = np.abs(np.subtract(handling.location, clean.location)) / clean.scale
+    assert shift.max() < 0.35
+    assert np.max(np.divide(handling.scale, clean.scale)) < 1.5
+    own = calibrate(model, mixed)
+    assert stable_share(own, FRESH) > 0.9
+    sliding = handling_recording(8, held=12.0, slip=0.5)
+    for trace in detect(own, sliding).fingers.values():
+        shown = (trace.times > 2.0) & (trace.times < 7.0)
+        assert np.mean(trace.state[shown] == UNSTABLE) > 0.9
+
+
+def test_handling_of_several_sensors(model, calibrated):
+    palm = handling_module(2, 12.0, sensor=CUP)
+    hand = Recording("hand", {"thumb": handling_module(1, 12.0), "palm": palm})
+    report = calibrate_with_report(model, [hand])
+    assert {summary.sensor for summary in report.sensors} == {"pad", "cup"}
+    both = calibrate(calibrated.model, [Recording("cup", {"palm": palm})])
+    assert handling_of(both, "pad") == handling_of(calibrated.model, "pad")
+    assert handling_of(both, "cup").recordings.keys() == {"cup"}
+    assert both.name == calibrated.model.name
+
+
+def test_a_sensor_that_holds_too_little_is_left_as_it_was(model):
+    palm = handling_module(2, 12.0, sensor=CUP, force=0.0)
+    hand = Recording("hand", {"thumb": handling_module(1, 12.0), "palm": palm})
+    report = calibrate_with_report(model, [hand])
+    assert list(report.model.fingers["*"].handling) == ["pad"]
+    assert "cup: 0.0 s of holding, at least 5 s needed; left as it was" in report.warnings
+
+
+def test_each_finger_of_a_model_has_its_own(model):
+    part = msgspec.structs.replace(model.fingers["*"], sensor="pad")
+    hand = msgspec.structs.replace(
+        model, fingers={"thumb": part, "index": part}, sensors={"pad": PAD}
+    )
+    report = calibrate_with_report(hand, DATA)
+    assert [summary.sensor for summary in report.sensors] == ["thumb (pad)", "index (pad)"]
+    thumb, index = (report.model.fingers[name].handling["pad"] for name in ("thumb", "index"))
+    assert thumb.location != index.location
+
+
+def test_it_warns_of_little_and_of_still_handling(model):
+    report = calibrate_with_report(model, [handling_recording(0, held=12.0, sway=0.0)])
+    assert len(report.warnings) == 2
+    assert "pad: 13 s of holding; 30 s or more are better" in report.warnings
+    assert "pad: the arm hardly moved; add handling in which it carries" in report.warnings[1]
+
+
+@pytest.mark.parametrize("alarms", [2.0, 20.0])
+def test_false_alarms_set_the_threshold(model, calibrated, alarms):
+    report = calibrate_with_report(model, DATA, false_alarms=alarms)
+    (summary,), (usual,) = report.sensors, calibrated.sensors
+    assert summary.after.alarms_per_minute <= alarms < usual.after.alarms_per_minute
+    assert summary.after.threshold < usual.after.threshold
+    assert handling_of(report.model).location == handling_of(calibrated.model).location
+
+
+def test_activity_is_in_default_scales(model):
+    part = model.fingers["*"]
+    location, scale = part.default_handling
+    rows = location + 0.7 * scale * np.ones((5, 1))
+    rows[:, -1] = 1e6  # the load is no change
+    assert activity(part, rows) == pytest.approx(0.7)
+
+
+def test_features_that_changed_are_counted(model):
+    part = model.fingers["*"]
+    location, scale = part.default_handling
+    own = {"seconds": 9.0, "location": location.copy(), "scale": scale.copy()}
+    own["location"][0] += 0.6 * scale[0]
+    own["location"][1] -= 0.4 * scale[1]
+    own["scale"][2] *= 1.6
+    own["scale"][3] /= 1.6
+    own["scale"][4] *= 1.4
+    handling = Handling(**{**own, "location": tuple(own["location"]),
+                                          "scale": tuple(own["scale"])})  # fmt: skip
+    assert n_changed(part, handling) == 3
+
+
+def test_most_of_it_slip_is_refused(model):
+    slips = [handling_recording(k, held=12.0, slip=0.8) for k in range(3)]
+    with pytest.raises(
+        TrainingError,
+        match=r"pad: most of this handling looks like slip \(activity 2\.\d\d, at most 1\.4 ",
+    ):
+        calibrate(model, slips)
+
+
+def test_other_models_are_refused():
+    with pytest.raises(
+        ModelError,
+        match=r"builtin:twin was not trained on normalised features and cannot be calibrated; "
+        r"builtin:any can",
+    ):
+        calibrate(Model.load("builtin:twin"), DATA)
+
+
+def test_another_sensor_is_refused(model):
+    part = msgspec.structs.replace(model.fingers["*"], sensor="cup")
+    own = msgspec.structs.replace(model, fingers={"*": part}, sensors={"cup": CUP})
+    with pytest.raises(ModelError, match="the model is for fingers with the sensor 'cup'"):
+        calibrate(own, DATA)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
+def test_false_alarms_are_a_number(model, wrong):
+    with pytest.raises(ValueError, match="false alarms per minute of at least 0 expected"):
+        calibrate(model, DATA, false_alarms=wrong)
+
+
+def test_no_recordings(model):
+    with pytest.raises(TrainingError, match="nothing is held in 0 recordings"):
+        calibrate(model, [])
+
+
+def test_a_threshold_that_is_tuned_later_wins(calibrated):
+    moved = with_threshold(calibrated.model, 0.125).finger("*", PAD)
+    assert moved.classifier.threshold == 0.125
+    assert moved.classifier.mean == handling_of(calibrated.model).location
+    assert moved.slip == calibrated.model.finger("*", PAD).slip
+
+
+def test_tuning_starts_from_the_threshold_of_the_sensor(calibrated):
+    part = calibrated.model.fingers["*"]
+    handling = msgspec.structs.replace(part.handling["pad"], threshold=0.0625)
+    part = msgspec.structs.replace(part, handling={"pad": handling})
+    own = msgspec.structs.replace(calibrated.model, fingers={"*": part})
+    times = DATA[0].modules["thumb"].times
+    label = Label(times[0] + 2.0, times[-1] - 2.0, ContactState.STABLE)
+    module = DATA[0].modules["thumb"]
+    labelled = Recording("held", {"thumb": Tactile(PAD, times, module.readings, labels=(label,))})
+    tuned = tune(own, [labelled], false_alarms=100.0)
+    assert tuned.before.threshold == 0.0625
+    assert tuned.model.finger("*", PAD).classifier.threshold == tuned.chosen.threshold
+
+
+def test_labels_are_learned_from_the_own_handling(calibrated):
+    seeds = range(4)
+    data = [tiny_recording(seed, n=1200) for seed in seeds]
+    own = calibrate(normalised_model(), [handling_recording(k, held=12.0, sensor=TINY, force=600.0)
+                                         for k in range(2)])  # fmt: skip
+    trained = train(data, Setting.adapting(own, trials=0, shared=True)).model
+    part = trained.fingers["*"]
+    assert part.classifier.mean == handling_of(own, "tiny").location
+    assert not part.handling
+    assert not part.normalised
