@@ -20,10 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 from hand_handling import (
+    NORMALISED_BY,
     HandGrasp,
     Moments,
-    default_handling,
     folds_of,
+    moments_by,
     moments_of_others,
     read_grasp,
 )
@@ -59,6 +60,8 @@ COLUMNS = (
     "tugs, own",
     "tugs, default",
 )
+SHIPPED = "default"
+"""What the features are normalised by in the training of the model that ships."""
 EVERYTHING = np.ones(len(FEATURES), dtype=bool)
 
 Normalisation = Callable[[Sequence[HandGrasp]], list[Moments | None]]
@@ -140,31 +143,28 @@ def main(folder: Path, real: Path) -> None:
     sets, folds = RealSets.read(real, reader), folds_of(grasps, N_FOLDS)
     print(f"| {len(grasps)} grasps | {' | '.join(COLUMNS)} |\n|---{'|--:' * len(COLUMNS)}|")
 
+    others = moments_of_others(grasps)
+
     def row(title: str, moments: list[Moments | None], used: np.ndarray = EVERYTHING) -> None:
         cut = [grasp._replace(features=np.where(used, grasp.features, 0.0)) for grasp in grasps]
         parts = (None if own is None else only(own, used) for own in moments)
         kept = list(parts)
-        own, default, stable = map(np.concatenate, zip(*out_of_fold(cut, kept, folds), strict=True))
+        handling = [own and only(own, used) for own in others]
+        parts = zip(*out_of_fold(cut, kept, folds, handling), strict=True)
+        own, default, stable = map(np.concatenate, parts)
         figures = [float(roc_auc_score(stable, values)) for values in (own, default)]
         figures += sets.figures(fit(cut, kept), used)
         print(f"| {title} | {' | '.join(f'{figure:.3f}' for figure in figures)} |", flush=True)
 
-    others = moments_of_others(grasps)
-    row("ships: normalised by the other grasps", others)
-    row("normalised by the grasp itself", [moments_of(grasp) for grasp in grasps])
-    default = default_handling(grasps)
-    row("all by default handling", [None if own is None else default for own in others])
+    for name in NORMALISED_BY:
+        row(f"normalised by: {name}", moments_by(name, grasps))
     for name, family in FAMILIES.items():
-        row(f"without {name}", others, ~family)
+        row(f"without {name}", moments_by(SHIPPED, grasps), ~family)
 
 
 def only(moments: Moments, used: np.ndarray) -> Moments:
     """Return the moments; 0 and 1 of features that are left out."""
     return np.where(used, moments[0], 0.0), np.where(used, moments[1], 1.0)
-
-
-def moments_of(grasp: HandGrasp) -> Moments | None:
-    return location_and_scale(grasp.handling) if len(grasp.handling) else None
 
 
 def score(

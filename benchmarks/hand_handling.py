@@ -20,6 +20,8 @@ from holdfast.training.own_handling import held_samples
 
 MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
+NORMALISED_BY = "others", "itself", "default"
+"""What the features of a grasp may be normalised by."""
 MIN_SAMPLES = 100
 """Fewer samples of handling are no own handling: 5 s."""
 
@@ -112,6 +114,22 @@ def default_handling(grasps: Sequence[HandGrasp]) -> Moments:
     moments = [location_and_scale(part) for part in parts if len(part) >= MIN_SAMPLES]
     locations, scales = (np.array(values) for values in zip(*moments, strict=True))
     return np.median(locations, axis=0), np.sqrt((scales**2).mean(axis=0) + locations.var(axis=0))
+
+
+def moments_by(name: str, grasps: Sequence[HandGrasp]) -> list[Moments | None]:
+    """Return by what the features of each grasp are normalised for the training, by its name.
+
+    Args:
+        name: `others`, the other grasps of its hand; `itself`; or `default`, default handling.
+        grasps: of all hands.
+    """
+    others = moments_of_others(grasps)
+    if name == "others":
+        return others
+    if name == "itself":
+        return [location_and_scale(x.handling) if len(x.handling) else None for x in grasps]
+    default = default_handling(grasps)
+    return [None if own is None else default for own in others]
 
 
 def folds_of(grasps: Sequence[HandGrasp], n_folds: int) -> np.ndarray:

@@ -19,10 +19,12 @@ from pathlib import Path
 
 import numpy as np
 from hand_handling import (
+    NORMALISED_BY,
     HandGrasp,
     Moments,
     default_handling,
     folds_of,
+    moments_by,
     moments_of_others,
     read_grasp,
 )
@@ -46,20 +48,21 @@ STABLE_SHARE = 0.95
 N_FOLDS = 5
 
 
-def main(folder: Path, out: Path | None) -> None:
+def main(folder: Path, out: Path | None, normalised_by: str) -> None:
     recordings = load_dataset(folder)
     reader = model_of(untrained())
     grasps = [read_grasp(reader, recording) for recording in recordings]
-    moments = moments_of_others(grasps)
+    others = moments_of_others(grasps)
+    moments = moments_by(normalised_by, grasps)
     folds = folds_of(grasps, N_FOLDS)
     kinds = np.array([grasp.kind for grasp in grasps])
     print(f"{len(grasps)} grasps of {len({grasp.hand for grasp in grasps})} hands")
     print("| left out | own handling: AUC | default handling: AUC | sliding found |")
     print("|---|---|---|---|")
-    figures, threshold = report("a fifth of the hands", grasps, moments, folds)
+    figures, threshold = report("a fifth of the hands", grasps, moments, folds, others)
     for kind in sorted(set(kinds)):
         chosen = kinds == kind
-        report(f"all hands with {kind}", grasps, moments, np.where(chosen, 0, -1))
+        report(f"all hands with {kind}", grasps, moments, np.where(chosen, 0, -1), others)
     if out is not None:
         digests = {recording.name: recording.digest for recording in recordings}
         save(fit(grasps, moments), threshold, digests, figures, out)
@@ -127,13 +130,14 @@ def report(
     grasps: Sequence[HandGrasp],
     moments: Sequence[Moments | None],
     folds: np.ndarray,
+    handling: Sequence[Moments | None],
 ) -> tuple[dict[str, float], float]:
     """Print the metrics of predictions out of fold; fold -1 is never left out.
 
     Returns:
         The metrics by name, and the threshold.
     """
-    parts = zip(*out_of_fold(grasps, moments, folds), strict=True)
+    parts = zip(*out_of_fold(grasps, moments, folds, handling), strict=True)
     own, default, stable = (np.concatenate(part) for part in parts)
     names, values = ("auc", "auc_default"), (own, default)
     figures = {name: float(roc_auc_score(stable, p)) for name, p in zip(names, values, strict=True)}
@@ -146,14 +150,16 @@ def report(
     return figures, threshold
 
 
-def out_of_fold(grasps, moments, folds) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def out_of_fold(
+    grasps, moments, folds, handling
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield probabilities with own and default handling, and the class, of each grasp."""
     for fold in sorted(set(folds) - {-1}):
         training = np.flatnonzero(folds != fold)
         classifier = fit([grasps[k] for k in training], [moments[k] for k in training])
         middle = np.array(classifier.mean), np.array(classifier.scale)
         for k in np.flatnonzero(folds == fold):
-            own, used = moments[k], is_used(grasps[k])
+            own, used = handling[k], is_used(grasps[k])
             if own is None or not used.any():
                 continue
             # The same classifier with another location and scale.
@@ -221,5 +227,6 @@ if __name__ == "__main__":
     )
     parser.add_argument("folder", type=Path)
     parser.add_argument("-o", "--out", type=Path)
+    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="default")
     options = parser.parse_args()
-    main(options.folder, options.out)
+    main(options.folder, options.out, options.normalised_by)

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from hand_handling import moments_of_others, read_grasp
+from hand_handling import NORMALISED_BY, moments_by, read_grasp
 
 from holdfast.classifiers.slip import SlipRule
 from holdfast.features import FeatureSpec, Tare
@@ -60,7 +60,7 @@ def main(options: argparse.Namespace) -> None:
     plan = plan_of(model, recordings, features or model.finger("*").features)
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
     if model.finger("*").normalised:
-        samples = normalised_samples(model, samples, recordings)
+        samples = normalised_samples(model, samples, recordings, options.normalised_by)
     print(f"{len(recordings)} recordings, {samples.own.samples.stable.sum()} sliding samples")
     folds = folds_of_recordings(plan, recordings)
     units = plan.data_split.group_of
@@ -108,12 +108,12 @@ def folds_of_recordings(plan: SamplesPlan, recordings: Sequence[Recording]) -> n
 
 
 def normalised_samples(
-    model: Model, samples: SlipSamples, recordings: Sequence[Recording]
+    model: Model, samples: SlipSamples, recordings: Sequence[Recording], name: str
 ) -> SlipSamples:
-    """Return the samples normalised by the other grasps of their hand; by default without."""
+    """Return the samples normalised by own handling, by its name; by default handling without."""
     grasps = [read_grasp(model, recording) for recording in recordings]
     default, own = model.finger("*").default_handling, samples.own
-    moments = [moments or default for moments in moments_of_others(grasps)]
+    moments = [moments or default for moments in moments_by(name, grasps)]
     locations, scales = (np.array(values)[own.recordings] for values in zip(*moments, strict=True))
     features = (own.samples.features - locations) / scales
     return replace(samples, own=replace(own, samples=own.samples._replace(features=features)))
@@ -197,4 +197,6 @@ if __name__ == "__main__":
     parser.add_argument("--own-features", action="store_true", help="SLIP_FEATURES, with squares")
     parser.add_argument("--without", nargs="*", default=[], metavar="TEXT",
                         help="leave out those of them whose names contain it")  # fmt: skip
+    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="default",
+                        help="of a model of normalised features")  # fmt: skip
     main(parser.parse_args())
