@@ -377,7 +377,7 @@ class TestSlipRule:
 
     def test_relative_features_of_a_rule_need_a_rate_for_which_they_are_made(self):
         part = finger_model(slip=squared_rule(TAXELS))
-        with pytest.raises(ModelError, match="10 Hz given, the model expects 30 to 500 Hz"):
+        with pytest.raises(ModelError, match="10 Hz given, the model expects 30 to 1000 Hz"):
             Model(fingers={ANY_FINGER: part}).plan({"thumb": sensor()}, 10.0)
 
 

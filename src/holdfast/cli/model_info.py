@@ -100,6 +100,11 @@ def _slip(rule: "SlipRule") -> dict[str, Any]:
     }
 
 
+def _filter(debounce: dict[str, float]) -> str:
+    rate = debounce.get("switching", 0.0)
+    return f", filter for {rate:g} switches per second" if rate else ""
+
+
 def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     debounce, rate = document["debounce"], document["rate"]
     yield "rate", "any" if rate is None else f"{rate:g} Hz"
@@ -107,7 +112,7 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield (
         "debouncing",
         f"hold {debounce['hold']:g} s, minimum {debounce['min_duration']:g} s, hysteresis "
-        f"{debounce['hysteresis']:g}",
+        f"{debounce['hysteresis']:g}{_filter(debounce)}",
     )
     for name, part in document["fingers"].items():
         finger = "any finger" if name == "*" else name

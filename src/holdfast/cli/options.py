@@ -188,6 +188,7 @@ class DetectorOptions:
             trained.min_duration if self.debounce is None else self.debounce,
             trained.hysteresis if self.hysteresis is None else self.hysteresis,
             trained.hold,
+            trained.switching,
         )
         return replace(model, name=model.name or name, debounce=debounce)
 

@@ -51,8 +51,10 @@ NO_SLIP_RULE = -1.0
     SLIP_LOG_ODDS,  # smoothed log odds of a slip; NaN before the first
     SLIP_PROBABILITY,  # NaN without an estimate, NO_SLIP_RULE without a rule
     LAST_SLIP,  # time of the last sample over the threshold of a slip [s]
+    FILTERED,  # log odds of stable to unstable by the forward filter; NaN before the first sample
+    FILTERED_AT,  # time of that sample [s]
     DECIDED_WIDTH,
-) = range(14)  # fmt: skip
+) = range(16)  # fmt: skip
 
 # Rows of the report, one for each finger.
 (
@@ -80,6 +82,7 @@ class DecisionRule(NamedTuple):
     hysteresis: float
     min_duration: float
     hold: float
+    switching: float  # of the forward filter [1/s]; 0 for none
     n_model_fingers: int
 
 

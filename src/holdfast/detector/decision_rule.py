@@ -43,6 +43,11 @@ from holdfast.sensors.types import Array, Flags, Integers
 
 _hand_state = compiled_step(hand_state)
 _is_held = compiled_step(is_held)
+EVIDENCE_SECONDS = 1 / 60
+"""Time over which neighbouring samples say the same [s]: samples that come faster count less in
+the forward filter, so that it does the same at any rate."""
+LEAST_PROBABILITY = 1e-12
+"""Bound of probabilities and thresholds in the forward filter, from 0 and from 1."""
 CodeT = TypeVar("CodeT", int, Integers)
 
 
@@ -139,6 +144,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         hysteresis=float(model.debounce.hysteresis),
         min_duration=float(model.debounce.min_duration),
         hold=float(model.debounce.hold),
+        switching=model.debounce.switching_rate,
         n_model_fingers=len(plan.fingers) if any_finger else len(model.fingers),
     )
 
@@ -339,6 +345,7 @@ def _decide_unready(
         debounce(codes, decided, UNKNOWN, rule.min_duration, time, period)
     if codes[rule_at.STATE] == UNKNOWN:
         decided[rule_at.PROBABILITY] = decided[rule_at.LAST_UNSTABLE] = math.nan
+        decided[rule_at.FILTERED] = math.nan
         _forget_cause(codes, decision.scores, f)
         end_slip(codes, decided, math.nan)
     else:
@@ -364,10 +371,19 @@ def _decide(
         # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[rule_at.PROBABILITY] = linear_probability(output.features[f], weights)
-    if not unloaded:
+    if unloaded:
+        decided[rule_at.FILTERED] = math.nan
+        if not by_load:
+            follow(output.values[f], decided, period)
+    else:
+        threshold = limits[rule_at.THRESHOLD]
+        if rule.switching > 0.0:
+            decided[rule_at.PROBABILITY] = filter_probability(
+                decided, decided[rule_at.PROBABILITY], threshold, rule.switching, time
+            )
         state = classify_contact(
             decided[rule_at.PROBABILITY],
-            limits[rule_at.THRESHOLD],
+            threshold,
             rule.hysteresis,
             codes[rule_at.STATE],
         )
@@ -377,8 +393,6 @@ def _decide(
                 output.features[f], rule.causes[f], decision.scores[f]
             )
         state = hold_unstable(state, decided, rule.hold, time, period)
-    elif not by_load:
-        follow(output.values[f], decided, period)
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
     if unloaded:
@@ -459,6 +473,43 @@ def run(
         for f in range(len(decision.codes)):
             fill_report(memory, output, decision, rows.report[k], f)
             rows.taxels[k, f] = output.status[f, at.TAXELS]
+
+
+@compiled_step
+def filter_probability(
+    decided: Array, probability: float, threshold: float, switching: float, time: float
+) -> float:
+    """Return the probability of stability by the forward filter of two states.
+
+    A sample counts for or against stability by how far its probability is from the threshold, so
+    that the filter never decides against samples that are all on one side.
+
+    Args:
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        probability: of stability, of this sample alone.
+        threshold: from which a contact is stable.
+        switching: how often a contact turns from one state to the other [1/s].
+        time: of the sample [s].
+    """
+    # e = logit p - logit p_0. Prediction over dt: the chance of each state moves towards 1/2,
+    # tanh(L/2) -> exp(-2 r dt) tanh(L/2). Update: L -> L + min(1, dt / T_e) e.
+    middle = _bounded_log_odds(threshold)
+    evidence, before = _bounded_log_odds(probability) - middle, decided[rule_at.FILTERED]
+    if math.isnan(before):
+        filtered = evidence
+    else:
+        step = time - decided[rule_at.FILTERED_AT]
+        lean = math.exp(-2.0 * switching * step) * math.tanh(0.5 * before)
+        filtered = math.log((1.0 + lean) / (1.0 - lean))
+        filtered += min(1.0, step / EVIDENCE_SECONDS) * evidence
+    decided[rule_at.FILTERED], decided[rule_at.FILTERED_AT] = filtered, time
+    return float(probability_of(filtered + middle))
+
+
+@compiled_step
+def _bounded_log_odds(probability: float) -> float:
+    bounded = min(max(probability, LEAST_PROBABILITY), 1.0 - LEAST_PROBABILITY)
+    return math.log(bounded / (1.0 - bounded))
 
 
 @compiled_step

@@ -203,9 +203,9 @@ class Memory(NamedTuple):
     counts: Integers2  # (n_fingers, COUNTS_WIDTH)
     levels: Floats2  # (n_fingers, LEVELS_WIDTH)
     own: Floats2  # (n_fingers, n_features) values of each finger, before the maximum of the hand
-    taxel_forces: Floats3  # (longest lag + 1, n_taxels, 3) in the fingertip frame, a ring
+    taxel_forces: Floats3  # (length, n_taxels, 3) in the fingertip frame, a ring
     reference: Floats2  # (n_taxels, 3) taxel forces at the least normal force since the start
-    track: Floats3  # (n_fingers, TRACK_WIDTH, longest lag + 1), a ring
+    track: Floats3  # (n_fingers, TRACK_WIDTH, length), a ring
     motion: Floats2  # (n_fingers, MOTION_WIDTH)
     relative: Floats3  # (n_fingers, n_kinds, n_lags) relative features of the last sample
     pressed: Floats1  # (n_taxels,) |h . n| of the last sample

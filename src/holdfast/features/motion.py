@@ -90,13 +90,10 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
         back = _samples_back(times, now, n_before, time - seconds, layout.lags[lag])
         if families[at.LAGS] or families[at.RATIOS]:
             then = _place(now, back, length)
-            # What moved over a gap counts for the time of the lag: v s, s = lag / (t - t_then).
-            elapsed = time - times[then]
-            share = seconds / elapsed if elapsed > seconds + 1.5 * period else 1.0
             if families[at.LAGS]:
-                _fill_lag(layout, memory, f, now, then, lag, share)
+                _fill_lag(layout, memory, f, now, then, lag)
             if families[at.RATIOS]:
-                _fill_ratios(layout, memory, f, now, then, lag, share)
+                _fill_ratios(layout, memory, f, now, then, lag)
         if families[at.SECONDS]:
             _fill_seconds(layout, memory, f, now, back, n_before, lag, gain)
 
@@ -343,10 +340,8 @@ def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time:
 
 
 @inlined
-def _fill_lag(
-    layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int, share: float
-) -> None:
-    """Fill the relative features over one lag; a share of the changes counts."""
+def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int) -> None:
+    """Fill the relative features over one lag."""
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     noise, taxel_noise = motion[f, at.NOISE_NOW], motion[f, at.TAXEL_NOISE_NOW]
@@ -358,15 +353,13 @@ def _fill_lag(
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
     across = x * nx + y * ny + z * nz
-    square = share * share * (x * x + y * y + z * z)
+    square = x * x + y * y + z * z
     out[f, FORCE_CHANGE, lag] = _relative(square, noise * noise, load)
-    across *= share
     shear = square - across * across
     out[f, SHEAR_CHANGE, lag] = _relative(shear, TWO_AXES * noise * noise, load)
     # v = sqrt(sum |dg_i - mean dg|^2), whole and across the normal, over the taxels' L.
     n_used = layout.constants[f, at.N_USED]
     moved, pressed = _residual(layout, memory, f, now, then, x / n_used, y / n_used, z / n_used)
-    moved, pressed = share * share * moved, share * share * pressed
     echo = taxel_noise * taxel_noise
     out[f, RESIDUAL, lag] = _relative(moved, echo, taxel_load)
     out[f, SHEAR_RESIDUAL, lag] = _relative(moved - pressed, TWO_AXES * echo, taxel_load)
@@ -375,9 +368,9 @@ def _fill_lag(
     for axis in range(3):
         delta = track[f, at.TRACK_PRESSURE + axis, now] - track[f, at.TRACK_PRESSURE + axis, then]
         shift += delta * delta
-    out[f, PRESSURE_SHIFT, lag] = math.log(share * math.sqrt(shift) + PRESSURE_FLOOR)
+    out[f, PRESSURE_SHIFT, lag] = math.log(math.sqrt(shift) + PRESSURE_FLOOR)
     # v = |d moment|, over L.
-    turned = share * (track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then])
+    turned = track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then]
     out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
     # log(L / noise).
     out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
@@ -523,20 +516,16 @@ def _beyond_noise(square: float) -> float:
 
 
 @inlined
-def _fill_ratios(
-    layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int, share: float
-) -> None:
+def _fill_ratios(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int) -> None:
     """Fill the changes of tangential and normal force, and of their ratio, over one lag."""
     track, motion, out = memory.track, memory.motion, memory.relative
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
     # dF . t / N, dF . n / N and r(k) - r(k-l).
-    scale = share / motion[f, at.NORMAL_FLOOR]
+    scale = 1.0 / motion[f, at.NORMAL_FLOOR]
     tx, ty, tz = motion[f, at.TANGENT], motion[f, at.TANGENT + 1], motion[f, at.TANGENT + 2]
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     out[f, SHEAR_GAIN, lag] = scale * (x * tx + y * ty + z * tz)
     out[f, NORMAL_GAIN, lag] = scale * (x * nx + y * ny + z * nz)
-    out[f, RATIO_GAIN, lag] = share * (
-        track[f, at.TRACK_RATIO, now] - track[f, at.TRACK_RATIO, then]
-    )
+    out[f, RATIO_GAIN, lag] = track[f, at.TRACK_RATIO, now] - track[f, at.TRACK_RATIO, then]

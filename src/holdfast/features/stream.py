@@ -48,6 +48,9 @@ NOISE_SECONDS, LOADED_NOISE_SECONDS = 0.5, 0.2
 stream begins in contact [s]."""
 NEWTON_NOISE = 1e-6
 """Least noise of a reading in newtons, whose step is not known [N]."""
+RING_SPARE = 2
+"""Samples that the history of relative features holds, as a multiple of those of its longest lag:
+for bursts, and for a rate that rises."""
 CHUNK_SAMPLES = 2048
 """Instants that are packed at a time: bounds the memory of offline work."""
 
@@ -377,7 +380,7 @@ def _memory(layout: Layout) -> Memory:
     levels[:, [at.FIRST_TIME, at.LAST_TIME, at.NOISE]] = np.nan
     # A second difference looks back by two lags.
     reaches = layout.lags * (1 + layout.families[:, at.SECONDS])
-    length = int(reaches.max()) + 1 if len(reaches) else 1
+    length = RING_SPARE * int(reaches.max()) + 1 if len(reaches) else 1
     motion = np.zeros((n_fingers, at.MOTION_WIDTH))
     motion[:, [at.LEAST_NOISE, at.LEAST_TAXEL_NOISE]] = np.inf
     motion[:, at.BLOCK_START] = np.nan

@@ -35,7 +35,7 @@ ANY_FINGER = "*"
 """Name in place of a finger, for a model of any finger."""
 EXACT_RATE = 0.05
 """Tolerance of a measured rate beside a nominal one, as a share of it."""
-RELATIVE_RATES = (30.0, 500.0)
+RELATIVE_RATES = (30.0, 1000.0)
 """Rates for which relative features are made [Hz]."""
 RATE_TOLERANCE = 0.2
 """A source whose rate differs less from the model's, as a share of it, is not resampled."""

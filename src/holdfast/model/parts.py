@@ -245,21 +245,41 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         hysteresis: distance past its threshold that a probability needs to change the state.
         hold: time for which UNSTABLE is still reported after the last unstable sample, while
             the finger is in contact, so that one disturbance is one alarm [s].
+        switching: of the forward filter of the probability: how often a contact turns from stable
+            to unstable, or back [1/s]; 0 or unset for no filter. 15.3 is a probability of 0.8 to
+            stay as it is for 1/60 s.
 
     Raises:
         ModelError: a value is out of range.
+
+    Example:
+        >>> round(Debounce(switching=15.3).stay(1 / 60), 2)
+        0.8
     """
 
     min_duration: float = 0.0
     hysteresis: float = 0.0
     hold: float = 0.0
+    switching: float | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
+        rate = self.switching_rate
+        if not (math.isfinite(rate) and rate >= 0):
+            raise ModelError(f"a switching of at least 0 per second expected, {rate} given")
         for seconds in (self.min_duration, self.hold):
             if not (math.isfinite(seconds) and seconds >= 0):
                 raise ModelError(f"a duration of at least 0 s expected, {seconds} given")
         if not 0 <= self.hysteresis < 1:
             raise ModelError(f"a hysteresis from 0 to 1 expected, {self.hysteresis} given")
+
+    @property
+    def switching_rate(self) -> float:
+        """The rate of switching [1/s]; 0 if there is no filter."""
+        return 0.0 if self.switching is msgspec.UNSET else float(self.switching)
+
+    def stay(self, seconds: float) -> float:
+        """Return the probability that a contact is in the same state after some time [s]."""
+        return 0.5 * (1.0 + math.exp(-2.0 * self.switching_rate * seconds))
 
 
 class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

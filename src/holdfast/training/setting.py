@@ -180,9 +180,9 @@ class Setting:
 
     @property
     def debounce(self) -> Debounce:
-        """Debouncing of the model; its minimum duration is that of the adapted model."""
+        """Debouncing of the model; minimum duration and filter are those of the adapted model."""
         known = Debounce() if self.init is None else self.init.debounce
-        return Debounce(known.min_duration, self.hysteresis, self.hold)
+        return Debounce(known.min_duration, self.hysteresis, self.hold, known.switching)
 
     @property
     def rate(self) -> float | None:

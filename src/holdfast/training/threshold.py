@@ -14,10 +14,11 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
-from holdfast.detector.arrays import CANDIDATE, LAST_UNSTABLE, STATE
+from holdfast.detector.arrays import CANDIDATE, FILTERED, LAST_UNSTABLE, STATE
 from holdfast.detector.decision_rule import (
     classify_contact,
     debounce,
+    filter_probability,
     hold_unstable,
     new_decision_memory,
 )
@@ -101,7 +102,10 @@ class ThresholdReplay:
         out = np.zeros(len(finger.times), dtype=np.int8)
         rule = self.debounce
         memory = new_decision_memory(1)
-        limits = np.array([threshold, rule.hysteresis, rule.hold, rule.min_duration, self.period])
+        limits = np.array([
+            threshold, rule.hysteresis, rule.hold, rule.min_duration, self.period,
+            rule.switching_rate,
+        ])  # fmt: skip
         _replay(
             np.array(finger.times), np.array(finger.stable_probability), np.array(finger.states),
             limits, memory.codes[0], memory.values[0], out,
@@ -355,20 +359,26 @@ def _replay(
         times: (n,) [s].
         probability: (n,) of stability.
         raw: (n,) states without debouncing; UNKNOWN and NO_CONTACT do not depend on the threshold.
-        limits: threshold, hysteresis, hold [s], minimum duration [s] and period [s].
+        limits: threshold, hysteresis, hold [s], minimum duration [s], period [s] and switching
+            [1/s].
         codes: as in `DecisionMemory`; is changed.
         decided: as in `DecisionMemory`; is changed.
         out: (n,) is filled.
     """
-    threshold, hysteresis, hold, min_duration, period = limits
+    threshold, hysteresis, hold, min_duration, period, switching = limits
     for k in range(len(times)):
         if raw[k] == UNKNOWN:
             codes[STATE] = codes[CANDIDATE] = UNKNOWN
-            decided[LAST_UNSTABLE] = np.nan
+            decided[LAST_UNSTABLE] = decided[FILTERED] = np.nan
         else:
             state = NO_CONTACT
-            if raw[k] != NO_CONTACT:
-                state = classify_contact(probability[k], threshold, hysteresis, codes[STATE])
+            if raw[k] == NO_CONTACT:
+                decided[FILTERED] = np.nan
+            else:
+                stable = probability[k]
+                if switching > 0.0:
+                    stable = filter_probability(decided, stable, threshold, switching, times[k])
+                state = classify_contact(stable, threshold, hysteresis, codes[STATE])
                 state = hold_unstable(state, decided, hold, times[k], period)
             debounce(codes, decided, state, min_duration, times[k], period)
         out[k] = codes[STATE]

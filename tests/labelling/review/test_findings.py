@@ -64,7 +64,7 @@ def test_one_taxel_and_an_odd_rate():
     readings = rng.normal(0, 1, (200, 1, 3))
     kinds = {kind: text for _, kind, text in found(Tactile(one, np.arange(200) / 20, readings))}
     assert kinds == {
-        "rate": "20 Hz; builtin:any needs 30 to 500 Hz",
+        "rate": "20 Hz; builtin:any needs 30 to 1000 Hz",
         "one_taxel": "one taxel: taxels cannot be compared, only its force is judged",
         "no_contact": "no finger is in contact in the whole recording",
     }

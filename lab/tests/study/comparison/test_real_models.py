@@ -108,7 +108,7 @@ def test_where_others_cannot_train_the_model_stays_as_it_ships(corpus, monkeypat
 
 
 def test_recordings_that_the_model_refuses_have_no_estimate(tmp_path):
-    """`builtin:any` is for 30 to 500 Hz."""
+    """`builtin:any` is for 30 to 1000 Hz."""
     slow = []
     for seed in range(2):
         recording = part(seed)
