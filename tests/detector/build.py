@@ -83,7 +83,7 @@ def speed_rule(linear, seed=0):
     """Return a speed rule for the features of a classifier; some samples reach its highest."""
     rng = np.random.default_rng([seed, 11])
     squares = tuple((0.1 * rng.normal(size=len(linear.mean))).tolist())
-    return SpeedRule(linear.mean, linear.scale, linear.coefficients, squares, 1.5, 12.0)
+    return SpeedRule(linear.mean, linear.scale, linear.coefficients, squares, 1.5, 3.0)
 
 
 def with_speed(rule):

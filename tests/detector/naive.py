@@ -356,8 +356,12 @@ class Finger:
             u = (value - mean) / scale
             z += c * u + square * min(abs(u), 5.0) ** 2
         self.speed = min(max(z, 0.0) ** 2, rule.highest)
-        step = self.period if self.slid_at is None else time - self.slid_at
-        self.distance, self.slid_at = self.distance + self.speed * step, time
+        before, step = self.distance, self.period
+        if self.slid_at is None:
+            before = 0.0
+        else:
+            step = time - self.slid_at
+        self.distance, self.slid_at = before + self.speed * step, time
 
     def debounce(self, state, time, min_duration):
         if state != self.candidate:

@@ -248,14 +248,14 @@ class TestSlip:
     def test_distance_is_the_sum_of_the_speed(self, clock):
         """Both are 0 while the finger does not slide, and NaN while UNKNOWN."""
         made, slips = recording(**CLOCKS[clock]), ("thumb", "index")
-        hand_model = model(slips=slips, speeds=slips)
-        n_slides = 0
+        hand_model = model(threshold=20.0, slips=slips, speeds=slips)
+        n_slides, speeds = 0, set()
         for trace in detect(hand_model, made).fingers.values():
             slides, unknown = trace.cause == SLIP_CODE, trace.state == 0
             assert np.isnan(trace.slip_speed[unknown]).all()
             assert not np.isnan(trace.slip_speed[~unknown]).any()
             assert (trace.slip_speed[~slides & ~unknown] == 0).all()
-            assert 0 <= np.nanmin(trace.slip_speed) < np.nanmax(trace.slip_speed) <= 12
+            speeds.update(trace.slip_speed[slides].tolist())
             steps = np.diff(trace.times, prepend=np.nan)
             steps[np.flatnonzero(slides & ~np.roll(slides, 1))] = 1 / RATE
             for start, end in runs(slides):
@@ -263,7 +263,8 @@ class TestSlip:
                 np.testing.assert_allclose(trace.slip_distance[start:end], slid, rtol=1e-9)
                 n_slides += 1
             assert (trace.slip_distance[~slides & ~unknown] == 0).all()
-        assert n_slides > 2
+        assert n_slides > 1
+        assert min(speeds) >= 0 and max(speeds) == 3 and len(speeds) > 10
 
     def test_features_of_the_rule_do_not_change_the_rest(self):
         made = recording(**CLOCKS["one clock"])
