@@ -93,8 +93,10 @@ def add_speed(model: Model, options: argparse.Namespace, engine: Engine) -> None
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
     rule = samples.with_speed(part.slip, [])
     if samples.speeds is None or rule == part.slip:
-        raise SystemExit(f"too few samples whose true speed is known in {len(recordings)} recordings")
-    print(f"{len(samples.speeds.speed)} sliding samples of slips over 1 mm")
+        raise SystemExit(
+            f"too few samples whose true speed is known in {len(recordings)} recordings"
+        )
+    print(f"{samples.speeds.n_sliding} sliding samples of slips over 1 mm")
     if options.out is not None:
         named_model = msgspec.structs.replace(replaced(model, rule), name=options.out.stem)
         named_model.save(options.out, force=True)

@@ -10,7 +10,14 @@ import numpy.typing as npt
 
 from holdfast.classifiers.cause import ALL_CAUSES, add_scores
 from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
-from holdfast.classifiers.slip import SlipRule, SpeedRule, add_squares, probability_of, smooth, speed_of
+from holdfast.classifiers.slip import (
+    SlipRule,
+    SpeedRule,
+    add_squares,
+    probability_of,
+    smooth,
+    speed_of,
+)
 from holdfast.compiled import compiled_step, inlined
 from holdfast.contact import (
     NO_CONTACT,

@@ -1,4 +1,4 @@
-"""Training of speed rules: how fast a finger slides, from samples of slips whose truth is known."""
+"""Training of speed rules: how fast a finger slides, from samples whose true speed is known."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 
 from holdfast.classifiers.fitting import standardise
 from holdfast.classifiers.slip import MAX_DEVIATION, SpeedRule
-from holdfast.metrics.slip_truth import DISTANCES, SLIDING, SlipTruth, has_slip_truth
+from holdfast.metrics.slip_truth import DISTANCES, SLIDING, STILL, SlipTruth, has_slip_truth
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Flags, Integers
 
@@ -16,23 +16,35 @@ MIN_SPEED_SAMPLES = 500
 """Fewer sliding samples train no speed rule."""
 SPEED_PENALTY = 10.0
 """Weight of the squared coefficients, beside the sum of squared errors over the samples."""
+STILL_STEP = 10
+"""Every tenth sample that holds still trains, with the speed 0."""
+STILL_WEIGHT = 0.3
+"""Weight of all samples that hold still, as a share of that of those that slide.
+
+Without them the speed rises less with that of the marker on the real recordings, and a false alarm
+slides further."""
 MILLIMETRES = 1e3
 """Millimetres in a metre."""
 
 
 @dataclass(frozen=True)
 class SpeedSamples:
-    """Samples that slide, of slips over 1 mm, and their true speed.
+    """Samples that slide, of slips over 1 mm, and some that hold still, with their true speed.
 
     Attributes:
         features: (n, n_features) of the slip rule.
-        speed: (n,) of the contact [mm/s].
+        speed: (n,) of the contact [mm/s]; 0 where it holds still.
         units: (n,) unit of each sample, with which it is held out.
     """
 
     features: Array
     speed: Array
     units: Integers
+
+    @property
+    def n_sliding(self) -> int:
+        """Number of samples that slide."""
+        return int(np.count_nonzero(self.speed))
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -41,21 +53,27 @@ class SpeedSamples:
         return cls(*map(np.concatenate, columns))
 
     def fit(self, held: Collection[int]) -> SpeedRule | None:
-        """Fit a rule to the samples that are not in held units; None with too few of them.
+        """Fit a rule to the samples that are not in held units.
 
         The root of the speed is fitted by least squares with a small penalty. So fast slides
         count more than with the logarithm, and less than with the speed itself.
+
+        Args:
+            held: units whose samples are left out.
+
+        Returns:
+            The rule; None with too few samples that slide.
         """
         kept = ~np.isin(self.units, [*held])
-        if np.count_nonzero(kept) < MIN_SPEED_SAMPLES:
+        features, speed = self.features[kept], self.speed[kept]
+        slides = speed > 0
+        if np.count_nonzero(slides) < MIN_SPEED_SAMPLES:
             return None
-        mean, scale, standard = standardise(self.features[kept])
+        mean, scale, _ = standardise(features[slides])
+        standard = (features - mean) / scale
         squares = np.minimum(np.abs(standard), MAX_DEVIATION) ** 2
         columns = np.hstack([np.ones((len(standard), 1)), standard, squares])
-        penalty = np.diag([0.0, *[SPEED_PENALTY] * (columns.shape[1] - 1)])
-        # (A^T A + penalty) w = A^T sqrt(v), the intercept without penalty.
-        target = np.sqrt(self.speed[kept])
-        weights = np.linalg.solve(columns.T @ columns + penalty, columns.T @ target).tolist()
+        weights = _solve(columns, np.sqrt(speed), _sample_weights(slides)).tolist()
         n = len(mean)
         return SpeedRule(
             mean=tuple(mean.tolist()),
@@ -63,8 +81,22 @@ class SpeedSamples:
             coefficients=tuple(weights[1 : n + 1]),
             squares=tuple(weights[n + 1 :]),
             intercept=weights[0],
-            highest=float(self.speed[kept].max()),
+            highest=float(speed.max()),
         )
+
+
+def _sample_weights(slides: Flags) -> Array:
+    """Return (n,) 1 for samples that slide, and what `STILL_WEIGHT` leaves for each other one."""
+    n_still = max(np.count_nonzero(~slides), 1)
+    return np.where(slides, 1.0, STILL_WEIGHT * np.count_nonzero(slides) / n_still)
+
+
+def _solve(columns: Array, target: Array, weights: Array) -> Array:
+    """Return the coefficients of the columns, of which the first has no penalty."""
+    # (A^T W A + penalty) c = A^T W y.
+    weighted = (columns * weights[:, None]).T
+    penalty = np.diag([0.0, *[SPEED_PENALTY] * (columns.shape[1] - 1)])
+    return np.asarray(np.linalg.solve(weighted @ columns + penalty, weighted @ target))
 
 
 def speed_samples(
@@ -84,8 +116,12 @@ def speed_samples(
     """
     if recording.truth is None or not has_slip_truth(recording.truth, finger):
         return None
-    speed = true_speed(recording, finger, recording.modules[finger].times)
-    used = in_long_slips(recording.modules[finger].times, truth) & np.isfinite(features).all(axis=1)
+    times = recording.modules[finger].times
+    slides, still = in_long_slips(times, truth), np.flatnonzero(truth.codes == STILL)
+    used = slides.copy()
+    used[still[::STILL_STEP]] = True
+    used &= np.isfinite(features).all(axis=1)
+    speed = np.where(slides, true_speed(recording, finger, times), 0.0)
     return SpeedSamples(features[used], speed[used], units[used])
 
 
