@@ -198,8 +198,7 @@ class _Trainer:
 
     def _that_fit(self, features: tuple[FeatureSpec, ...]) -> tuple[FeatureSpec, ...]:
         """Return the features that all sensors have, and warn of those that are left out."""
-        smallest = min(self.scan.sensors.values(), key=lambda sensor: sensor.n_taxels)
-        n_taxels = smallest.n_taxels
+        smallest, n_taxels = self.scan.smallest, self.scan.smallest.n_taxels
         left_out = [spec for spec in features if spec.min_taxels > n_taxels]
         if not left_out:
             return features

@@ -42,7 +42,7 @@ export class EventLog {
   /** Add a slip that began; write how far and how long the finger slid when it has ended. */
   addSlip({ finger, begin, end, distance: slid }) {
     if (!this.slips.has(finger)) {
-      this.slips.set(finger, make("span", "change slip", shape("slip"), "slips"));
+      this.slips.set(finger, make("span", "change slid-far", shape("slip"), "slips"));
       this.addItem(begin, make("b", "finger marked", finger), this.slips.get(finger));
     }
     if (end === null) return;
