@@ -87,8 +87,9 @@ class SpeedSamples:
 
 def _sample_weights(slides: Flags) -> Array:
     """Return (n,) 1 for samples that slide, and what `STILL_WEIGHT` leaves for each other one."""
-    n_still = max(np.count_nonzero(~slides), 1)
-    return np.where(slides, 1.0, STILL_WEIGHT * np.count_nonzero(slides) / n_still)
+    n_sliding = int(np.count_nonzero(slides))
+    n_still = max(len(slides) - n_sliding, 1)
+    return np.where(slides, 1.0, STILL_WEIGHT * n_sliding / n_still)
 
 
 def _solve(columns: Array, target: Array, weights: Array) -> Array:

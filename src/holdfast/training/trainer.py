@@ -182,6 +182,8 @@ class _Trainer:
         slips = (
             gather_slip_samples(recordings, plan, engine, progress) if setting.init is None else {}
         )
+        if slip_features and not slips:
+            warn("no slips are known in the recordings: the model gets no slip rule")
         self.data = TrainingData(self.scan, self.data_split, self.fingers, slips, slip_features)
         self.slip_curves: list[tuple[Mapping[str, Curve], int]] = []
 
