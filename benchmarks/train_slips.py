@@ -1,4 +1,4 @@
-"""Add a slip rule to a model: trained on true sliding, with the threshold from folds.
+"""Add a slip rule to a model, or the speed of slips: trained on true sliding.
 
     holdfast simulate twin/ --seed 0
     holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
@@ -6,6 +6,10 @@
         -o src/holdfast/models/twin.json
     holdfast simulate hands/ --randomize --measured all --repeats 150 --grasps 3 --seed 0
     python benchmarks/train_slips.py any.json hands/ -o any.json
+    python benchmarks/train_slips.py builtin:twin twin/ slips/ --only-speed \
+        -o src/holdfast/models/twin.json
+
+With --only-speed, the slip rule of the model gets a speed rule, and the model stays as it is.
 
 The features and the classifier of stability stay. With --own-features, the rule gets the list
 `SLIP_FEATURES` and squares; else it has the features of that classifier. It is fitted without a
@@ -52,6 +56,9 @@ N_FOLDS = 5
 
 def main(options: argparse.Namespace) -> None:
     model, engine, out = Model.load(options.model), Engine(options.jobs), options.out
+    if options.only_speed:
+        add_speed(model, options, engine)
+        return
     features = None
     if options.own_features:
         left_out = tuple(options.without)
@@ -78,6 +85,26 @@ def main(options: argparse.Namespace) -> None:
     print(msgspec.json.encode(complete.finger("*").slip.thresholds).decode())
     if out is not None:
         save(complete, recordings, out)
+
+
+def add_speed(model: Model, options: argparse.Namespace, engine: Engine) -> None:
+    """Write the model with a speed rule in its slip rule, and change nothing else."""
+    part = model.finger("*")
+    if part.slip is None:
+        raise SystemExit(f"{options.model} has no slip rule; one expected, whose features it uses")
+    recordings = [recording for folder in options.folders for recording in named(folder)]
+    plan = plan_of(model, recordings, part.slip.used_features(part.features))
+    samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
+    rule = samples.with_speed(part.slip, [])
+    if samples.speeds is None or rule == part.slip:
+        raise SystemExit(
+            f"too few samples whose true speed is known in {len(recordings)} recordings"
+        )
+    print(f"{samples.speeds.n_sliding} sliding samples of slips over 1 mm")
+    if options.out is not None:
+        named_model = msgspec.structs.replace(replaced(model, rule), name=options.out.stem)
+        named_model.save(options.out, force=True)
+        print(f"{options.out} written")
 
 
 def named(folder: Path) -> list[Recording]:
@@ -199,4 +226,5 @@ if __name__ == "__main__":
                         help="leave out those of them whose names contain it")  # fmt: skip
     parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="default",
                         help="of a model of normalised features")  # fmt: skip
+    parser.add_argument("--only-speed", action="store_true", help="add a speed rule, no more")
     main(parser.parse_args())

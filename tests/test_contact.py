@@ -107,6 +107,8 @@ def test_estimates_can_be_written_as_json():
         "faulty_taxels": [],
         "cause": None,
         "slip_probability": None,
+        "slip_speed": None,
+        "slip_distance": None,
     }
     with pytest.raises(AttributeError):
         finger.state = ContactState.UNSTABLE

@@ -132,6 +132,10 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
             the state becomes UNSTABLE.
         slip_probability: probability that the finger slides; NaN while UNKNOWN, None for a model
             without a slip rule.
+        slip_speed: speed at which the finger slides [mm/s], 0 while it is not decided to slide;
+            NaN while UNKNOWN, None for a model without a speed rule.
+        slip_distance: distance slid since the slip began, the sum of this speed over time [mm];
+            likewise.
     """
 
     time: float
@@ -144,6 +148,8 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     faulty_taxels: tuple[int, ...] = ()
     cause: Cause | None = None
     slip_probability: float | None = None
+    slip_speed: float | None = None
+    slip_distance: float | None = None
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):
@@ -445,6 +451,8 @@ def _with_faults(
         reason=reason,
         stable_probability=math.nan,
         slip_probability=None if finger.slip_probability is None else math.nan,
+        slip_speed=None if finger.slip_speed is None else math.nan,
+        slip_distance=None if finger.slip_distance is None else math.nan,
         cause=None,
         faults=tuple(fault for fault in Fault if fault in both),
     )

@@ -317,6 +317,21 @@ def test_hold_and_our_own_features(capsys, data, model):
     assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].features
 
 
+def test_own_slip_features(capsys, data, model):
+    code, _, err = run(capsys, data, "-o", model, "--trials", 0, "--own-slip-features")
+    assert code == 0
+    assert "no slips are known in the recordings: the model gets no slip rule" in err
+    assert Model.load(model).fingers["index"].slip is None
+    before = model.read_bytes()
+    words = ["--init", TWIN, "--own-slip-features", "--force"]
+    code, _, err = run(capsys, data, "-o", model, *words)
+    assert (code, model.read_bytes()) == (2, before)
+    assert err == (
+        "holdfast: own slip features given with a model to adapt, which keeps its slip rule; leave "
+        "one of them out\n"
+    )
+
+
 def test_a_missing_model_to_adapt(capsys, data, model, tmp_path):
     missing = tmp_path / "none.json"
     assert refusal(capsys, data, "-o", model, "--init", missing) == (

@@ -6,7 +6,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule
+from holdfast.classifiers.slip import SlipRule, SpeedRule
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.features.specs import MEAN_SECOND_KINDS, RATIO_KINDS, SECOND_KINDS
 from holdfast.model import FingerModel, Model
@@ -79,6 +79,18 @@ def squared_rule(features, seed=0, scale=20.0):
     return SlipRule(linear, 0.02, 0.05, features=tuple(features), squares=squares)
 
 
+def speed_rule(linear, seed=0):
+    """Return a speed rule for the features of a classifier; some samples reach its highest."""
+    rng = np.random.default_rng([seed, 11])
+    squares = tuple((0.1 * rng.normal(size=len(linear.mean))).tolist())
+    return SpeedRule(linear.mean, linear.scale, linear.coefficients, squares, 1.5, 3.0)
+
+
+def with_speed(rule):
+    """Return a slip rule that estimates the speed, too."""
+    return replace(rule, speed=speed_rule(rule.classifier))
+
+
 def model(
     fingers=("thumb", "index"),
     features=None,
@@ -86,9 +98,13 @@ def model(
     threshold=None,
     slips=(),
     own=(),
+    speeds=(),
     **options,
 ):
-    """Return a model; the fingers in `slips` have a slip rule, with own features if given."""
+    """Return a model; the fingers in `slips` have a slip rule, with own features if given.
+
+    Those in `speeds` have a speed rule, too.
+    """
     which = sensor() if which is None else which
     n_features = 5 if features is None else len(features)
     rule = (lambda _, seed: squared_rule(own, seed)) if own else slip_rule
@@ -99,6 +115,8 @@ def model(
         )
         for seed, name in enumerate(fingers)
     }  # fmt: skip
+    for name in speeds:
+        parts[name] = replace(parts[name], slip=with_speed(parts[name].slip))
     options = {"rate": which.rate, "window": 6, "tare": "0.2"} | options
     return Model(fingers=parts, sensors={which.name: which}, **options)
 

@@ -90,7 +90,7 @@ class Finger:
         self.faults = ()
         self.force = (NAN, NAN, NAN)
         self.sigma = self.probability = NAN
-        self.slip, self.odds, self.slid, self.slides = NAN, None, -math.inf, False
+        self.end_slip(NAN)
         self.state = self.candidate = "UNKNOWN"
         self.since = self.unstable_at = NAN
 
@@ -312,6 +312,8 @@ class Finger:
             self.rest += min(1, self.period / 3) * (np.array(self.force) - self.rest)
 
     def end_slip(self, probability):
+        self.speed = self.distance = probability
+        self.slid_at = None
         self.slip, self.odds, self.slid, self.slides = probability, None, -math.inf, False
 
     def decide_slip(self, features, fingers, time):
@@ -339,6 +341,27 @@ class Finger:
         if self.slip >= linear.threshold:
             self.slid = time
         self.slides = time == self.slid or time - self.slid + self.period / 2 < rule.hold
+        if rule.speed:
+            self.follow_slip(rule.speed, features, time)
+
+    def follow_slip(self, rule, features, time):
+        """Speed, and its sum over time since the slip began."""
+        if not self.slides:
+            self.speed, self.distance, self.slid_at = 0.0, 0.0, None
+            return
+        z = rule.intercept
+        for value, c, square, mean, scale in zip(
+            features, rule.coefficients, rule.squares, rule.mean, rule.scale, strict=True
+        ):
+            u = (value - mean) / scale
+            z += c * u + square * min(abs(u), 5.0) ** 2
+        self.speed = min(max(z, 0.0) ** 2, rule.highest)
+        before, step = self.distance, self.period
+        if self.slid_at is None:
+            before = 0.0
+        else:
+            step = time - self.slid_at
+        self.distance, self.slid_at = before + self.speed * step, time
 
     def debounce(self, state, time, min_duration):
         if state != self.candidate:
@@ -429,7 +452,9 @@ class Hand:
     def row(finger):
         last = NAN if finger.last is None else finger.last
         names = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
-        slip = None if finger.part.slip is None else (finger.slip, finger.slides)
+        rule = finger.part.slip
+        speed = (finger.speed, finger.distance) if rule and rule.speed else (None, None)
+        slip = None if rule is None else (finger.slip, finger.slides, *speed)
         return names, (last, finger.probability, finger.sigma, *finger.force), slip
 
     def state(self):

@@ -51,10 +51,15 @@ def same(estimate, slow):
         found = (one.time, one.stable_probability, one.instability, *one.force)
         assert found == pytest.approx(numbers, rel=1e-9, abs=1e-9, nan_ok=True)
         if slip is None:
-            assert one.slip_probability is None
+            assert one.slip_probability is one.slip_speed is None
         else:
             assert one.slip_probability == pytest.approx(slip[0], rel=1e-9, abs=1e-9, nan_ok=True)
             assert (one.cause is Cause.SLIP) == slip[1]
+            found = (one.slip_speed, one.slip_distance)
+            expected = slip[2:]
+            if slip[2] is not None:
+                expected = pytest.approx(expected, rel=1e-9, abs=1e-9, nan_ok=True)
+            assert found == expected
 
 
 MODELS = {
@@ -70,6 +75,18 @@ MODELS = {
         "threshold": 30.0,
         "slips": ("thumb", "ring"),
         "own": SLIP_OWN,
+    },
+    "speeds": {
+        "tare": "0.1",
+        "threshold": 30.0,
+        "slips": ("thumb", "ring"),
+        "own": SLIP_OWN,
+        "speeds": ("ring",),
+    },
+    "speeds by the features of stability": {
+        "tare": "first",
+        "slips": ("thumb", "index"),
+        "speeds": ("thumb", "index"),
     },
     "slips of some": {"tare": "first", "features": RICH, "slips": ("index",)},
 }

@@ -14,6 +14,7 @@ from holdfast.contact import Cause, ContactState
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import fingertip_force
+from holdfast.metrics.masks import runs
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
@@ -49,6 +50,7 @@ def fields(estimate):
     numbers = (estimate.time, estimate.stable_probability, estimate.instability, *estimate.force)
     codes = (estimate.state, estimate.reason, estimate.faults, estimate.faulty_taxels)
     codes += (estimate.cause, estimate.slip_probability)
+    codes += (estimate.slip_speed, estimate.slip_distance)
     return repr((*numbers, *codes))
 
 
@@ -189,12 +191,14 @@ def test_the_future_changes_nothing():
 
 @pytest.mark.parametrize("start", [0.0, 0.3, 1e9, 1.7e9])
 def test_a_shift_of_time_changes_nothing(start):
-    hand_model = model(("thumb",), threshold=20.0, slips=("thumb",))
+    hand_model = model(("thumb",), threshold=20.0, slips=("thumb",), speeds=("thumb",))
     plain = detect(hand_model, recording(thumb=tactile(seed=4))).fingers["thumb"]
     moved = detect(hand_model, recording(thumb=tactile(seed=4, start=start))).fingers["thumb"]
-    for found, expected in zip(moved[1:], plain[1:], strict=True):
+    for found, expected in zip(moved[1:-1], plain[1:-1], strict=True):
         assert np.array_equal(found, expected, equal_nan=True)
-    assert plain.slip_probability is not None
+    assert plain.slip_speed is not None and np.nanmax(plain.slip_distance) > 0
+    # Its steps of time are rounded.
+    np.testing.assert_allclose(moved.slip_distance, plain.slip_distance, rtol=1e-4)
 
 
 class TestSlip:
@@ -219,6 +223,48 @@ class TestSlip:
         assert_same(found, list(feed(Detector(hand_model), made)))
         probability = found.fingers["index"].slip_probability
         assert clock != "one clock" or np.nanstd(probability) > 0.01
+
+    @pytest.mark.parametrize("speeds", [("thumb", "index"), ("thumb",)])
+    @pytest.mark.parametrize("clock", CLOCKS)
+    def test_detect_equals_update_with_a_speed(self, clock, speeds):
+        made = recording(**CLOCKS[clock])
+        slips = ("thumb", "index")
+        hand_model = model(features=RICH, threshold=20.0, slips=slips, own=TAXELS, speeds=speeds)
+        found = detect(hand_model, made)
+        assert_same(found, list(feed(Detector(hand_model), made)))
+        for name, trace in found.fingers.items():
+            assert (trace.slip_speed is None) == (trace.slip_distance is None)
+            assert (trace.slip_speed is None) == (name not in speeds)
+
+    def test_a_speed_changes_nothing_else(self):
+        made, slips = recording(**CLOCKS["one clock"]), ("thumb", "index")
+        plain = detect(model(slips=slips, own=TAXELS), made)
+        found = detect(model(slips=slips, own=TAXELS, speeds=slips), made)
+        for name, trace in plain.fingers.items():
+            for one, other in zip(found.fingers[name][:-2], trace[:-2], strict=True):
+                assert np.array_equal(one, other, equal_nan=True)
+
+    @pytest.mark.parametrize("clock", ["one clock", "two rates", "since 1970", "broken"])
+    def test_distance_is_the_sum_of_the_speed(self, clock):
+        """Both are 0 while the finger does not slide, and NaN while UNKNOWN."""
+        made, slips = recording(**CLOCKS[clock]), ("thumb", "index")
+        hand_model = model(threshold=20.0, slips=slips, speeds=slips)
+        n_slides, speeds = 0, set()
+        for trace in detect(hand_model, made).fingers.values():
+            slides, unknown = trace.cause == SLIP_CODE, trace.state == 0
+            assert np.isnan(trace.slip_speed[unknown]).all()
+            assert not np.isnan(trace.slip_speed[~unknown]).any()
+            assert (trace.slip_speed[~slides & ~unknown] == 0).all()
+            speeds.update(trace.slip_speed[slides].tolist())
+            steps = np.diff(trace.times, prepend=np.nan)
+            steps[np.flatnonzero(slides & ~np.roll(slides, 1))] = 1 / RATE
+            for start, end in runs(slides):
+                slid = np.cumsum((trace.slip_speed * steps)[start:end])
+                np.testing.assert_allclose(trace.slip_distance[start:end], slid, rtol=1e-9)
+                n_slides += 1
+            assert (trace.slip_distance[~slides & ~unknown] == 0).all()
+        assert n_slides > 1
+        assert min(speeds) >= 0 and max(speeds) == 3 and len(speeds) > 10
 
     def test_features_of_the_rule_do_not_change_the_rest(self):
         made = recording(**CLOCKS["one clock"])

@@ -26,7 +26,7 @@ from holdfast.live.publishers.ros_publisher import NOT_IN_DIAGNOSTICS, diagnosti
 from live import estimates
 
 PACKAGE = Path(holdfast.__file__).parent
-NEW_FIELD = "    slip_probability: float | None = None\n"
+NEW_FIELD = "    slip_distance: float | None = None\n"
 """Line of the package after which the test adds a field to the estimate."""
 PROGRAM = """
 import json, sys
@@ -83,8 +83,8 @@ def wider(tmp_path_factory):
 
 
 def test_a_new_field_of_the_estimate_is_in_every_document(wider):
-    assert list(wider["line"])[-2:] == ["slip_probability", "humidity"]
-    assert list(wider["socket"])[-3:] == ["slip_probability", "humidity", "taxels"]
+    assert list(wider["line"])[-2:] == ["slip_distance", "humidity"]
+    assert list(wider["socket"])[-3:] == ["slip_distance", "humidity", "taxels"]
     assert wider["line"]["humidity"] == wider["socket"]["humidity"] == 0.25
     assert wider["socket"]["taxels"] == [[1.0, 2.0, 3.0]]
     assert wider["ros"]["humidity"] == "0.25"
@@ -109,7 +109,9 @@ def test_numbers_may_be_null_where_a_value_may_have_none():
         found = {field.name: field.type for field in fields(kind)}
         return {name for name, part in found.items() if float in get_args(part)}
 
-    assert nullable(FingerDocument) == {"stable_probability", "instability", "slip_probability"}
+    assert nullable(FingerDocument) == {
+        "stable_probability", "instability", "slip_probability", "slip_speed", "slip_distance",
+    }  # fmt: skip
     assert nullable(GripLimits) == {"max_force", "recovery"}
     force = next(field.type for field in fields(FingerDocument) if field.name == "force")
     assert get_args(force) == (float | None,) * 3

@@ -48,6 +48,21 @@ def test_the_model_is_for_any_sensor_rate_and_finger(mixed):
     assert model.debounce == Debounce(hold=0.1)
 
 
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_sensor_of_one_taxel_leaves_out_what_compares_taxels(mixed, is_first):
+    """It need not be the first sensor of its finger."""
+    single = tiny_recording(4, fingers=("gripper/1",))
+    recordings = [single, mixed[2]] if is_first else [mixed[2], single]
+    warnings = []
+    model = train(recordings, SETTING, warn=warnings.append).model
+    kept = model.fingers[ANY_FINGER].features
+    assert {spec.kind for spec in kept} == {"force_change", "shear_change", "load_to_noise"}
+    assert [text for text in warnings if "taxel" in text] == [
+        "residual, shear_residual, pressure_shift, moment_change left out: tiny has 1 taxel, they "
+        "need at least 2"
+    ]
+
+
 def test_options_that_are_given_count(mixed):
     setting = replace(SETTING, tare=Tare.parse("none"), shared=False)
     model = fit_recordings(mixed, setting, {"C": 1.0, "class_weight": None})

@@ -1,6 +1,7 @@
 import pytest
 
-from holdfast.model import Debounce
+from holdfast.features.specs import ANY_FEATURES, SLIP_FEATURES
+from holdfast.model import Debounce, Model
 from holdfast.training import Setting
 
 
@@ -40,6 +41,11 @@ def test_the_defaults_are_those_of_the_deployed_model():
         ),
         ({"hold": -0.1}, "a hold of at least 0 s expected, -0.1 given"),
         ({"hold": float("inf")}, "a hold of at least 0 s expected, inf given"),
+        (
+            {"own_slip_features": True, "init": Model.load("builtin:any")},
+            "own slip features given with a model to adapt, which keeps its slip rule; leave "
+            "one of them out",
+        ),
         ({"hysteresis": 1.0}, "a hysteresis from 0 to 1 expected, 1.0 given"),
     ],
 )
@@ -47,6 +53,15 @@ def test_refusals(given, message):
     with pytest.raises(ValueError) as refusal:
         Setting(**given)
     assert str(refusal.value) == message
+
+
+def test_features_of_the_slip_rule():
+    assert Setting().slip_features is None
+    assert Setting(own_slip_features=True).slip_features == SLIP_FEATURES
+    relative = Setting(features=ANY_FEATURES, own_slip_features=True).slip_features
+    assert relative[: len(ANY_FEATURES)] == ANY_FEATURES
+    added = relative[len(ANY_FEATURES) :]
+    assert added == tuple(spec for spec in SLIP_FEATURES if spec.seconds)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Rule that decides whether a finger slides: a probability, smoothed, with its own threshold."""
+"""Rule that decides whether a finger slides, from a smoothed probability, and how fast."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -40,6 +40,63 @@ class SlipThresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     recordings: dict[str, str] = {}
 
 
+class SpeedRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Estimate of the speed of a finger that slides, from the features of its slip rule.
+
+    The speed is v = min(max(z, 0)^2, highest) [mm/s], with the standardised features
+    u_j = (phi_j - mean_j) / scale_j and
+
+        z = intercept + sum_j coefficients_j u_j + sum_j squares_j min(|u_j|, 5)^2
+
+    Attributes:
+        mean: of each feature, over the sliding samples of the training.
+        scale: standard deviation of each feature there.
+        coefficients: of the standardised features.
+        squares: coefficients of their squares.
+        intercept: of z.
+        highest: no speed is above that of the training [mm/s].
+
+    Raises:
+        ModelError: lengths differ, or a number is not finite or out of range.
+    """
+
+    mean: tuple[float, ...]
+    scale: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    squares: tuple[float, ...]
+    intercept: float
+    highest: float
+
+    def __post_init__(self) -> None:
+        columns = (self.mean, self.scale, self.coefficients, self.squares)
+        if len(set(map(len, columns))) != 1:
+            given = ", ".join(str(len(column)) for column in columns)
+            raise ModelError(
+                f"{given} means, scales, coefficients and squares of the slip speed given; the "
+                "same number of each expected"
+            )
+        if min((*self.scale, self.highest)) <= 0:
+            raise ModelError("scales and a highest slip speed above 0 expected")
+        with np.errstate(over="ignore", invalid="ignore"):
+            numbers = (*self.weights(), *self.square_weights().ravel(), self.highest)
+        if not np.isfinite(numbers).all():
+            raise ModelError("a number of the slip speed is not finite")
+
+    @property
+    def n_features(self) -> int:
+        """Number of features of its input."""
+        return len(self.mean)
+
+    def weights(self) -> Array:
+        """Return the weights of z: first the offset, then one weight for each raw feature."""
+        folded = np.array(self.coefficients) / np.array(self.scale)
+        return np.append(self.intercept - float(folded @ np.array(self.mean)), folded)
+
+    def square_weights(self) -> Array:
+        """Return (3, n_features) mean, 1 / scale and weight of the squares."""
+        return np.array([self.mean, 1.0 / np.array(self.scale), self.squares])
+
+
 class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Decision whether a finger slides, from features of its own or of the classifier of stability.
 
@@ -61,6 +118,7 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         thresholds: how the threshold was chosen; None if it was given.
         features: input of the classifier; those of the classifier of stability if there are none.
         squares: coefficients of the squares of the standardised features, if there are any.
+        speed: how fast the finger slides, if it is estimated.
 
     Raises:
         ModelError: a duration is out of range, or the fields contradict each other.
@@ -72,6 +130,7 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     thresholds: SlipThresholds | None = None
     features: tuple[FeatureSpec, ...] | msgspec.UnsetType = msgspec.UNSET
     squares: tuple[float, ...] | msgspec.UnsetType = msgspec.UNSET
+    speed: SpeedRule | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         for name, seconds in (("smoothing", self.smoothing), ("hold", self.hold)):
@@ -88,6 +147,11 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ModelError("a feature of the slip rule is given twice")
         if self.squares is not msgspec.UNSET and self.features is msgspec.UNSET:
             raise ModelError("squares given without features; a slip rule with both expected")
+        if self.speed is not msgspec.UNSET and self.speed.n_features != expected:
+            raise ModelError(
+                f"{self.speed.n_features} features of the slip speed given, the slip rule expects "
+                f"{expected}"
+            )
         with np.errstate(over="ignore", invalid="ignore"):
             is_finite = np.isfinite(self.square_weights()).all()
         if not is_finite:
@@ -117,7 +181,7 @@ def add_squares(value: float, features: Array, squares: Array) -> float:
     Args:
         value: log odds without them.
         features: (n_features,) or more.
-        squares: (3, n_features) as of `SlipRule.square_weights`.
+        squares: (3, n_features) as of `square_weights` of a rule.
     """
     # z + sum_j q_j min(|u_j|, 5)^2, u_j = (phi_j - mean_j) / scale_j.
     for j in range(squares.shape[1]):
@@ -137,6 +201,13 @@ def smooth(smoothed: float, value: float, gain: float) -> float:
 def probability_of(log_odds: float) -> float:
     """Return 1 / (1 + exp(-log odds))."""
     return 1.0 / (1.0 + math.exp(-log_odds))
+
+
+@compiled_step
+def speed_of(value: float, highest: float) -> float:
+    """Return the speed of a slip from z, see `SpeedRule`, both up to the highest [mm/s]."""
+    root = max(value, 0.0)
+    return min(root * root, highest)
 
 
 def raised_at(times: Array, probability: Array, threshold: float, hold: float) -> Flags:

@@ -110,6 +110,15 @@ class TrainingOptions:
         typer.Option(help="Time for which UNSTABLE is kept after the last unstable sample [s]."),
     ] = None
     hysteresis: HysteresisOption = None
+    own_slip_features: Annotated[
+        bool,
+        typer.Option(
+            "--own-slip-features",
+            help="Give the slip rule features of its own, which see single taxels move, and their "
+            "squares; it also estimates how fast a finger slides, where the recordings have the "
+            "true speed.",
+        ),
+    ] = False
     max_samples: Annotated[
         int,
         typer.Option(
@@ -174,6 +183,7 @@ def train(
       holdfast train recordings/ -o model.json
       holdfast train recordings/ -o model.json --split object --classifier svm
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
+      holdfast train recordings/ -o model.json --features holdfast --own-slip-features
       holdfast train recordings/ -o model.json --init builtin:any
       holdfast train recordings/ -o model.json --engine dask:tcp://hub:8786
     """

@@ -22,8 +22,9 @@ from holdfast.features.arrays import Floats2, Floats3, Integers1, Integers2
     SLIP_THRESHOLD,  # of the probability of a slip; NaN without a slip rule
     SLIP_GAIN,  # share of a new sample in the smoothed log odds
     SLIP_HOLD,  # time for which a slip is still reported [s]
+    HIGHEST_SPEED,  # of a slip [mm/s]; NaN without a speed rule
     SLIP_LIMITS_WIDTH,
-) = range(4)
+) = range(5)
 
 # DecisionMemory.codes.
 (
@@ -37,6 +38,8 @@ from holdfast.features.arrays import Floats2, Floats3, Integers1, Integers2
 NO_EXCESS, TOUCH, DRIFT = range(3)
 NO_SLIP_RULE = -1.0
 """Probability of a slip of a finger without a slip rule."""
+NO_SPEED_RULE = -1.0
+"""Speed and distance of a slip of a finger without a speed rule."""
 
 # DecisionMemory.values.
 (
@@ -51,10 +54,13 @@ NO_SLIP_RULE = -1.0
     SLIP_LOG_ODDS,  # smoothed log odds of a slip; NaN before the first
     SLIP_PROBABILITY,  # NaN without an estimate, NO_SLIP_RULE without a rule
     LAST_SLIP,  # time of the last sample over the threshold of a slip [s]
+    SPEED,  # of the slip [mm/s]; NaN without an estimate, NO_SPEED_RULE without a rule
+    DISTANCE,  # slid since the slip began [mm]; likewise
+    SLID_AT,  # time of the last sample that slides [s]; NaN while it does not slide
     FILTERED,  # log odds of stable to unstable by the forward filter; NaN before the first sample
     FILTERED_AT,  # time of that sample [s]
     DECIDED_WIDTH,
-) = range(16)  # fmt: skip
+) = range(19)  # fmt: skip
 
 # Rows of the report, one for each finger.
 (
@@ -64,8 +70,10 @@ NO_SLIP_RULE = -1.0
     REPORT_SIGMA,
     REPORT_FORCE, _, _,  # F_tip, in three components
     REPORT_SLIP,  # probability of a slip; NO_SLIP_RULE without a rule
+    REPORT_SPEED,  # of the slip [mm/s]; NO_SPEED_RULE without a speed rule
+    REPORT_DISTANCE,  # slid since the slip began [mm]; likewise
     REPORT_WIDTH,
-) = range(9)  # fmt: skip
+) = range(11)  # fmt: skip
 
 
 class DecisionRule(NamedTuple):
@@ -77,6 +85,8 @@ class DecisionRule(NamedTuple):
     slips: Floats2  # (n_fingers, n_features + 1)
     n_slip_weights: Integers1  # (n_fingers,)
     squares: Floats3  # (n_fingers, 3, n_features) of `SlipRule.square_weights`, or n_features is 0
+    speeds: Floats2  # (n_fingers, n_features + 1), or (n_fingers, 0) without speed rules
+    speed_squares: Floats3  # (n_fingers, 3, n_features) of `SpeedRule.square_weights`
     slip_limits: Floats2  # (n_fingers, SLIP_LIMITS_WIDTH)
     limits: Floats2  # (n_fingers, LIMITS_WIDTH)
     hysteresis: float

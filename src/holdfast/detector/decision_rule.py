@@ -4,12 +4,20 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple, Self, TypeVar
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE, add_scores
 from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
-from holdfast.classifiers.slip import add_squares, probability_of, smooth
+from holdfast.classifiers.slip import (
+    SlipRule,
+    SpeedRule,
+    add_squares,
+    probability_of,
+    smooth,
+    speed_of,
+)
 from holdfast.compiled import compiled_step, inlined
 from holdfast.contact import (
     NO_CONTACT,
@@ -108,6 +116,8 @@ def fill_report(
     )
     report[f, rule_at.REPORT_PROBABILITY] = decision.values[f, rule_at.PROBABILITY]
     report[f, rule_at.REPORT_SLIP] = decision.values[f, rule_at.SLIP_PROBABILITY]
+    report[f, rule_at.REPORT_SPEED] = decision.values[f, rule_at.SPEED]
+    report[f, rule_at.REPORT_DISTANCE] = decision.values[f, rule_at.DISTANCE]
     report[f, rule_at.REPORT_SIGMA] = output.values[f, at.SIGMA]
     for axis in range(3):
         report[f, rule_at.REPORT_FORCE + axis] = output.values[f, at.FORCE + axis]
@@ -131,6 +141,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         for part in parts
     ]
     slips, squares = _slip_weights(parts)
+    speeds, speed_squares = _speed_weights(parts)
     any_finger = ANY_FINGER in model.fingers
     return DecisionRule(
         weights=weights,
@@ -139,6 +150,8 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         slips=slips,
         n_slip_weights=np.array([len(part.all_features) + 1 for part in parts]),
         squares=squares,
+        speeds=speeds,
+        speed_squares=speed_squares,
         slip_limits=_slip_limits(parts, plan.rate),
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
@@ -177,12 +190,38 @@ def _slip_weights(parts: Sequence[FingerModel]) -> tuple[Array, Array]:
     squares = np.zeros((len(parts), 3, width if has_squares else 0))
     for row, square, part in zip(weights, squares, parts, strict=True):
         if part.slip is not None:
-            features = part.slip.used_features(part.features)
-            places = np.array([part.all_features.index(spec) for spec in features])
+            places = _slip_places(part, part.slip)
             np.add.at(row, np.append(0, places + 1), part.slip.classifier.weights())
             if has_squares:
                 square[:, places] = part.slip.square_weights()
     return weights, squares
+
+
+def _speed_weights(parts: Sequence[FingerModel]) -> tuple[Array, Array]:
+    """Return the weights of the speed rules, and of their squares, as `_slip_weights`."""
+    width = max(len(part.all_features) for part in parts)
+    if not any(_speed_rule(part) for part in parts):
+        return np.zeros((len(parts), 0)), np.zeros((len(parts), 3, 0))
+    weights, squares = np.zeros((len(parts), width + 1)), np.zeros((len(parts), 3, width))
+    for row, square, part in zip(weights, squares, parts, strict=True):
+        speed = _speed_rule(part)
+        if part.slip is not None and speed is not None:
+            places = _slip_places(part, part.slip)
+            np.add.at(row, np.append(0, places + 1), speed.weights())
+            square[:, places] = speed.square_weights()
+    return weights, squares
+
+
+def _slip_places(part: FingerModel, rule: SlipRule) -> Integers:
+    """Return the places of the features of a slip rule in all features of its finger."""
+    used = rule.used_features(part.features)
+    return np.array([part.all_features.index(spec) for spec in used])
+
+
+def _speed_rule(part: FingerModel) -> SpeedRule | None:
+    """Return how a finger estimates the speed of a slip; None if it does not."""
+    speed = None if part.slip is None else part.slip.speed
+    return None if speed is msgspec.UNSET else speed
 
 
 def _slip_limits(parts: Sequence[FingerModel], rate: float) -> Array:
@@ -191,7 +230,12 @@ def _slip_limits(parts: Sequence[FingerModel], rate: float) -> Array:
     for limit, part in zip(limits, parts, strict=True):
         if part.slip is not None:
             rule = part.slip
-            limit[:] = rule.classifier.threshold, rule.gain(rate), rule.hold
+            limit[: rule_at.HIGHEST_SPEED] = (
+                rule.classifier.threshold, rule.gain(rate), rule.hold
+            )  # fmt: skip
+            speed = _speed_rule(part)
+            if speed is not None:
+                limit[rule_at.HIGHEST_SPEED] = speed.highest
     return limits
 
 
@@ -232,14 +276,19 @@ class ProbabilityFeeder:
 
 
 def new_decision_memory(
-    n_fingers: int, n_causes: int = 0, has_slip_rule: Flags | None = None
+    n_fingers: int, n_causes: int = 0, slip_limits: Array | None = None
 ) -> DecisionMemory:
     """Return the memory before the first sample; of fingers without slip rules by default."""
+    if slip_limits is None:
+        slip_limits = np.full((n_fingers, rule_at.SLIP_LIMITS_WIDTH), np.nan)
     values = np.full((n_fingers, rule_at.DECIDED_WIDTH), np.nan)
     values[:, rule_at.REST : rule_at.PEAK + 1] = 0.0
     values[:, rule_at.SHAKEN_AT] = -np.inf
-    has_none = slice(None) if has_slip_rule is None else ~has_slip_rule
-    values[has_none, rule_at.SLIP_PROBABILITY] = rule_at.NO_SLIP_RULE
+    has_no_rule = np.isnan(slip_limits)
+    values[has_no_rule[:, rule_at.SLIP_THRESHOLD], rule_at.SLIP_PROBABILITY] = rule_at.NO_SLIP_RULE
+    has_no_speed = has_no_rule[:, rule_at.HIGHEST_SPEED]
+    values[has_no_speed, rule_at.SPEED] = rule_at.NO_SPEED_RULE
+    values[has_no_speed, rule_at.DISTANCE] = rule_at.NO_SPEED_RULE
     return DecisionMemory(
         codes=np.full((n_fingers, rule_at.CODES_WIDTH), UNKNOWN, dtype=np.int64),
         values=values,
@@ -403,6 +452,8 @@ def _decide(
         if rule.squares.shape[2] > 0:
             value = add_squares(value, output.features[f], rule.squares[f])
         decide_slip(codes, decided, rule.slip_limits[f], value, time, period)
+        if decided[rule_at.SPEED] != rule_at.NO_SPEED_RULE:
+            _follow_slip(output, rule, codes, decided, f, time, period)
     debounce(codes, decided, state, rule.min_duration, time, period)
 
 
@@ -424,13 +475,46 @@ def decide_slip(
         codes[rule_at.SLIPS] = int(_is_held(time, decided[rule_at.LAST_SLIP], hold, period))
 
 
+@inlined
+def _follow_slip(
+    output: Output,
+    rule: DecisionRule,
+    codes: Integers,
+    decided: Array,
+    f: int,
+    time: float,
+    period: float,
+) -> None:
+    """Report speed and distance of the slip of a finger; both are 0 while it does not slide."""
+    if codes[rule_at.SLIPS] == 0:
+        decided[rule_at.SPEED] = decided[rule_at.DISTANCE] = 0.0
+        decided[rule_at.SLID_AT] = math.nan
+        return
+    # z by the weights of the speed rule, v = min(max(z, 0)^2, highest).
+    value = log_odds(output.features[f], rule.speeds[f, : rule.n_slip_weights[f]])
+    value = add_squares(value, output.features[f], rule.speed_squares[f])
+    speed = speed_of(value, rule.slip_limits[f, rule_at.HIGHEST_SPEED])
+    # s = sum_k v(k) (t(k) - t(k-1)), the first step one period.
+    if math.isnan(decided[rule_at.SLID_AT]):
+        decided[rule_at.DISTANCE] = speed * period
+    else:
+        decided[rule_at.DISTANCE] += speed * (time - decided[rule_at.SLID_AT])
+    decided[rule_at.SPEED], decided[rule_at.SLID_AT] = speed, time
+
+
 @compiled_step
 def end_slip(codes: Integers, decided: Array, probability: float) -> None:
-    """Report no slip, with a probability of 0 without contact or NaN without an estimate."""
+    """Report no slip, with a probability of 0 without contact or NaN without an estimate.
+
+    Speed and distance are that number, too.
+    """
     if decided[rule_at.SLIP_PROBABILITY] != rule_at.NO_SLIP_RULE:
         codes[rule_at.SLIPS] = 0
         decided[rule_at.SLIP_LOG_ODDS] = decided[rule_at.LAST_SLIP] = math.nan
         decided[rule_at.SLIP_PROBABILITY] = probability
+    if decided[rule_at.SPEED] != rule_at.NO_SPEED_RULE:
+        decided[rule_at.SPEED] = decided[rule_at.DISTANCE] = probability
+        decided[rule_at.SLID_AT] = math.nan
 
 
 @compiled_step

@@ -19,11 +19,14 @@ from holdfast.contact import (
 )
 from holdfast.detector.arrays import (
     NO_SLIP_RULE,
+    NO_SPEED_RULE,
     REPORT_CODE,
+    REPORT_DISTANCE,
     REPORT_FORCE,
     REPORT_PROBABILITY,
     REPORT_SIGMA,
     REPORT_SLIP,
+    REPORT_SPEED,
 )
 from holdfast.detector.decision_rule import TraceRows, estimate_code, split_code
 from holdfast.sensors.types import Array, Integers
@@ -63,12 +66,16 @@ def estimates_of(
     """
     estimates: dict[Name, ContactEstimate] = {}
     known = _DECISIONS
-    for name, (time, code, probability, sigma, x, y, z, slip) in zip(names, report, strict=False):
+    for name, row in zip(names, report, strict=False):
+        time, code, probability, sigma, x, y, z, slip, speed, distance = row
+        has_speed = speed != NO_SPEED_RULE
         state, reason, faults, cause = known[code]
         taxels = taxels_of(int(taxel_masks[len(estimates)])) if faults else ()
         estimates[name] = ContactEstimate(
             time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
             None if slip == NO_SLIP_RULE else slip,
+            speed if has_speed else None,
+            distance if has_speed else None,
         )  # fmt: skip
     return estimates
 
@@ -88,6 +95,9 @@ class FingerTrace(NamedTuple):
         cause: (n,) codes of the causes while UNSTABLE, or while it slides: 1 is the first of
             `Cause`; 0 for none.
         slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
+        slip_speed: (n,) speed of the slip [mm/s]; 0 while the finger does not slide, NaN while
+            UNKNOWN. None for a model without a speed rule.
+        slip_distance: (n,) slid since the slip began [mm]; likewise.
     """
 
     times: Array
@@ -100,6 +110,8 @@ class FingerTrace(NamedTuple):
     faulty_taxels: Integers
     cause: npt.NDArray[np.int8]
     slip_probability: Array | None = None
+    slip_speed: Array | None = None
+    slip_distance: Array | None = None
 
     def __len__(self) -> int:
         return len(self.times)
@@ -112,10 +124,15 @@ class FingerTrace(NamedTuple):
         """Return the estimates of these samples."""
         fields = (self.state, self.reason, self.faults, self.cause)
         codes = estimate_code(*(field[rows].astype(np.int64) for field in fields))
-        slips = self.slip_probability
-        if slips is None:
-            slips = np.full(len(self), NO_SLIP_RULE)
-        columns = (self.times, self.stable_probability, self.instability, *self.force.T, slips)
+        slips = [
+            np.full(len(self), missing) if column is None else column
+            for column, missing in (
+                (self.slip_probability, NO_SLIP_RULE),
+                (self.slip_speed, NO_SPEED_RULE),
+                (self.slip_distance, NO_SPEED_RULE),
+            )
+        ]
+        columns = (self.times, self.stable_probability, self.instability, *self.force.T, *slips)
         times, *numbers = (column[rows] for column in columns)
         report = np.column_stack([times, codes, *numbers]).tolist()
         numbered = estimates_of(range(len(report)), report, self.faulty_taxels[rows])
@@ -166,7 +183,6 @@ def detection_of(
 
 def _trace_of(times: Array, report: Array, taxels: Integers) -> FingerTrace:
     state, reason, faults, cause = split_code(report[:, REPORT_CODE].astype(np.int64))
-    slips = report[:, REPORT_SLIP].copy()
     return FingerTrace(
         times,
         state.astype(np.int8),
@@ -177,5 +193,13 @@ def _trace_of(times: Array, report: Array, taxels: Integers) -> FingerTrace:
         faults.astype(np.int16),
         taxels,
         cause.astype(np.int8),
-        None if (slips == NO_SLIP_RULE).any() else slips,
+        _column(report, REPORT_SLIP, NO_SLIP_RULE),
+        _column(report, REPORT_SPEED, NO_SPEED_RULE),
+        _column(report, REPORT_DISTANCE, NO_SPEED_RULE),
     )
+
+
+def _column(report: Array, place: int, missing: float) -> Array | None:
+    """Return a copy of a column of the report; None if the model has no rule for it."""
+    column = report[:, place].copy()
+    return None if (column == missing).any() else column

@@ -23,7 +23,7 @@ from holdfast.contact import (
     StateChanges,
 )
 from holdfast.detector.address_table import table_of
-from holdfast.detector.arrays import REPORT_CODE, REPORT_WIDTH, SLIP_THRESHOLD, THRESHOLD
+from holdfast.detector.arrays import REPORT_CODE, REPORT_WIDTH, THRESHOLD
 from holdfast.detector.decision_rule import (
     ProbabilityFeeder,
     TraceRows,
@@ -158,9 +158,8 @@ class Detector:
         if not all(isinstance(part.classifier, LinearClassifier) for part in self._parts):
             self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
             self._n_together = -1  # `update` takes the plain way
-        has_slip_rule = np.isfinite(self._rule.slip_limits[:, SLIP_THRESHOLD])
         n_causes = self._rule.causes.shape[1]
-        self._decision = new_decision_memory(len(self._slots), n_causes, has_slip_rule)
+        self._decision = new_decision_memory(len(self._slots), n_causes, self._rule.slip_limits)
         arrays = StepArrays(
             stream.layout, stream.memory, stream.output, self._rule, self._decision,
             self._readings, self._present, self._report, KNOWN_TYPES,

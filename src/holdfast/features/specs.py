@@ -38,6 +38,15 @@ RATIO_KINDS = ("shear_gain", "normal_gain", "ratio_gain")
 RELATIVE_KINDS = (*LAG_KINDS, *SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
 """Kinds that look back by a lag in seconds, relative to load or noise; see `features.motion`."""
 
+OF_TWO_TAXELS = (
+    "residual",
+    "shear_residual",
+    "pressure_shift",
+    "moment_change",
+    *(f"{mean}second_{name}" for mean in ("", "mean_") for name in ("shared", "own", "top")),
+)
+"""Kinds that compare taxels, so that a sensor of one taxel has none of them."""
+
 FEATURE_KINDS = (*VALUE_KINDS, *RELATIVE_KINDS)
 """All kinds. The code of a kind is its position."""
 TRANSFORMS = ("none", "log", "noise", "relative")
@@ -121,6 +130,11 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             )
         if not (np.isfinite(self.floor) and self.floor >= 0):
             raise ValueError(f"a floor of at least 0 expected, {self.floor} given")
+
+    @property
+    def min_taxels(self) -> int:
+        """Number of taxels from which a sensor has the feature."""
+        return 2 if self.kind in OF_TWO_TAXELS else 1
 
     def __str__(self) -> str:
         text = f"{self.kind}[{self.window}]" if self.window else self.kind

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from holdfast.contact import ContactState, HandEstimate
+from holdfast.detector.slips import SlipWatch
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
@@ -48,6 +49,7 @@ class StatusPublisher:
         self._grip = grip
         self._report = report
         self._faults = FaultWatch()
+        self._slips = SlipWatch()
         self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._newest: HandEstimate | None = None
@@ -93,6 +95,12 @@ class StatusPublisher:
             ],
             thresholds=dict(self._session.stream.thresholds),
             grip=None if self._grip is None else self._grip.document(),
+            slips=[
+                schema.SlipDocument(*slip)
+                for estimate, updated in estimates
+                for name in updated
+                for slip in self._slips.update(name, [estimate.fingers[name]])
+            ],
         )
 
     def _watch_faults(self, estimates: list[StreamEstimate]) -> None:
@@ -221,4 +229,5 @@ def _finger_series(estimates: list[StreamEstimate], name: str) -> schema.Estimat
         stable_probability=[np.nan if row is None else row.stable_probability for row in rows],
         state=[None if row is None else row.state.code for row in rows],
         slip_probability=[None if row is None else row.slip_probability for row in rows],
+        slip_speed=[None if row is None else row.slip_speed for row in rows],
     )

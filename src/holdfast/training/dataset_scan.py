@@ -101,12 +101,14 @@ class DatasetScan:
     Attributes:
         recordings: in the order of the dataset.
         sensors: sensor of each finger that has labels; the first one, if they differ.
+        smallest: the sensor with the fewest taxels of all of them.
         requested_rate: rate of the model [Hz]; None for that of the recordings.
         relative: whether the model is for any sensor and rate.
     """
 
     recordings: tuple[ScannedRecording, ...]
     sensors: dict[str, Sensor]
+    smallest: Sensor
     requested_rate: float | None = None
     relative: bool = False
 
@@ -184,18 +186,20 @@ def combine_scans(
     """Return the scan of a dataset from those of its recordings; see `scan_dataset`."""
     scanned: list[ScannedRecording] = []
     sensors: dict[str, Sensor] = {}
+    smallest: Sensor | None = None
     for recording, sensors_of_recording in scans:
         scanned.append(recording)
         for finger, sensor in sensors_of_recording.items():
             known = sensors.setdefault(finger, sensor)
+            smallest = min(smallest or sensor, sensor, key=lambda each: each.n_taxels)
             if not relative:
                 _check_same_sensor(f"{finger} of {recording.name!r}", sensor, known)
     if not scanned:
         raise TrainingError("no recordings given; at least one expected")
-    if not sensors:
+    if smallest is None:
         raise TrainingError(f"none of the {len(scanned)} recordings has labels to train from")
     _check_no_duplicates(scanned)
-    return DatasetScan(tuple(scanned), sensors, rate, relative)
+    return DatasetScan(tuple(scanned), sensors, smallest, rate, relative)
 
 
 def _check_rate(recording: Recording) -> None:

@@ -10,6 +10,7 @@ from msgspec import UNSET
 
 from holdfast.classifiers import Parameters
 from holdfast.errors import TrainingError
+from holdfast.features import FeatureSpec
 from holdfast.metrics import SampleMetrics
 from holdfast.model import FingerModel, Model, Training
 from holdfast.recordings import Recording
@@ -32,12 +33,14 @@ class TrainingData:
         data_split: of the dataset into units.
         fingers: training samples of each classifier: by finger, or `"*"` for all fingers.
         slips: training samples of each slip rule, likewise.
+        slip_features: of the slip rules alone; None for those of the classifiers.
     """
 
     scan: DatasetScan
     data_split: DataSplit
     fingers: Mapping[str, FingerSamples]
     slips: Mapping[str, SlipSamples] = field(default_factory=dict)
+    slip_features: tuple[FeatureSpec, ...] | None = None
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], setting: Setting) -> Self:
@@ -122,7 +125,7 @@ def fit_model(
                 pool.contact_threshold(recordings) if threshold is None else threshold
             ),
             contact_load=setting.contact_load_of(finger),
-            slip=data.slips[finger].fit(held) if finger in data.slips else None,
+            slip=data.slips[finger].fit(held, data.slip_features) if finger in data.slips else None,
         )
     if not fingers:
         return None

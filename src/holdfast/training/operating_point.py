@@ -175,9 +175,10 @@ def choose_operating_point(
     """Choose the thresholds of a model on own handling.
 
     The threshold of stability is at most `EQUAL_ODDS` or that of the model, the threshold of slips
-    at least that of the model. Up to there it is the highest (of slips the lowest) at which enough held samples are quiet: `STABLE_SHARE` of them STABLE, a slip reported
-    in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which there are at most
-    so many alarms of either kind.
+    at least that of the model. Up to there it is the highest (of slips the lowest) at which enough
+    held samples are quiet: `STABLE_SHARE` of them STABLE, a slip reported in at most
+    `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which there are at most so many
+    alarms of either kind.
 
     Args:
         handling: decided with its own location and scale.

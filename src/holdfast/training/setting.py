@@ -9,6 +9,7 @@ from holdfast.classifiers.logreg import linear_prior
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
+from holdfast.features.specs import SLIP_FEATURES
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.training.tuning import OBJECTIVES, Objective
 
@@ -53,6 +54,8 @@ class Setting:
         max_samples: maximum number of samples per finger that are kept in memory.
         hold: time for which UNSTABLE is still reported after the last unstable sample [s].
         hysteresis: distance past its threshold that a probability needs to change the state.
+        own_slip_features: whether the slip rule has features of its own, and squares of them, so
+            that it sees single taxels move; else it has `features`.
         init: model to adapt to the data, with its features and window; None for none.
 
     Raises:
@@ -75,6 +78,7 @@ class Setting:
     max_samples: int = MAX_SAMPLES
     hold: float = 0.0
     hysteresis: float = 0.0
+    own_slip_features: bool = False
     init: Model | None = None
 
     def __post_init__(self) -> None:
@@ -104,6 +108,12 @@ class Setting:
             raise ModelError(
                 f"one classifier for all fingers (shared) cannot be adapted from "
                 f"{_name(self.init)}, which has one for each of {', '.join(self.init.fingers)}"
+            )
+
+        if self.own_slip_features and self.init is not None:
+            raise ValueError(
+                "own slip features given with a model to adapt, which keeps its slip rule; leave "
+                "one of them out"
             )
 
     @classmethod
@@ -146,6 +156,19 @@ class Setting:
     def relative(self) -> bool:
         """Whether all features are relative: the model then fits any sensor, unit and rate."""
         return all(spec.seconds for spec in self.features)
+
+    @property
+    def slip_features(self) -> tuple[FeatureSpec, ...] | None:
+        """Features of the slip rule alone; None if it has those of stability.
+
+        Beside relative features, it has only relative ones of its own.
+        """
+        if not self.own_slip_features:
+            return None
+        if not self.relative:
+            return SLIP_FEATURES
+        relative = (spec for spec in SLIP_FEATURES if spec.seconds)
+        return tuple(dict.fromkeys((*self.features, *relative)))
 
     @property
     def used_tare(self) -> Tare:

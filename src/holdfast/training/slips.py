@@ -35,6 +35,7 @@ from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Flags
 from holdfast.training.dataset_scan import OneRecording, Progress
 from holdfast.training.evaluation import compute_decisions
+from holdfast.training.slip_speed import SpeedSamples, speed_samples
 from holdfast.training.training_samples import (
     FingerSamples,
     SamplesPlan,
@@ -75,10 +76,12 @@ class SlipSamples:
     Attributes:
         own: of the finger; class 1 slides. All that slide are kept, and some that hold still.
         n_still: number of samples that hold still, before thinning.
+        speeds: samples of the speed rule; None if no speed is known.
     """
 
     own: FingerSamples
     n_still: int
+    speeds: SpeedSamples | None = None
 
     @property
     def n_sliding(self) -> int:
@@ -95,8 +98,9 @@ class SlipSamples:
 
         Args:
             held: units whose samples are left out.
-            features: of the samples, for a rule with features of its own and with squares; those
-                of the classifier of stability, without squares, by default.
+            features: of the samples, for a rule with features of its own and with squares, which
+                estimates the speed, too, where it is known; those of the classifier of
+                stability, without squares, by default.
 
         Returns:
             The rule; None with too few sliding samples, or none that hold still.
@@ -110,7 +114,18 @@ class SlipSamples:
         thinning = np.log(self.n_still / kept)  # odds of sliding fall by the samples left out
         offset = rule.classifier.offset - float(thinning)
         classifier = msgspec.structs.replace(rule.classifier, offset=offset, threshold=0.5)
-        return msgspec.structs.replace(rule, classifier=classifier)
+        rule = msgspec.structs.replace(rule, classifier=classifier)
+        return rule if features is None else self.with_speed(rule, held)
+
+    def with_speed(self, rule: SlipRule, held: Collection[int]) -> SlipRule:
+        """Return a rule that estimates the speed, too, if enough samples have one.
+
+        Args:
+            rule: with the features of the samples.
+            held: units whose samples are left out.
+        """
+        speed = None if self.speeds is None else self.speeds.fit(held)
+        return rule if speed is None else msgspec.structs.replace(rule, speed=speed)
 
 
 def _fitted_rule(
@@ -153,17 +168,24 @@ def gather_slip_samples(
         By finger; none without a truth or labels of slips.
     """
     parts: dict[str, list[FingerSamples]] = {finger: [] for finger in plan.scan.sensors}
+    speeds: dict[str, list[SpeedSamples]] = {finger: [] for finger in plan.scan.sensors}
     calls = ((place, OneRecording(recordings, place)) for place in plan.places)
     read = engine.map_ordered(_samples_of_part, calls, shared=(plan,))
     for fingers in progress(read, "slips", len(plan.places)):
-        for finger, samples in fingers.items():
+        for finger, (samples, speed) in fingers.items():
             parts[finger].append(samples)
+            speeds[finger] += [speed] if speed is not None else []
     no_rest = np.zeros((len(plan.scan.recordings), 3))
     by_finger = {finger: join_samples(part, no_rest) for finger, part in parts.items() if part}
     if plan.setting.is_shared and by_finger:
         by_finger = {ANY_FINGER: pool_fingers(by_finger)}
+        speeds = {ANY_FINGER: [part for finger in speeds.values() for part in finger]}
     return {
-        finger: SlipSamples(own, own.n_usable - int(own.samples.stable.sum()))
+        finger: SlipSamples(
+            own,
+            own.n_usable - int(own.samples.stable.sum()),
+            SpeedSamples.joined(speeds[finger]) if speeds[finger] else None,
+        )
         for finger, own in by_finger.items()
         if own.samples.stable.any()
     }
@@ -171,7 +193,7 @@ def gather_slip_samples(
 
 def _samples_of_part(
     plan: SamplesPlan, place: int, part: Sequence[Recording]
-) -> dict[str, FingerSamples]:
+) -> dict[str, tuple[FingerSamples, SpeedSamples | None]]:
     """Return the samples of one recording by finger; class 1 slides.
 
     A model of one hand learns the first 0.1 s of slips, and to tell them from pushes. On real
@@ -199,15 +221,18 @@ def _samples_of_part(
         quiet = usable[is_still & is_quiet][:: step * (1 if scan.relative else QUIET_STEP)]
         disturbed = usable[is_still & ~is_quiet][::step]
         kept = np.sort(np.concatenate([usable[~is_still], quiet, disturbed]))
-        fingers[finger] = FingerSamples(
+        units = plan.data_split.units_of(place, module.n_samples)
+        samples = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),
-            plan.data_split.units_of(place, module.n_samples)[kept],
+            units[kept],
             np.full(len(kept), place),
             module.times[kept] - recording.start,
             np.zeros((1, 3)),
             len(usable),
         )
+        speed = speed_samples(recording, finger, rows.features, truth, units)
+        fingers[finger] = samples, speed
     return fingers
 
 

@@ -8,6 +8,7 @@ import msgspec
 
 from holdfast.classifiers import Parameters, Samples
 from holdfast.classifiers.logreg import linear_prior
+from holdfast.features import FeatureSpec
 from holdfast.metrics import (
     Decisions,
     Metrics,
@@ -168,16 +169,22 @@ class _Trainer:
         scans = engine.map_ordered(_scan_part, parts, shared=(setting.relative,))
         read = progress(scans, "reading", len(recordings))
         self.scan = combine_scans(read, setting.rate, relative=setting.relative)
+        if setting.init is None:
+            setting = replace(setting, features=self._that_fit(setting.features))
         self.setting = setting = self._with_split(self._with_handling(setting))
         self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
         self.fingers = gather_samples(
             recordings, self.scan, setting, self.data_split, engine, progress
         )
-        plan = SamplesPlan(self.scan, setting, self.data_split)
+        slip_features = setting.slip_features and self._that_fit(setting.slip_features)
+        slip_setting = replace(setting, features=slip_features or setting.features)
+        plan = SamplesPlan(self.scan, slip_setting, self.data_split)
         slips = (
             gather_slip_samples(recordings, plan, engine, progress) if setting.init is None else {}
         )
-        self.data = TrainingData(self.scan, self.data_split, self.fingers, slips)
+        if slip_features and not slips:
+            warn("no slips are known in the recordings: the model gets no slip rule")
+        self.data = TrainingData(self.scan, self.data_split, self.fingers, slips, slip_features)
         self.slip_curves: list[tuple[Mapping[str, Curve], int]] = []
 
     def _with_handling(self, setting: Setting) -> Setting:
@@ -197,6 +204,20 @@ class _Trainer:
             "and too good; the next grasp is another"
         )
         return replace(setting, split="time")
+
+    def _that_fit(self, features: tuple[FeatureSpec, ...]) -> tuple[FeatureSpec, ...]:
+        """Return the features that all sensors have, and warn of those that are left out."""
+        smallest, n_taxels = self.scan.smallest, self.scan.smallest.n_taxels
+        left_out = [spec for spec in features if spec.min_taxels > n_taxels]
+        if not left_out:
+            return features
+        kinds = ", ".join(dict.fromkeys(spec.kind for spec in left_out))
+        least = max(spec.min_taxels for spec in left_out)
+        self.warn(
+            f"{kinds} left out: {smallest.name} has {n_taxels} taxel{'s' * (n_taxels > 1)}, they "
+            f"need at least {least}"
+        )
+        return tuple(spec for spec in features if spec.min_taxels <= n_taxels)
 
     @property
     def tares(self) -> LoadedTares:

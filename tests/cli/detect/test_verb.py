@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule
+from holdfast.classifiers.slip import SlipRule, SpeedRule
 from holdfast.cli import main
 from holdfast.cli.detect.verb import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
@@ -30,7 +30,7 @@ from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
     "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults",
-    "faulty_taxels", "cause", "slip_probability",
+    "faulty_taxels", "cause", "slip_probability", "slip_speed", "slip_distance",
 ]  # fmt: skip
 NOISE_FLOOR = "builtin:noise-floor"
 NO_SLIP_RULE = (
@@ -118,6 +118,8 @@ def plain(estimate):
         "faulty_taxels": [taxel + 1 for taxel in estimate.faulty_taxels],
         "cause": estimate.cause,
         "slip_probability": estimate.slip_probability,
+        "slip_speed": estimate.slip_speed,
+        "slip_distance": estimate.slip_distance,
     }
 
 
@@ -295,9 +297,40 @@ class TestSlips:
         assert main(["detect", str(sliding), str(grasp), "--summary"]) == 0
         out = capsys.readouterr().out
         begin, end, probability = want["thumb"][0]
-        row = rf"^ +{begin:.3f} +{end:.3f} +thumb +{100 * probability:.0f}$"
+        row = rf"^ +{begin:.3f} +{end:.3f} +thumb +{100 * probability:.0f} +-$"
         assert re.search(row, out, re.MULTILINE)
         assert re.search(r"^and \d+ more slips \(--json prints all\)$", out, re.MULTILINE)
+
+    def test_a_speed_rule_gives_the_distance(
+        self, capsys, monkeypatch, sliding, grasp, want, tmp_path
+    ):
+        model, path = Model.load(sliding), tmp_path / "speed.json"
+        rule = SpeedRule((10.0,), (3.0,), (1.0,), (0.0,), 2.0, 50.0)
+        parts = {
+            name: msgspec.structs.replace(part, slip=msgspec.structs.replace(part.slip, speed=rule))
+            for name, part in model.fingers.items()
+        }
+        msgspec.structs.replace(model, fingers=parts).save(path)
+        got, _ = lines(capsys, path, grasp)
+        for line in got:
+            assert (line["slip_speed"] is None) == (line["state"] == "UNKNOWN")
+            assert ((line["slip_speed"] or 0) > 0) == (line["cause"] == "slip")
+        ended = [slip for slip in summary(capsys, path, grasp)["slips"] if slip["end"]]
+        for slip in ended:
+            speeds = [
+                line["slip_speed"]
+                for line in got
+                if line["finger"] == slip["finger"] and slip["begin"] <= line["time"] < slip["end"]
+            ]
+            assert slip["distance"] == pytest.approx(sum(speeds) / 150, rel=1e-6)
+        assert len(ended) > 5
+        monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+        assert main(["detect", str(path), str(grasp)]) == 0
+        rows = [row for row in capsys.readouterr().out.splitlines() if " slip ends " in row]
+        assert len(rows) == len(ended) and all(len(row) <= 80 for row in rows)
+        thumb = next(slip for slip in ended if slip["finger"] == "thumb")
+        shown = f"{thumb['end'] - thumb['begin']:.3f} s, {thumb['distance']:.1f} mm, P(slip)"
+        assert any(shown in row for row in rows)
 
     def test_a_source_without_a_slip_says_so(self, capsys, sliding, save):
         whole = synthetic_recording("a", 1, ("thumb", "index"))

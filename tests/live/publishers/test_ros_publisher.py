@@ -83,24 +83,27 @@ class FakePublisher(RosPublisher):
 def test_topics_and_their_messages():
     before = time.time()
     with FakePublisher(namespace="/robot/hand_1/") as publisher:
-        publisher.publish(estimate(thumb=finger(slip_probability=0.875)))
+        slides = finger(slip_probability=0.875, slip_speed=12.5, slip_distance=0.75)
+        publisher.publish(estimate(thumb=slides))
     assert [topic.removeprefix("/robot/hand_1") for topic in publisher.kinds] == [
         "/hand/state", "/diagnostics",
         "/thumb/state", "/thumb/stable_probability", "/thumb/slip_probability",
-        "/thumb/instability", "/thumb/force",
+        "/thumb/slip_speed", "/thumb/slip_distance", "/thumb/instability", "/thumb/force",
         "/index_1/state", "/index_1/stable_probability", "/index_1/slip_probability",
-        "/index_1/instability", "/index_1/force",
+        "/index_1/slip_speed", "/index_1/slip_distance", "/index_1/instability", "/index_1/force",
     ]  # fmt: skip
     assert publisher.kinds["/robot/hand_1/thumb/force"] == "geometry_msgs/WrenchStamped"
     assert publisher.kinds["/robot/hand_1/index_1/force"] == "geometry_msgs/Vector3Stamped"
     published = {topic: what for topic, what in publisher.published if topic != "/diagnostics"}
-    without_rule = published.pop("/robot/hand_1/index_1/slip_probability")
-    assert math.isnan(without_rule)
+    for field in ("slip_probability", "slip_speed", "slip_distance"):
+        assert math.isnan(published.pop(f"/robot/hand_1/index_1/{field}"))  # without a rule
     assert published == {
         "/robot/hand_1/hand/state": "UNSTABLE",
         "/robot/hand_1/thumb/state": "STABLE",
         "/robot/hand_1/thumb/stable_probability": 0.75,
         "/robot/hand_1/thumb/slip_probability": 0.875,
+        "/robot/hand_1/thumb/slip_speed": 12.5,
+        "/robot/hand_1/thumb/slip_distance": 0.75,
         "/robot/hand_1/thumb/instability": 0.5,
         "/robot/hand_1/thumb/force": ("thumb", (1.0, -2.0, 3.0), True),
         "/robot/hand_1/index_1/state": "UNSTABLE",

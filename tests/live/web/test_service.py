@@ -8,7 +8,7 @@ import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule
+from holdfast.classifiers.slip import SlipRule, SpeedRule
 from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
@@ -18,6 +18,7 @@ from holdfast.live.status import operating_points
 from holdfast.live.stream_detector import StreamDetector, compile_kernels
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
+from holdfast.metrics.masks import runs
 from holdfast.model import ThresholdPoint, Tuning
 from holdfast.web.guard import Guard
 from live import build, estimates
@@ -104,12 +105,17 @@ def with_slip_rule(finger):
         threshold=0.7,
     )  # fmt: skip
     fingers = dict.fromkeys(build.FINGERS, part)
-    fingers[finger] = msgspec.structs.replace(part, slip=SlipRule(classifier, hold=0.05))
+    speed = SpeedRule(
+        classifier.mean, classifier.scale, classifier.coefficients, (0.0,) * n, 0.5, 40.0
+    )
+    fingers[finger] = msgspec.structs.replace(
+        part, slip=SlipRule(classifier, hold=0.05, speed=speed)
+    )
     return msgspec.structs.replace(model, fingers=fingers)
 
 
-def test_probabilities_and_threshold_of_slips_are_in_the_documents():
-    recording, model = build.grasp(), with_slip_rule("thumb")
+def documents_of(recording, model):
+    """Return the first document of a connection, and all live documents of a recording."""
 
     async def work():
         source = build.Script.of(recording)
@@ -124,7 +130,32 @@ def test_probabilities_and_threshold_of_slips_are_in_the_documents():
             session.stop()
             return hello, found
 
-    hello, found = run(work())
+    return run(work())
+
+
+def test_slips_are_in_the_documents():
+    """Each when it begins and when it ends, with the distance that the estimates have."""
+    recording, model = build.grasp(), with_slip_rule("thumb")
+    _, found = documents_of(recording, model)
+    trace = detect(model, recording).fingers["thumb"]
+    slips = [slip for one in found for slip in one["slips"]]
+    slides = trace.slip_distance > 0
+    assert slides.any()
+    expected = [
+        {"finger": "thumb", "begin": trace.times[start], "end": time, "distance": distance}
+        for start, end in runs(slides)
+        for time, distance in (
+            (None, trace.slip_distance[start]), (trace.times[end], trace.slip_distance[end - 1])
+        )
+    ]  # fmt: skip
+    assert [{key: slip[key] for key in expected[0]} for slip in slips] == expected
+    got = [x for one in found for x in one["series"]["fingers"]["thumb"]["slip_speed"]]
+    np.testing.assert_array_equal(np.array(got, dtype=float), trace.slip_speed)
+
+
+def test_probabilities_and_threshold_of_slips_are_in_the_documents():
+    recording, model = build.grasp(), with_slip_rule("thumb")
+    hello, found = documents_of(recording, model)
     thresholds = {name: finger["slip_threshold"] for name, finger in hello["fingers"].items()}
     assert thresholds == {"thumb": 0.7, "index": None, "middle": None}
     trace = detect(model, recording).fingers["thumb"]
@@ -132,7 +163,8 @@ def test_probabilities_and_threshold_of_slips_are_in_the_documents():
     got = [x for one in series for x in one["thumb"]["slip_probability"]]
     np.testing.assert_array_equal(np.array(got, dtype=float), trace.slip_probability)
     assert (trace.slip_probability > 0.7).any()
-    assert {x for one in series for x in one["index"]["slip_probability"]} == {None}
+    for field in ("slip_probability", "slip_speed"):
+        assert {x for one in series for x in one["index"][field]} == {None}
     fingers = [one["fingers"] for one in found if one["fingers"]]
     assert {finger["index"]["slip_probability"] for finger in fingers} == {None}
 
@@ -580,8 +612,11 @@ def test_the_schema_is_that_of_the_documents():
 
     document = run(work())
     assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(document["$defs"])
-    assert "slip_probability" in document["$defs"]["EstimateSeries"]["required"]
-    assert "slip_probability" in document["$defs"]["FingerDocument"]["required"]
+    for field in ("slip_probability", "slip_speed"):
+        assert field in document["$defs"]["EstimateSeries"]["required"]
+        assert field in document["$defs"]["FingerDocument"]["required"]
+    assert "slip_distance" in document["$defs"]["FingerDocument"]["required"]
+    assert {"begin", "end", "distance"} < set(document["$defs"]["SlipDocument"]["required"])
     threshold = document["$defs"]["FingerInfo"]["properties"]["slip_threshold"]
     assert {"type": "null"} in threshold["anyOf"]
 

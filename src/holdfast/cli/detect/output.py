@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec.json import Encoder
 
-from holdfast.cli.detect.slips import DetectedSlip, SlipWatch
 from holdfast.cli.terminal.console import print_line, print_table, visible_json
 from holdfast.contact import (
     LASTING_DURATION,
@@ -21,6 +20,7 @@ from holdfast.contact import (
     StateChanges,
 )
 from holdfast.detector import HAND
+from holdfast.detector.slips import DetectedSlip, SlipWatch
 from holdfast.live.documents import estimate_line
 from holdfast.live.fault_notices import FAULT_TEXTS
 from holdfast.recordings import shown_origin
@@ -182,7 +182,7 @@ class DetectionSummary:
             print_line("no slips")
             return
         print_table(
-            ("slip from [s]", "to [s]", "finger", "largest P(slip) %"),
+            ("slip from [s]", "to [s]", "finger", "largest P(slip) %", "slid [mm]"),
             [_slip_cells(slip, origin) for slip in slips[:MAX_EVENTS_SHOWN]],
         )
         if len(slips) > MAX_EVENTS_SHOWN:
@@ -204,7 +204,9 @@ class DetectionSummary:
 def _slip_cells(slip: DetectedSlip, origin: float) -> tuple[object, ...]:
     """Return a slip as cells of a table."""
     end = "-" if slip.end is None else f"{slip.end - origin:.3f}"
-    return f"{slip.begin - origin:.3f}", end, slip.finger, f"{100 * slip.max_probability:.0f}"
+    distance = "-" if slip.distance is None else f"{slip.distance:.1f}"
+    percent = f"{100 * slip.max_probability:.0f}"
+    return f"{slip.begin - origin:.3f}", end, slip.finger, percent, distance
 
 
 class _StateCounts:
@@ -300,8 +302,10 @@ class ChangeLines:
         if slip.end is None:
             text = self._text(slip.begin, slip.finger, "slip begins", f"P(slip) {percent:.0f} %")
             return slip.begin, text
-        lasted = f"{slip.end - slip.begin:.3f} s, largest P(slip) {percent:.0f} %"
-        return slip.end, self._text(slip.end, slip.finger, "slip ends", lasted)
+        lasted = f"{slip.end - slip.begin:.3f} s, "
+        lasted += "largest " if slip.distance is None else f"{slip.distance:.1f} mm, "
+        text = f"{lasted}P(slip) {percent:.0f} %"
+        return slip.end, self._text(slip.end, slip.finger, "slip ends", text)
 
     def _text(self, time: float, finger: str, change: str, reason: str) -> str:
         return f"{time - self.origin:9.3f} s  {finger:8}  {change:24}  {reason}".rstrip()

@@ -57,8 +57,9 @@ def detect(
     begins and when it ends. In a pipe or file, or with --json, print one line of JSON per finger
     and sample, in the order of time: time [s], finger, state, reason (why the state is UNKNOWN),
     stable_probability, instability (sigma) and force (both in the unit of the readings), faults,
-    faulty_taxels, cause (slip while the finger slides) and slip_probability. Values that are not
-    known are null. The memory does not grow with the length of the recording.
+    faulty_taxels, cause (slip while the finger slides), slip_probability, slip_speed [mm/s] and
+    slip_distance [mm]. Values that are not known are null. The memory does not grow with the
+    length of the recording.
 
     SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C or
     for --seconds:

@@ -36,7 +36,9 @@ DIAGNOSTICS_PERIOD = 1.0
 """Maximum time between two diagnostics messages [s]."""
 MAX_ESTIMATE_AGE = 1.0
 """Age from which an estimate counts as missing in the diagnostics [s]."""
-NUMBER_FIELDS = ("stable_probability", "slip_probability", "instability")
+NUMBER_FIELDS = (
+    "stable_probability", "slip_probability", "slip_speed", "slip_distance", "instability",
+)  # fmt: skip
 """Fields of an estimate with a topic of numbers for each finger; NaN where there is none."""
 NO_TORQUE_FIELDS = {"x": 0.0, "y": 0.0, "z": 0.0}
 GRIP_TEXTS = ("state", "reason")
@@ -75,8 +77,9 @@ class RosPublisher(Openable):
     """Publish estimates in a separate thread; it never delays the caller.
 
     The topics of each finger are `NAMESPACE/FINGER/state` (text), `stable_probability`,
-    `slip_probability` (NaN without a slip rule) and `instability` (numbers), and `force` (a
-    wrench if the unit is N, else a vector). The topic of the hand is `NAMESPACE/hand/state`.
+    `slip_probability` (NaN without a slip rule), `slip_speed` [mm/s] and `slip_distance` [mm]
+    (NaN without a speed rule) and `instability` (numbers), and `force` (a wrench if the unit is
+    N, else a vector). The topic of the hand is `NAMESPACE/hand/state`.
     `/diagnostics` is published once a second, and when faults change. Time stamps are the host's
     time when `publish` was called.
 

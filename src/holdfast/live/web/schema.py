@@ -106,6 +106,8 @@ class EstimateSeries(Struct, frozen=True, gc=False):
         stable_probability: from 0 to 1.
         state: 0 UNKNOWN, 1 NO_CONTACT, 2 UNSTABLE, 3 STABLE.
         slip_probability: from 0 to 1; null without a slip rule.
+        slip_speed: of the sliding finger [mm/s], 0 while it does not slide; null without a speed
+            rule.
     """
 
     force: tuple[list[Number], list[Number], list[Number]]
@@ -113,6 +115,7 @@ class EstimateSeries(Struct, frozen=True, gc=False):
     stable_probability: list[Number]
     state: list[int | None]
     slip_probability: list[Number]
+    slip_speed: list[Number]
 
 
 class HandSeries(Struct, frozen=True, gc=False):
@@ -129,6 +132,24 @@ class EventDocument(Struct, frozen=True, gc=False):
     state: ContactState
     previous: ContactState
     time: float
+
+
+class SlipDocument(Struct, frozen=True, gc=False):
+    """Slip of a finger, sent when it begins and again when it has ended.
+
+    Attributes:
+        finger: name of the finger.
+        begin: time of the first sample that slides [s].
+        end: time of the first sample after them that does not [s]; null while it slides.
+        max_probability: largest probability of a slip within that time.
+        distance: slid within that time [mm]; null without a speed rule.
+    """
+
+    finger: str
+    begin: float
+    end: Number
+    max_probability: float
+    distance: Number
 
 
 class Notice(Struct, frozen=True, gc=False):
@@ -202,6 +223,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
         problems: faults that last.
         thresholds: probability from which each finger is stable now.
         grip: the grip loop; null if no hand is controlled.
+        slips: that began or ended since the previous document.
     """
 
     time: Number
@@ -216,6 +238,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
     problems: list[ProblemDocument] = []
     thresholds: dict[str, float] = {}
     grip: GripDocument | None = None
+    slips: list[SlipDocument] = []
 
 
 class EstimateDocument(

@@ -118,6 +118,7 @@ class Tape:
         self.points = []  # expected errors by threshold
         self.change = {}  # finger -> fields to write over its part of a message
         self.slip_threshold = None  # without a slip rule
+        self.slips_now = []  # slips of the next message
 
     def hello(self):
         fingers = {
@@ -166,6 +167,7 @@ class Tape:
                 "stable_probability": plain(track.probability[rows]),
                 "state": track.state[rows].tolist(),
                 "slip_probability": self.slips(track, rows),
+                "slip_speed": [None] * len(rows),
             }
             for name, track in self.tracks.items()
         }
@@ -175,12 +177,12 @@ class Tape:
             for name, state in states.items()
             if state != self.states[name]
         ]
-        self.states = states
+        self.states, slips, self.slips_now = states, self.slips_now, []
         latency = {"p50": 0.00021, "p99": 0.0013, "max": 0.011}
         return {
             "type": "live", "time": now, "hand": hand, "fingers": fingers,
             "series": {"times": times.tolist(), "fingers": series},
-            "events": events, "notices": [],
+            "events": events, "slips": slips, "notices": [],
             "health": {
                 "rate": 149.9, "n_packets": self.n_packets, "n_lost": 0, "n_refused": 0,
                 "n_dropped": 0, "silent": False, "latency": latency,
@@ -205,6 +207,8 @@ class Tape:
             "faulty_taxels": [],
             "cause": None,
             "slip_probability": self.slips(track, [k])[0],
+            "slip_speed": None,
+            "slip_distance": None,
             "taxels": plain(np.round(track.taxels[k], 1)),
         }
 

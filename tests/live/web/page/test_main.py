@@ -164,6 +164,41 @@ def test_a_card_says_that_its_finger_slips_whatever_its_state(visit, service):
     assert visible_slips(page) == []
 
 
+def test_a_card_shows_how_far_and_how_fast_its_finger_slides(visit, service):
+    service.tape.slip_threshold = 0.6
+    change(service, cause="slip", slip_speed=12.34, slip_distance=1.26)
+    page = visit(service.url)
+    pill = '[aria-label="index"] .slips'
+    shows(page, pill, r"1\.3\smm")
+    title = page.locator(pill).get_attribute("title")
+    assert title.endswith("slides: 1.3\u202fmm since the slip began, now at 12\u202fmm/s")
+    change(service, cause="slip", slip_speed=None, slip_distance=None)  # without a speed rule
+    shows(page, pill, "^slips$")
+
+
+def test_the_list_of_events_has_how_far_a_finger_slid(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    service.muted = True
+    page.evaluate(
+        """() => {
+          const slip = { finger: "thumb", begin: 7, end: null, distance: 0.1 };
+          const other = { finger: "ring", begin: 7.1, end: null, distance: null };
+          for (const item of [slip, other]) holdfast.events.addSlip(item);
+          holdfast.events.addSlip({ ...slip, end: 7.25, distance: 2.04 });
+        }"""
+    )
+    rows = page.locator("#events li").all_inner_texts()[:2]
+    assert [" ".join(row.split()).split(" s ", 1)[1] for row in rows] == [
+        "ring slips", "thumb slid 2.0 mm in 0.25 s",
+    ]  # fmt: skip
+    page.evaluate(
+        "(slip) => holdfast.events.addSlip(slip)",
+        {"finger": "ring", "begin": 7.1, "end": 7.2, "distance": None},
+    )
+    assert "slid 0.10 s" in page.locator("#events li").first.inner_text()
+
+
 def test_a_slip_is_not_shown_without_a_connection(visit):
     with Service(Tape(*made_up())) as service:
         service.tape.slip_threshold = 0.6

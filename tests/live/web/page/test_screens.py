@@ -37,14 +37,16 @@ def test_nothing_overlaps_or_overflows(visit, service, size, tmp_path):
 
 @pytest.mark.parametrize("size", [*SCREENS, (820, 1180), (1400, 900)])
 @pytest.mark.parametrize("n", [4, 6])
-def test_slips_overlap_nothing(visit, size, n, tmp_path):
+@pytest.mark.parametrize("measured", [{}, {"slip_speed": 234.5, "slip_distance": 123.6}])
+def test_slips_overlap_nothing(visit, size, n, measured, tmp_path):
     names = ("thumb", "index", "middle", "ring", "left palm", "right palm")[:n]
     with Service(Tape(*made_up(names))) as service:
         service.at = 3.5
         service.tape.slip_threshold = 0.6
-        change(service, state="UNSTABLE", cause="slip")
+        change(service, state="UNSTABLE", cause="slip", **measured)
         page = visit(service.url, size)
-        shows(page, '[aria-label="index"] .head', "slips")
+        text = r"124\smm" if measured else "slips"
+        shows(page, '[aria-label="index"] .head', text)
         wait_for_samples(page)
         page.screenshot(path=tmp_path / "page.png", full_page=True)
         assert flaws(page, size) == []

@@ -3,7 +3,7 @@
 import { make, shape, setText } from "../web/dom.js";
 import { fingerColour } from "../web/theme.js";
 import { Scale, TaxelMap } from "./taxel_map.js";
-import { debounceNote, faultWord, hasSlipRule, number, percent, reasonWord, shownProbability, stateKey, stateWord, unitWord } from "./format.js";
+import { debounceNote, distance, faultWord, hasSlipRule, number, percent, reasonWord, shownProbability, slipSpeed, stateKey, stateWord, unitWord } from "./format.js";
 
 // Range of the sigma bar by unit, from noise to a strong slip.
 const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
@@ -69,7 +69,7 @@ export class Cards {
   clearStates(reason) {
     for (const card of this.cards.values()) {
       card.showState("UNKNOWN", reason);
-      card.showSlip(false);
+      card.showSlip(null);
     }
   }
 
@@ -101,8 +101,9 @@ class Card {
     this.word = make("strong", "word", "UNKNOWN");
     this.reason = make("span", "reason");
     this.longReason = make("span", "reason long");
-    this.slip = make("span", "slips", shape("slip"), "slips");
-    this.slip.title = "The model's slip rule decided that this finger slides";
+    this.slid = make("span", "slid");
+    this.speed = make("span", "speed");
+    this.slip = make("span", "slips", shape("slip"), make("span", "slips-word", "slips"), this.slid, this.speed);
     const title = make("span", "name", swatch, make("span", "", name));
     title.title = name;
     this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason, this.slip), this.word));
@@ -119,7 +120,7 @@ class Card {
     this.element = make("article", "card", this.head, body, this.faults);
     this.element.setAttribute("aria-label", name);
     this.showState("UNKNOWN", "");
-    this.showSlip(false);
+    this.showSlip(null);
   }
 
   makeValues() {
@@ -148,7 +149,7 @@ class Card {
   update(finger, frozen) {
     const note = debounceNote(finger, this.threshold, this.hello.debounce);
     this.showState(finger.state, note?.short ?? reasonWord(finger.reason), note?.long);
-    this.showSlip(hasSlipRule(this.sensor) && finger.cause === "slip");
+    this.showSlip(hasSlipRule(this.sensor) && finger.cause === "slip" ? finger : null);
     const probability = shownProbability(finger.state, finger.stable_probability);
     setText(this.probability.value, percent(probability));
     setBar(this.probability, probability ?? 0);
@@ -171,10 +172,18 @@ class Card {
     this.shape.firstChild.setAttribute("href", `#shape-${key}`);
   }
 
-  // Say that the finger slides, whatever its state; a model without a slip rule never does.
-  showSlip(slips) {
-    this.slip.hidden = !slips;
-    this.element.classList.toggle("sliding", slips);
+  // Say that the finger slides, whatever its state, and how far and how fast, if the model has a
+  // rule for it. A model without a slip rule never says it: the finger is null.
+  showSlip(finger) {
+    this.slip.hidden = !finger;
+    this.element.classList.toggle("sliding", Boolean(finger));
+    const measured = Number.isFinite(finger?.slip_distance);
+    this.slip.classList.toggle("measured", measured);
+    const slid = measured ? distance(finger.slip_distance) : "", speed = measured ? slipSpeed(finger.slip_speed) : "";
+    setText(this.slid, slid);
+    setText(this.speed, speed);
+    const decided = "The model's slip rule decided that this finger slides";
+    this.slip.title = measured ? `${decided}: ${slid} since the slip began, now at ${speed}` : decided;
   }
 
   showFaults(faults, taxels) {

@@ -54,6 +54,11 @@ export function debounceNote({ state, stable_probability: probability }, thresho
   return null;
 }
 
+/** Format a distance that a finger slid [mm]: "0.8 mm", "12 mm". */
+export const distance = (mm) => `${mm.toFixed(mm < 9.95 ? 1 : 0)}\u202fmm`;
+/** Format the speed of a slip [mm/s]: "3.2 mm/s", "85 mm/s". */
+export const slipSpeed = (speed) => `${distance(speed)}/s`;
+
 const note = (short, long) => ({ short, long });
 const seconds = (value) => `${Number(value.toPrecision(2))} s`;
 

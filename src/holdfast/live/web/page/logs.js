@@ -1,7 +1,7 @@
 // Lists of the newest events and notices, newest first.
 
 import { make, shape, setText } from "../web/dom.js";
-import { duration, stateKey, stateWord, wallTime } from "./format.js";
+import { distance, duration, stateKey, stateWord, wallTime } from "./format.js";
 
 const MAX_ITEMS = 50;
 const CHANGE_TIME = 0.25; // [s] between the same changes of two fingers that are one change
@@ -17,11 +17,13 @@ export class EventLog {
     this.list = list;
     this.times = new WeakMap(); // of each item: [s] on the source's clock
     this.changes = new Map(); // newest change to each state
+    this.slips = new Map(); // text of the slip of each finger that slides
   }
 
   clear() {
     this.list.replaceChildren();
     this.changes.clear();
+    this.slips.clear();
   }
 
   /** Add the change of a finger or of the hand to the line of the same change, or as a new line. */
@@ -35,6 +37,18 @@ export class EventLog {
     change.add(event);
     this.times.set(change.item, event.time);
     this.list.prepend(change.item);
+  }
+
+  /** Add a slip that began; write how far and how long the finger slid when it has ended. */
+  addSlip({ finger, begin, end, distance: slid }) {
+    if (!this.slips.has(finger)) {
+      this.slips.set(finger, make("span", "change slid-far", shape("slip"), "slips"));
+      this.addItem(begin, make("b", "finger marked", finger), this.slips.get(finger));
+    }
+    if (end === null) return;
+    const far = Number.isFinite(slid) ? `${distance(slid)} in ` : "";
+    this.slips.get(finger).replaceChildren(shape("slip"), `slid ${far}${lasted(end - begin)}`);
+    this.slips.delete(finger);
   }
 
   addMarker(time, text, kind = "marker") {
@@ -57,6 +71,8 @@ export class EventLog {
     }
   }
 }
+
+const lasted = (seconds) => `${seconds.toFixed(seconds < 9.95 ? 2 : 0)} s`;
 
 // One line: the change of the hand with the fingers that made it, or of fingers alone.
 class Change {

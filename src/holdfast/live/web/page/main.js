@@ -87,6 +87,7 @@ class Page {
     this.cards.setOutdated(ended || silent);
     this.cards.update(message);
     for (const event of message.events ?? []) this.events.add(event);
+    for (const slip of message.slips ?? []) this.events.addSlip(slip);
     for (const notice of message.notices ?? []) this.notices.add(notice);
     if (message.health) this.health.update(message.health);
     this.controls.update(message.recording);

@@ -1,4 +1,4 @@
-"""Slips in the output of `holdfast detect`: when each began and ended, beside the states."""
+"""Slips in a stream of estimates: when each began and ended, and how far the finger slid."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -14,12 +14,14 @@ class DetectedSlip(NamedTuple):
         begin: time of the first sample that slides [s].
         end: time of the first sample after them that does not [s]; None while it slides.
         max_probability: largest probability of a slip within that time.
+        distance: slid within that time [mm]; None for a model without a speed rule.
     """
 
     finger: str
     begin: float
     end: float | None
     max_probability: float
+    distance: float | None = None
 
 
 def slides(estimate: ContactEstimate) -> bool:
@@ -66,10 +68,13 @@ class SlipWatch:
             self.has_rule |= probability is not None
             slip = self._running.get(finger)
             if probability is not None and slides(estimate):
+                begins = slip is None
                 if slip is None:
-                    self._running[finger] = DetectedSlip(finger, estimate.time, None, probability)
-                    yield self._running[finger]
-                elif probability > slip.max_probability:
-                    self._running[finger] = slip._replace(max_probability=probability)
+                    slip = DetectedSlip(finger, estimate.time, None, probability)
+                largest = max(probability, slip.max_probability)
+                slip = slip._replace(max_probability=largest, distance=estimate.slip_distance)
+                self._running[finger] = slip
+                if begins:
+                    yield slip
             elif slip is not None:
                 yield self._running.pop(finger)._replace(end=estimate.time)

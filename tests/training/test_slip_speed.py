@@ -1,0 +1,149 @@
+"""Speed rules: their samples, their fit, and models with them."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.classifiers.slip import add_squares, speed_of
+from holdfast.detector import detect
+from holdfast.features import parse_features
+from holdfast.features.specs import OF_TWO_TAXELS, SLIP_FEATURES
+from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
+from holdfast.training import Setting, train
+from holdfast.training.slip_speed import (
+    MIN_SPEED_SAMPLES,
+    STILL_STEP,
+    SpeedSamples,
+    speed_samples,
+    true_speed,
+)
+
+from .build import sliding_recording
+
+SETTING = Setting(
+    window=6, features=parse_features("F_a,F_x,F_y,F_z,sigma", 6), trials=0, shared=True,
+    own_slip_features=True,
+)  # fmt: skip
+
+
+def speeds_of(rule, features):
+    weights, squares = rule.weights(), rule.square_weights()
+    return np.array(
+        [
+            speed_of(add_squares(weights[0] + weights[1:] @ row, row, squares), rule.highest)
+            for row in features
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def samples():
+    """Speed is the square of 2 + u_0 + 0.5 u_1^2; one in five samples holds still."""
+    rng = np.random.default_rng(0)
+    features = rng.normal(size=(4000, 2))
+    speed = np.maximum(2.0 + features[:, 0] + 0.5 * features[:, 1] ** 2, 0.01) ** 2
+    still = np.zeros((800, 2)) + [-2.0, 0.0] + 0.01 * rng.normal(size=(800, 2))
+    units = np.arange(4800) % 4
+    return SpeedSamples(np.vstack([features, still]), np.concatenate([speed, np.zeros(800)]), units)
+
+
+class TestFit:
+    def test_it_finds_the_speed(self, samples):
+        rule = samples.fit(())
+        slides = samples.speed > 0
+        error = np.abs(speeds_of(rule, samples.features) - samples.speed)
+        assert error[slides].mean() < 0.1
+        assert error[~slides].max() < 0.1
+        assert rule.highest == samples.speed.max()
+
+    def test_mean_and_scale_are_those_of_the_samples_that_slide(self, samples):
+        rule, features = samples.fit(()), samples.features[samples.speed > 0]
+        np.testing.assert_allclose(rule.mean, features.mean(axis=0))
+        np.testing.assert_allclose(rule.scale, features.std(axis=0))
+
+    def test_held_units_are_left_out(self, samples):
+        strange = replace(samples, speed=np.where(samples.units == 1, 50.0, samples.speed))
+        assert strange.fit({1}) == samples.fit({1})
+        assert strange.fit(()) != samples.fit(())
+
+    def test_too_few_samples_that_slide(self, samples):
+        places = np.flatnonzero(samples.speed > 0)[: MIN_SPEED_SAMPLES - 1]
+        rows = np.concatenate([places, np.flatnonzero(samples.speed == 0)])
+        few = SpeedSamples(samples.features[rows], samples.speed[rows], samples.units[rows])
+        assert few.n_sliding == MIN_SPEED_SAMPLES - 1
+        assert few.fit(()) is None
+
+
+def test_samples_are_those_of_long_slips_and_some_that_hold_still():
+    made = sliding_recording(0, ("thumb",), slips=(400, 700))
+    arrays = made.truth.fingers["thumb"]
+    speed = arrays["slip_speed"].copy()
+    speed[700:740] /= 5  # 0.8 mm
+    fingers = {"thumb": arrays | {"slip_speed": speed}}
+    made = replace(made, truth=replace(made.truth, fingers=fingers))
+    times = made.modules["thumb"].times
+    truth = slip_truth(made, "thumb", times)
+    features = np.arange(len(times), dtype=float)[:, None]
+    features[405] = np.nan
+    found = speed_samples(made, "thumb", features, truth, np.zeros(len(times), dtype=int))
+    rows = found.features[:, 0].astype(int)
+    slides = found.speed > 0
+    assert rows[slides].tolist() == [*range(400, 405), *range(406, 440)]
+    np.testing.assert_allclose(found.speed[slides], 10.0)
+    assert rows[~slides].tolist() == np.flatnonzero(truth.codes == STILL)[::STILL_STEP].tolist()
+    assert (true_speed(made, "thumb", times)[truth.codes == SLIDING] >= 2.0 - 1e-9).all()
+    assert speed_samples(replace(made, truth=None), "thumb", features, truth, rows) is None
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [sliding_recording(seed) for seed in range(6)]
+
+
+@pytest.fixture(scope="module")
+def trained(recordings):
+    warnings = []
+    return train(recordings, SETTING, warn=warnings.append), warnings
+
+
+@pytest.mark.slow
+class TestTrain:
+    def test_the_slip_rule_has_features_of_its_own(self, trained):
+        model, warnings = trained[0].model, trained[1]
+        part = model.fingers["*"]
+        assert part.features == SETTING.features
+        expected = tuple(spec for spec in SLIP_FEATURES if spec.kind not in OF_TWO_TAXELS)
+        assert part.slip.features == expected
+        assert len(part.slip.squares) == len(expected)
+        (text,) = [text for text in warnings if "taxel" in text]
+        assert text == (
+            "second_shared, second_own, second_top, mean_second_shared, mean_second_own, "
+            "mean_second_top left out: tiny has 1 taxel, they need at least 2"
+        )
+        assert trained[0].cross_validation.slips.pooled.incipient["0.1"] > 50
+
+    def test_the_speed_is_that_of_the_truth(self, trained):
+        model, made = trained[0].model, sliding_recording(20)
+        for name, trace in detect(model, made).fingers.items():
+            true = true_speed(made, name, trace.times)
+            both = (true > 0) & (trace.slip_speed > 0)
+            assert both.sum() > 50
+            assert np.abs(trace.slip_speed - true)[both].mean() < 3  # of 10 mm/s
+
+    def test_the_file_has_the_rule(self, trained, tmp_path):
+        model = trained[0].model
+        model.save(tmp_path / "model.json")
+        assert type(model).load(tmp_path / "model.json").fingers == model.fingers
+
+    def test_labels_give_no_speed(self, recordings):
+        labelled = [replace(made, truth=None) for made in recordings]
+        rule = train(labelled, SETTING).model.fingers["*"].slip
+        assert rule.features is not msgspec.UNSET
+        assert rule.speed is msgspec.UNSET
+
+    def test_without_features_of_its_own_there_is_no_speed(self, recordings):
+        plain = train(recordings, replace(SETTING, own_slip_features=False)).model
+        assert plain.fingers["*"].slip.features is msgspec.UNSET
+        assert plain.fingers["*"].slip.speed is msgspec.UNSET
