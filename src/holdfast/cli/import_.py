@@ -142,8 +142,11 @@ def import_(
             (folder / recording.file_name).replace(task.out / recording.file_name)
     for recording in imported:
         recording.document["path"] = out / recording.file_name
-    _print([recording.document for recording in imported], out, as_json)
+    hint = _hint(task)
+    _print([recording.document for recording in imported], out, hint, as_json)
     _report_findings(imported)
+    if hint:
+        print_message(f"hint: {hint}")
 
 
 @dataclass(frozen=True)
@@ -326,7 +329,14 @@ def _report_findings(imported: Sequence[_Imported]) -> None:
         print_message(f"{name}{more}: {module}{finding.text}")
 
 
-def _print(recordings: list[dict[str, Any]], out: Path, as_json: bool) -> None:
+def _hint(task: _ImportTask) -> str | None:
+    """Return the option that helps with the recordings of the format; None for our own."""
+    from holdfast.io.importers import HINTS
+
+    return None if task.data_format is None else HINTS[task.data_format]
+
+
+def _print(recordings: list[dict[str, Any]], out: Path, hint: str | None, as_json: bool) -> None:
     n_modules = sum(len(recording["modules"]) for recording in recordings)
     n_samples = sum(recording["n_samples"] for recording in recordings)
     if as_json:
@@ -337,6 +347,7 @@ def _print(recordings: list[dict[str, Any]], out: Path, as_json: bool) -> None:
                 "n_modules": n_modules,
                 "n_samples": n_samples,
                 "recordings": recordings,
+                "hint": hint,
             }
         )
         return
