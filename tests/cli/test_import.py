@@ -76,6 +76,15 @@ def test_imports_a_file(capsys, table, tmp_path):
     assert load_recording(path).modules["finger1"].n_samples == 40
 
 
+def test_a_folder_of_folders(capsys, table, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / "in" / name).mkdir(parents=True)
+        table(f"{name}/press.csv")
+    document = imported(capsys, tmp_path / "in", tmp_path / "out")
+    assert [one["name"] for one in document["recordings"]] == ["a_press", "b_press"]
+    assert load_recording(tmp_path / "out" / "b_press.parquet").name == "b_press"
+
+
 def test_every_format_has_a_hint():
     assert list(HINTS) == list(FORMATS)
     assert all("--in-contact" in hint and "\n" not in hint for hint in HINTS.values())

@@ -1,6 +1,6 @@
 """Import of recordings in other formats; each format has a module, which is loaded by name."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -9,7 +9,7 @@ from types import ModuleType
 from holdfast.errors import RecordingError, require_extras
 from holdfast.files import check_regular
 from holdfast.io.importers.csv_columns import Columns
-from holdfast.io.importers.table import SLIPPED
+from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -81,11 +81,10 @@ def import_recordings(
         source = _importer(name)
         if name in EXTRAS:
             require_extras(EXTRAS[name])
-        recordings: Iterator[Recording] = (
-            source.read(place, sensors, given, report)
-            if name == "csv"
-            else (recording for part in source.parts(place) for recording in source.read(part))
-        )
+        if name == "csv":
+            recordings: Iterator[Recording] = source.read(place, sensors, given, report)
+        else:
+            recordings = _named_apart(source.parts(place), source.read)
     return _guarded(place, recordings, labels=labels)
 
 
@@ -117,6 +116,15 @@ def import_parts(
         source = _importer(name)
         parts: list[Path] = source.parts(place, given) if name == "csv" else source.parts(place)
     return name, parts
+
+
+def _named_apart(
+    parts: Sequence[Path], read: Callable[[Path], Iterator[Recording]]
+) -> Iterator[Recording]:
+    """Read the parts one by one; see `name_prefixes`."""
+    for part, prefix in name_prefixes(parts).items():
+        for recording in read(part):
+            yield replace(recording, name=f"{prefix}{recording.name}")
 
 
 def _columns(columns: Columns | str | None) -> Columns | None:

@@ -223,6 +223,22 @@ def csv_files(path: Path) -> list[Path]:
     return sorted(deeper, key=lambda file: (natural_order(file.parent), natural_order(file)))
 
 
+def name_prefixes(parts: Sequence[Path]) -> dict[Path, str]:
+    """Return what to put before the names of the recordings of each part.
+
+    It is the name of the folder where files of two folders have the same name, else empty.
+
+    Example:
+        >>> name_prefixes([Path("a/log.csv"), Path("b/log.csv")])[Path("b/log.csv")]
+        'b_'
+        >>> name_prefixes([Path("a/1.csv"), Path("a/2.csv")])[Path("a/1.csv")]
+        ''
+    """
+    stems = {part.name if part.is_dir() else part.stem for part in parts}
+    apart = len(stems) < len(parts) and len({part.parent for part in parts}) > 1
+    return {part: f"{part.parent.name}_" if apart else "" for part in parts}
+
+
 class CsvFormat(NamedTuple):
     """Format of CSV files that are recognised by their header.
 
