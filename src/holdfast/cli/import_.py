@@ -165,7 +165,8 @@ def _parts(path: Path, task: _ImportTask) -> tuple[dict[Path, str], _ImportTask]
 
     The parts are imported one by one.
     """
-    from holdfast.io.importers import import_parts, name_prefixes
+    from holdfast.io.importers import import_parts
+    from holdfast.io.importers.table import name_prefixes
 
     foreign = task.data_format is not None or task.sensors or task.columns is not None
     if not foreign and (files := _own_files(path)):
