@@ -19,7 +19,7 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.detector import FingerTrace, detect
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.eflesh import RATE
+from holdfast.io.importers.eflesh import SEQUENCE_RATE
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.statistics import mann_whitney_u
 from holdfast.model import Model
@@ -80,7 +80,7 @@ def tug_figures(
     for recording, _ in sequences:
         traces = detect(model, recording).fingers.values()
         values = np.array([score(trace) for trace in traces])
-        times = np.arange(values.shape[1]) / RATE
+        times = np.arange(values.shape[1]) / SEQUENCE_RATE
         with np.errstate(invalid="ignore"):
             largest.append(np.nanmax(values[:, times > TUG_QUIET[1]]))
         inside = values[:, (times > TUG_QUIET[0]) & (times < TUG_QUIET[1])]

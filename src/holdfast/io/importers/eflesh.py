@@ -28,14 +28,14 @@ from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 
 SOURCE = "notvenky/eFlesh"
-SUFFIX = ".pt"
+TENSOR_SUFFIX = ".pt"
 LABELS_FILE = "labels.csv"
 N_FINGERTIPS = 2
 N_MAGNETOMETERS = 5
 NUMBER_TYPE = np.dtype("<f4")
 ROW_SIZE = N_FINGERTIPS * N_MAGNETOMETERS * 3 * NUMBER_TYPE.itemsize
 """Size of the values of one instant [bytes]."""
-RATE = 100.0
+SEQUENCE_RATE = 100.0
 """Nominal rate; the files have no times [Hz]."""
 MAX_PICKLE_SIZE = 1 << 16
 """Maximum size of the pickle of one tensor; it has some 200 [bytes]."""
@@ -49,7 +49,7 @@ def can_read(path: Path) -> bool:
     """Return whether `path` is a file of torch, or a folder with sequences."""
     if path.is_dir():
         return bool(_sequences(path))
-    return path.suffix == SUFFIX and _is_zip(path)
+    return path.suffix == TENSOR_SUFFIX and _is_zip(path)
 
 
 def parts(path: Path) -> list[Path]:
@@ -60,12 +60,12 @@ def parts(path: Path) -> list[Path]:
     """
     files = [path] if path.is_file() else _sequences(path)
     if not files:
-        raise RecordingError(f"no eflesh sequence in {path}; files seq_N{SUFFIX} expected")
+        raise RecordingError(f"no eflesh sequence in {path}; files seq_N{TENSOR_SUFFIX} expected")
     return files
 
 
 def _sequences(folder: Path) -> list[Path]:
-    return sorted(folder.glob(f"seq_*{SUFFIX}"), key=natural_order)
+    return sorted(folder.glob(f"seq_*{TENSOR_SUFFIX}"), key=natural_order)
 
 
 def _is_zip(path: Path) -> bool:
@@ -83,7 +83,7 @@ def read(path: Path) -> Iterator[Recording]:
     if not path.stat().st_size:
         raise RecordingError(f"{path} is empty; a tensor saved by torch expected")
     values = _values(path)
-    times = np.arange(len(values)) / RATE
+    times = np.arange(len(values)) / SEQUENCE_RATE
     skin = sensor("anyskin")
     modules = {
         f"finger{k + 1}": Tactile(skin, times, values[:, k].copy()) for k in range(N_FINGERTIPS)
@@ -167,7 +167,11 @@ def _shaped(path: Path, data: bytes) -> npt.NDArray[np.float32]:
 
 
 def _metadata(path: Path) -> dict[str, Any]:
-    metadata = {"source": SOURCE, "clock": f"none; {RATE:g} Hz assumed", **BEGINS_IN_CONTACT}
+    metadata = {
+        "source": SOURCE,
+        "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
+        **BEGINS_IN_CONTACT,
+    }
     slipped = _labels(path.parent / LABELS_FILE).get(path.stem)
     return metadata if slipped is None else metadata | {SLIPPED: slipped}
 
