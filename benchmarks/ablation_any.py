@@ -28,7 +28,7 @@ from hand_handling import (
     moments_of_others,
     read_grasp,
 )
-from real_sets import TUG_START, fingers_of, loaded, slips_in
+from real_sets import TUG_START, fingers_of, slips_in
 from real_slips import auc, boxes, tugs
 from sklearn.metrics import roc_auc_score
 from train_any import FEATURES, N_FOLDS, fit, model_of, out_of_fold, untrained
@@ -87,11 +87,9 @@ class RealSets:
 
     @classmethod
     def read(cls, folder: Path, model: Model) -> "RealSets":
-        carried = [loaded(item) for item in boxes(folder / "uskin_pick_move")]
-        sequences = ((loaded(item), slipped) for item, slipped in tugs(folder / "eflesh_slip"))
         return cls(
-            [finger for item in carried for finger in real_fingers(model, item)],
-            [(real_fingers(model, item), slipped) for item, slipped in sequences],
+            [x for item in boxes(folder / "uskin_pick_move") for x in real_fingers(model, item)],
+            [(real_fingers(model, x), slipped) for x, slipped in tugs(folder / "eflesh_slip")],
         )
 
     def figures(self, classifier: LinearClassifier, used: np.ndarray) -> list[float]:

@@ -19,7 +19,6 @@ The second table has recordings of healthy skins (`--healthy` folders, and the r
 """
 
 import argparse
-import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -30,24 +29,15 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.gtac import NODE_COLUMNS, TO_TAXEL_FRAME
 from holdfast.metrics.masks import runs
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import Sensor, sensor
 
 N_FROZEN = (1, 3, 7, 15, 20, 29)
 MOMENTS = ("start", "hold", "push")
 GRACE = {"start": 2.5, "hold": 0.6, "push": 0.6}
 """Time after which a frozen taxel has to be found [s]."""
 BITS = sum(1 << place for place, fault in enumerate(Fault) if fault in ("stuck", "dead"))
-EFLESH = Sensor(
-    "eflesh",
-    1e-3 * np.array([[0, 0, 0], [8, 0, 0], [-8, 0, 0], [0, 8, 0], [0, -8, 0]]),
-    np.tile(np.eye(3), (5, 1, 1)),
-    np.array([0.0, 0.0, 1.0]),
-    100.0,
-)
 
 
 class Case(NamedTuple):
@@ -147,37 +137,8 @@ def healthy_table(
 
 def real_recordings(data: Path) -> dict[str, list[Recording]]:
     """Return the real recordings of a folder of data sets, by set."""
-    sets = {"gtac_v2": list(gtac_grasps(data / "gtac_v2"))}
-    for name in ("gtac", "uskin_pick_move"):
-        sets[name] = list(import_recordings(data / name))
-    sets["eflesh_slip"] = list(tugs(data / "eflesh_slip"))
-    return sets
-
-
-def gtac_grasps(folder: Path) -> Iterator[Recording]:
-    """Yield the grasps of a GTac gripper, whose time stamps repeat, at their measured rate."""
-    for path in sorted(folder.glob("*.csv")):
-        with path.open() as file:
-            names = file.readline().strip().split(",")
-            rows = np.array([line.strip().split(",") for line in file], dtype=np.float64)
-        rate = float(np.median(rows[:, names.index("Hz")]))
-        readings = rows[:, [names.index(name) for name in NODE_COLUMNS]].reshape(len(rows), -1, 3)
-        times = np.arange(len(rows)) / rate
-        module = Tactile(sensor("gtac"), times, readings * TO_TAXEL_FRAME)
-        yield Recording(path.stem, {"finger1": module})
-
-
-def tugs(folder: Path) -> Iterator[Recording]:
-    """Yield the sequences of a gripper with two magnetic fingertips, without unpickling."""
-    for path in sorted(folder.glob("*.pt")):
-        with zipfile.ZipFile(path) as archive:
-            member = next(name for name in archive.namelist() if name.endswith("data/0"))
-            values = np.frombuffer(archive.read(member), "<f4").reshape(-1, 2, 5, 3)
-        times = np.arange(len(values)) / EFLESH.rate
-        modules = {
-            f"finger{k + 1}": Tactile(EFLESH, times, values[:, k].astype(float)) for k in range(2)
-        }
-        yield Recording(path.stem, modules, {"starts_loaded": True})
+    names = ("gtac_v2", "gtac", "uskin_pick_move", "eflesh_slip")
+    return {name: list(import_recordings(data / name)) for name in names}
 
 
 def main(arguments: argparse.Namespace) -> None:

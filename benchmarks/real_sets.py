@@ -24,14 +24,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from frozen_skin import gtac_grasps
 from real_slips import SCORES, TUG_QUIET, auc, boxes, tugs
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import HoldfastError
+from holdfast.io.importers import import_recordings
 from holdfast.model import Model
-from holdfast.recordings import STARTS_LOADED, Recording, label_states
+from holdfast.recordings import Recording, label_states
 from holdfast.training.calibration import calibrate
 
 TUG_START = 0.5
@@ -62,9 +62,11 @@ class Finger(NamedTuple):
 
 
 def main(folder: Path, names: Sequence[str]) -> None:
-    carried = [loaded(item) for item in boxes(folder / "uskin_pick_move")]
-    tugged = [(loaded(item), slipped) for item, slipped in tugs(folder / "eflesh_slip")]
-    sets = carried, tugged, [loaded(item) for item in gtac_grasps(folder / "gtac_v2")]
+    sets = (
+        boxes(folder / "uskin_pick_move"),
+        list(tugs(folder / "eflesh_slip")),
+        list(import_recordings(folder / "gtac_v2")),
+    )
     columns: dict[str, dict[str, float]] = {}
     for name in names:
         model = Model.load(name)
@@ -79,11 +81,6 @@ def main(folder: Path, names: Sequence[str]) -> None:
         values = " | ".join(f"{column[row]:.3f}" for column in columns.values())
         goals = ", ".join(f"{goal:g}" for goal in GOALS.get(row, ()))
         print(f"| {row} | {values} | {goals} |")
-
-
-def loaded(recording: Recording) -> Recording:
-    """Return the recording, which begins in contact: the object is held at the first sample."""
-    return replace(recording, metadata={**recording.metadata, STARTS_LOADED: True})
 
 
 def figures(

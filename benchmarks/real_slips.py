@@ -10,9 +10,7 @@ half second, and the share of the quiet first 0.2 to 0.5 s without a slip report
 """
 
 import argparse
-import csv
 import math
-import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -21,12 +19,12 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.detector import FingerTrace, detect
 from holdfast.io.importers import import_recordings
+from holdfast.io.importers.eflesh import SEQUENCE_RATE
+from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.statistics import mann_whitney_u
 from holdfast.model import Model
-from holdfast.recordings import Recording, Tactile, label_states
-from holdfast.sensors import sensor
+from holdfast.recordings import Recording, label_states
 
-TUG_RATE = 100.0
 TUG_QUIET = (0.2, 0.5)
 """Interval in which every tug is quiet, after the first windows are full [s]."""
 
@@ -51,17 +49,8 @@ def boxes(folder: Path) -> list[Recording]:
 
 def tugs(folder: Path) -> Iterator[tuple[Recording, bool]]:
     """Yield each sequence and whether the object slipped."""
-    with (folder / "labels.csv").open() as lines:
-        slips = {row["sequence"]: row["slip"] == "1" for row in csv.DictReader(lines)}
-    for name, slipped in slips.items():
-        with zipfile.ZipFile(folder / f"seq_{name}.pt") as archive:
-            member = next(item for item in archive.namelist() if item.endswith("data/0"))
-            rows = np.frombuffer(archive.read(member), dtype="<f4").reshape(-1, 2, 5, 3)
-        times = np.arange(len(rows)) / TUG_RATE
-        modules = {
-            f"finger{k + 1}": Tactile(sensor("anyskin"), times, rows[:, k]) for k in range(2)
-        }
-        yield Recording(f"seq_{name}", modules, {"starts_loaded": True}), slipped
+    for recording in import_recordings(folder, "eflesh"):
+        yield recording, recording.metadata[SLIPPED]
 
 
 def box_aucs(model: Model, recordings: list[Recording], score: Score) -> list[float]:
@@ -92,7 +81,7 @@ def tug_figures(
         rule = model.finger("*", sensor).slip
         traces = detect(model, recording).fingers.values()
         values = np.array([score(trace) for trace in traces])
-        times = np.arange(values.shape[1]) / TUG_RATE
+        times = np.arange(values.shape[1]) / SEQUENCE_RATE
         with np.errstate(invalid="ignore"):
             largest.append(np.nanmax(values[:, times > TUG_QUIET[1]]))
         inside = values[:, (times > TUG_QUIET[0]) & (times < TUG_QUIET[1])]

@@ -10,6 +10,7 @@ import resource
 import sqlite3
 import struct
 import sys
+import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -426,6 +427,42 @@ def _csv(header: str, rows: str, name: str = "a.csv") -> Make:
     return make
 
 
+def _tensor_packed(folder: Path) -> Path:
+    """Make a tensor of 2 GB of zeros that is packed to 2 MB."""
+    path = folder / "seq_1.pt"
+    archive = zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
+    with archive, archive.open("seq_1/data/0", "w") as member:
+        for _ in range(10):
+            member.write(bytes(CHUNK))
+    return path
+
+
+def _tensor_size(folder: Path) -> Path:
+    """Make a tensor of which the archive says that it has 4 GB."""
+    path = folder / "seq_1.pt"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("seq_1/data/0", bytes(1200))
+    data = path.read_bytes()
+    size = struct.pack("<II", 1200, 1200)
+    path.write_bytes(data.replace(size, struct.pack("<II", 0xFFFFFFF0, 0xFFFFFFF0)))
+    return path
+
+
+def _tensor_members(folder: Path) -> Path:
+    """Make an archive of 60,000 members that are all the tensor."""
+    path = folder / "seq_1.pt"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("data/0", bytes(1200))
+    data = path.read_bytes()
+    first = data.index(b"PK\x01\x02")
+    entry, end = data[first : data.index(b"PK\x05\x06")], bytearray(data[-22:])
+    n_members = 60_000
+    end[8:12] = struct.pack("<HH", n_members, n_members)
+    end[12:16] = struct.pack("<I", n_members * len(entry))
+    path.write_bytes(data[:first] + entry * n_members + end)
+    return path
+
+
 def _hdf5_depth(folder: Path) -> Path:
     """Make an HDF5 file with 3,000 groups inside each other."""
     import h5py
@@ -547,6 +584,11 @@ FILES: dict[str, tuple[Make, str]] = {
     "csv, two million rows that are wrong": (
         _csv("time,t01_x,t01_y,t01_z", "\n" * 2_000_000 + "a,b,c,d"), "import"
     ),
+    "csv, semicolons, a million columns": (_csv(";" * 1_000_000, ";" * 1_000_000), "import"),
+    "tensor, sparse": (_sparse("seq_1.pt", b"PK\x03\x04"), "import"),
+    "tensor, packed": (_tensor_packed, "import"),
+    "tensor, a size that is too large": (_tensor_size, "import"),
+    "tensor, one member many times": (_tensor_members, "import"),
     "HDF5, sparse": (_sparse("a.h5", b"\x89HDF\r\n\x1a\n"), "import"),
     "HDF5, groups in groups": (_hdf5_depth, "import"),
     "HDF5, links to one array": (_hdf5_links, "import"),

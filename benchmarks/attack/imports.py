@@ -1,5 +1,6 @@
 """Attacks on the import of other formats: damaged CSV, HDF5 and bags of ROS."""
 
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
@@ -21,7 +22,8 @@ KIND = "xela_server_ros2/msg/SensStream"
 def attack_imports(n_tried: int) -> Iterator[CpuResult]:
     """Import damaged files of each format; those without their package are left out."""
     for name, make in (
-        ("csv", _csv), ("gtac", _gtac), ("arq-crisp", _hdf5), ("rosbag", _db3), ("rosbag", _bag)
+        ("csv", _csv), ("gtac", _gtac), ("eflesh", _eflesh), ("arq-crisp", _hdf5),
+        ("rosbag", _db3), ("rosbag", _bag),
     ):  # fmt: skip
         with TemporaryDirectory() as folder:
             try:
@@ -56,6 +58,15 @@ def _gtac(folder: Path) -> Path:
     rows = [",".join(str(k + j) for j in range(46)) for k in range(10)]
     path = folder / "g.csv"
     path.write_text(f"{','.join(names)},milliseconds\n" + "\n".join(rows))
+    return path
+
+
+def _eflesh(folder: Path) -> Path:
+    path = folder / "seq_1.pt"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("seq_1/data.pkl", b"torch\nFloatStorage\n.")
+        archive.writestr("seq_1/byteorder", b"little")
+        archive.writestr("seq_1/data/0", np.arange(240, dtype="<f4").tobytes())
     return path
 
 

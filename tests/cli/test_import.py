@@ -8,6 +8,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.io import load_recording, save_recording
+from holdfast.io.importers import FORMATS, HINTS
 from holdfast.synthetic import synthetic_recording
 
 HEADER = "# sensor: anyskin\ntime," + ",".join(
@@ -69,9 +70,24 @@ def test_imports_a_file(capsys, table, tmp_path):
                 "complete": True,
             }
         ],
+        "hint": HINTS["csv"],
     }
     assert list(path.parent.iterdir()) == [path]
     assert load_recording(path).modules["finger1"].n_samples == 40
+
+
+def test_a_folder_of_folders(capsys, table, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / "in" / name).mkdir(parents=True)
+        table(f"{name}/press.csv")
+    document = imported(capsys, tmp_path / "in", tmp_path / "out")
+    assert [one["name"] for one in document["recordings"]] == ["a_press", "b_press"]
+    assert load_recording(tmp_path / "out" / "b_press.parquet").name == "b_press"
+
+
+def test_every_format_has_a_hint():
+    assert list(HINTS) == list(FORMATS)
+    assert all("--in-contact" in hint and "\n" not in hint for hint in HINTS.values())
 
 
 def test_the_table(capsys, table, tmp_path):
@@ -179,7 +195,7 @@ class TestOutputs:
 
 def test_refusals(capsys, table, tmp_path):
     out = tmp_path / "out"
-    formats = "uskin-pick-move, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv"
+    formats = "uskin-pick-move, eflesh, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv"
     missing, empty, text = tmp_path / "none", tmp_path / "empty", tmp_path / "notes.txt"
     empty.mkdir()
     text.write_text("hello")
@@ -252,6 +268,7 @@ class TestASensorOfOnesOwn:
         assert err[2:] == [
             "a (and 1 more): finger1: readings along x and y never change; 3 axes are expected",
             "a (and 1 more): no finger is in contact in the whole recording",
+            f"hint: {HINTS['csv']}",
         ]
 
     def test_without_a_sensor(self, capsys, press, tmp_path):

@@ -9,10 +9,12 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 from devices.sources.ros_build import (
     OLD,
     PILLARS,
+    PILLARS_OF_ROS2,
     XELA,
     counts,
     sens_stream,
     sensor_state,
+    sensor_state_of_ros2,
     store,
     x_server,
     x_stream,
@@ -92,6 +94,16 @@ def test_pillars(ros2):
         assert one[:5] == (None, "papillarray", 1.5, 12.25, None)
         assert one.counts is None
         np.testing.assert_array_equal(one.forces, forces)
+
+
+def test_pillars_of_ros2_with_small_letters_and_without_headers():
+    types = store("sensor_interfaces", PILLARS_OF_ROS2, ros2=True)
+    forces = np.random.default_rng(2).normal(size=(9, 3)).astype(np.float32)
+    message = sensor_state_of_ros2(types, "sensor_interfaces", 1_500_000, forces)
+    decode = SampleDecoder(stored_definition(types, message, ros2=True), ros2=True)
+    (sample,) = decode(encoded(types, message, ros2=True))
+    assert sample[:5] == (None, "papillarray", 1.5, None, None)
+    np.testing.assert_array_equal(sample.forces, forces)
 
 
 def test_counts_of_more_than_16_bits_are_refused():

@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import ZipFile
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from holdfast.features import Tare, parse_features
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.gtac import NODE_COLUMNS, TO_TAXEL_FRAME
+from holdfast.io.importers.gtac import SERVO_POSITIONS
+from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.recordings import Recording, Tactile, Truth
-from holdfast.sensors import sensor
 from holdfast.sensors.types import Array, Flags
 from holdfast_lab.skin.families import family_features, finger_of
 
@@ -37,8 +36,8 @@ GRAVITY_LAG, GRAVITY_STILL = 0.2, 0.1
 more than this within it [m/s^2]."""
 SETTLED = 0.3
 """Samples of a situation are used from this time after it begins [s], except those of a slip."""
-TUG_RATE, TUG_QUIET, TUG_MOVES = 100.0, (0.2, 0.5), (1.43, 2.5)
-"""Tugs: rate [Hz], time in which all are quiet, and in which all tug [s]."""
+TUG_QUIET, TUG_MOVES = (0.2, 0.5), (1.43, 2.5)
+"""Tugs: time in which all are quiet, and in which all tug [s]."""
 GTAC_SETTLED = 1.0
 """Time after the last motion of a servo [s]."""
 
@@ -215,21 +214,14 @@ def boxes(folder: Path) -> Iterator[Marked]:
 
 def tugs(folder: Path) -> Iterator[Marked]:
     """Yield tugs at held objects: pushed if the object was held, slip if it slid at some time."""
-    with (folder / "labels.csv").open() as lines:
-        slips = {row["sequence"]: row["slip"] == "1" for row in csv.DictReader(lines)}
-    for name, slipped in slips.items():
-        with ZipFile(folder / f"seq_{name}.pt") as archive:
-            member = next(item for item in archive.namelist() if item.endswith("data/0"))
-            rows = np.frombuffer(archive.read(member), dtype="<f4").reshape(-1, 2, 5, 3)
-        times = np.arange(len(rows)) / TUG_RATE
+    for recording in import_recordings(folder, "eflesh"):
+        times = recording.modules["finger1"].times
+        situation = "slip" if recording.metadata[SLIPPED] else "pushed"
         masks = {
             "quiet": (times > TUG_QUIET[0]) & (times < TUG_QUIET[1]),
-            "slip" if slipped else "pushed": (times > TUG_MOVES[0]) & (times < TUG_MOVES[1]),
+            situation: (times > TUG_MOVES[0]) & (times < TUG_MOVES[1]),
         }
-        modules = {
-            f"finger{k + 1}": Tactile(sensor("anyskin"), times, rows[:, k]) for k in range(2)
-        }
-        yield Marked(Recording(f"seq_{name}", modules), dict.fromkeys(modules, masks))
+        yield Marked(recording, dict.fromkeys(recording.modules, masks))
 
 
 def gtac(folder: Path) -> Iterator[Marked]:
@@ -243,17 +235,11 @@ def gtac(folder: Path) -> Iterator[Marked]:
 
 
 def gtac_grasps(folder: Path) -> Iterator[Marked]:
-    """Yield grasps in which the servos stand still after closing, at their measured rate."""
-    for path in sorted(folder.glob("*.csv")):
-        with path.open() as file:
-            names = file.readline().strip().split(",")
-            rows = np.array([line.strip().split(",") for line in file], dtype=np.float64)
-        rate = float(np.median(rows[:, names.index("Hz")]))
-        readings = rows[:, [names.index(name) for name in NODE_COLUMNS]].reshape(len(rows), -1, 3)
-        times = np.arange(len(rows)) / rate
-        servos = rows[:, [k for k, name in enumerate(names) if name.startswith("servo")]]
-        moves = np.append(False, np.diff(servos, axis=0).any(axis=1))
+    """Yield grasps in which the servos stand still after closing."""
+    for recording in import_recordings(folder, "gtac"):
+        if recording.truth is None:
+            raise ValueError(f"{recording.name} has no servos")
+        times, servos = recording.truth.times, recording.truth.hand[SERVO_POSITIONS]
+        moves = np.append(False, np.diff(servos.astype(np.float64), axis=0).any(axis=1))
         last = times[np.flatnonzero(moves)[-1]] if moves.any() else 0.0
-        module = Tactile(sensor("gtac"), times, readings * TO_TAXEL_FRAME)
-        masks = {"finger1": {"quiet": times > last + GTAC_SETTLED}}
-        yield Marked(Recording(path.stem, {"finger1": module}), masks)
+        yield Marked(recording, {"finger1": {"quiet": times > last + GTAC_SETTLED}})

@@ -131,19 +131,20 @@ def import_(
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
     started = start_engine(engine, jobs)
-    parts, task = _parts(started.path(path), options.task(started.path(out), force=force))
+    prefixes, task = _parts(started.path(path), options.task(started.path(out), force=force))
     with _staging_folder(task.out) as folder:
-        results = started.map_ordered(
-            _import_part, ((part,) for part in parts), shared=(task, folder)
-        )
-        results = progress(results, "importing", len(parts))
+        results = started.map_ordered(_import_part, prefixes.items(), shared=(task, folder))
+        results = progress(results, "importing", len(prefixes))
         imported = list(_collect(results, folder, started))
         for recording in imported:
             (folder / recording.file_name).replace(task.out / recording.file_name)
     for recording in imported:
         recording.document["path"] = out / recording.file_name
-    _print([recording.document for recording in imported], out, as_json)
+    hint = _hint(task)
+    _print([recording.document for recording in imported], out, hint, as_json)
     _report_findings(imported)
+    if hint:
+        print_message(f"hint: {hint}")
 
 
 @dataclass(frozen=True)
@@ -159,19 +160,23 @@ class _ImportTask:
     out: Path
 
 
-def _parts(path: Path, task: _ImportTask) -> tuple[list[Path], _ImportTask]:
-    """Return the parts of the input that are imported one by one, and the task with the format."""
+def _parts(path: Path, task: _ImportTask) -> tuple[dict[Path, str], _ImportTask]:
+    """Return the parts of the input with the prefix of their names, and the task with the format.
+
+    The parts are imported one by one.
+    """
     from holdfast.io.importers import import_parts
+    from holdfast.io.importers.table import name_prefixes
 
     foreign = task.data_format is not None or task.sensors or task.columns is not None
     if not foreign and (files := _own_files(path)):
-        return files, task
+        return dict.fromkeys(files, ""), task
     name, parts = import_parts(path, task.data_format, sensors=task.sensors, columns=task.columns)
-    return parts, replace(task, data_format=name)
+    return name_prefixes(parts), replace(task, data_format=name)
 
 
 def _import_part(
-    task: _ImportTask, folder: Path, part: Path
+    task: _ImportTask, folder: Path, part: Path, prefix: str
 ) -> tuple[list[_Imported], dict[str, str]]:
     """Import a part into the staging folder; return its recordings and messages.
 
@@ -182,7 +187,10 @@ def _import_part(
     def report(text: str) -> None:
         messages[text.replace(part.name, "")] = text
 
-    recordings = _recordings(part, task, report)
+    recordings = (
+        replace(recording, name=f"{prefix}{recording.name}")
+        for recording in _recordings(part, task, report)
+    )
     return [_write(recording, folder, task) for recording in recordings], messages
 
 
@@ -326,7 +334,14 @@ def _report_findings(imported: Sequence[_Imported]) -> None:
         print_message(f"{name}{more}: {module}{finding.text}")
 
 
-def _print(recordings: list[dict[str, Any]], out: Path, as_json: bool) -> None:
+def _hint(task: _ImportTask) -> str | None:
+    """Return the option that helps with the recordings of the format; None for our own."""
+    from holdfast.io.importers import HINTS
+
+    return None if task.data_format is None else HINTS[task.data_format]
+
+
+def _print(recordings: list[dict[str, Any]], out: Path, hint: str | None, as_json: bool) -> None:
     n_modules = sum(len(recording["modules"]) for recording in recordings)
     n_samples = sum(recording["n_samples"] for recording in recordings)
     if as_json:
@@ -337,6 +352,7 @@ def _print(recordings: list[dict[str, Any]], out: Path, as_json: bool) -> None:
                 "n_modules": n_modules,
                 "n_samples": n_samples,
                 "recordings": recordings,
+                "hint": hint,
             }
         )
         return

@@ -172,9 +172,19 @@ def _from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
 
 
 def _from_sensor_state(message: Mapping[str, Any]) -> list[DeviceSample]:
-    forces = _points(message["pillars"], ("fX", "fY", "fZ"))
+    return _pillar_sample(message, ("fX", "fY", "fZ"))
+
+
+def _from_sensor_state_of_ros2(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the sample of a PapillArray in ROS 2, which allows small letters only."""
+    return _pillar_sample(message, ("fx", "fy", "fz"))
+
+
+def _pillar_sample(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
+    forces = _points(message["pillars"], names)
     time = message["tus"] * 1e-6 if message["tus"] > 0 else None
-    stamp = _seconds(message["header"]["stamp"])
+    header = message.get("header")  # the maker's messages of ROS 2 have none
+    stamp = _seconds(header["stamp"]) if header else None
     return [DeviceSample(None, PAPILLARRAY, time, stamp, None, None, forces)]
 
 
@@ -196,10 +206,8 @@ _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSamp
         | _axis_paths("points[].point.", "float64"),
         _from_x_server,
     ),
-    (
-        {"tus int64", "header.frame_id string"} | _axis_paths("pillars[].f", "float32", "XYZ"),
-        _from_sensor_state,
-    ),
+    ({"tus int64"} | _axis_paths("pillars[].f", "float32", "XYZ"), _from_sensor_state),
+    ({"tus int64"} | _axis_paths("pillars[].f", "float32"), _from_sensor_state_of_ros2),
 )
 
 

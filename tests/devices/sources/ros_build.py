@@ -53,6 +53,13 @@ bool in_contact
 int32 slip_state
 """,
 }
+PILLARS_OF_ROS2 = {
+    name: "\n".join(line for line in text.lower().splitlines() if "header" not in line)
+    .replace("pillarstate[]", "PillarState[]")
+    .replace("still=", "STILL=")
+    for name, text in PILLARS.items()
+}
+"""As in the manual of the maker: small letters, and no headers."""
 
 
 def store(package, texts, *, ros2):
@@ -114,6 +121,15 @@ def sensor_state(types, package, tus, stamp, forces, *, ros2):
     ]
     fields = (0.5,) * 8
     return kinds["SensorState"](head, tus, pillars, *fields, True, False, True)
+
+
+def sensor_state_of_ros2(types, package, tus, forces):
+    kinds = {name: types.types[f"{package}/msg/{name}"] for name in PILLARS}
+    pillars = [
+        kinds["PillarState"](k, 0.1, 0.2, 0.3, *map(float, f), True, 2)
+        for k, f in enumerate(forces)
+    ]
+    return kinds["SensorState"](tus, pillars, *(0.5,) * 8, True, False, True)
 
 
 def counts(n_taxels, seed=0):

@@ -200,3 +200,157 @@ def test_sensors_and_columns_are_for_csv(tmp_path):
         ValueError, match=r"--sensor and --columns belong to the format csv; 'gtac'"
     ):
         import_recordings(tmp_path, "gtac", sensors=ANY)
+
+
+def flat(separator=",", prefix="", first=0, time="time"):
+    """Header of the flat CSV that many loggers write, of an AnySkin."""
+    names = [f"{prefix}t{k + first}_{axis}" for k in range(5) for axis in "xyz"]
+    return separator.join([time, *names])
+
+
+def write_flat(path, header, stamps, separator=",", convert=str):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [[convert(stamp), *(str(k + c) for c in range(15))] for k, stamp in enumerate(stamps)]
+    path.write_text("\n".join([header, *(separator.join(row) for row in rows)]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("separator", [",", ";"])
+@pytest.mark.parametrize(("prefix", "module"), [("", "finger1"), ("index_", "index")])
+@pytest.mark.parametrize("time", ["time", "t"])
+def test_the_flat_csv_that_people_have(tmp_path, first, separator, prefix, module, time):
+    header = flat(separator, prefix, first, time)
+    write_flat(tmp_path / "a.csv", header, [0.0, 0.01, 0.02], separator)
+    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY)
+    assert list(recording.modules) == [module]
+    found = recording.modules[module]
+    assert found.readings[1, :2].tolist() == [[1, 2, 3], [4, 5, 6]]
+    np.testing.assert_allclose(found.times, [0, 0.01, 0.02])
+
+
+@pytest.mark.parametrize("time", ["time", "t"])
+def test_the_flat_csv_of_two_fingers(tmp_path, time):
+    names = [f"{f}_t{k}_{a}" for f in ("thumb", "index") for k in range(5) for a in "xyz"]
+    rows = [[k / 50, *range(30)] for k in range(3)]
+    write(tmp_path / "a.csv", [], [time, *names], rows)
+    (recording,) = import_recordings(tmp_path, sensors=ANY)
+    assert list(recording.modules) == ["thumb", "index"]
+    assert recording.modules["index"].readings[0, 4].tolist() == [27, 28, 29]
+
+
+def test_semicolons_with_decimal_commas(tmp_path):
+    header = flat(";")
+    stamps = [0.0, 0.01, 0.02]
+    write_flat(
+        tmp_path / "a.csv", header, stamps, ";", lambda stamp: f"{stamp:.2f}".replace(".", ",")
+    )
+    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY)
+    np.testing.assert_allclose(recording.modules["finger1"].times, stamps)
+
+
+@pytest.mark.parametrize("cells", [("0.01", "1,5"), ("0,01", "1.5")])
+def test_decimal_commas_beside_decimal_points(tmp_path, cells):
+    stamp, value = cells
+    rows = ["0;" + ";".join(["1"] * 15), f"{stamp};" + ";".join([value] * 15)]
+    (tmp_path / "a.csv").write_text("\n".join([flat(";"), *rows]))
+    text = "a.csv, row 3: numbers with a decimal comma and with a decimal point given; one of the"
+    with pytest.raises(RecordingError, match=re.escape(text)):
+        list(import_recordings(tmp_path / "a.csv", sensors=ANY))
+
+
+@pytest.mark.parametrize(
+    ("time", "stamps"),
+    [
+        ("time", [0, 10, 20]),
+        ("time_ms", [0, 10, 20]),
+        ("timestamp", [1_669_000_000_000_000_000 + 10_000_000 * k for k in range(3)]),
+        ("time", [1_669_000_000_000_000_000 + 10_000_000 * k for k in range(3)]),
+        ("timestamp", [1_669_000_000.0, 1_669_000_000.01, 1_669_000_000.02]),
+        ("t (us)", [0, 10_000, 20_000]),
+        ("time_s", [0.0, 0.01, 0.02]),
+        ("milliseconds", [0.0, 10.0, 20.0]),
+    ],
+)
+def test_units_of_times(tmp_path, time, stamps):
+    write_flat(tmp_path / "a.csv", flat(time=time), stamps)
+    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY)
+    times = recording.modules["finger1"].times
+    np.testing.assert_allclose(times - times[0], [0, 0.01, 0.02], atol=1e-6)
+
+
+def test_times_in_another_unit_are_reported(tmp_path):
+    texts = []
+    for name in ("a.csv", "b.csv"):
+        write_flat(tmp_path / name, flat(), [0, 10, 20])
+    list(import_recordings(tmp_path, sensors=ANY, report=texts.append))
+    line = "times of column 'time' are taken as ms; --columns time=time:s if they are in s"
+    assert texts == [f"a.csv: {line}"]
+
+
+def test_a_file_that_names_its_sensor_has_times_in_seconds(tmp_path):
+    write_flat(tmp_path / "a.csv", f"# sensor: anyskin\n{flat()}", [0, 10, 20])
+    (recording,) = import_recordings(tmp_path / "a.csv", report=pytest.fail)
+    assert recording.modules["finger1"].times.tolist() == [0, 10, 20]
+
+
+@pytest.mark.parametrize(
+    ("time", "stamps", "text"),
+    [
+        (
+            "time",
+            [0, 1, 2],
+            "column 'time' with steps of 1 and without a unit given, which may be a number of "
+            "samples, 1 Hz in s or 1000 Hz in ms: give --columns time=time:s or time=time:ms, or "
+            "time=100Hz with the true rate if it counts samples",
+        ),
+        (
+            "t",
+            [0.0, 0.5, 1.0],
+            "column 't' with steps of 0.5 and without a unit given, which may be 2 Hz in s or "
+            "2000 Hz in ms: give --columns time=t:s or time=t:ms",
+        ),
+        (
+            "time_ms",
+            [0.0, 0.01, 0.02],
+            "column 'time_ms' with steps of 0.01 given, 1e+05 Hz in ms; 5 to 5000 Hz expected: "
+            "give --columns time=time_ms:s, or the unit that is true",
+        ),
+        ("time_s", [0, 10, 20], "give --columns time=time_s:ms, or the unit that is true"),
+        ("t", [0.0, "nan", 0.02], "a.csv: "),
+        ("time", [0.0, "", 0.02], "a.csv: "),
+    ],
+)
+def test_times_that_are_in_doubt(tmp_path, time, stamps, text):
+    write_flat(tmp_path / "a.csv", flat(time=time), stamps)
+    with pytest.raises(RecordingError) as caught:
+        list(import_recordings(tmp_path / "a.csv", sensors=ANY))
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", ["s", "ms"])
+def test_columns_end_the_doubt(tmp_path, unit):
+    write_flat(tmp_path / "a.csv", flat(), [0, 1, 2])
+    columns = f"time=time:{unit}"
+    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY, columns=columns)
+    assert recording.modules["finger1"].times[1] == {"s": 1.0, "ms": 1e-3}[unit]
+
+
+def test_one_taxel_in_two_columns(tmp_path):
+    (tmp_path / "a.csv").write_text("time,t1_x,t01_x,t1_y,t1_z\n0,1,2,3,4\n")
+    text = "a.csv: columns 't1_x' and 't01_x' are the same taxel and axis; one column for each"
+    with pytest.raises(RecordingError, match=re.escape(text)):
+        list(import_recordings(tmp_path / "a.csv", sensors=ANY))
+
+
+def test_a_folder_of_folders(tmp_path):
+    for name in ("grasp10/log.csv", "grasp9/log.csv", ".hidden/log.csv"):
+        write_flat(tmp_path / name, flat(), [0.0, 0.01])
+    recordings = list(import_recordings(tmp_path, sensors=ANY))
+    assert [recording.name for recording in recordings] == ["grasp9_log", "grasp10_log"]
+    write_flat(tmp_path / "grasp10" / "log.csv", flat(), [0.0, 0.01]).rename(
+        tmp_path / "grasp10" / "other.csv"
+    )
+    recordings = list(import_recordings(tmp_path, sensors=ANY))
+    assert [recording.name for recording in recordings] == ["log", "other"]

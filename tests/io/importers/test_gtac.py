@@ -52,6 +52,52 @@ def test_bad_times(tmp_path, stamps, text):
         list(import_recordings(tmp_path / "a.csv", "gtac"))
 
 
+GRIPPER2 = ["", *NAMED, "servo_f1", "servo_b1", "Hz", "milliseconds"]
+
+
+def rows_of_gripper2(n, rate=157):
+    return [[k, *range(-10 + k, 35 + k), k // 2, 79, rate, 1] for k in range(n)]
+
+
+def test_the_second_gripper_has_a_rate_in_place_of_times(tmp_path):
+    write(tmp_path / "Apple_4.csv", GRIPPER2, rows_of_gripper2(4))
+    (recording,) = import_recordings(tmp_path)
+    np.testing.assert_allclose(recording.modules["finger1"].times, np.arange(4) / 157)
+    assert recording.modules["finger1"].readings[0, 1].tolist() == [-7, 6, 5]
+    assert recording.metadata["clock"] == "none; 157 Hz by its column Hz"
+    assert recording.metadata["source"] == "roobooot/GTac_Gripper_V2"
+    servos = recording.truth.hand["servo_positions"]
+    assert servos.tolist() == [[0, 79], [0, 79], [1, 79], [1, 79]]
+
+
+def test_servos_without_the_first_row(tmp_path):
+    rows_with_servos = [[*row[:46], 10 + k, row[-2], row[-1]] for k, row in enumerate(rows(3, 1))]
+    rows_with_servos[0][-1] = ""
+    write(tmp_path / "a.csv", ["", *NAMED, "servo_1", "Hz", "milliseconds"], rows_with_servos)
+    (recording,) = import_recordings(tmp_path)
+    assert recording.truth.hand["servo_positions"].tolist() == [[11], [12]]
+
+
+@pytest.mark.parametrize("rate", [0, -157, "", "nan", "inf"])
+def test_a_second_gripper_without_a_rate(tmp_path, rate):
+    table = rows_of_gripper2(4)
+    table[2][-2] = rate
+    write(tmp_path / "a.csv", GRIPPER2, table)
+    with pytest.raises(
+        RecordingError, match=r"a\.csv, row 4, column 'Hz': \S+ given; a rate above"
+    ):
+        list(import_recordings(tmp_path))
+
+
+def test_the_real_recordings_of_the_second_gripper(data_folder):
+    recordings = list(import_recordings(data_folder / "gtac_v2"))
+    assert len(recordings) == 21
+    for recording in recordings:
+        assert recording.modules["finger1"].rate == pytest.approx(157.5, abs=0.6)
+        moves = np.diff(recording.truth.hand["servo_positions"], axis=0).any(axis=1)
+        assert 0 < np.flatnonzero(moves)[-1] < 0.7 * len(moves)
+
+
 def test_other_columns(tmp_path):
     write(tmp_path / "a.csv", ["a", "b"], [[1, 2]])
     with pytest.raises(

@@ -8,7 +8,9 @@ from holdfast.io import FORMATS, import_recordings
 
 
 def test_unknown_formats(tmp_path):
-    with pytest.raises(ValueError, match="unknown format 'bag'; there are uskin-pick-move, xela-"):
+    with pytest.raises(
+        ValueError, match="unknown format 'bag'; there are uskin-pick-move, eflesh,"
+    ):
         import_recordings(tmp_path, "bag")
 
 

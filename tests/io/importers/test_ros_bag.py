@@ -23,10 +23,12 @@ from rosbags.rosbag2 import Writer as Writer2
 from devices.sources.ros_build import (
     OLD,
     PILLARS,
+    PILLARS_OF_ROS2,
     XELA,
     counts,
     sens_stream,
     sensor_state,
+    sensor_state_of_ros2,
     store,
     x_server,
     x_stream,
@@ -234,6 +236,68 @@ def test_pillars_of_two_sensors(tmp_path, storage):
         assert (module.sensor.name, module.unit) == ("papillarray", "N")
         np.testing.assert_array_equal(module.readings, forces[number])
         np.testing.assert_allclose(module.times, 0.001 * np.arange(1, N + 1))
+
+
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_pillars_as_the_maker_sends_them_in_ros2(tmp_path, storage):
+    forces = np.random.default_rng(0).normal(size=(N, 9, 3)).astype(np.float32)
+    with Bag(tmp_path / "pillars", storage, "sensor_interfaces", PILLARS_OF_ROS2) as given:
+        for k in range(N):
+            time = EPOCH + 0.002 * k
+            message = sensor_state_of_ros2(
+                given.types, given.package, 2000 * (k + 1) + 40 * (k % 3), forces[k]
+            )
+            given.write("/hub_0/sensor_0", message, time + 0.0015 * (k % 2))
+    recording = read(given.path)
+    assert recording.metadata["clock"] == "device"
+    module = recording.modules["finger1"]
+    np.testing.assert_array_equal(module.readings, forces)
+    expected = (2000 * np.arange(1, N + 1) + 40 * (np.arange(N) % 3)) * 1e-6
+    np.testing.assert_allclose(module.times, expected)
+
+
+def pillars_with(tmp_path, tus):
+    """A bag with one message of a PapillArray for each time of its clock [us]."""
+    with Bag(tmp_path / "pillars", "ros1", "papillarray_ros_v2", PILLARS) as given:
+        for k, microseconds in enumerate(tus):
+            time = EPOCH + 0.002 * k
+            given.pillars("/hub_0/sensor_0", time, microseconds, time, np.full((9, 3), float(k)))
+    return read(given.path)
+
+
+def test_pillars_without_a_time_of_their_own(tmp_path):
+    recording = pillars_with(tmp_path, [0, 0, 2000, 4000, 4000, 6000, 8000])
+    assert recording.metadata["clock"] == "device"
+    assert recording.metadata["n_undated"] == 3
+    module = recording.modules["finger1"]
+    assert module.readings[:, 0, 0].tolist() == [2, 3, 5, 6]
+    np.testing.assert_allclose(module.times, [0.002, 0.004, 0.006, 0.008])
+
+
+@pytest.mark.parametrize(
+    "tus", [[2000, 4000, 3000, 6000], [2000] * 5, [0, 0, 0, 2000, 4000], [0] * 4, [5, 0, 7, 9]]
+)
+def test_pillars_with_a_clock_that_is_none(tmp_path, tus):
+    recording = pillars_with(tmp_path, tus)
+    assert recording.metadata["clock"] == "header"
+    assert "n_undated" not in recording.metadata
+    assert recording.modules["finger1"].n_samples == len(tus)
+
+
+def test_forces_that_are_missing_stay_missing(tmp_path):
+    with Bag(tmp_path / "pillars", "mcap", "sensor_interfaces", PILLARS) as given:
+        for k in range(4):
+            forces = np.full((9, 3), np.nan if k == 2 else 1.0)
+            given.pillars("/hub_0/sensor_0", EPOCH + k, 1000 * (k + 1), EPOCH + k, forces)
+    readings = read(given.path).modules["finger1"].readings
+    assert np.isnan(readings).any(axis=(1, 2)).tolist() == [False, False, True, False]
+
+
+def test_another_number_of_pillars(tmp_path):
+    with Bag(tmp_path / "pillars", "mcap", "sensor_interfaces", PILLARS) as given:
+        given.pillars("/hub_0/sensor_0", EPOCH, 1000, EPOCH, np.ones((8, 3)))
+    with pytest.raises(RecordingError, match=r"8 taxels given, 9 expected \(papillarray\)$"):
+        read(given.path)
 
 
 def test_clocks_of_two_devices_are_not_mixed(tmp_path):

@@ -1,6 +1,6 @@
 """Import of recordings in other formats; each format has a module, which is loaded by name."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -9,14 +9,16 @@ from types import ModuleType
 from holdfast.errors import RecordingError, require_extras
 from holdfast.files import check_regular
 from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 FORMATS = {
     "uskin-pick-move": "folders of uSkin 4x4 recordings with measured slip (imanlab)",
+    "eflesh": "tensors seq_N.pt of tugs at held objects with two eFlesh fingertips",
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
-    "gtac": "CSV of the GTac gripper: 15 magnetic nodes",
+    "gtac": "CSV of the GTac grippers, first and second version: 15 magnetic nodes",
     "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
@@ -25,6 +27,22 @@ FORMATS = {
 """Formats that can be imported, with a description; they are detected in this order."""
 EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags"}
 """Extras that formats need."""
+_IN_CONTACT = (
+    "the object is held from the first sample on (metadata: begins); where a verb does not read "
+    "this, give --in-contact"
+)
+_IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
+HINTS = {
+    "uskin-pick-move": _IN_CONTACT,
+    "eflesh": f"{_IN_CONTACT}; whether the object slipped is in the metadata (slipped)",
+    "xela-log": _IF_IN_CONTACT,
+    "gtac": f"grasps of the second gripper begin with an open hand; {_IF_IN_CONTACT}",
+    "anyskin-slip": f"{_IF_IN_CONTACT}; check the labels of contact with holdfast label",
+    "arq-crisp": _IF_IN_CONTACT,
+    "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
+    "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, import with --columns signs=+--",
+}
+"""Option that helps with the recordings of a format, for the person who imports them."""
 
 
 def import_recordings(
@@ -63,11 +81,10 @@ def import_recordings(
         source = _importer(name)
         if name in EXTRAS:
             require_extras(EXTRAS[name])
-        recordings: Iterator[Recording] = (
-            source.read(place, sensors, given, report)
-            if name == "csv"
-            else (recording for part in source.parts(place) for recording in source.read(part))
-        )
+        if name == "csv":
+            recordings: Iterator[Recording] = source.read(place, sensors, given, report)
+        else:
+            recordings = _named_apart(source.parts(place), source.read)
     return _guarded(place, recordings, labels=labels)
 
 
@@ -99,6 +116,15 @@ def import_parts(
         source = _importer(name)
         parts: list[Path] = source.parts(place, given) if name == "csv" else source.parts(place)
     return name, parts
+
+
+def _named_apart(
+    parts: Sequence[Path], read: Callable[[Path], Iterator[Recording]]
+) -> Iterator[Recording]:
+    """Read the parts one by one; see `name_prefixes`."""
+    for part, prefix in name_prefixes(parts).items():
+        for recording in read(part):
+            yield replace(recording, name=f"{prefix}{recording.name}")
 
 
 def _columns(columns: Columns | str | None) -> Columns | None:
@@ -154,4 +180,5 @@ def _detected_format(path: Path) -> str:
 
 def _without_labels(recording: Recording) -> Recording:
     modules = {name: replace(module, labels=()) for name, module in recording.modules.items()}
-    return replace(recording, modules=modules)
+    metadata = {key: value for key, value in recording.metadata.items() if key != SLIPPED}
+    return replace(recording, modules=modules, metadata=metadata)

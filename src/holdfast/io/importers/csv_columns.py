@@ -23,6 +23,11 @@ TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 PLAUSIBLE_RATES = (5.0, 5000.0)
 """Rates that decide the unit of times without one [Hz]; it is unambiguous, because units are a
 factor of 1000 apart."""
+DOUBTFUL_STEPS = (0.2, 1.0)
+"""Steps of times without a unit that are 1 to 5 Hz in s, or 1000 to 5000 Hz in ms; a step of 1 may
+also be a number of samples."""
+STATED_RATES = (0.5, 50_000.0)
+"""Rates at which the unit that a header names is believed [Hz]."""
 MAX_PATTERNS = 1 << 18
 """Maximum number of patterns that a guess compares; 368 taxels have some thousand."""
 MAX_GUESSED_NAME = 200
@@ -33,6 +38,14 @@ RUN = ".."
 _FIELDS = ("time", "taxels", "signs", "label", "cause")
 _TIME_NAMES = ("time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis")
 _RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s*hz", re.IGNORECASE)
+_UNIT_WORDS = {
+    **dict.fromkeys(("s", "sec", "secs", "seconds"), "s"),
+    **dict.fromkeys(("ms", "millis", "milliseconds"), "ms"),
+    **dict.fromkeys(("us", "micros", "microseconds"), "us"),
+    **dict.fromkeys(("ns", "nanos", "nanoseconds"), "ns"),
+}
+_UNIT_AT_END = re.compile(rf"(?:^|[\W_])(?P<unit>{'|'.join(_UNIT_WORDS)})\W*$", re.IGNORECASE)
+_ONE_FINGER = re.compile(r"(?P<module>.+)(?P<rest>[._]t\{taxel\}[._]\{axis\})")
 _TOKEN = re.compile(r"\d+|[A-Za-z]+|[^A-Za-z\d]+")
 _WORD = re.compile(r"\{\w+\}|\d+|[A-Za-z]+|[^A-Za-z\d{]+")
 _PLACEHOLDERS = {
@@ -149,6 +162,66 @@ class Columns:
         return layout
 
 
+def stated_unit(name: str) -> str | None:
+    """Return the unit at the end of the name of a column of times; None without one.
+
+    Example:
+        >>> [stated_unit(name) for name in ("time_ms", "t [us]", "timestamp", "time")]
+        ['ms', 'us', None, None]
+    """
+    match = _UNIT_AT_END.search(name)
+    return _UNIT_WORDS[match["unit"].lower()] if match else None
+
+
+def unit_of_column(name: str, values: Array, where: str) -> str:
+    """Return the unit of a column of times: as its name states, or that of a plausible rate.
+
+    Args:
+        name: name of the column.
+        values: (n,) times.
+        where: the file, for messages.
+
+    Raises:
+        RecordingError: name and values contradict each other, or two units are possible.
+    """
+    step = _median_step(values)
+    unit = stated_unit(name)
+    if unit is None:
+        _check_clear(name, step, where)
+        return _unit_of(values)
+    rate = 1 / (step * TIME_UNITS[unit]) if step else 0.0
+    low, high = STATED_RATES
+    if step and not low <= rate <= high:
+        likely = _unit_of(values)
+        raise RecordingError(
+            f"{where}: column {name!r} with steps of {step:.6g} given, {rate:.4g} Hz in {unit}; "
+            f"{PLAUSIBLE_RATES[0]:g} to {PLAUSIBLE_RATES[1]:g} Hz expected: give --columns "
+            f"time={name}:{likely}, or the unit that is true"
+        )
+    return unit
+
+
+def _check_clear(name: str, step: float, where: str) -> None:
+    """Check that times without a unit have a single plausible one."""
+    low, high = DOUBTFUL_STEPS
+    if not low < step <= high:
+        return
+    counted = "a number of samples, " if step == 1 else ""
+    samples = ", or time=100Hz with the true rate if it counts samples" if counted else ""
+    raise RecordingError(
+        f"{where}: column {name!r} with steps of {step:.6g} and without a unit given, which may be "
+        f"{counted}{1 / step:.4g} Hz in s or {1e3 / step:.4g} Hz in ms: give --columns "
+        f"time={name}:s or time={name}:ms{samples}"
+    )
+
+
+def _median_step(values: Array) -> float:
+    """Return the median of the steps above 0; 0 without any."""
+    steps = np.diff(values)
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    return float(np.median(steps)) if len(steps) else 0.0
+
+
 def seconds_of(values: Array, unit: str | None) -> tuple[Array, str]:
     """Return times in seconds, and their unit; without one, that of a plausible rate.
 
@@ -162,9 +235,7 @@ def seconds_of(values: Array, unit: str | None) -> tuple[Array, str]:
 
 
 def _unit_of(values: Array) -> str:
-    steps = np.diff(values)
-    steps = steps[np.isfinite(steps) & (steps > 0)]
-    step = float(np.median(steps)) if len(steps) else 0.0
+    step = _median_step(values)
     low, high = PLAUSIBLE_RATES
     fitting = (
         unit for unit, size in TIME_UNITS.items() if low <= 1 / max(step * size, 1e-12) < high
@@ -272,6 +343,8 @@ def _with_module(patterns: Sequence[str]) -> str:
         >>> _with_module(["f1_{axis}{taxel}", "f2_{axis}{taxel}"])
         '{module}_{axis}{taxel}'
     """
+    if len(patterns) == 1 and (single := _ONE_FINGER.fullmatch(patterns[0])):
+        return "{module}" + single["rest"]
     words = [_WORD.findall(pattern) for pattern in patterns]
     start = _common_start(words)
     while start and start[-1].isalnum():  # "f1" and "f2" are whole names

@@ -13,17 +13,24 @@ import numpy as np
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.io.importers.csv_columns import Columns, Layout, seconds_of
+from holdfast.io.importers.csv_columns import (
+    TIME_UNITS,
+    Columns,
+    Layout,
+    seconds_of,
+    unit_of_column,
+)
 from holdfast.io.importers.table import (
     Table,
     csv_files,
     errors_named,
     header_line,
+    name_prefixes,
     read_table,
     with_integer_type,
 )
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
-from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_numbers
+from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_number, taxel_numbers
 from holdfast.sensors.types import Array, Unit
 
 TIME = "time"
@@ -36,7 +43,7 @@ Settings = Mapping[tuple[str, str | None], str]
 """Value by key (sensor or unit) and module; None for all modules."""
 Report = Callable[[str], None]
 
-_TAXEL = re.compile(r"(?:(?P<module>.+)\.)?t(?P<taxel>\d+)[._](?P<axis>[xyz])")
+_TAXEL = re.compile(r"(?:(?P<module>.+)[._])?t(?P<taxel>\d+)[._](?P<axis>[xyz])")
 _TEXT = re.compile(r"(?:(?P<module>.+)\.)?(?P<column>label|cause)")
 _COMMENT = re.compile(r"(?P<key>sensor|unit)\s*:\s*(?:(?P<module>[^=]+?)\s*=)?\s*(?P<value>\S+)")
 
@@ -76,8 +83,11 @@ def read(
             for line in lines:
                 report(line)
 
-    files = parts(path, columns)
-    return (_recording(file, sensors or {}, columns, report_once) for file in files)
+    return (
+        replace(recording, name=f"{prefix}{recording.name}")
+        for file, prefix in name_prefixes(parts(path, columns)).items()
+        for recording in [_recording(file, sensors or {}, columns, report_once)]
+    )
 
 
 def parts(path: Path, columns: Columns | None = None) -> list[Path]:
@@ -118,19 +128,27 @@ def _recording(
     path: Path,
     sensors: Mapping[str, Sensor],
     columns: Columns | None,
-    report: Callable[[str, tuple[str, str]], None],
+    report: Callable[[str, tuple[str, ...]], None],
 ) -> Recording:
     with errors_named(path):
         if columns is None and _is_header(header_line(path)):
-            return _generic(path, sensors)
+            return _generic(path, sensors, report)
         return _of_any_logger(path, sensors, columns or Columns(), report)
 
 
-def _generic(path: Path, sensors: Mapping[str, Sensor]) -> Recording:
+def _generic(
+    path: Path, sensors: Mapping[str, Sensor], report: Callable[[str, tuple[str, ...]], None]
+) -> Recording:
     names = header_line(path)
     table, cells = read_table(path, [name for name in names if _TEXT.fullmatch(name)])
     layout, settings = _layout(table), _settings(table)
     times = table.columns([TIME])[:, 0]
+    if not settings:  # not the format of docs/formats.md, in which times are in s
+        unit = unit_of_column(TIME, times, str(path))
+        times = times * TIME_UNITS[unit]
+        if unit != "s":
+            line = f"{path.name}: times of column {TIME!r} are taken as {unit}; --columns "
+            report(unit, (f"{line}time={TIME}:s if they are in s",))
     return _assembled(table, cells, times, layout, settings, sensors)
 
 
@@ -138,7 +156,7 @@ def _of_any_logger(
     path: Path,
     sensors: Mapping[str, Sensor],
     columns: Columns,
-    report: Callable[[str, tuple[str, str]], None],
+    report: Callable[[str, tuple[str, ...]], None],
 ) -> Recording:
     """Return the recording in a file with any names of the columns; report a guess."""
     names = header_line(path) or read_table(path)[0].names  # which reports what is wrong
@@ -169,7 +187,10 @@ def _with_signs(recording: Recording, factors: Array) -> Recording:
 def _times(table: Table, columns: Columns) -> tuple[Array, str]:
     if columns.rate is not None:
         return np.arange(len(table.values)) / columns.rate, "s"
-    return seconds_of(table.columns([columns.time or TIME])[:, 0], columns.time_unit)
+    name = columns.time or TIME
+    values = table.columns([name])[:, 0]
+    unit = columns.time_unit or unit_of_column(name, values, str(table.path))
+    return seconds_of(values, unit)
 
 
 def _guess_text(
@@ -215,7 +236,13 @@ def _layout(table: Table) -> Layout:
         taxel = _TAXEL.fullmatch(name)
         if taxel:
             columns = layout.setdefault(taxel["module"] or DEFAULT_MODULE, {})
-            columns[int(taxel["taxel"]), taxel["axis"]] = name
+            key = int(taxel["taxel"]), taxel["axis"]
+            if key in columns:
+                raise RecordingError(
+                    f"{table.path}: columns {columns[key]!r} and {name!r} are the same taxel and "
+                    "axis; one column for each expected"
+                )
+            columns[key] = name
         elif name != TIME and not _TEXT.fullmatch(name):
             raise RecordingError(
                 f"{table.path}: unknown column {name!r}; {TIME!r}, 'MODULE.t01.x' (or 't01_x'), "
@@ -224,7 +251,18 @@ def _layout(table: Table) -> Layout:
             )
     if not layout:
         raise RecordingError(f"{table.path}: no taxel columns such as 'thumb.t01.x' or 't01_x'")
-    return layout
+    return _counted_from_one(layout)
+
+
+def _counted_from_one(layout: Layout) -> Layout:
+    """Return the layout with taxels from 1, also if the file counts them from 0."""
+    first = min(taxel for columns in layout.values() for taxel, _ in columns)
+    if first != 0:
+        return layout
+    return {
+        module: {(taxel_number(taxel), axis): name for (taxel, axis), name in columns.items()}
+        for module, columns in layout.items()
+    }
 
 
 def _settings(table: Table) -> Settings:

@@ -101,6 +101,28 @@ class _DeviceTrack:
             self.stamps.append((sample.time, sample.stamp, time))
         self.last = sample
 
+    def drop_undated(self) -> int:
+        """Drop samples without a time of their own by the clock of the device.
+
+        The node of the PapillArray sends what it has, at its own rate: zeros before the first
+        packet, and a sample that changes while it is read, twice with one time. A clock that goes
+        back, or stands still for more than half of the samples, is no clock, and all are kept.
+
+        Returns:
+            The number of samples that were dropped.
+        """
+        times = [time for time, _, _ in self.stamps]
+        first = next((k for k, time in enumerate(times) if time is not None), len(times))
+        dated = np.array(times[first:], dtype=np.float64)  # NaN for None
+        steps = np.diff(dated)
+        n_kept = 1 + int(np.count_nonzero(steps > 0))
+        if not (steps >= 0).all() or not len(dated) or 2 * n_kept < len(times):
+            return 0
+        places = first + np.flatnonzero(np.append(True, steps > 0))
+        self.readings = [self.readings[place] for place in places]
+        self.stamps = [self.stamps[place] for place in places]
+        return len(times) - n_kept
+
     def times(self, clock: str) -> Array | None:
         """Return the times by a clock [s]; None if one is missing or they do not increase."""
         column = [stamps[CLOCKS.index(clock)] for stamps in self.stamps]
@@ -132,10 +154,12 @@ class _BagImport:
         self._path = path
         self._bag = bag
         self._tracks: dict[tuple[str, int], _DeviceTrack] = {}
+        self._n_undated = 0
 
     def recording(self) -> Recording:
         topics = self._tactile_topics()
         self._read(topics)
+        self._n_undated = sum(track.drop_undated() for track in self._tracks.values())
         if not any(track.readings for track in self._tracks.values()):
             names = ", ".join(topic.name for topic in topics)
             raise RecordingError(f"{self._path} has no messages on {names}; at least one expected")
@@ -230,6 +254,7 @@ class _BagImport:
             "clock": clock,
             **({"hand": names[0]} if len(names) == 1 else {}),
             **({"n_refused": n_refused} if n_refused else {}),
+            **({"n_undated": self._n_undated} if self._n_undated else {}),
         }
 
 

@@ -3,10 +3,10 @@
 import csv
 import re
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple, TextIO, cast
+from typing import Any, NamedTuple, TextIO, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,12 @@ MAX_ROW_SIZE = 1 << 26
 """Maximum size of a row with long cells, and of all lines before the first row [bytes]."""
 COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
+SEPARATORS = ",;"
+"""Characters between the cells of a row, of which a file has one."""
+BEGINS_IN_CONTACT: Mapping[str, Any] = {"begins": "in_contact", "starts_loaded": True}
+"""Metadata of a recording whose first samples are load, as a fact of its format."""
+SLIPPED = "slipped"
+"""Field of the metadata with the label of a whole recording: whether the object slipped."""
 
 _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 """Characters with which Python reads numbers that no other program writes, such as `1_000`."""
@@ -71,24 +77,27 @@ def header_line(path: Path) -> tuple[str, ...]:
 def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, list[str]]]:
     """Read the numbers of a CSV file, and the cells of its columns of text.
 
+    Cells are separated by commas, or by semicolons; with these a number may have a decimal comma.
+
     Args:
         path: path of the file.
         text: names of the columns of text; they are NaN among the numbers.
 
     Raises:
         RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
-            that is not a number, or a row that is too long.
+            that is not a number, both decimal commas and points, or a row that is too long.
     """
-    comments, names, first_line = _head(path)
+    comments, names, first_line, separator = _head(path)
     ReadBudget(path).keep(len(names) * COLUMN_SIZE)
     cells: dict[int, list[str]] = {names.index(name): [] for name in text if name in names}
     numbers = array("d")
+    points = _DecimalPoints(path, separator)
     try:
         with _long_cells():
-            rows = csv.reader(_lines(path, first_line))
+            rows = csv.reader(_lines(path, first_line), delimiter=separator)
             for number, row in enumerate(rows, start=first_line):
                 if row:
-                    numbers.extend(_numbers(path, number, names, row, cells))
+                    numbers.extend(_numbers(path, number, names, row, cells, points))
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
     except (UnicodeError, csv.Error) as cause:
@@ -102,8 +111,45 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     )
 
 
+class _DecimalPoints:
+    """Conversion of decimal commas to points; a file has only one of the two.
+
+    Args:
+        path: path of the file.
+        separator: between cells; with commas there is no decimal comma.
+    """
+
+    def __init__(self, path: Path, separator: str) -> None:
+        self._path = path
+        self._used = ""
+        self._converts = separator != ","
+
+    def converted(self, number: int, row: list[str]) -> list[str]:
+        """Return a row of numbers without decimal commas.
+
+        Raises:
+            RecordingError: the file has decimal commas and points.
+        """
+        if not self._converts:
+            return row
+        text = "".join(row)
+        used = {mark for mark in ",." if mark in text} | {self._used} - {""}
+        if len(used) > 1:
+            raise RecordingError(
+                f"{self._path}, row {number}: numbers with a decimal comma and with a decimal "
+                "point given; one of the two expected in the whole file"
+            )
+        self._used = "".join(used)
+        return [cell.replace(",", ".", 1) for cell in row] if self._used == "," else row
+
+
 def _numbers(
-    path: Path, number: int, names: Sequence[str], row: list[str], cells: dict[int, list[str]]
+    path: Path,
+    number: int,
+    names: Sequence[str],
+    row: list[str],
+    cells: dict[int, list[str]],
+    points: _DecimalPoints,
 ) -> list[float]:
     """Return the numbers of a row; NaN for empty cells and text, which is appended to `cells`.
 
@@ -119,6 +165,7 @@ def _numbers(
         row[place].encode()
         column.append(row[place])
         row[place] = ""
+    row = points.converted(number, row)
     if not _OTHER_FORMS.search("".join(row)):
         with suppress(ValueError):  # a cell is empty or wrong
             return list(map(float, row))
@@ -164,8 +211,32 @@ def with_integer_type(values: Array) -> npt.NDArray[np.generic]:
 
 
 def csv_files(path: Path) -> list[Path]:
-    """Return the file at `path`, or the CSV files in that folder in natural order."""
-    return [path] if path.is_file() else sorted(path.glob("*.csv"), key=natural_order)
+    """Return the file at `path`, or the CSV files in that folder in natural order.
+
+    Without any, those in the folders inside it, folder by folder.
+    """
+    if path.is_file():
+        return [path]
+    if inside := sorted(path.glob("*.csv"), key=natural_order):
+        return inside
+    deeper = (file for file in path.glob("*/*.csv") if not file.parent.name.startswith("."))
+    return sorted(deeper, key=lambda file: (natural_order(file.parent), natural_order(file)))
+
+
+def name_prefixes(parts: Sequence[Path]) -> dict[Path, str]:
+    """Return what to put before the names of the recordings of each part.
+
+    It is the name of the folder where files of two folders have the same name, else empty.
+
+    Example:
+        >>> name_prefixes([Path("a/log.csv"), Path("b/log.csv")])[Path("b/log.csv")]
+        'b_'
+        >>> name_prefixes([Path("a/1.csv"), Path("a/2.csv")])[Path("a/1.csv")]
+        ''
+    """
+    stems = {part.name if part.is_dir() else part.stem for part in parts}
+    apart = len(stems) < len(parts) and len({part.parent for part in parts}) > 1
+    return {part: f"{part.parent.name}_" if apart else "" for part in parts}
 
 
 class CsvFormat(NamedTuple):
@@ -218,8 +289,8 @@ def natural_order(path: Path) -> list[str | int]:
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
-def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
-    """Return comments, names of the columns, and the line of the first row."""
+def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int, str]:
+    """Return comments, names of the columns, the line of the first row, and the separator."""
     try:
         check_regular(path)
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -228,14 +299,24 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
                 if line.startswith("#"):
                     comments.append(line[1:].strip())
                 elif line.strip():
-                    with _long_cells():
-                        names = next(csv.reader([line.rstrip("\r\n")]))
-                    return tuple(comments), tuple(name.strip() for name in names), number + 1
+                    names, separator = _names(line.rstrip("\r\n"))
+                    return tuple(comments), names, number + 1, separator
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
         raise RecordingError(f"{path} is not CSV text: {_text(cause)}") from cause
     raise RecordingError(f"{path} is empty; a header line and samples expected")
+
+
+def _names(header: str) -> tuple[tuple[str, ...], str]:
+    """Return the names in a header line, and the separator that gives more than one."""
+    names: list[str] = []
+    with _long_cells():
+        for separator in SEPARATORS:
+            names = next(csv.reader([header], delimiter=separator))
+            if len(names) > 1:
+                return tuple(name.strip() for name in names), separator
+    return (header.strip().strip('"'),), SEPARATORS[0]
 
 
 def _first_lines(file: TextIO) -> Iterator[str]:

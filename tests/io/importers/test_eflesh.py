@@ -1,0 +1,170 @@
+import os
+import re
+import zipfile
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.errors import RecordingError
+from holdfast.io import import_recordings, load_recording
+
+N = 20
+VALUES = np.arange(N * 30, dtype="<f4").reshape(N, 30)
+
+
+def write(path, values=VALUES, *, pickle=b"torch\nFloatStorage\n.", packed=False, **members):
+    """Write a tensor as torch does, without torch."""
+    kind = zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
+    data = values if isinstance(values, bytes) else values.tobytes()
+    content = {"data.pkl": pickle, "byteorder": b"little", "data/0": data, "version": b"3\n"}
+    with zipfile.ZipFile(path, "w", kind) as archive:
+        for name, part in (content | members).items():
+            if part is not None:
+                archive.writestr(f"{path.stem}/{name}", part)
+    return path
+
+
+def refusal(path):
+    with pytest.raises(RecordingError) as caught:
+        list(import_recordings(path, "eflesh"))
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_a_folder_of_sequences_with_labels(tmp_path):
+    for number in (10, 9, 11):
+        write(tmp_path / f"seq_{number}.pt")
+    (tmp_path / "labels.csv").write_text("sequence,slip\n9,1\n10,0\n")
+    recordings = list(import_recordings(tmp_path))
+    assert [recording.name for recording in recordings] == ["seq_9", "seq_10", "seq_11"]
+    assert [recording.metadata.get("slipped") for recording in recordings] == [True, False, None]
+    first = recordings[0]
+    assert list(first.modules) == ["finger1", "finger2"]
+    one, two = first.modules.values()
+    assert (one.sensor.name, one.unit, one.readings.dtype) == ("anyskin", "count", np.float32)
+    assert one.readings[1, 1].tolist() == [33, 34, 35]
+    assert two.readings[0, 0].tolist() == [15, 16, 17]
+    np.testing.assert_allclose(one.times, np.arange(N) / 100)
+    assert first.metadata["begins"] == "in_contact"
+    assert first.metadata["clock"] == "none; 100 Hz assumed"
+
+
+def test_labels_can_be_left_out(tmp_path):
+    write(tmp_path / "seq_9.pt")
+    (tmp_path / "labels.csv").write_text("sequence,slip\n9,1\n")
+    (recording,) = import_recordings(tmp_path, labels=False)
+    assert "slipped" not in recording.metadata
+    assert recording.metadata["begins"] == "in_contact"
+
+
+class Bomb:
+    """Creates a file if it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.system, (f"touch {self.path}",)
+
+
+def test_nothing_is_unpickled(tmp_path):
+    import pickle
+
+    target = tmp_path / "unpickled"
+    pickle.loads(pickle.dumps(Bomb(target)))
+    assert target.exists(), "the bomb of this test does not work"
+    target.unlink()
+    path = write(tmp_path / "seq_1.pt", pickle=pickle.dumps(Bomb(target), 2))
+    (recording,) = import_recordings(path)
+    assert recording.modules["finger1"].n_samples == N
+    assert not target.exists()
+
+
+def test_a_pickle_that_is_missing_or_none_is_not_needed(tmp_path):
+    for content in (None, b"", b"\x00\xff" * 10):
+        path = write(tmp_path / "seq_1.pt", pickle=content)
+        assert next(import_recordings(path)).modules["finger2"].n_samples == N
+
+
+@pytest.mark.parametrize(
+    ("values", "members", "text"),
+    [
+        (VALUES[:, :29], {}, "2320 bytes of values given; rows of 120 bytes expected (2 finger"),
+        (b"", {}, "0 bytes of values given; rows of 120 bytes expected"),
+        (VALUES, {"data/1": b"1234"}, "one tensor, a member data/0, expected; 2 tensors given"),
+        (VALUES, {"data/0": None}, "one tensor, a member data/0, expected; 0 tensors given"),
+        (VALUES, {"byteorder": b"big"}, "byte order b'big' given, b'little' expected"),
+        (
+            VALUES.astype("<f8"),
+            {"pickle": b"torch\nDoubleStorage\n"},
+            "a DoubleStorage given; 2 fingertips x 5 magnetometers x 3 axes of float32 expected",
+        ),
+        (VALUES, {"packed": True}, "torch stores it as it is"),
+    ],
+)
+def test_tensors_of_another_form(tmp_path, values, members, text):
+    path = write(tmp_path / "seq_1.pt", values, **members)
+    assert re.search(f"seq_1.pt: .*{re.escape(text)}", refusal(path))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_value_that_is_no_number(tmp_path, value):
+    values = VALUES.copy()
+    values[3, 7] = value
+    text = refusal(write(tmp_path / "seq_1.pt", values))
+    assert text.endswith(f"seq_1.pt, row 3, value 7: {value} given, a finite number expected")
+
+
+def test_cut_and_damaged_files(tmp_path):
+    path = write(tmp_path / "seq_1.pt")
+    data = path.read_bytes()
+    for size in range(1, len(data), len(data) // 9):
+        path.write_bytes(data[:size])
+        assert refusal(path).startswith(f"{path} is cut or damaged: ")
+    place = data.index(VALUES.tobytes()[:64]) + 100
+    path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+    assert refusal(path) == f"{path} is cut or damaged: Bad CRC-32 for file 'seq_1/data/0'"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sequence,slip\n1,2\n", "row 2: sequence 1 with slip 2 given; a whole number, each once"),
+        ("sequence,slip\n1,1\n1,0\n", "row 3: sequence 1 with slip 0 given; a whole number"),
+        ("sequence,slip\nx,1\n", "row 2, column 'sequence': 'x' given, a number expected"),
+        ("number,slip\n1,1\n", "column 'sequence' is missing; it has 'number', 'slip'"),
+        ("", "is empty; a header line and samples expected"),
+    ],
+)
+def test_labels_of_another_form(tmp_path, text, message):
+    path = write(tmp_path / "seq_1.pt")
+    (tmp_path / "labels.csv").write_text(text)
+    assert message in refusal(path)
+    assert "labels.csv" in refusal(path)
+
+
+def test_the_command_gives_a_hint_and_writes_all_or_nothing(tmp_path, capsys):
+    source, out = tmp_path / "in", tmp_path / "out"
+    source.mkdir()
+    write(source / "seq_1.pt")
+    assert main(["import", str(source), str(out)]) == 0
+    error = capsys.readouterr().err
+    assert "hint: the object is held from the first sample on" in error
+    assert "--in-contact" in error
+    assert load_recording(out / "seq_1.parquet").metadata["begins"] == "in_contact"
+    write(source / "seq_2.pt", VALUES[:, 1:])
+    assert main(["import", str(source), str(tmp_path / "again")]) == 2
+    out_text, error = capsys.readouterr()
+    assert (out_text, error.count("\n")) == ("", 1)
+    assert not (tmp_path / "again").exists()
+
+
+def test_the_real_recordings(data_folder):
+    recordings = list(import_recordings(data_folder / "eflesh_slip"))
+    assert len(recordings) == 69
+    assert sum(recording.metadata["slipped"] for recording in recordings) == 52
+    for recording in recordings:
+        assert [module.n_samples for module in recording.modules.values()] == [300, 300]
+        assert recording.duration == pytest.approx(2.99)
