@@ -47,7 +47,7 @@ def test_a_folder_of_sequences_with_labels(tmp_path):
     assert one.readings[1, 1].tolist() == [33, 34, 35]
     assert two.readings[0, 0].tolist() == [15, 16, 17]
     np.testing.assert_allclose(one.times, np.arange(N) / 100)
-    assert first.metadata["begins"] == "in_contact"
+    assert first.metadata["starts_loaded"]
     assert first.metadata["clock"] == "none; 100 Hz assumed"
 
 
@@ -56,7 +56,7 @@ def test_labels_can_be_left_out(tmp_path):
     (tmp_path / "labels.csv").write_text("sequence,slip\n9,1\n")
     (recording,) = import_recordings(tmp_path, labels=False)
     assert "slipped" not in recording.metadata
-    assert recording.metadata["begins"] == "in_contact"
+    assert recording.metadata["starts_loaded"]
 
 
 class Bomb:
@@ -153,7 +153,7 @@ def test_the_command_gives_a_hint_and_writes_all_or_nothing(tmp_path, capsys):
     error = capsys.readouterr().err
     assert "hint: the object is held from the first sample on" in error
     assert "--in-contact" in error
-    assert load_recording(out / "seq_1.parquet").metadata["begins"] == "in_contact"
+    assert load_recording(out / "seq_1.parquet").metadata["starts_loaded"]
     write(source / "seq_2.pt", VALUES[:, 1:])
     assert main(["import", str(source), str(tmp_path / "again")]) == 2
     out_text, error = capsys.readouterr()

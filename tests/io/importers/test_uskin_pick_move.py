@@ -54,7 +54,6 @@ def test_all_comes_along(folder):
     assert recording.metadata == {
         "object": "box",
         "source": "imanlab/proactive-slip-control",
-        "begins": "in_contact",
         "starts_loaded": True,
         "dropped": 0,
         "notes": "fine",

@@ -18,13 +18,12 @@ import numpy.typing as npt
 from holdfast.errors import RecordingError
 from holdfast.files import check_regular
 from holdfast.io.importers.table import (
-    BEGINS_IN_CONTACT,
     SLIPPED,
     natural_order,
     read_table,
 )
 from holdfast.io.safe_reading import ReadBudget
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import STARTS_LOADED, Recording, Tactile
 from holdfast.sensors import sensor
 
 SOURCE = "notvenky/eFlesh"
@@ -170,7 +169,7 @@ def _metadata(path: Path) -> dict[str, Any]:
     metadata = {
         "source": SOURCE,
         "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
-        **BEGINS_IN_CONTACT,
+        STARTS_LOADED: True,
     }
     slipped = _labels(path.parent / LABELS_FILE).get(path.stem)
     return metadata if slipped is None else metadata | {SLIPPED: slipped}

@@ -3,10 +3,10 @@
 import csv
 import re
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO, cast
+from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +24,6 @@ COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
 SEPARATORS = ",;"
 """Characters between the cells of a row, of which a file has one."""
-BEGINS_IN_CONTACT: Mapping[str, Any] = {"begins": "in_contact", "starts_loaded": True}
-"""Metadata of a recording whose first samples are load, as a fact of its format."""
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
 

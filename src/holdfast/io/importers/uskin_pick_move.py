@@ -18,13 +18,12 @@ from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.files import read_input
 from holdfast.io.importers.table import (
-    BEGINS_IN_CONTACT,
     Table,
     errors_named,
     read_table,
     with_integer_type,
 )
-from holdfast.recordings import Label, Recording, Tactile, Truth, labels_from_samples
+from holdfast.recordings import STARTS_LOADED, Label, Recording, Tactile, Truth, labels_from_samples
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
@@ -152,7 +151,7 @@ def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
 
 
 def _metadata(path: Path) -> dict[str, Any]:
-    metadata: dict[str, Any] = {"object": "box", "source": SOURCE, **BEGINS_IN_CONTACT}
+    metadata: dict[str, Any] = {"object": "box", "source": SOURCE, STARTS_LOADED: True}
     if path.is_file():
         text = read_input(path, MAX_METADATA_SIZE).decode("utf-8-sig")
         row = next(csv.DictReader(text.splitlines()), {})
