@@ -252,6 +252,8 @@ def test_features_of_the_slip_rule_are_shown(capsys):
     assert "slips by 39 features, of them new relative(second_all[0.0067 s])," in out
     slip = info_json(capsys, "builtin:twin")["fingers"]["*"]["slip"]
     assert len(slip["features"]) == 39
+    assert f"speed and distance of slips, up to {slip['highest_speed']:.3g} mm/s" in out
+    assert info_json(capsys, "builtin:any")["fingers"]["*"]["slip"]["highest_speed"] is None
     assert info_json(capsys, "builtin:any")["fingers"]["*"]["slip"]["features"] is None
 
 

@@ -96,6 +96,7 @@ def _slip(rule: "SlipRule") -> dict[str, Any]:
         "threshold": rule.classifier.threshold,
         "smoothing": rule.smoothing,
         "hold": rule.hold,
+        "highest_speed": None if rule.speed is msgspec.UNSET else rule.speed.highest,
         "chosen_on": chosen,
     }
 
@@ -152,6 +153,8 @@ def _slip_lines(part: dict[str, Any]) -> Iterator[str]:
     if slip["features"] is not None:
         added = [name for name in slip["features"] if name not in part["features"]]
         yield f"slips by {len(slip['features'])} features, of them new {_few(added)}"
+    if slip["highest_speed"] is not None:
+        yield f"speed and distance of slips, up to {slip['highest_speed']:.3g} mm/s"
     chosen = slip["chosen_on"]
     if chosen is None:
         yield "threshold of slips given, not chosen on recordings"

@@ -68,15 +68,18 @@ def estimates_of(
     known = _DECISIONS
     for name, row in zip(names, report, strict=False):
         time, code, probability, sigma, x, y, z, slip, speed, distance = row
-        has_speed = speed != NO_SPEED_RULE
         state, reason, faults, cause = known[code]
         taxels = taxels_of(int(taxel_masks[len(estimates)])) if faults else ()
-        estimates[name] = ContactEstimate(
-            time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
-            None if slip == NO_SLIP_RULE else slip,
-            speed if has_speed else None,
-            distance if has_speed else None,
-        )  # fmt: skip
+        if speed == NO_SPEED_RULE:
+            estimates[name] = ContactEstimate(
+                time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
+                None if slip == NO_SLIP_RULE else slip,
+            )  # fmt: skip
+        else:
+            estimates[name] = ContactEstimate(
+                time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
+                slip, speed, distance,
+            )  # fmt: skip
     return estimates
 
 
