@@ -100,10 +100,17 @@ def test_pillars_of_ros2_with_small_letters_and_without_headers():
     types = store("sensor_interfaces", PILLARS_OF_ROS2, ros2=True)
     forces = np.random.default_rng(2).normal(size=(9, 3)).astype(np.float32)
     message = sensor_state_of_ros2(types, "sensor_interfaces", 1_500_000, forces)
-    decode = SampleDecoder(stored_definition(types, message, ros2=True), ros2=True)
-    (sample,) = decode(encoded(types, message, ros2=True))
-    assert sample[:5] == (None, "papillarray", 1.5, None, None)
-    np.testing.assert_array_equal(sample.forces, forces)
+    for definition in (
+        stored_definition(types, message, ros2=True),
+        known_definition(message.__msgtype__, ros2=True),
+    ):
+        decode = SampleDecoder(definition, ros2=True)
+        for _ in range(2):
+            (sample,) = decode(encoded(types, message, ros2=True))
+            assert sample[:5] == (None, "papillarray", 1.5, None, None)
+            np.testing.assert_array_equal(sample.forces, forces)
+        with pytest.raises(ValueError, match=r"^the message is cut: 1 float32 expected"):
+            decode(encoded(types, message, ros2=True)[:-20])
 
 
 def test_counts_of_more_than_16_bits_are_refused():

@@ -45,6 +45,17 @@ _SENSOR_STATE = (
     + "bool in_contact\nint32 slip_state\n"
 )
 
+_SENSOR_STATE_OF_ROS2 = (
+    "int64 tus\nPillarState[] pillars\n"
+    "float32 gfx\nfloat32 gfy\nfloat32 gfz\nfloat32 gtx\nfloat32 gty\nfloat32 gtz\n"
+    "float32 friction_est\nfloat32 target_grip_force\n"
+    "bool is_sd_active\nbool is_ref_loaded\nbool is_contact\n"
+    + SEPARATOR
+    + "PACKAGE/PillarState\nint32 id\n"
+    + "float32 dx\nfloat32 dy\nfloat32 dz\nfloat32 fx\nfloat32 fy\nfloat32 fz\n"
+    + "bool in_contact\nint32 slip_state\n"
+)
+
 _NO_FORCES = np.empty((0, 3))
 _PILLARS = ("papillarray_ros_v2/SensorState", "sensor_interfaces/SensorState")
 
@@ -94,6 +105,17 @@ def known_definition(name: str, *, ros2: bool) -> Definition | None:
     return None
 
 
+def _other_layout(name: str) -> list[Definition]:
+    """Return at most one other definition of a type of ROS 2, whose bags and topics may have none.
+
+    Packages of one name differ: the maker's messages have no headers.
+    """
+    if short_name(name) not in _PILLARS:
+        return []
+    text = _SENSOR_STATE_OF_ROS2.replace("PACKAGE", short_name(name).partition("/")[0])
+    return [parse_definition(short_name(name), text)]
+
+
 class SampleDecoder:
     """Decoder of messages of one type into the samples in them.
 
@@ -106,8 +128,8 @@ class SampleDecoder:
     """
 
     def __init__(self, definition: Definition, *, ros2: bool) -> None:
-        self._convert = _converter(definition)
-        self._decode = MessageDecoder(definition, ros2=ros2)
+        layouts = [definition, *(_other_layout(definition.name) if ros2 else ())]
+        self._layouts = [(_converter(text), MessageDecoder(text, ros2=ros2)) for text in layouts]
 
     def __call__(self, data: bytes) -> list[DeviceSample]:
         """Return the sample of each device in a message.
@@ -119,7 +141,18 @@ class SampleDecoder:
             raise ValueError(
                 f"a message of at most {MAX_MESSAGE_SIZE} bytes expected, {len(data)} given"
             )
-        return self._convert(self._decode(data))
+        problems: list[ValueError] = []
+        for layout in self._layouts:
+            convert, decode = layout
+            try:
+                samples = convert(decode(data))
+            except ValueError as problem:
+                problems.append(problem)
+            else:
+                if layout is not self._layouts[0]:  # the first from now on
+                    self._layouts.reverse()
+                return samples
+        raise problems[0]
 
 
 SUPPORTED_MESSAGES = (

@@ -313,17 +313,35 @@ def test_clocks_of_two_devices_are_not_mixed(tmp_path):
 
 def test_definitions_are_not_needed_where_the_type_is_known(tmp_path):
     """As bags of ROS 2 before Iron, that keep types by name only."""
-    import sqlite3
-
     with Bag(tmp_path / "grasp", "sqlite3", "xela_server_ros2", XELA) as given:
         for k in range(4):
             given.xela(EPOCH + k, (1, "uSPa44", k, EPOCH + k, counts(16, k), []))
-    (file,) = given.path.glob("*.db3")
+    without_definitions(given.path)
+    assert read(given.path).modules["finger1"].n_samples == 4
+
+
+def test_pillars_of_ros2_before_definitions_were_stored(tmp_path):
+    forces = np.random.default_rng(0).normal(size=(N, 9, 3)).astype(np.float32)
+    with Bag(tmp_path / "pillars", "sqlite3", "sensor_interfaces", PILLARS_OF_ROS2) as given:
+        for k in range(N):
+            tus = 2000 * (k + 1)
+            message = sensor_state_of_ros2(given.types, given.package, tus, forces[k])
+            given.write("/hub_0/sensor_0", message, EPOCH + 0.002 * k)
+    without_definitions(given.path)
+    recording = read(given.path)
+    assert recording.metadata["clock"] == "device"
+    np.testing.assert_array_equal(recording.modules["finger1"].readings, forces)
+
+
+def without_definitions(path):
+    """Remove the definitions of messages from a bag."""
+    import sqlite3
+
+    (file,) = path.glob("*.db3")
     base = sqlite3.connect(file)
     base.execute("DELETE FROM message_definitions")
     base.commit()
     base.close()
-    assert read(given.path).modules["finger1"].n_samples == 4
 
 
 def test_found_by_content_and_in_folders(tmp_path, bag):
