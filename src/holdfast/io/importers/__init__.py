@@ -28,8 +28,8 @@ FORMATS = {
 EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags"}
 """Extras that formats need."""
 _IN_CONTACT = (
-    "the object is held from the first sample on (metadata: starts_loaded); where a verb does not read "
-    "this, give --in-contact"
+    "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
+    "read this, give --in-contact"
 )
 _IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
 HINTS = {
