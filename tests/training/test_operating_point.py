@@ -75,6 +75,13 @@ def test_it_is_at_most_the_threshold_of_the_model(usual):
     assert choose_operating_point(handling(calm), part(usual)).threshold == usual
 
 
+@pytest.mark.parametrize(("usual", "highest"), [(0.1, 0.5), (0.6, 0.6)])
+def test_handling_that_moves_may_raise_it_to_equal_odds(usual, highest):
+    calm = logistic(np.random.default_rng(1).normal(6.0, 0.5, size=500))
+    chosen = choose_operating_point(handling(calm), part(usual), moves=True)
+    assert chosen.threshold == pytest.approx(highest)
+
+
 def test_a_tenth_of_slip_does_not_move_it_to_the_slip():
     rng = np.random.default_rng(2)
     mixed = np.concatenate([rng.normal(1.0, 1.0, size=1700), rng.normal(-12.0, 1.0, size=300)])

@@ -211,7 +211,8 @@ class _Calibration:
         after = self._decide(_with_handling(self.model, handling))
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
-            chosen = choose_operating_point(after[key], part, false_alarms)
+            moves = self.seen.load_change(key) >= STILL_CHANGE
+            chosen = choose_operating_point(after[key], part, false_alarms, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, **chosen._asdict())
         model = _with_handling(self.model, handling)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)

@@ -28,8 +28,7 @@ MAX_DISTANCE = 3.0
 """A threshold is at most this many scales of the log odds from their location: what is further
 away is taken for slip, and the share is not reached then."""
 EQUAL_ODDS = 0.5
-"""The threshold of stability is at most this, or that of the model: above it a contact is unstable
-that is rather stable."""
+"""Threshold above which a contact would be unstable that is rather stable."""
 STABLE_THRESHOLDS = 1.0 / (1.0 + np.exp(0.02 * np.arange(300, -301, -1)))
 """Thresholds of the probability of stability that are tried, lowest first."""
 
@@ -170,12 +169,17 @@ class HeldFingers:
 
 
 def choose_operating_point(
-    handling: HeldFingers, part: FingerModel, false_alarms: float | None = None
+    handling: HeldFingers,
+    part: FingerModel,
+    false_alarms: float | None = None,
+    *,
+    moves: bool = False,
 ) -> OperatingThresholds:
     """Choose the thresholds of a model on own handling.
 
-    The threshold of stability is at most `EQUAL_ODDS` or that of the model, the threshold of slips
-    at least that of the model. Up to there it is the highest (of slips the lowest) at which enough
+    The threshold of stability is at most that of the model, the threshold of slips at least:
+    handling that is still tells nothing about motion, so it is no reason to alarm more. Handling
+    in which the arm moves may raise the threshold of stability to `EQUAL_ODDS`. Up to there it is the highest (of slips the lowest) at which enough
     held samples are quiet: `STABLE_SHARE` of them STABLE, a slip reported in at most
     `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which there are at most so many
     alarms of either kind.
@@ -184,11 +188,12 @@ def choose_operating_point(
         handling: decided with its own location and scale.
         part: model of the fingers, with the thresholds of the model.
         false_alarms: maximum number of alarms a minute of held time; None for the shares.
+        moves: whether the arm moves in the handling.
 
     Raises:
         TrainingError: no threshold gives so few alarms of a kind.
     """
-    usual = max(part.classifier.threshold, EQUAL_ODDS)
+    usual = max(part.classifier.threshold, EQUAL_ODDS if moves else 0.0)
     tried = [*(t for t in STABLE_THRESHOLDS.tolist() if t < usual), usual]
     slips = []
     if part.slip is not None:
