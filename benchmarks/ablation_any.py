@@ -60,7 +60,7 @@ COLUMNS = (
     "tugs, own",
     "tugs, default",
 )
-SHIPPED = "default"
+SHIPPED = "others"
 """What the features are normalised by in the training of the model that ships."""
 EVERYTHING = np.ones(len(FEATURES), dtype=bool)
 

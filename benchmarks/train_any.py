@@ -227,6 +227,6 @@ if __name__ == "__main__":
     )
     parser.add_argument("folder", type=Path)
     parser.add_argument("-o", "--out", type=Path)
-    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="default")
+    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="others")
     options = parser.parse_args()
     main(options.folder, options.out, options.normalised_by)

@@ -224,7 +224,7 @@ if __name__ == "__main__":
     parser.add_argument("--own-features", action="store_true", help="SLIP_FEATURES, with squares")
     parser.add_argument("--without", nargs="*", default=[], metavar="TEXT",
                         help="leave out those of them whose names contain it")  # fmt: skip
-    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="default",
+    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="others",
                         help="of a model of normalised features")  # fmt: skip
     parser.add_argument("--only-speed", action="store_true", help="add a speed rule, no more")
     main(parser.parse_args())
