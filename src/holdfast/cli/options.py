@@ -183,13 +183,14 @@ class DetectorOptions:
         return replace(model, name=model.name or name, debounce=debounce)
 
     def create_stream(self, model: "Model", source: "Source") -> "StreamDetector":
-        """Create the detector of an open source, and report fingers that the source lacks."""
+        """Create the detector of an open source, and report what the source lacks."""
         from holdfast.live.stream_detector import StreamDetector
 
         taxels = parse_taxels(self.ignore, source.sensors)
         strict = self.rate is RatePolicy.STRICT
         stream = StreamDetector(model, source, strict=strict, ignore=taxels)
         report_missing_fingers(model, source.name, source.sensors)
+        report_blind_features(model, stream.fingers)
         return stream
 
 
@@ -311,6 +312,18 @@ def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, obje
             f"{name} has {', '.join(modules)}; the model also has {', '.join(missing)}, "
             "which get no estimates"
         )
+
+
+def report_blind_features(model: "Model", sensors: Mapping[str, "Sensor"]) -> None:
+    """Print the features of a model that some sensors have too few taxels for."""
+    for finger, sensor in sensors.items():
+        if kinds := model.blind_features(finger, sensor):
+            n_taxels = sensor.n_taxels
+            print_message(
+                f"{finger}: {sensor.name} has {n_taxels} taxel{'s' * (n_taxels > 1)}, too few for "
+                f"{', '.join(kinds)}, which see nothing there (holdfast train on recordings of "
+                "this sensor leaves them out)"
+            )
 
 
 def report_missing_slip_rules(model: "Model") -> None:

@@ -19,6 +19,7 @@ from holdfast.cli.options import (
     SourceArgument,
     check_seconds,
     parse_taxels,
+    report_blind_features,
     report_missing_fingers,
     report_missing_slip_rules,
 )
@@ -150,7 +151,9 @@ def _detect_recording(
             detector = Detector.for_recording(model, part, ignore=taxels)
             report_missing_fingers(model, part.name, part.modules)
             report_missing_slip_rules(model)
-            readings = ReadingsMonitor(model.fingers_of(sensors))
+            used = model.fingers_of(sensors)
+            report_blind_features(model, used)
+            readings = ReadingsMonitor(used)
         for notice in readings.update_recording(part):
             print_message(notice)
         yield chunk_from_detection(detector.run(part))
