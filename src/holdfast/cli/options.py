@@ -193,7 +193,7 @@ class DetectorOptions:
         return replace(model, name=model.name or name, debounce=debounce)
 
     def create_stream(self, model: "Model", source: "Source") -> "StreamDetector":
-        """Create the detector of an open source, and report fingers that the source lacks."""
+        """Create the detector of an open source, and report what the source lacks."""
         from holdfast.live.stream_detector import StreamDetector
 
         taxels = parse_taxels(self.ignore, source.sensors)
@@ -203,6 +203,7 @@ class DetectorOptions:
         )
         report_missing_fingers(model, source.name, source.sensors)
         report_other_handling(model, stream.fingers.values())
+        report_blind_features(model, stream.fingers)
         return stream
 
 
@@ -340,6 +341,18 @@ def report_handling(model: "Model", recordings: "Sequence[Recording]") -> None:
     if model.handled_sensors and recordings:
         sensors = {name: module.sensor for name, module in recordings[0].modules.items()}
         report_other_handling(model, model.fingers_of(sensors).values())
+
+
+def report_blind_features(model: "Model", sensors: Mapping[str, "Sensor"]) -> None:
+    """Print the features of a model that some sensors have too few taxels for."""
+    for finger, sensor in sensors.items():
+        if kinds := model.blind_features(finger, sensor):
+            n_taxels = sensor.n_taxels
+            print_message(
+                f"{finger}: {sensor.name} has {n_taxels} taxel{'s' * (n_taxels > 1)}, too few for "
+                f"{', '.join(kinds)}, which see nothing there (holdfast train on recordings of "
+                "this sensor leaves them out)"
+            )
 
 
 def report_missing_slip_rules(model: "Model") -> None:

@@ -1,7 +1,7 @@
 """The model of a hand: features, classifiers and decision rule."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from hashlib import sha256
 from importlib import resources
@@ -203,12 +203,9 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Return the plan of the feature stream of some fingers, for a source of a rate [Hz].
 
         Raises:
-            ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`; or
-                they need more taxels than a sensor has.
+            ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`.
         """
         features = {name: self.finger(name).all_features for name in sensors}
-        for name, sensor in sensors.items():
-            _check_taxels(name, sensor, features[name])
         relative = any(spec.seconds for specs in features.values() for spec in specs)
         low, high = RELATIVE_RATES
         rate = self.rate or source_rate
@@ -224,6 +221,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             tare=Tare.parse(self.tare),
             rate=rate,
         )
+
+    def blind_features(self, finger: str, sensor: Sensor) -> tuple[str, ...]:
+        """Return the kinds of features of a finger that need more taxels than a sensor has."""
+        features = self.finger(finger).all_features
+        return tuple(dict.fromkeys(x.kind for x in features if x.min_taxels > sensor.n_taxels))
 
     def rate_fits(self, rate: float) -> bool:
         """Return whether a source of a rate [Hz] needs no resampling."""
@@ -285,22 +287,6 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"{name}: the taxels of {sensor.name} have other rotations than those of the "
                 "training"
             )
-
-
-def _check_taxels(name: str, sensor: Sensor, features: Sequence[FeatureSpec]) -> None:
-    """Check that a sensor has enough taxels for the features of a finger.
-
-    Raises:
-        ModelError: it has too few.
-    """
-    least = max(spec.min_taxels for spec in features)
-    if sensor.n_taxels < least:
-        kinds = dict.fromkeys(spec.kind for spec in features if spec.min_taxels > sensor.n_taxels)
-        raise ModelError(
-            f"{name}: {sensor.n_taxels} taxel{'s' * (sensor.n_taxels > 1)} ({sensor.name}) given, "
-            f"at least {least} expected by the model's features {', '.join(kinds)}; train a model "
-            "on recordings of this sensor, which leaves them out"
-        )
 
 
 def _other_sensor(text: str) -> ModelError:

@@ -25,7 +25,7 @@ from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import sensor
+from holdfast.sensors import flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
@@ -644,3 +644,17 @@ def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
     first = next(row.split() for row in out.splitlines()[1:] if " index " in row)
     assert 0 <= float(first[0]) < 3  # times count from the first sample
     assert "thumb" not in out  # it is UNKNOWN all the time
+
+
+def test_features_that_a_sensor_has_too_few_taxels_for_are_named(capsys, save):
+    rng = np.random.default_rng(0)
+    which = flat_sensor("single", 1, 1, 0.005, 100.0, "count")
+    module = Tactile(which, np.arange(100) / 100, np.rint(rng.normal(0, 4, size=(100, 1, 3))))
+    path = save(Recording("a", {"thumb": module}))
+    got, err = lines(capsys, "builtin:any", path)
+    assert len(got) == 100
+    assert err == (
+        "thumb: single has 1 taxel, too few for residual, shear_residual, pressure_shift, "
+        "moment_change, which see nothing there (holdfast train on recordings of this sensor "
+        "leaves them out)\n"
+    )

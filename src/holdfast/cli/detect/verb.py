@@ -19,6 +19,7 @@ from holdfast.cli.options import (
     SourceArgument,
     check_seconds,
     parse_taxels,
+    report_blind_features,
     report_missing_fingers,
     report_missing_slip_rules,
     report_other_handling,
@@ -156,6 +157,7 @@ def _detect_recording(
             report_missing_slip_rules(model)
             used = model.fingers_of(sensors)
             report_other_handling(model, used.values())
+            report_blind_features(model, used)
             loaded = begins_in_contact(part.metadata, options.in_contact or None)
             readings = ReadingsMonitor(used, finds_pull=not loaded)
         for notice in readings.update_recording(part):
