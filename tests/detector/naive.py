@@ -377,6 +377,12 @@ class Finger:
         share = (0.08 if touching else 0.12) if time - self.shaken > 0.2 else 0
         return self.load < least or (least > 0 and self.load < share * self.peak)
 
+    def is_leaving(self):
+        """Whether what is left of the load is as little as a skin shows that was released."""
+        touching = self.candidate in ("STABLE", "UNSTABLE")
+        small = self.load < (0.08 if touching else 0.12) * self.peak
+        return self.contact() > 0 and small and not self.empty
+
     def contact(self):
         if self.part.contact_threshold is not None:
             return self.part.contact_threshold
@@ -395,6 +401,7 @@ class Finger:
         if not (self.window > 2 and self.sigma <= 3 * quiet):
             self.shaken = time
         self.empty = self.is_empty(time)
+        self.leaving = self.is_leaving()
         calm = self.window > 2 and self.sigma <= 3 * quiet and away <= threshold / 2
         if not calm:
             self.roused = time
@@ -411,6 +418,9 @@ class Finger:
         if self.empty:
             self.probability = 0.0
             return "NO_CONTACT"
+        if self.leaving:
+            self.probability = 0.0
+            return "UNSTABLE"
         rule = self.part.classifier
         z = rule.intercept
         for value, c, mean, scale in zip(

@@ -56,3 +56,12 @@ def test_a_tare_under_load_is_in_contact_while_the_force_moves():
     sway = 1 + 0.3 * np.sin(2 * np.pi * 0.8 * np.arange(800) / RATE)
     states = states_of(sway[:, None] * LOADED)
     assert (states[30:] != NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.02, 0.06])
+def test_a_finger_is_not_stable_once_its_force_has_gone(rest):
+    states = states_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, rest), (2, rest)))
+    assert (states[250:530] == STABLE).all()
+    gone = round(RATE * 5.5)
+    assert (states[gone:] != STABLE).all()
+    assert (states[gone + 45 :] == NO_CONTACT).all()

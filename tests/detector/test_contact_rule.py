@@ -60,3 +60,12 @@ def test_a_contact_ends_below_a_share_of_the_threshold():
 def test_an_empty_finger_that_drifts_far_is_no_contact():
     drift = np.linspace(0.0, 8.0 * THRESHOLD, round(60 * RATE))
     assert set(states_of(drift)[40:]) == {NO_CONTACT}
+
+
+def test_a_skin_that_relaxes_is_not_stable_before_it_rests():
+    """8800 counts are released, and 1.4 % stay, which is above the threshold."""
+    rest = 1.2 * THRESHOLD
+    force = [np.zeros(100), np.full(400, 8800.0), np.linspace(8800.0, rest, 20), np.full(300, rest)]
+    states = states_of(np.concatenate(force))
+    assert STABLE not in states[525:]
+    assert set(states[560:]) == {NO_CONTACT}

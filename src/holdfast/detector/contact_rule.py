@@ -23,6 +23,9 @@ TOUCH_SHARE = 1.5 * RELEASED_SHARE
 """Share of the largest load so far that a touch exceeds."""
 REST_SECONDS = 0.2
 """A force is at rest if it has not moved, or not been shaken, for this time [s]."""
+IN_CONTACT, LEAVING, WITHOUT_CONTACT = range(3)
+"""What a force shows. LEAVING: what is left of it is as small as without contact, but it moves
+still. Such a finger may touch or leave something; it holds nothing."""
 CALM_RATIO = 3.0
 """A finger is calm while sigma is at most this many times the sigma of noise alone."""
 
@@ -37,8 +40,10 @@ def contact_threshold(noise: float, limits: Array) -> float:
 
 
 @compiled_step
-def is_at_rest(motion: Array, limit: float, latest: int, time: float, zero_unknown: bool) -> bool:
-    """Return whether a finger is without contact: its load is small, and its force is at rest.
+def contact_by_load(
+    motion: Array, limit: float, latest: int, time: float, zero_unknown: bool
+) -> int:
+    """Return IN_CONTACT, LEAVING or WITHOUT_CONTACT: by the load, and whether the force rests.
 
     Args:
         motion: of the finger, as in `Memory`.
@@ -48,20 +53,26 @@ def is_at_rest(motion: Array, limit: float, latest: int, time: float, zero_unkno
         zero_unknown: whether the stream began in contact, with a load that is not known.
     """
     # No contact: 0.2 s without motion, and load < limit noise, or a small share of the peak.
-    at_rest = time - motion[at.MOVED_AT] > REST_SECONDS
     threshold, peak = limit * motion[at.NOISE_NOW], motion[at.PEAK_LOAD]
     if zero_unknown:
         # fall = first F . n - least F . n: the load of the start, once it has gone.
         fall = -motion[at.LEAST_NORMAL]
         if fall < NOISE_WEIGHT * motion[at.NOISE_NOW]:
-            return False
+            return IN_CONTACT
         peak = max(peak, fall)
-    return bool(at_rest and _is_unloaded(motion[at.LOAD], peak, threshold, latest))
+    if not _is_unloaded(motion[at.LOAD], peak, threshold, latest):
+        return IN_CONTACT
+    if time - motion[at.MOVED_AT] > REST_SECONDS:
+        return WITHOUT_CONTACT
+    # Leaving: a grip was seen, peak >= 100 noise. A stream may begin in contact undeclared.
+    return LEAVING if peak >= NOISE_WEIGHT * motion[at.NOISE_NOW] else IN_CONTACT
 
 
-@inlined
-def is_empty(load: float, decided: Array, threshold: float, latest: int, time: float) -> bool:
-    """Return whether a finger is without contact: below the threshold of contact, or relaxing.
+@compiled_step
+def contact_by_force(
+    load: float, decided: Array, threshold: float, latest: int, time: float, zero_unknown: bool
+) -> int:
+    """Return IN_CONTACT, LEAVING or WITHOUT_CONTACT: by F_a, and whether a share of it rests.
 
     A released skin relaxes slowly: its load is a small share of the largest one, and at rest.
 
@@ -71,13 +82,16 @@ def is_empty(load: float, decided: Array, threshold: float, latest: int, time: f
         threshold: of contact; NaN for none, and then there is always contact.
         latest: the state of the last sample, before debouncing.
         time: of the sample [s].
+        zero_unknown: whether the stream began in contact, with a load that is not known.
     """
-    if not threshold > 0.0:
-        return False
-    # The share of the peak counts only after 0.2 s in which sigma was that of noise.
+    if not (threshold > 0.0 and _is_unloaded(load, decided[rule_at.PEAK], threshold, latest)):
+        return IN_CONTACT
+    # A share of the peak counts only after 0.2 s in which sigma was that of noise, and so does all
+    # of the load if it counts from the least so far.
     at_rest = time - decided[rule_at.SHAKEN_AT] > REST_SECONDS
-    peak = decided[rule_at.PEAK] if at_rest else 0.0
-    return bool(_is_unloaded(load, peak, threshold, latest))
+    if at_rest or (not zero_unknown and _is_unloaded(load, 0.0, threshold, latest)):
+        return WITHOUT_CONTACT
+    return LEAVING
 
 
 @compiled_step

@@ -30,13 +30,15 @@ from holdfast.contact import (
 from holdfast.detector import arrays as rule_at
 from holdfast.detector.arrays import DecisionMemory, DecisionRule
 from holdfast.detector.contact_rule import (
-    REST_SECONDS,
+    IN_CONTACT,
+    LEAVING,
+    WITHOUT_CONTACT,
+    contact_by_force,
+    contact_by_load,
     contact_threshold,
     fall_of,
     follow,
     has_drifted,
-    is_at_rest,
-    is_empty,
     update_load,
     update_reference,
 )
@@ -321,13 +323,13 @@ def step(
     """
     kernel.advance(layout, memory, output, readings, present, time)
     for f in range(len(present)):
-        unloaded = False
+        contact = IN_CONTACT
         if present[f] and output.status[f, at.REASON] == at.READY:
-            unloaded = _find_contact(layout, memory, output, rule, decision, f, time)
+            contact = _find_contact(layout, memory, output, rule, decision, f, time)
         if output.status[f, at.REASON] != at.READY:
             _decide_unready(output, rule, decision, f, present[f], time, layout.period)
         elif present[f]:
-            _decide(output, rule, decision, f, unloaded, time, layout.period)
+            _decide(output, rule, decision, f, contact, time, layout.period)
     return hand_code(decision, rule)
 
 
@@ -346,12 +348,12 @@ def _find_contact(
     decision: DecisionMemory,
     f: int,
     time: float,
-) -> bool:
-    """Return whether a finger with features is without contact. Report a drift of its tare."""
+) -> int:
+    """Return what the force of a finger with features shows. Report a drift of its tare."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
     if not math.isnan(limits[rule_at.LOAD_LIMIT]):
         # By the load of relative features: load < limit noise, at rest.
-        return is_at_rest(
+        return contact_by_load(
             memory.motion[f], limits[rule_at.LOAD_LIMIT], codes[rule_at.CANDIDATE], time,
             layout.zero_unknown,
         )  # fmt: skip
@@ -364,13 +366,15 @@ def _find_contact(
     load = update_load(values, decided, quiet, time, layout.period)
     if layout.zero_unknown:
         fall = fall_of(decided, layout.normals[f])
-        if fall < NOISE_WEIGHT * noise or time - decided[rule_at.SHAKEN_AT] <= REST_SECONDS:
-            return False
+        if fall < NOISE_WEIGHT * noise:
+            return IN_CONTACT
         decided[rule_at.PEAK] = max(decided[rule_at.PEAK], fall)
     elif has_drifted(load, values, codes, decided, threshold, quiet, time, layout.period):
         output.status[f, at.REASON] = at.FAULT
         output.status[f, at.FAULTS] = TARE_DRIFT
-    return is_empty(load, decided, threshold, codes[rule_at.CANDIDATE], time)
+    return contact_by_force(
+        load, decided, threshold, codes[rule_at.CANDIDATE], time, layout.zero_unknown
+    )
 
 
 @inlined
@@ -407,16 +411,16 @@ def _decide(
     rule: DecisionRule,
     decision: DecisionMemory,
     f: int,
-    unloaded: bool,
+    contact: int,
     time: float,
     period: float,
 ) -> None:
     """Decide the state of a finger from its features, and report it when it has lasted."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    by_load = not math.isnan(limits[rule_at.LOAD_LIMIT])
+    by_load, unloaded = not math.isnan(limits[rule_at.LOAD_LIMIT]), contact == WITHOUT_CONTACT
     state = NO_CONTACT
     decided[rule_at.PROBABILITY] = 0.0
-    if by_load or not unloaded:
+    if contact == IN_CONTACT or (by_load and unloaded):
         # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[rule_at.PROBABILITY] = linear_probability(output.features[f], weights)
@@ -436,6 +440,8 @@ def _decide(
             rule.hysteresis,
             codes[rule_at.STATE],
         )
+        if contact == LEAVING:
+            state = UNSTABLE
         if state == UNSTABLE and rule.causes.shape[1] > 0:
             # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
             codes[rule_at.CAUSE] = add_scores(
