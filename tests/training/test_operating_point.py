@@ -75,8 +75,8 @@ def test_it_is_at_most_the_threshold_of_the_model(usual):
     assert choose_operating_point(handling(calm), part(usual)).threshold == usual
 
 
-@pytest.mark.parametrize(("usual", "highest"), [(0.1, 0.5), (0.6, 0.6)])
-def test_handling_that_moves_may_raise_it_to_equal_odds(usual, highest):
+@pytest.mark.parametrize(("usual", "highest"), [(0.1, 0.9), (0.95, 0.95)])
+def test_handling_that_moves_may_raise_it(usual, highest):
     calm = logistic(np.random.default_rng(1).normal(6.0, 0.5, size=500))
     chosen = choose_operating_point(handling(calm), part(usual), moves=True)
     assert chosen.threshold == pytest.approx(highest)

@@ -27,8 +27,8 @@ RAISED_SHARE = 0.05
 MAX_DISTANCE = 3.0
 """A threshold is at most this many scales of the log odds from their location: what is further
 away is taken for slip, and the share is not reached then."""
-EQUAL_ODDS = 0.5
-"""Threshold above which a contact would be unstable that is rather stable."""
+HIGHEST_THRESHOLD = 0.9
+"""Highest threshold of stability that own handling sets."""
 STABLE_THRESHOLDS = 1.0 / (1.0 + np.exp(0.02 * np.arange(300, -301, -1)))
 """Thresholds of the probability of stability that are tried, lowest first."""
 
@@ -179,7 +179,7 @@ def choose_operating_point(
 
     The threshold of stability is at most that of the model, the threshold of slips at least:
     handling that is still tells nothing about motion, so it is no reason to alarm more. Handling
-    in which the arm moves may raise the threshold of stability to `EQUAL_ODDS`. Up to there it is
+    in which the arm moves may raise the threshold of stability to `HIGHEST_THRESHOLD`. Up to there it is
     the highest (of slips the lowest) at which enough held samples are quiet: `STABLE_SHARE` of
     them STABLE, a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or
     at which there are at most so many alarms of either kind.
@@ -193,7 +193,7 @@ def choose_operating_point(
     Raises:
         TrainingError: no threshold gives so few alarms of a kind.
     """
-    usual = max(part.classifier.threshold, EQUAL_ODDS if moves else 0.0)
+    usual = max(part.classifier.threshold, HIGHEST_THRESHOLD if moves else 0.0)
     tried = [*(t for t in STABLE_THRESHOLDS.tolist() if t < usual), usual]
     slips = []
     if part.slip is not None:
