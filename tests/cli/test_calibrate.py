@@ -1,8 +1,10 @@
 """`holdfast calibrate`: what it writes, prints and refuses."""
 
 import json
+from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from holdfast.cli import main
@@ -57,6 +59,25 @@ def test_the_screen(capsys, folder, tmp_path, monkeypatch):
     assert lines[-1] == "mine.json: builtin:any, calibrated"
     recordings = [load_recording(folder / "data" / f"handling-{k}.mcap") for k in range(2)]
     assert Model.load("mine.json") == calibrate(Model.load(folder / "model.json"), recordings)
+
+
+def test_handling_that_begins_in_contact(capsys, tmp_path):
+    """The first second of a hold is load only if it is declared: the hand is never seen open."""
+    normalised_model().save(tmp_path / "model.json")
+    whole = handling_recording(0, held=20.0)
+    modules = {
+        name: module.slice(*np.searchsorted(module.times, (4.0, 18.0)))
+        for name, module in whole.modules.items()
+    }
+    (tmp_path / "data").mkdir()
+    save_recording(replace(whole, modules=modules), tmp_path / "data" / "held.mcap")
+    seconds = []
+    for words in ([], ["--in-contact"]):
+        out = tmp_path / f"mine{len(words)}.json"
+        code, printed, _ = calibrated(capsys, tmp_path, out, "--json", *words)
+        seconds.append(json.loads(printed)["sensors"][0]["seconds"] if code == 0 else 0.0)
+    assert seconds[1] > 12.0
+    assert seconds[0] < seconds[1]
 
 
 def test_json(capsys, folder, tmp_path):

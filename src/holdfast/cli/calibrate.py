@@ -1,6 +1,6 @@
 """`holdfast calibrate`: a model with the own handling of a hand, without labels."""
 
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
@@ -9,6 +9,7 @@ import typer
 
 from holdfast.cli.options import (
     ForceOption,
+    InContactOption,
     JsonOption,
     ModelArgument,
     ModelOutput,
@@ -63,8 +64,8 @@ def calibrate(
         float | None,
         typer.Option(
             "--false-alarms",
-            help="Maximum number of alarms per minute of this handling; by default, nine tenths "
-            "of it are STABLE.",
+            help="Maximum number of alarms per minute of this handling; by default, 95 % "
+            "of it is STABLE.",
         ),
     ] = None,
     seconds: Annotated[
@@ -74,6 +75,7 @@ def calibrate(
         ),
     ] = None,
     speed: SpeedOption = 1.0,
+    in_contact: InContactOption = False,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -81,7 +83,8 @@ def calibrate(
 
     Write a copy of the model in which every feature is normalised by what it is on this sensor
     while it is used as usual: grasp, carry, turn, put down, without slip. The thresholds are set
-    by the same handling. Begin with an open hand. A tenth of the handling may be slip.
+    by the same handling. Begin with an open hand, or give --in-contact. A tenth of the handling
+    may be slip.
 
     DATA are recordings, or a live source such as xela://HOST:PORT or twin:?object=can, which is
     recorded for --seconds and not kept. At least 5 s of holding are needed, 30 s are better.
@@ -94,6 +97,7 @@ def calibrate(
     """
     from holdfast.devices.uri import is_uri
     from holdfast.files import refuse_overwrite
+    from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training.calibration import calibrate_with_report, check_normalised
 
@@ -105,7 +109,12 @@ def calibrate(
     if not live and (seconds is not None or speed != 1.0):
         raise ValueError(f"--seconds and --speed are for live sources; {data} is a recording")
     check_speed(data, speed)
-    with _recordings(data, seconds or HANDLING_SECONDS, speed, live=live) as recordings:
+    read: AbstractContextManager[Dataset]
+    if live:
+        read = _recorded(data, seconds or HANDLING_SECONDS, speed, in_contact=in_contact)
+    else:
+        read = nullcontext(load_dataset(data, labels=False, in_contact=in_contact))
+    with read as recordings:
         calibrated = calibrate_with_report(
             loaded, recordings, false_alarms=false_alarms, progress=_with_progress
         )
@@ -123,16 +132,13 @@ def _with_progress(recordings: "Iterable[Recording]") -> "Iterator[Recording]":
 
 
 @contextmanager
-def _recordings(data: str, seconds: float, speed: float, *, live: bool) -> "Iterator[Dataset]":
-    """Yield the recordings; those of a live source are deleted afterwards."""
+def _recorded(data: str, seconds: float, speed: float, *, in_contact: bool) -> "Iterator[Dataset]":
+    """Record a live source, and yield the recording; it is deleted afterwards."""
     from holdfast.io import load_dataset
 
-    if not live:
-        yield load_dataset(data, labels=False)
-        return
     with TemporaryDirectory(prefix="holdfast-") as folder:
         capture(data, Path(folder) / "handling.mcap", seconds=seconds, speed=speed)
-        yield load_dataset(folder)
+        yield load_dataset(folder, in_contact=in_contact)
 
 
 def _print(calibrated: "CalibratedModel", out: Path) -> None:

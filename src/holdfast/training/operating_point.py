@@ -179,10 +179,10 @@ def choose_operating_point(
 
     The threshold of stability is at most that of the model, the threshold of slips at least:
     handling that is still tells nothing about motion, so it is no reason to alarm more. Handling
-    in which the arm moves may raise the threshold of stability to `HIGHEST_THRESHOLD`. Up to there it is
-    the highest (of slips the lowest) at which enough held samples are quiet: `STABLE_SHARE` of
-    them STABLE, a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or
-    at which there are at most so many alarms of either kind.
+    in which the arm moves may raise the threshold of stability to `HIGHEST_THRESHOLD`. Up to there
+    it is the highest (of slips the lowest) at which enough held samples are quiet: `STABLE_SHARE`
+    of them STABLE, a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`;
+    or at which there are at most so many alarms of either kind.
 
     Args:
         handling: decided with its own location and scale.
