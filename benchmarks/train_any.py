@@ -43,6 +43,7 @@ C = 1e-3
 """Weight of the samples against the penalty on the weights."""
 LOAD_TO_NOISE_OF_CONTACT = 10.0
 """Threshold of contact, in multiples of the noise of the force: 6 standard deviations."""
+HOLD = 0.1
 SWITCHING = 15.3
 """Rate of the forward filter of the states [1/s]: 0.8 to stay as it is for 1/60 s."""
 STABLE_SHARE = 0.95
@@ -197,7 +198,7 @@ def model_of(classifier: LinearClassifier, training: Training | None = None) -> 
     return Model(
         fingers={"*": finger},
         tare="first",
-        debounce=Debounce(switching=SWITCHING),
+        debounce=Debounce(hold=HOLD, switching=SWITCHING),
         training=training,
         name="any",
     )

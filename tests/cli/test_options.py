@@ -7,9 +7,11 @@ from typer.models import OptionInfo
 from holdfast.cli import app
 
 OTHER_MEANING = {
+    "--false-alarms": "by labels of events, and of all alarms in handling without labels",
     "--hand": "the hand that play stands for is driven by another program",
     "--model": "the detector of trials, and a model whose decisions a figure shows",
     "--rate": "of a sensor, and of a source against its model",
+    "--seconds": "record until it is stopped, and a minute of handling",
     "--set": "metadata of a recording, and parameters of a rule",
     "--speed": "play cannot send as fast as possible",
     "--separate": "classifiers of the fingers, and sensors in a packet",

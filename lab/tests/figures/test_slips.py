@@ -39,7 +39,7 @@ def model(monkeypatch, recording):
     detection = SimpleNamespace(fingers=dict.fromkeys(recording.modules, trace))
     monkeypatch.setattr(slips, "detect", lambda *_: detection)
     rule = SimpleNamespace(classifier=SimpleNamespace(threshold=0.3))
-    return SimpleNamespace(name="mine", finger=lambda _: SimpleNamespace(slip=rule))
+    return SimpleNamespace(name="mine", finger=lambda *_: SimpleNamespace(slip=rule))
 
 
 def test_kinds_of_events_in_which_a_finger_slips(recording):
@@ -81,7 +81,7 @@ def test_onsets_are_marked(model, recording):
 def test_an_event_without_a_slip_cannot_be_drawn(model, recording):
     with pytest.raises(ValueError, match="grasp has no slip event 'grip' in which a finger slips"):
         slip_figure(model, recording, "grip")
-    without = SimpleNamespace(name="mine", finger=lambda _: SimpleNamespace(slip=None))
+    without = SimpleNamespace(name="mine", finger=lambda *_: SimpleNamespace(slip=None))
     with pytest.raises(ValueError, match="mine has no slip rule of the thumb"):
         slip_figure(without, recording, "weight")
 
