@@ -2,7 +2,6 @@
 
 import math
 
-import msgspec
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -12,7 +11,7 @@ from holdfast.detector import Detector, detect
 from holdfast.detector.decision_rule import filter_probability, new_decision_memory
 from holdfast.errors import ModelError
 from holdfast.model import Debounce, Model
-from holdfast.model.files import encode
+from holdfast.model.files import decode, encode
 from holdfast.synthetic import synthetic_recording
 from holdfast.training.threshold import ThresholdReplay, with_threshold
 
@@ -84,7 +83,7 @@ def test_old_models_keep_their_bytes():
     assert b"switching" not in encode(model)
     assert model.debounce.switching_rate == 0.0
     steady = replace(model, debounce=Debounce(hold=0.1, switching=15.3))
-    assert msgspec.json.decode(encode(steady), type=Model) == steady
+    assert decode(encode(steady), Model) == steady
 
 
 @pytest.mark.parametrize("value", [-1.0, math.inf, math.nan])

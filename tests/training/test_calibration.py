@@ -171,7 +171,7 @@ def test_it_warns_of_little_and_of_still_handling(model):
     assert "pad: the arm hardly moved; add handling in which it carries" in report.warnings[1]
 
 
-@pytest.mark.parametrize("alarms", [2.0, 20.0])
+@pytest.mark.parametrize("alarms", [2.0, 10.0])
 def test_false_alarms_set_the_threshold(model, calibrated, alarms):
     report = calibrate_with_report(model, DATA, false_alarms=alarms)
     (summary,), (usual,) = report.sensors, calibrated.sensors
