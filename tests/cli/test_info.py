@@ -153,7 +153,7 @@ def test_findings_are_listed(capsys, grasp, path):
     findings = lines[lines.index("findings:") + 1 :]
     assert (
         findings[0]
-        == "- begins in contact (metadata: starts_loaded): choose --tare first in train and"
+        == "- begins in contact (metadata: starts_loaded): the first samples are load (give"
     )
     assert max(map(len, findings)) <= 80
     assert main(["info", str(path.parent)]) == 0

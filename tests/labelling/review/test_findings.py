@@ -90,8 +90,8 @@ def test_a_start_in_contact(thumb):
     assert only == (
         "",
         "starts_loaded",
-        "begins in contact (metadata: starts_loaded): choose --tare first in train and info; "
-        "or z of the sensor points inwards (docs/sensors.md)",
+        "begins in contact (metadata: starts_loaded): the first samples are load "
+        "(give --in-contact); or z of the sensor points inwards (docs/sensors.md)",
     )
 
 

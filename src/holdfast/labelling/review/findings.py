@@ -64,8 +64,8 @@ def findings_of(recording: Recording) -> list[Finding]:
         for kind, text in _of_module(module)
     ]
     if reason := evidence_of_contact(recording):
-        text = f"begins in contact ({reason}): choose --tare first in train and info; or z of the "
-        text += "sensor points inwards (docs/sensors.md)"
+        text = f"begins in contact ({reason}): the first samples are load (give --in-contact); or "
+        text += "z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
     if _without_contact(recording):
         found.append(Finding("", "no_contact", "no finger is in contact in the whole recording"))
