@@ -21,6 +21,7 @@ class Taxel:
     def __init__(self, share):
         self.share = share
         self.changed = []
+        self.at = 0  # number of the last change
         self.longest = 0  # samples without a change, but not by a fault
         self.steps = np.empty((0, 3))  # number, squared change, squared change of the change
         self.step = np.zeros(3)
@@ -37,6 +38,7 @@ class Taxel:
             if self.still(number) * self.share > 1:
                 self.step = np.zeros(3)
             self.changed.append(number)
+            self.at = number
             if before.any() and now.any():
                 turn = change - self.step
                 self.steps = np.vstack([self.steps, (number, change @ change, turn @ turn)])
@@ -52,15 +54,91 @@ class Taxel:
         return weights @ self.steps[:, 1:]
 
     def still(self, number):
-        return number - (self.changed[-1] if self.changed else 0)
+        return number - self.at
 
     def busy(self):
-        return bool(self.changed) and len(self.changed) > 0.5 * self.changed[-1]
+        return bool(self.changed) and len(self.changed) > 0.5 * self.at
 
     def suspect(self, number, period):
         if len(self.changed) < 10:
             return self.still(number) >= 2 / period
         return self.still(number) >= max(0.5 / period, 10 * (self.longest + 1))
+
+
+class Mask:
+    """What is filled in for faulty taxels, and what fades after they come back."""
+
+    def __init__(self, finger):
+        self.finger, self.taxels, self.too_many = finger, set(), False
+        self.known, self.ratio = False, 1.0
+        self.shapes, self.fades, self.since = {}, {}, {}
+
+    def beyond(self, readings, i):
+        return readings[i] - self.finger.baseline[i]
+
+    def load(self, readings, i):
+        if i in self.finger.noisy_taxels | self.finger.lost:
+            return np.zeros(3)
+        if i in self.taxels and not self.too_many:
+            return self.ratio * self.shapes[i]
+        return self.beyond(readings, i) + self.fades.get(i, np.zeros(3))
+
+    def weigh(self, readings, taxels):
+        """Whether the load is known, and whether half of it, or of the taxels, is healthy."""
+        used = self.finger.used
+        if len(readings) > 63:
+            return False, False
+        loads = {i: self.load(readings, i) for i in used}
+        sizes = {i: float(np.linalg.norm(loads[i])) for i in used}
+        noise = self.finger.noise / math.sqrt(len(used))
+        known = sum(size**2 for size in sizes.values()) > len(used) * (10 * noise) ** 2
+        healthy = sum(sizes[i] for i in used if i not in taxels)
+        n_healthy = len(set(used) - taxels)
+        enough = healthy >= 0.5 * sum(sizes.values()) if known else 2 * n_healthy >= len(used)
+        return known, enough and n_healthy > 0
+
+    def update(self, readings, taxels, time):
+        if len(readings) > 63:
+            return False
+        if taxels != self.taxels or self.too_many:
+            self.change(readings, taxels, time)
+        if not self.too_many:
+            self.fill(readings)
+        return not self.too_many
+
+    def change(self, readings, taxels, time):
+        finger, before = self.finger, set() if self.too_many else self.taxels
+        known, enough = self.weigh(readings, taxels)
+        shapes = {i: self.load(readings, i) for i in finger.used}
+        for i in taxels:
+            self.fades.pop(i, None)
+            if i not in before:
+                self.since[i] = time
+        for i in before - taxels:
+            if time - self.since[i] > 0.10001:
+                self.fades[i] = self.ratio * self.shapes[i] - self.beyond(readings, i)
+            shapes[i] = self.beyond(readings, i) + self.fades.get(i, np.zeros(3))
+        if finger.noisy_taxels - self.taxels or (before and not enough):
+            finger.stretch = []
+        self.shapes, self.ratio, self.taxels, self.too_many = shapes, 1.0, set(taxels), not enough
+        healthy = [i for i in finger.used if i not in taxels]
+        self.known = known and any(shapes[i].any() for i in healthy)
+
+    def fill(self, readings):
+        finger = self.finger
+        for i, fade in self.fades.items():
+            readings[i] = readings[i] + fade
+        noise = finger.noise / math.sqrt(len(finger.used))
+        largest = max([0.0, *(abs(fade).max() for fade in self.fades.values())])
+        keep = 1 - min(1, finger.period / 2)
+        fades = self.fades if largest > 0.1 * noise else {}
+        self.fades = {i: keep * fade for i, fade in fades.items()}
+        if self.known:
+            healthy = [i for i in finger.used if i not in self.taxels]
+            self.ratio = sum(self.beyond(readings, i) @ self.shapes[i] for i in healthy)
+            self.ratio /= sum(self.shapes[i] @ self.shapes[i] for i in healthy)
+        for i in self.taxels:
+            readings[i] = finger.baseline[i] + self.ratio * self.shapes[i]
 
 
 class Finger:
@@ -70,6 +148,8 @@ class Finger:
         self.rotations = sensor.rotations[self.used]
         self.n_news = 0
         self.wrong, self.wrong_taxels = set(), set()
+        self.noisy_taxels, self.lost, self.lost_faults, self.n_refused = set(), set(), set(), 0
+        self.mask = Mask(self)
         self.faulty_taxels = ()
         self.slow = self.roused = NAN
         self.rest, self.peak, self.shaken = np.zeros(3), 0.0, -math.inf
@@ -104,10 +184,10 @@ class Finger:
         self.stretch = []
         self.force, self.sigma = (NAN, NAN, NAN), NAN
 
-    def refuse(self, fault, bad):
+    def refuse(self, faults, taxels):
         self.interrupt()
-        self.status, self.faults = "fault", (fault,)
-        self.faulty_taxels = tuple(i for i in self.used if bad[i].any() and i < 63)
+        self.status, self.faults = "fault", tuple(fault for fault in ORDER if fault in faults)
+        self.faulty_taxels = tuple(sorted(i for i in taxels if i < 63))
 
     def take(self, time, given):
         readings = np.zeros_like(given)
@@ -116,10 +196,31 @@ class Finger:
         self.last = time
         self.force, self.sigma = (NAN, NAN, NAN), NAN
         low, high = self.sensor.limits or (-math.inf, math.inf)
-        if not np.isfinite(readings).all():
-            return self.refuse("not_finite", ~np.isfinite(readings))
-        if ((readings[self.used] < low) | (readings[self.used] > high)).any():
-            return self.refuse("out_of_range", (readings < low) | (readings > high))
+        faults, invalid = set(self.lost_faults), set(self.lost)
+        for i in self.lost:
+            readings[i] = 0.0 if low < 0 < high else (low + high) / 2
+            self.taxels[i].at = self.n_news
+        bad = {i for i in self.used if not np.isfinite(readings[i]).all()}
+        outside = {
+            i for i in self.used if ((readings[i] < low) | (readings[i] > high)).any()
+        } - bad
+        if bad or outside:
+            faults |= {"not_finite"} if bad else set()
+            faults |= {"out_of_range"} if outside else set()
+            invalid |= bad | outside
+            if self.baseline is None:
+                self.lose(faults, invalid)
+                return self.refuse(faults, invalid)
+            for i in bad | outside:
+                readings[i] = self.samples[-1][1][i]
+                self.taxels[i].at = self.n_news
+            masked = invalid | self.mask.taxels | self.wrong_taxels
+            enough = not self.mask.too_many
+            if masked != self.mask.taxels:
+                enough = self.mask.weigh(readings, masked)[1]
+            if not enough:
+                return self.refuse(faults, invalid)
+        self.n_refused = self.n_refused * (self.baseline is not None)
         if self.samples:
             changed = (self.samples[-1][1] != readings).any()
             if changed and self.frozen >= 0.5 / self.period and not self.is_stuck():
@@ -128,19 +229,35 @@ class Finger:
             self.frozen = 0 if changed else self.frozen + 1
             if changed:
                 self.watch_taxels(self.samples[-1][1], readings, fresh)
-        self.samples.append((time, readings))
+        self.samples.append((time, readings.copy()))
         elapsed = time - self.samples[0][0] + self.period / 2
         self.measure_noise(elapsed)
         if self.baseline is None and not self.tared(elapsed):
-            self.status, self.faults, self.faulty_taxels = "tare", (), ()
+            self.status, self.faulty_taxels = "tare", tuple(sorted(invalid))
+            self.faults = tuple(fault for fault in ORDER if fault in faults)
             return None
-        return self.process_force(readings)
+        return self.process_force(readings, faults, invalid, time)
 
-    def process_force(self, readings):
+    def lose(self, faults, taxels):
+        """Leave out taxels for good that have no valid reading in the tare for half a second."""
+        self.n_refused += 1
+        enough = 2 * (len(self.used) - len(taxels)) >= len(self.used)
+        if self.n_refused * self.period >= 0.5 and enough:
+            self.lost, self.lost_faults = set(taxels), set(faults)
+
+    def process_force(self, readings, faults, invalid, time):
+        found = self.find_faults(readings)
+        faults, taxels = faults | found[0], invalid | found[1]
+        enough = True
+        if faults or self.mask.taxels or self.mask.fades:
+            enough = self.mask.update(readings, taxels, time)
         force = naive.force(readings[self.used], self.baseline[self.used], self.rotations)
         self.force = tuple(force)
-        faults, taxels = self.find_faults(readings)
-        if faults & {"stuck", "noisy"}:
+        serious = set() if enough else set(faults)
+        if self.is_stuck():
+            serious.add("stuck")
+        faults |= serious
+        if serious & {"stuck", "noisy"}:
             self.stretch, self.pulling = [], 0
         else:
             self.stretch.append(force)
@@ -148,10 +265,11 @@ class Finger:
             if len(self.stretch) >= self.window:
                 self.sigma = self.moments(self.window)[1]
             if self.loaded(readings):
-                faults = faults | {"tare_loaded"}
+                faults.add("tare_loaded")
+                serious.add("tare_loaded")
         self.faults = tuple(fault for fault in ORDER if fault in faults)
         self.faulty_taxels = tuple(sorted(taxels)) if faults else ()
-        if self.faults:
+        if serious:
             self.status = "fault"
         elif len(self.stretch) < self.longest:
             self.status = "gap" if self.gapped else "warm_up"
@@ -181,7 +299,7 @@ class Finger:
                 dead.add(i)
             elif not ((now[i] <= low) | (now[i] >= high)).any():
                 stuck.add(i)
-        noisy = self.noisy()
+        noisy = self.noisy_taxels = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}
         self.wrong = {fault for fault, taxels in named.items() if taxels}
         self.wrong_taxels = {i for i in dead | stuck | noisy if i < 63}
@@ -226,8 +344,6 @@ class Finger:
 
     def find_faults(self, readings):
         faults, taxels = set(self.wrong), set(self.wrong_taxels)
-        if self.is_stuck():
-            faults.add("stuck")
         low, high = self.sensor.limits or (-math.inf, math.inf)
         at_limit = {i for i in self.used if ((readings[i] <= low) | (readings[i] >= high)).any()}
         if at_limit:
@@ -289,7 +405,8 @@ class Finger:
             if any(math.isnan(value) for value in features):
                 self.status = "tare"
             elif self.drifted(time):
-                self.status, self.faults = "fault", ("tare_drift",)
+                self.status = "fault"
+                self.faults = (*self.faults, "tare_drift")
         if self.status != "":
             if self.status == "fault" and not math.isnan(self.force[0]):
                 self.debounce("UNKNOWN", time, debounce.min_duration)

@@ -268,7 +268,7 @@ class ProbabilityFeeder:
     def update(self, readings: Array, present: Flags, time: float) -> None:
         """Write the log odds of one sample; the arguments are those of `decision_rule.step`."""
         layout, memory, output = self._stream.layout, self._stream.memory, self._stream.output
-        kernel.advance(layout, memory, output, readings, present, time)
+        kernel.advance(layout, memory, output, readings.copy(), present, time)
         for place, classifier in self._classifiers.items():
             if present[place] and output.status[place, at.REASON] == at.READY:
                 features = output.features[place, None, : classifier.n_features]
@@ -371,7 +371,7 @@ def _find_contact(
         decided[rule_at.PEAK] = max(decided[rule_at.PEAK], fall)
     elif has_drifted(load, values, codes, decided, threshold, quiet, time, layout.period):
         output.status[f, at.REASON] = at.FAULT
-        output.status[f, at.FAULTS] = TARE_DRIFT
+        output.status[f, at.FAULTS] |= TARE_DRIFT
     return contact_by_force(
         load, decided, threshold, codes[rule_at.CANDIDATE], time, layout.zero_unknown
     )

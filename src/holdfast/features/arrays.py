@@ -53,8 +53,16 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     FAULTY_TAXELS,  # bits of those taxels
     LONGEST_REST,  # most successive samples without a change, if long and not by a fault
     N_MOTION,  # forces since the last gap that is not bridged
+    NOISY_TAXELS,  # bits of the noisy taxels among the faulty ones
+    MASKED,  # bits of the taxels that are left out, see holdfast.features.masks
+    TOO_MANY,  # 1 if the others carry too little of the load
+    LOAD_KNOWN,  # 1 if the load was known when the mask last changed
+    FADING,  # 1 while the value of a taxel that came back still fades
+    N_REFUSED,  # successive samples of the tare with a reading that is not valid
+    LOST,  # bits of the taxels that have no tare
+    LOST_FAULTS,  # their faults
     COUNTS_WIDTH,
-) = range(13)
+) = range(21)
 
 # Memory.levels.
 (
@@ -64,8 +72,10 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     N_STEPS,  # their number
     NOISE,  # standard deviation of a force component by noise alone; NaN while unknown
     MAX_AMPLITUDE,  # largest F_a so far, of samples without a serious fault
+    SHAPE_SQUARES,  # sum of the squares of Memory.masks SHAPE, of the healthy taxels
+    FILL_RATIO,  # load of the healthy taxels, beside that when the mask last changed
     LEVELS_WIDTH,
-) = range(7)
+) = range(9)
 
 # Memory.taxels.
 (
@@ -77,6 +87,14 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     LONGEST_STILL,  # most successive samples without a change, among those that changed the finger
     TAXELS_WIDTH,
 ) = range(9)  # fmt: skip
+
+# Memory.masks.
+(
+    SHAPE, _, _,  # reading beyond rest when the mask last changed
+    FADE, _, _,  # is added to the reading of a taxel that came back
+    MASKED_AT,  # time from which it is left out [s]
+    MASKS_WIDTH,
+) = range(8)  # fmt: skip
 
 # Layout.constants.
 (
@@ -199,6 +217,7 @@ class Memory(NamedTuple):
     baseline: Floats2  # (n_taxels, 3) a sum while the tare runs, then the mean
     previous: Floats2  # (n_taxels, 3) readings of the last valid sample
     taxels: Floats2  # (n_taxels, TAXELS_WIDTH)
+    masks: Floats2  # (n_taxels, MASKS_WIDTH)
     history: Floats3  # (n_fingers, 4, 2 * longest) F_a, F_x, F_y, F_z, each written twice
     counts: Integers2  # (n_fingers, COUNTS_WIDTH)
     levels: Floats2  # (n_fingers, LEVELS_WIDTH)

@@ -20,7 +20,7 @@ from holdfast.sensors.types import Array, Flags, Integers
 NOT_FINITE, STUCK, SATURATED, TARE_LOADED = 1, 2, 4, 8
 DEAD, NOISY, OUT_OF_RANGE, TARE_DRIFT = 16, 32, 64, 128
 SERIOUS = STUCK | NOISY
-"""Faults whose samples no window may hold, though they have a force."""
+"""Faults of a finger whose samples no window may hold, though they have a force."""
 
 STUCK_SECONDS = 0.5
 """Readings that changed for this long and then do not change for this long are stuck [s]."""
@@ -106,6 +106,27 @@ def taxels_outside(
     return found
 
 
+@compiled_step
+def invalid_taxels(
+    readings: Array, ignored: Flags, first: int, last: int, low: float, high: float
+) -> tuple[int, int]:
+    """Return NOT_FINITE and OUT_OF_RANGE, as far as some taxel has them, and the bits of these.
+
+    Args:
+        readings: of all fingers; at least one of this finger is not valid.
+        ignored: (n_taxels,) taxels that do not count.
+        first: first taxel of the finger.
+        last: one past its last taxel.
+        low: smallest valid reading.
+        high: largest valid reading.
+    """
+    infinite = taxels_outside(readings, ignored, first, last, -math.inf, math.inf)
+    low, high = np.nextafter(low, -math.inf), np.nextafter(high, math.inf)
+    bits = taxels_outside(readings, ignored, first, last, low, high)
+    faults = NOT_FINITE if infinite else 0
+    return (faults | OUT_OF_RANGE if bits != infinite else faults), bits
+
+
 @inlined
 def track_changes(
     layout: Layout, memory: Memory, readings: Array, f: int, time: float, after_gap: bool
@@ -188,7 +209,7 @@ def _find_taxel_faults(
     any_still, alone, loudest = _update_taxels(layout, memory, readings, f)
     if after_gap:
         _reset_noise(taxels, first, last)
-    counts[f, at.TAXEL_FAULTS] = counts[f, at.FAULTY_TAXELS] = 0
+    counts[f, at.TAXEL_FAULTS] = counts[f, at.FAULTY_TAXELS] = counts[f, at.NOISY_TAXELS] = 0
     if any_still:
         low, high, ignored = constants[f, at.LOW_LIMIT], constants[f, at.HIGH_LIMIT], layout.ignored
         at_limit = taxels_outside(readings, ignored, first, last, low, high)
@@ -202,7 +223,8 @@ def _find_taxel_faults(
             quiet = memory.levels[f, at.NOISE] / math.sqrt(constants[f, at.N_USED])
         if _is_noisy(taxels, loudest, quiet):
             counts[f, at.TAXEL_FAULTS] |= NOISY
-            counts[f, at.FAULTY_TAXELS] |= bit_of(loudest - first)
+            counts[f, at.NOISY_TAXELS] = bit_of(loudest - first)
+            counts[f, at.FAULTY_TAXELS] |= counts[f, at.NOISY_TAXELS]
 
 
 @inlined

@@ -14,12 +14,12 @@ from holdfast.features import arrays as at
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import (
     NOT_FINITE,
-    OUT_OF_RANGE,
     SATURATED,
     SERIOUS,
     STUCK,
     TARE_LOADED,
     copy_readings,
+    invalid_taxels,
     is_pulled,
     is_stuck,
     scan_readings,
@@ -28,6 +28,7 @@ from holdfast.features.faults import (
 )
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
+from holdfast.features.masks import hold_lost, lose_taxels, mask_taxels, replace_invalid
 from holdfast.features.motion import GAP_LIMIT_PERIODS, append_taxels, update_motion
 from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
@@ -53,7 +54,7 @@ def advance(
         memory: is changed.
         output: is filled.
         readings: (n_taxels, 3) of all fingers. Those of absent fingers are not read, and those
-            of ignored taxels are set to zero.
+            of ignored taxels are set to zero, and those of faulty ones filled in.
         present: (n_fingers,) True for each finger with a sample.
         time: of the sample [s].
     """
@@ -90,12 +91,8 @@ def _process(
     layout: Layout, memory: Memory, values: Array, readings: Array, time: float, f: int
 ) -> tuple[int, int, int]:
     """Process a sample of one finger. Return its reason, its faults and their taxels."""
-    counts, levels, constants, ignored = (
-        memory.counts,
-        memory.levels,
-        layout.constants,
-        layout.ignored,
-    )
+    counts, levels, ignored = memory.counts, memory.levels, layout.ignored
+    constants = layout.constants
     first, last = layout.offsets[f], layout.offsets[f + 1]
     low, high = constants[f, at.LOW_LIMIT], constants[f, at.HIGH_LIMIT]
     for column in range(at.VALUES_WIDTH):
@@ -104,27 +101,54 @@ def _process(
     levels[f, at.LAST_TIME] = time
     if after_gap:
         counts[f, at.N_STRETCH] = 0
+    lost, faults = counts[f, at.LOST], counts[f, at.LOST_FAULTS]
+    if lost:
+        hold_lost(layout, memory, readings, f)
     total, least, most = scan_readings(readings, ignored, first, last)
-    if not math.isfinite(total):
-        counts[f, at.N_STRETCH] = 0
-        bits = taxels_outside(readings, ignored, first, last, -math.inf, math.inf)
-        return at.FAULT, NOT_FINITE, bits
-    # Valid: low <= every reading <= high.
-    if least < low or most > high:
-        counts[f, at.N_STRETCH] = 0
-        low, high = np.nextafter(low, -math.inf), np.nextafter(high, math.inf)
-        return at.FAULT, OUT_OF_RANGE, taxels_outside(readings, ignored, first, last, low, high)
+    bits = lost
+    # Valid: finite, and low <= every reading <= high.
+    if not math.isfinite(total) or least < low or most > high:
+        invalid = _replace_or_refuse(layout, memory, readings, f, math.isfinite(total))
+        faults, bits = faults | invalid[1], bits | invalid[2]
+        if not invalid[0]:
+            counts[f, at.N_STRETCH] = 0
+            return at.FAULT, faults, bits
+        total, least, most = scan_readings(readings, ignored, first, last)
     track_changes(layout, memory, readings, f, time, after_gap)
     # Half a period of tolerance: the rounding of times moves no sample.
     elapsed = time - levels[f, at.FIRST_TIME] + 0.5 * layout.period
     if not _update_tare(layout, memory, readings, f, elapsed):
-        return at.TARE, 0, 0
-    faults, bits = counts[f, at.TAXEL_FAULTS], counts[f, at.FAULTY_TAXELS]
+        return at.TARE, faults, bits
+    faults, bits = faults | counts[f, at.TAXEL_FAULTS], bits | counts[f, at.FAULTY_TAXELS]
     # Saturated: a reading at low or at high.
     if least <= low or most >= high:
         faults |= SATURATED
         bits |= taxels_outside(readings, ignored, first, last, low, high)
-    return _process_force(layout, memory, values, readings, f, faults, bits)
+    enough = True
+    if faults | counts[f, at.MASKED] | counts[f, at.FADING]:
+        enough = mask_taxels(layout, memory, readings, f, bits, time)
+    return _process_force(layout, memory, values, readings, f, faults, bits, enough)
+
+
+@inlined
+def _replace_or_refuse(
+    layout: Layout, memory: Memory, readings: Array, f: int, finite: bool
+) -> tuple[bool, int, int]:
+    """Replace the readings of a sample that are not valid, if enough are valid.
+
+    Returns:
+        Whether the sample can be used, its faults, and the bits of their taxels.
+    """
+    counts, constants = memory.counts, layout.constants
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    low, high = constants[f, at.LOW_LIMIT], constants[f, at.HIGH_LIMIT]
+    faults, bits = invalid_taxels(readings, layout.ignored, first, last, low, high)
+    if not finite:
+        faults |= NOT_FINITE  # also of taxels beyond the mask
+    if counts[f, at.N_TARED] >= 0:
+        lose_taxels(layout, memory, f, faults, bits)
+        return False, faults, bits
+    return replace_invalid(layout, memory, readings, f, bits), faults, bits
 
 
 @inlined
@@ -139,6 +163,7 @@ def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapse
     if counts[f, at.N_TARED] < 0:
         return True
     # b_i = mean of f_i over the samples with t - t_first < tare_seconds.
+    counts[f, at.N_REFUSED] = 0
     running = elapsed < seconds or counts[f, at.N_TARED] == 0  # one sample at least
     return bool(update_baseline(readings, memory.baseline, counts, f, first, last, kind, running))
 
@@ -164,9 +189,27 @@ def _measure_noise(layout: Layout, memory: Memory, readings: Array, f: int, comp
 
 @inlined
 def _process_force(
-    layout: Layout, memory: Memory, values: Array, readings: Array, f: int, faults: int, bits: int
+    layout: Layout,
+    memory: Memory,
+    values: Array,
+    readings: Array,
+    f: int,
+    faults: int,
+    bits: int,
+    enough: bool,
 ) -> tuple[int, int, int]:
-    """Compute the force of a sample, given its faults so far. Return the same as `_process`."""
+    """Compute the force of a sample, given its faults so far. Return the same as `_process`.
+
+    Args:
+        layout: of the hand.
+        memory: is changed.
+        values: of the output; are filled.
+        readings: of all fingers.
+        f: the finger.
+        faults: of its taxels.
+        bits: of these taxels.
+        enough: whether it goes on without them.
+    """
     counts, levels, windows = memory.counts, memory.levels, layout.windows
     first, last = layout.offsets[f], layout.offsets[f + 1]
     # F_tip = sum_i R_i (f_i - b_i).
@@ -178,9 +221,11 @@ def _process_force(
     _append_blocks(memory.history, memory.blocks, counts, f, layout.n_levels)
     if len(layout.lags):
         update_motion(layout, memory, f, levels[f, at.LAST_TIME])
+    finger_faults = 0 if enough else faults
     if is_stuck(counts, f, layout.period):
-        faults |= STUCK
-    if faults & SERIOUS:
+        finger_faults |= STUCK
+    faults |= finger_faults
+    if finger_faults & SERIOUS:
         counts[f, at.N_STRETCH] = counts[f, at.N_MOTION] = counts[f, at.N_PULLED] = 0
         return at.FAULT, faults, bits
     # max over k of F_a(k).
@@ -190,14 +235,15 @@ def _process_force(
         found = _moments(memory.blocks, counts, f, 0, windows[f, at.SIGMA_WINDOW])
         values[f, at.MEAN], values[f, at.SIGMA] = found
     if layout.tare_kind == at.TARE_SECONDS and is_pulled(counts, levels, f, normal, layout.period):
+        finger_faults |= TARE_LOADED
         faults |= TARE_LOADED
-    if faults:
+    if finger_faults:
         return at.FAULT, faults, bits
     n_known = counts[f, at.N_MOTION if windows[f, at.BRIDGES] else at.N_STRETCH]
     if n_known < windows[f, at.READY_WINDOW]:
-        return at.GAP if counts[f, at.AFTER_GAP] else at.WARM_UP, 0, 0
+        return at.GAP if counts[f, at.AFTER_GAP] else at.WARM_UP, faults, bits
     counts[f, at.AFTER_GAP] = 0
-    return at.READY, 0, 0
+    return at.READY, faults, bits
 
 
 @compiled_step

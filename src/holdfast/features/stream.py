@@ -393,6 +393,7 @@ def _memory(layout: Layout) -> Memory:
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
         taxels=taxels,
+        masks=np.zeros((n_taxels, at.MASKS_WIDTH)),
         history=np.zeros((n_fingers, at.N_CHANNELS, 2 * longest)),
         counts=np.zeros((n_fingers, at.COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
