@@ -33,7 +33,7 @@ from holdfast.metrics.masks import runs
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 
-N_FROZEN = (1, 3, 7, 15, 20, 29)
+N_FROZEN = (0, 1, 3, 7, 15, 20, 29)
 MOMENTS = ("start", "hold", "push")
 GRACE = {"start": 2.5, "hold": 0.6, "push": 0.6}
 """Time after which a frozen taxel has to be found [s]."""

@@ -1,18 +1,119 @@
-"""Resample recordings and streams to another rate."""
+"""Resample recordings and streams to another rate, or to the true updates of their sensor."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import StreamError
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
-from holdfast.sensors.types import Array, Integers
+from holdfast.sensors.types import Array, Flags, Integers
 
 TOLERANCE_PERIODS = 1e-3
 """Tolerance of times in periods of the new rate. The rounding of times, 1e-7 s since 1970, then
 moves no sample."""
+
+MIN_ROWS_PER_UPDATE = 1.5
+"""Least number of rows from one change of the readings to the next of a sample-and-hold sensor."""
+EVEN_SHARE = 0.95
+"""Minimum share of the changes of such a sensor that follow after even numbers of rows."""
+MIN_HELD_UPDATES = 4
+"""Minimum number of steps between changes that show how a sensor updates."""
+LATE_UPDATE = 1.5
+"""Periods of the updates after which a reading that is still the same counts as a sample."""
+HELD_ROWS = 4096
+"""Rows at the begin of a recording that show whether its sensors hold their samples."""
+
+
+def rows_per_update(changed: Sequence[bool] | Flags) -> float:
+    """Return how many rows a sensor holds each of its samples; 1 if it does not.
+
+    A sensor that holds its samples changes its readings after even numbers of rows, but for one.
+    One that rests, or whose noise is less than a step, changes them at random.
+
+    Args:
+        changed: whether each row differs from the one before.
+
+    Example:
+        >>> rows_per_update([True, False, False, False] * 6)
+        4.0
+        >>> rows_per_update([True, True, True, False] * 6)
+        1.0
+    """
+    steps = np.diff(np.flatnonzero(changed))
+    if len(steps) < MIN_HELD_UPDATES:
+        return 1.0
+    n_of = np.bincount(steps, minlength=3)
+    shorter = int(np.argmax(n_of[:-1] + n_of[1:]))
+    even = steps[(steps == shorter) | (steps == shorter + 1)]
+    if len(even) < EVEN_SHARE * len(steps) or even.mean() < MIN_ROWS_PER_UPDATE:
+        return 1.0
+    return float(even.mean())
+
+
+class UpdateFilter:
+    """Filter that drops the repeated samples of a sample-and-hold sensor, row by row.
+
+    A reading that remains the same for longer than an update takes is a sample again, so that a
+    sensor that stands still is found.
+
+    Args:
+        rate: of the updates [Hz].
+
+    Example:
+        >>> repeats = UpdateFilter(rate=10.0)
+        >>> [repeats.is_update(k / 40, np.full((1, 3), k // 4)) for k in range(6)]
+        [True, False, False, False, True, False]
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._longest = LATE_UPDATE / rate
+        self._time = -np.inf
+        self._reading: npt.NDArray[Any] = np.empty(0)
+
+    def is_update(self, time: float, reading: npt.ArrayLike) -> bool:
+        """Return whether a row is a sample: it has changed, or it is late [s]."""
+        if time - self._time < self._longest and np.array_equal(
+            self._reading, reading, equal_nan=True
+        ):
+            return False
+        self._time, self._reading = time, np.array(reading)
+        return True
+
+
+def true_updates(recording: Recording) -> Recording:
+    """Return the recording with the true updates of its sensors, if all of them hold samples.
+
+    A sensor that updates at 10 Hz in rows of 40 Hz repeats each reading four times. The rows
+    between are no samples: features of them would be those of a slower motion with pauses.
+
+    Returns:
+        The same object if a sensor does not hold its samples.
+    """
+    modules = {name: module for name, module in recording.modules.items() if module.n_samples}
+    held = {name: rows_per_update(_changed_rows(module)) for name, module in modules.items()}
+    if not held or min(held.values()) == 1.0:
+        return recording
+    updates = {name: _update_rows(module, held[name]) for name, module in modules.items()}
+    return replace(recording, modules={**recording.modules, **updates})
+
+
+def _changed_rows(module: Tactile) -> Flags:
+    """Return whether each of the first rows differs from the one before; the first one does."""
+    readings = module.readings[:HELD_ROWS]
+    newer, older = readings[1:], readings[:-1]
+    differ = (newer != older) & ~(np.isnan(newer) & np.isnan(older))
+    return np.append(True, differ.any(axis=(1, 2)))
+
+
+def _update_rows(module: Tactile, n_rows: float) -> Tactile:
+    repeats = UpdateFilter(1 / (n_rows * module.period))
+    rows = zip(module.times.tolist(), module.readings, strict=True)
+    kept = [repeats.is_update(time, reading) for time, reading in rows]
+    return replace(module, times=module.times[kept], readings=module.readings[kept])
 
 
 def resample(recording: Recording, rate: float) -> Recording:

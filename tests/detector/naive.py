@@ -70,7 +70,8 @@ class Mask:
 
     def __init__(self, finger):
         self.finger, self.taxels, self.too_many = finger, set(), False
-        self.known, self.ratio = False, 1.0
+        self.known, self.unloaded, self.ratio = False, False, 1.0
+        self.unweighed = set()
         self.shapes, self.fades, self.since = {}, {}, {}
 
     def beyond(self, readings, i):
@@ -90,17 +91,22 @@ class Mask:
             return False, False
         loads = {i: self.load(readings, i) for i in used}
         sizes = {i: float(np.linalg.norm(loads[i])) for i in used}
-        noise = self.finger.noise / math.sqrt(len(used))
-        known = sum(size**2 for size in sizes.values()) > len(used) * (10 * noise) ** 2
+        known = sum(size**2 for size in sizes.values()) > (10 * self.finger.noise) ** 2
+        masked = taxels & set(used)
         healthy = sum(sizes[i] for i in used if i not in taxels)
-        n_healthy = len(set(used) - taxels)
-        enough = healthy >= 0.5 * sum(sizes.values()) if known else 2 * n_healthy >= len(used)
-        return known, enough and n_healthy > 0
+        unknown = {i for i in masked if self.is_unweighed(i)} if known else masked
+        enough = len(masked) < len(used) and 2 * (len(used) - len(unknown)) >= len(used)
+        return known, enough and (not known or healthy >= 0.5 * sum(sizes.values()))
+
+    def is_unweighed(self, i):
+        if i in self.taxels:
+            return i in self.unweighed
+        return i in self.finger.noisy_taxels | self.finger.lost or not self.finger.taxels[i].changed
 
     def update(self, readings, taxels, time):
         if len(readings) > 63:
             return False
-        if taxels != self.taxels or self.too_many:
+        if taxels != self.taxels or self.too_many or self.unloaded:
             self.change(readings, taxels, time)
         if not self.too_many:
             self.fill(readings)
@@ -110,6 +116,7 @@ class Mask:
         finger, before = self.finger, set() if self.too_many else self.taxels
         known, enough = self.weigh(readings, taxels)
         shapes = {i: self.load(readings, i) for i in finger.used}
+        self.unweighed = {i for i in taxels if not known or self.is_unweighed(i)}
         for i in taxels:
             self.fades.pop(i, None)
             if i not in before:
@@ -122,6 +129,7 @@ class Mask:
             finger.stretch = []
         self.shapes, self.ratio, self.taxels, self.too_many = shapes, 1.0, set(taxels), not enough
         healthy = [i for i in finger.used if i not in taxels]
+        self.unloaded = False
         self.known = known and any(shapes[i].any() for i in healthy)
 
     def fill(self, readings):
@@ -137,6 +145,8 @@ class Mask:
             healthy = [i for i in finger.used if i not in self.taxels]
             self.ratio = sum(self.beyond(readings, i) @ self.shapes[i] for i in healthy)
             self.ratio /= sum(self.shapes[i] @ self.shapes[i] for i in healthy)
+            left = sum(self.beyond(readings, i) @ self.beyond(readings, i) for i in healthy)
+            self.unloaded = left < (10 * finger.noise) ** 2
         for i in self.taxels:
             readings[i] = finger.baseline[i] + self.ratio * self.shapes[i]
 

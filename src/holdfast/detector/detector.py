@@ -41,7 +41,7 @@ from holdfast.features.loaded_start import declared_baselines
 from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import Model
 from holdfast.recordings import BASELINES, Recording
-from holdfast.resampling import resample
+from holdfast.resampling import resample, true_updates
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
@@ -361,8 +361,8 @@ def detect(model: Model, recording: Recording, *, in_contact: bool | None = None
 
     Args:
         model: features, classifiers and decision rule.
-        recording: that has some of the model's fingers. It is resampled first, if its rate is
-            not within 20 % of the model's.
+        recording: that has some of the model's fingers. Of a sample-and-hold sensor its true
+            updates are used. It is resampled first, if its rate is not within 20 % of the model's.
         in_contact: the first samples are load; None if the metadata say it (`starts_loaded`).
 
     Returns:
@@ -379,6 +379,7 @@ def detect(model: Model, recording: Recording, *, in_contact: bool | None = None
         >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
         (['index', 'middle', 'thumb'], 1725, (1725,))
     """
+    recording = true_updates(recording)
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
     return Detector.for_recording(model, recording, in_contact=in_contact).run(recording)

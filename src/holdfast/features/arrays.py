@@ -57,12 +57,13 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     MASKED,  # bits of the taxels that are left out, see holdfast.features.masks
     TOO_MANY,  # 1 if the others carry too little of the load
     LOAD_KNOWN,  # 1 if the load was known when the mask last changed
+    UNLOADED,  # 1 once this load has gone
     FADING,  # 1 while the value of a taxel that came back still fades
     N_REFUSED,  # successive samples of the tare with a reading that is not valid
     LOST,  # bits of the taxels that have no tare
     LOST_FAULTS,  # their faults
     COUNTS_WIDTH,
-) = range(21)
+) = range(22)
 
 # Memory.levels.
 (
@@ -93,8 +94,9 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     SHAPE, _, _,  # reading beyond rest when the mask last changed
     FADE, _, _,  # is added to the reading of a taxel that came back
     MASKED_AT,  # time from which it is left out [s]
+    UNWEIGHED,  # 1 while it is left out and its share of the load is not known
     MASKS_WIDTH,
-) = range(8)  # fmt: skip
+) = range(9)  # fmt: skip
 
 # Layout.constants.
 (

@@ -7,8 +7,6 @@ inlined: passing the arrays costs as much as the step.
 
 import math
 
-import numpy as np
-
 from holdfast.compiled import compiled_step, inlined
 from holdfast.features import arrays as at
 from holdfast.features.arrays import Layout, Memory, Output

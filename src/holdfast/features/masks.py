@@ -4,13 +4,15 @@ A masked taxel is filled in: with its last healthy reading beyond rest, scaled b
 healthy taxels. So the force has no step when a taxel is masked, and what is filled in goes with
 the load when the finger lets go. What is wrong with it when the taxel comes back fades slowly.
 `docs/decisions/0022-masks-of-taxels.md` has the reasons.
+
+The steps are not inlined, since few samples have a mask, and the compiler takes minutes for it.
 """
 
 import math
 
 import numpy as np
 
-from holdfast.compiled import compiled_step, inlined
+from holdfast.compiled import compiled_step
 from holdfast.features import arrays as at
 from holdfast.features.arrays import Layout, Memory
 from holdfast.features.faults import N_MASK_BITS, bit_of
@@ -31,7 +33,7 @@ LOST_SECONDS = 0.5
 """A taxel without a valid reading for this long in the tare is left out until the next [s]."""
 
 
-@inlined
+@compiled_step
 def hold_lost(layout: Layout, memory: Memory, readings: Array, f: int) -> None:
     """Set the readings of the taxels without a tare to a valid number that never changes."""
     first, low, high = (
@@ -44,7 +46,7 @@ def hold_lost(layout: Layout, memory: Memory, readings: Array, f: int) -> None:
             memory.taxels[i, at.CHANGED_AT] = memory.counts[f, at.N_CHANGES]  # not still
 
 
-@inlined
+@compiled_step
 def lose_taxels(layout: Layout, memory: Memory, f: int, faults: int, bits: int) -> None:
     """Count a sample of the tare that is not valid, and leave out its taxels if it lasts."""
     counts = memory.counts
@@ -66,7 +68,7 @@ def _n_bits(bits: int) -> int:
     return n
 
 
-@inlined
+@compiled_step
 def replace_invalid(layout: Layout, memory: Memory, readings: Array, f: int, bits: int) -> bool:
     """Replace readings that are not valid by the last that were. Return whether enough are valid.
 
@@ -92,7 +94,7 @@ def replace_invalid(layout: Layout, memory: Memory, readings: Array, f: int, bit
     return _weigh(layout, memory, readings, f, bits)[1]
 
 
-@inlined
+@compiled_step
 def mask_taxels(
     layout: Layout, memory: Memory, readings: Array, f: int, bits: int, time: float
 ) -> bool:
@@ -109,7 +111,7 @@ def mask_taxels(
     counts = memory.counts
     if layout.offsets[f + 1] - layout.offsets[f] > N_MASK_BITS:
         return False
-    if bits != counts[f, at.MASKED] or counts[f, at.TOO_MANY]:
+    if bits != counts[f, at.MASKED] or counts[f, at.TOO_MANY] or counts[f, at.UNLOADED]:
         _change_mask(layout, memory, readings, f, bits, time)
     if counts[f, at.TOO_MANY]:
         return False
@@ -132,7 +134,7 @@ def _beyond_rest(
     )
 
 
-@inlined
+@compiled_step
 def _load_of(
     layout: Layout, memory: Memory, readings: Array, f: int, i: int
 ) -> tuple[float, float, float]:
@@ -151,7 +153,7 @@ def _load_of(
     return x + masks[i, at.FADE], y + masks[i, at.FADE + 1], z + masks[i, at.FADE + 2]
 
 
-@inlined
+@compiled_step
 def _weigh(
     layout: Layout, memory: Memory, readings: Array, f: int, bits: int
 ) -> tuple[bool, bool, float]:
@@ -166,7 +168,7 @@ def _weigh(
     """
     first, n_used = layout.offsets[f], layout.constants[f, at.N_USED]
     carried = healthy = squares = all_squares = 0.0
-    n_healthy = 0
+    n_masked = n_unweighed = 0
     for i in range(first, layout.offsets[f + 1]):
         if layout.ignored[i]:
             continue
@@ -175,21 +177,40 @@ def _weigh(
         all_squares += square
         if bits & bit_of(i - first):
             carried += math.sqrt(square)
+            n_masked += 1
+            n_unweighed += _is_unweighed(memory, f, i, bit_of(i - first))
         else:
             healthy += math.sqrt(square)
             squares += square
-            n_healthy += 1
-    # Known: sum |h_i|^2 > n (10 noise)^2, with the noise of a reading: noise of F / sqrt(n).
-    noise = memory.levels[f, at.NOISE] / math.sqrt(n_used)
-    known = all_squares > n_used * (KNOWN_LOAD_TO_NOISE * noise) ** 2  # False for NaN
-    # Enough: sum over the healthy |h_i| >= half of that over all; else half of their number.
-    enough = n_healthy >= MIN_HEALTHY_SHARE * n_used
+    # Enough: sum over the healthy |h_i| >= half of that over all; and where loads are not known,
+    # n - n_unknown >= n / 2.
+    known = all_squares > _known_squares(layout, memory, f)  # False for NaN
     if known:
-        enough = healthy >= MIN_HEALTHY_SHARE * (healthy + carried)
-    return known, enough and n_healthy > 0, squares
+        left = n_used - n_unweighed
+        enough = healthy >= MIN_HEALTHY_SHARE * (healthy + carried) and n_masked < n_used
+    else:
+        left = n_used - n_masked
+        enough = n_masked < n_used
+    return known, enough and left >= MIN_HEALTHY_SHARE * n_used, squares
 
 
-@inlined
+@compiled_step
+def _known_squares(layout: Layout, memory: Memory, f: int) -> float:
+    """Return the sum of squares of the taxels of a finger beyond which its load is known."""
+    # sum |h_i|^2 > n (10 noise)^2, with the noise of a reading: noise of F / sqrt(n).
+    return float((KNOWN_LOAD_TO_NOISE * memory.levels[f, at.NOISE]) ** 2)
+
+
+@compiled_step
+def _is_unweighed(memory: Memory, f: int, i: int, bit: int) -> bool:
+    """Return whether the load of a masked taxel is not known even if that of the finger is."""
+    if memory.counts[f, at.MASKED] & bit:
+        return bool(memory.masks[i, at.UNWEIGHED] > 0.0)
+    unknown = (memory.counts[f, at.NOISY_TAXELS] | memory.counts[f, at.LOST]) & bit
+    return bool(unknown != 0 or memory.taxels[i, at.N_CHANGED] == 0.0)
+
+
+@compiled_step
 def _change_mask(
     layout: Layout, memory: Memory, readings: Array, f: int, bits: int, time: float
 ) -> None:
@@ -202,6 +223,8 @@ def _change_mask(
         bit = bit_of(i - first)
         x, y, z = _load_of(layout, memory, readings, f, i)
         if bits & bit:
+            unweighed = not known or _is_unweighed(memory, f, i, bit)
+            masks[i, at.UNWEIGHED] = 1.0 if unweighed else 0.0
             masks[i, at.FADE] = masks[i, at.FADE + 1] = masks[i, at.FADE + 2] = 0.0
             if before & bit == 0:
                 masks[i, at.MASKED_AT] = time
@@ -218,10 +241,11 @@ def _change_mask(
         counts[f, at.N_STRETCH] = counts[f, at.N_MOTION] = 0
     counts[f, at.MASKED], counts[f, at.TOO_MANY] = bits, 0 if enough else 1
     counts[f, at.LOAD_KNOWN] = 1 if known and squares > 0.0 else 0
+    counts[f, at.UNLOADED] = 0
     levels[f, at.SHAPE_SQUARES], levels[f, at.FILL_RATIO] = squares, 1.0
 
 
-@inlined
+@compiled_step
 def _return_taxel(
     layout: Layout, memory: Memory, readings: Array, f: int, i: int, time: float
 ) -> None:
@@ -238,7 +262,7 @@ def _return_taxel(
     memory.counts[f, at.FADING] = 1
 
 
-@inlined
+@compiled_step
 def _fill_taxels(layout: Layout, memory: Memory, readings: Array, f: int) -> None:
     """Fill in the masked taxels of a finger, and let those fade that came back."""
     counts, levels, masks = memory.counts, memory.levels, memory.masks
@@ -250,7 +274,7 @@ def _fill_taxels(layout: Layout, memory: Memory, readings: Array, f: int) -> Non
     # ratio = sum over the healthy h_i . shape_i / sum |shape_i|^2: linear in the readings.
     ratio = levels[f, at.FILL_RATIO]
     if counts[f, at.LOAD_KNOWN]:
-        ratio = 0.0
+        ratio = squares = 0.0
         for i in range(first, last):
             if bits & bit_of(i - first) or layout.ignored[i]:
                 continue
@@ -258,7 +282,9 @@ def _fill_taxels(layout: Layout, memory: Memory, readings: Array, f: int) -> Non
             ratio += x * masks[i, at.SHAPE]
             ratio += y * masks[i, at.SHAPE + 1]
             ratio += z * masks[i, at.SHAPE + 2]
+            squares += x * x + y * y + z * z
         ratio /= levels[f, at.SHAPE_SQUARES]
+        counts[f, at.UNLOADED] = 1 if squares < _known_squares(layout, memory, f) else 0
     levels[f, at.FILL_RATIO] = ratio
     # f_i = f_i(rest) + ratio shape_i.
     for i in range(first, last):
@@ -269,7 +295,7 @@ def _fill_taxels(layout: Layout, memory: Memory, readings: Array, f: int) -> Non
             readings[i, 2] += ratio * masks[i, at.SHAPE + 2] - z
 
 
-@inlined
+@compiled_step
 def _fade_taxels(layout: Layout, memory: Memory, readings: Array, f: int) -> None:
     """Add what is left of the difference of taxels that came back, and reduce it."""
     masks = memory.masks

@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from holdfast.features.loaded_start import begins_in_contact, declared_baselines
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
-from holdfast.resampling import Resampler
+from holdfast.resampling import Resampler, UpdateFilter, rows_per_update
 from holdfast.sensors import Sensor
 
 MAX_RATE_CHANGE = 0.2
@@ -47,6 +48,17 @@ def measure_rate(arrivals: list[Arrival], fingers: Iterable[str]) -> float | Non
         if len(steps):
             rates.append(1 / steps[steps <= GAP_PERIODS * np.median(steps)].mean())
     return float(np.median(rates)) if rates else None
+
+
+def measure_hold(arrivals: list[Arrival], fingers: Iterable[str]) -> float:
+    """Return how many rows the sensors hold each sample; 1 if one of them does not."""
+    rows = []
+    for name in fingers:
+        samples = [arrival.samples[name] for arrival in arrivals if name in arrival.samples]
+        if samples:
+            changed = [not np.array_equal(*pair, equal_nan=True) for pair in pairwise(samples)]
+            rows.append(rows_per_update([True, *changed]))
+    return float(np.median(rows)) if rows and min(rows) > 1.0 else 1.0
 
 
 class RateMonitor:
@@ -131,7 +143,7 @@ class ArrivalDetector:
     """Detector that takes arrivals instead of samples.
 
     It buffers the first half second until it has measured the rate of the source, then
-    processes the buffer. It resamples a source whose rate is not within 20 % of the model's.
+    processes the buffer. Of a sample-and-hold sensor it uses the true updates. It resamples a source whose rate is not within 20 % of the model's.
     A finger is UNKNOWN while the source reports a fault of it. Modules that the model does
     not use are ignored. All other samples give the same estimates as in a recording of the same
     rate: a recording has the rate of all its samples, a stream that of its first half second.
@@ -192,6 +204,7 @@ class ArrivalDetector:
         self._new_detector(100.0)  # raises for wrong arguments
         self.thresholds = self._own_thresholds()
         self._resamplers: dict[str, Resampler] = {}
+        self._filters: dict[str, UpdateFilter] = {}
         self._faults: dict[str, tuple[Fault, ...]] = {}
         self._silent_fingers: set[str] = set()
         self._last: HandEstimate | None = None
@@ -305,6 +318,14 @@ class ArrivalDetector:
 
     def _start(self, rate: float) -> list[StreamEstimate]:
         """Create the detector for a rate, and process the buffer."""
+        n_rows = measure_hold(list(self._buffer), self.fingers)
+        if n_rows > 1.0:
+            self.notices.append(
+                f"readings repeat in rows of {rate:.4g} Hz; the true updates are used, "
+                f"{rate / n_rows:.4g} Hz"
+            )
+            rate /= n_rows
+            self._filters = {name: UpdateFilter(rate) for name in self.fingers}
         model, self.rate = self.model, rate
         if model.rate is not None and not model.rate_fits(rate):
             if self._strict:
@@ -335,6 +356,12 @@ class ArrivalDetector:
                 self._silent_fingers.discard(name)
         self._faults.update(arrival.faults)
         used = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
+        if self._filters:
+            used = {
+                name: sample
+                for name, sample in used.items()
+                if self._filters[name].is_update(arrival.time, sample)
+            }
         if self._monitor is not None:
             self._watch(self._monitor, used, arrival.time)
         self.notices += self._readings.update(used, arrival.time)

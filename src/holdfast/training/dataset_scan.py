@@ -9,6 +9,7 @@ import numpy as np
 from holdfast.errors import TrainingError
 from holdfast.model import EXACT_RATE, RELATIVE_RATES
 from holdfast.recordings import Recording
+from holdfast.resampling import true_updates
 from holdfast.sensors import Sensor
 
 T = TypeVar("T")
@@ -161,6 +162,7 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
     Raises:
         TrainingError: relative features are not made for its rate.
     """
+    digest, recording = recording.digest, true_updates(recording)
     modules = {name: module for name, module in recording.modules.items() if module.labels}
     counts = {name: int((module.label_states > 0).sum()) for name, module in modules.items()}
     counts = {name: count for name, count in counts.items() if count}
@@ -171,7 +173,7 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
     held_object = recording.metadata.get("object")
     scanned = ScannedRecording(
         name=recording.name,
-        digest=recording.digest,
+        digest=digest,
         object=None if held_object is None else str(held_object),
         rate=recording.rate,
         n_labelled=counts,

@@ -19,6 +19,7 @@ from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
+from holdfast.resampling import true_updates
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 from holdfast.training.training_samples import resample_if_needed
@@ -119,6 +120,7 @@ class OwnHandling:
             self.n_left_out += 1
             return
         self.digests[recording.name] = recording.digest
+        recording = true_updates(recording)
         if self.model.rate is not None:
             recording = resample_if_needed(recording, self.model.rate)
         raw = msgspec.structs.replace(self.model, debounce=Debounce())

@@ -32,6 +32,7 @@ from holdfast.metrics.slips import SlipCounts, SlipMetrics, found_shares, slip_m
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
+from holdfast.resampling import true_updates
 from holdfast.sensors.types import Array, Flags
 from holdfast.training.dataset_scan import OneRecording, Progress
 from holdfast.training.evaluation import compute_decisions
@@ -200,7 +201,7 @@ def _samples_of_part(
     recordings that misled a model of any hand, so it learns all that slides and all that does not.
     """
     scan, setting = plan.scan, plan.setting
-    (recording,) = part
+    recording = true_updates(part[0])
     if not scan.relative:
         recording = resample_if_needed(recording, scan.rate)
     rate, sensors = scan.model_rate or recording.rate, sensors_of(recording, scan)

@@ -18,7 +18,7 @@ from holdfast.features.stream import StreamPlan, extract
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
-from holdfast.resampling import resample
+from holdfast.resampling import resample, true_updates
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Integers
 from holdfast.training.dataset_scan import DatasetScan, OneRecording, Progress, show_nothing
@@ -192,7 +192,7 @@ def _samples_of_part(
         n_seen: usable samples of each finger in all recordings before.
     """
     scan, setting, step = plan.scan, plan.setting, plan.step
-    (recording,) = part
+    recording = true_updates(part[0])
     if not scan.relative:
         recording = resample_if_needed(recording, scan.rate)
     rate, tare = scan.model_rate or recording.rate, setting.used_tare
@@ -273,7 +273,8 @@ def thin(samples: Samples, n_max: int) -> Samples:
 
 
 def resample_if_needed(recording: Recording, rate: float) -> Recording:
-    """Return a recording for a model of a rate [Hz]: unchanged within 20 %, else resampled."""
+    """Return the true updates of a recording, resampled unless their rate [Hz] is within 20 %."""
+    recording = true_updates(recording)
     if abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
         return recording
     return resample(recording, rate)

@@ -173,7 +173,7 @@ def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recor
     from holdfast.errors import ModelError, RecordingError
     from holdfast.features import Tare
     from holdfast.io import load_recording, read_chunks
-    from holdfast.resampling import resample
+    from holdfast.resampling import resample, true_updates
 
     parts = read_chunks(path, CHUNK_SIZE, labels=False)
     first = next(parts, None)
@@ -182,15 +182,22 @@ def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recor
     model.fingers_of({name: module.sensor for name, module in first.modules.items()})
     if not first.complete:
         print_message(f"{path} is cut off: only its readable part is used")
+    updates = true_updates(first)
+    if updates is not first:
+        print_message(
+            f"{path}: readings repeat in rows of {first.rate:.4g} Hz; "
+            f"the true updates are used, {updates.rate:.4g} Hz"
+        )
+        first, parts = true_updates(load_recording(path, labels=False)), iter(())
     if model.rate is None or model.rate_fits(first.rate):
         if Tare.parse(model.tare).kind == "interval":
-            return iter([load_recording(path, labels=False)])
+            return iter([true_updates(load_recording(path, labels=False))])
         return chain([first], parts)
     given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
     if rate is RatePolicy.STRICT:
         raise ModelError(f"{given} within 20 % (--rate resample accepts it)")
     print_message(f"{given}: resampled")
-    return iter([resample(load_recording(path, labels=False), model.rate)])
+    return iter([resample(true_updates(load_recording(path, labels=False)), model.rate)])
 
 
 def _detect_live(
