@@ -3,11 +3,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from holdfast.contact import ContactState
+from holdfast.contact import ContactState, Fault
+from holdfast.detector import detect
+from holdfast.devices.sources.base import Arrival
 from holdfast.errors import StreamError
+from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.recordings import Label, Recording, Tactile
-from holdfast.resampling import Resampler, resample
+from holdfast.model import Model
+from holdfast.resampling import Resampler, UpdateFilter, resample, rows_per_update, true_updates
 from holdfast.sensors import Sensor
+from holdfast.twin.simulation import Grasp, simulate
 
 SENSOR = Sensor("one", [[0.0, 0.0, 0.0]], [np.eye(3)], [0.0, 0.0, 1.0], 100.0)
 
@@ -241,3 +246,117 @@ def test_refuses_rates(rate):
     with pytest.raises(ValueError) as raised:
         resample(made([1.0], [0.0]), rate)
     assert str(raised.value) == f"a rate above 0 Hz expected, {rate} given"
+
+
+def changes(n_rows, ratio, start=0.0):
+    """Changed rows of a sensor that updates every `ratio` rows."""
+    updates = np.floor((np.arange(n_rows) + start) / ratio)
+    return np.append(True, np.diff(updates) > 0)
+
+
+class TestRowsPerUpdate:
+    @given(st.floats(1.6, 12.0), st.floats(0.0, 10.0), st.integers(80, 400))
+    @settings(max_examples=60, deadline=None)
+    def test_of_a_sensor_that_updates_evenly(self, ratio, start, n_rows):
+        assert rows_per_update(changes(n_rows, ratio, start)) == pytest.approx(ratio, rel=0.15)
+
+    @given(st.floats(0.02, 0.98), st.integers(0, 1000))
+    @settings(max_examples=60, deadline=None)
+    def test_of_readings_that_repeat_at_random(self, share, seed):
+        assert rows_per_update(np.random.default_rng(seed).random(1000) < share) == 1.0
+
+    @pytest.mark.parametrize("n_rows", [0, 1, 5, 16])
+    def test_of_too_few_updates(self, n_rows):
+        assert rows_per_update(changes(n_rows, 4.0)[:n_rows]) == 1.0
+
+    def test_of_a_sensor_that_drops_single_samples(self):
+        changed = np.random.default_rng(0).random(500) > 0.1
+        assert rows_per_update(changed) == 1.0
+
+
+def slow_and_held(grasp, rows=4, slow_rate=10.0):
+    """A grasp at a low rate, and the same with each sample held over some rows."""
+    slow, held = {}, {}
+    for name, module in grasp.modules.items():
+        step = round(module.rate / slow_rate)
+        values = np.asarray(module.readings, dtype=float)[::step]
+        times = np.arange(rows * len(values)) / (rows * slow_rate)
+        slow[name] = Tactile(module.sensor, times[::rows], values, labels=module.labels)
+        held[name] = Tactile(
+            module.sensor, times, np.repeat(values, rows, axis=0), labels=module.labels
+        )
+    return Recording("slow", slow), Recording("held", held)
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    whole = simulate(Grasp("can", case=1, repeat=1, profile="gentle"))
+    return Recording("grasp", {name: whole.modules[name] for name in ("thumb", "index")})
+
+
+@pytest.mark.slow
+class TestSampleAndHold:
+    def test_true_updates_are_those_of_the_sensor(self, grasp):
+        slow, held = slow_and_held(grasp)
+        assert true_updates(slow) is slow
+        updates = true_updates(held)
+        for name, module in updates.modules.items():
+            assert np.array_equal(module.times, slow.modules[name].times)
+            assert np.array_equal(module.readings, slow.modules[name].readings)
+            assert module.labels == held.modules[name].labels
+        assert updates.rate == pytest.approx(10.0)
+
+    @pytest.mark.parametrize("name", ["builtin:any", "builtin:twin"])
+    def test_estimates_are_those_of_the_slow_recording(self, grasp, name):
+        slow, held = slow_and_held(grasp)
+        expected, estimated = (detect(Model.load(name), r).fingers for r in (slow, held))
+        for finger, trace in expected.items():
+            assert np.array_equal(trace.times, estimated[finger].times)
+            assert np.array_equal(trace.state, estimated[finger].state)
+            assert np.array_equal(
+                trace.stable_probability, estimated[finger].stable_probability, equal_nan=True
+            )
+
+    def test_live_as_well(self, grasp):
+        slow, held = slow_and_held(grasp)
+        expected = detect(Model.load("builtin:any"), slow)
+        live = ArrivalDetector(
+            Model.load("builtin:any"), {name: m.sensor for name, m in held.modules.items()}
+        )
+        states = {}
+        times = next(iter(held.modules.values())).times
+        for k, time in enumerate(times.tolist()):
+            samples = {name: module.readings[k] for name, module in held.modules.items()}
+            for result in live.update(Arrival(time, samples, time)):
+                states[result.estimate.time] = result.estimate.state.code
+        assert live.rate == pytest.approx(10.0)
+        assert any("true updates are used, 10 Hz" in notice for notice in live.notices)
+        assert list(states) == expected.times.tolist()
+        assert np.mean(np.array(list(states.values())) == expected.hand) > 0.98
+
+    def test_a_module_that_does_not_hold_keeps_all_rows(self, grasp):
+        _, held = slow_and_held(grasp)
+        noise = np.random.default_rng(0).normal(size=held.modules["index"].readings.shape)
+        module = held.modules["index"]
+        lively = Tactile(module.sensor, module.times, module.readings + noise)
+        mixed = Recording("mixed", {**held.modules, "index": lively})
+        assert true_updates(mixed) is mixed
+
+    def test_a_sensor_that_stands_still_is_stuck(self, grasp):
+        _, held = slow_and_held(grasp)
+        modules = {}
+        for name, module in held.modules.items():
+            values = np.array(module.readings)
+            values[400:] = values[400]
+            modules[name] = Tactile(module.sensor, module.times, values)
+        found = detect(Model.load("builtin:any"), Recording("still", modules)).fingers["thumb"]
+        stuck = (found.faults >> list(Fault).index(Fault.STUCK) & 1).astype(bool)
+        assert not stuck[found.times < 10.0].any()
+        assert stuck[found.times > 11.5].all()
+
+
+def test_a_reading_that_remains_is_a_sample_again():
+    repeats = UpdateFilter(rate=10.0)
+    same = np.full((1, 3), np.nan)
+    kept = [k for k in range(40) if repeats.is_update(k / 40, same)]
+    assert kept == list(range(0, 40, 6))  # every 0.15 s

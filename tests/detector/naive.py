@@ -101,7 +101,17 @@ class Mask:
     def is_unweighed(self, i):
         if i in self.taxels:
             return i in self.unweighed
-        return i in self.finger.noisy_taxels | self.finger.lost or not self.finger.taxels[i].changed
+        unknown = self.finger.noisy_taxels | self.finger.lost | self.unweighed
+        return i in unknown or not self.finger.taxels[i].changed
+
+    def note_saturated(self, readings):
+        samples, sensor = self.finger.samples, self.finger.sensor
+        low, high = sensor.limits or (-math.inf, math.inf)
+        for i in set(self.finger.used) - self.taxels:
+            at_limit = ((readings[i] <= low) | (readings[i] >= high)).any()
+            if at_limit and len(readings) <= 63:
+                fade = self.fades.get(i, np.zeros(3))
+                self.fades[i] = fade + samples[-2][1][i] - readings[i]
 
     def update(self, readings, taxels, time):
         if len(readings) > 63:
@@ -116,7 +126,9 @@ class Mask:
         finger, before = self.finger, set() if self.too_many else self.taxels
         known, enough = self.weigh(readings, taxels)
         shapes = {i: self.load(readings, i) for i in finger.used}
-        self.unweighed = {i for i in taxels if not known or self.is_unweighed(i)}
+        still = {i for i in finger.used if finger.taxels[i].still(finger.n_news) >= 2}
+        unknown = {i for i in taxels if not known or self.is_unweighed(i)}
+        self.unweighed = unknown | (self.unweighed & still) - taxels
         for i in taxels:
             self.fades.pop(i, None)
             if i not in before:
@@ -211,9 +223,7 @@ class Finger:
             readings[i] = 0.0 if low < 0 < high else (low + high) / 2
             self.taxels[i].at = self.n_news
         bad = {i for i in self.used if not np.isfinite(readings[i]).all()}
-        outside = {
-            i for i in self.used if ((readings[i] < low) | (readings[i] > high)).any()
-        } - bad
+        outside = {i for i in self.used if ((readings[i] < low) | (readings[i] > high)).any()} - bad
         if bad or outside:
             faults |= {"not_finite"} if bad else set()
             faults |= {"out_of_range"} if outside else set()
@@ -242,11 +252,12 @@ class Finger:
         self.samples.append((time, readings.copy()))
         elapsed = time - self.samples[0][0] + self.period / 2
         self.measure_noise(elapsed)
-        if self.baseline is None and not self.tared(elapsed):
+        was_tared = self.baseline is not None
+        if not was_tared and not self.tared(elapsed):
             self.status, self.faulty_taxels = "tare", tuple(sorted(invalid))
             self.faults = tuple(fault for fault in ORDER if fault in faults)
             return None
-        return self.process_force(readings, faults, invalid, time)
+        return self.process_force(readings, faults, invalid, time, was_tared)
 
     def lose(self, faults, taxels):
         """Leave out taxels for good that have no valid reading in the tare for half a second."""
@@ -255,9 +266,11 @@ class Finger:
         if self.n_refused * self.period >= 0.5 and enough:
             self.lost, self.lost_faults = set(taxels), set(faults)
 
-    def process_force(self, readings, faults, invalid, time):
+    def process_force(self, readings, faults, invalid, time, was_tared):
         found = self.find_faults(readings)
         faults, taxels = faults | found[0], invalid | found[1]
+        if was_tared:
+            self.mask.note_saturated(readings)
         enough = True
         if faults or self.mask.taxels or self.mask.fades:
             enough = self.mask.update(readings, taxels, time)

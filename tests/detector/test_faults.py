@@ -68,10 +68,19 @@ class TestFaults:
         values[50:53, 1, 1] = value
         estimates = feed(Detector(model(("thumb",))), values)
         assert runs(estimates, lambda e: (e.reason, e.faults))[2:] == [
+            (("", ()), 25), (("", (Fault.OUT_OF_RANGE,)), 3), (("", ()), 47),
+        ]  # fmt: skip
+        assert {e.faulty_taxels for e in estimates[50:53]} == {(1,)}
+        assert np.isfinite([e.force for e in estimates[50:53]]).all()
+
+    def test_out_of_range_in_all_taxels_is_no_sample(self):
+        values = lively(100)
+        values[50:53] = -1.0
+        estimates = feed(Detector(model(("thumb",))), values)
+        assert runs(estimates, lambda e: (e.reason, e.faults))[2:] == [
             (("", ()), 25), (("fault", (Fault.OUT_OF_RANGE,)), 3), (("warm_up", ()), 5),
             (("", ()), 42),
         ]  # fmt: skip
-        assert {e.faulty_taxels for e in estimates[50:53]} == {(1,)}
         assert np.isnan([e.force for e in estimates[50:53]]).all()
 
     def test_out_of_range_does_not_spoil_the_tare(self):

@@ -11,6 +11,7 @@ from holdfast.compiled import compiled_step, inlined
 from holdfast.features import arrays as at
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import (
+    N_MASK_BITS,
     NOT_FINITE,
     SATURATED,
     SERIOUS,
@@ -26,7 +27,13 @@ from holdfast.features.faults import (
 )
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
-from holdfast.features.masks import hold_lost, lose_taxels, mask_taxels, replace_invalid
+from holdfast.features.masks import (
+    hold_lost,
+    lose_taxels,
+    mask_taxels,
+    note_saturated,
+    replace_invalid,
+)
 from holdfast.features.motion import GAP_LIMIT_PERIODS, append_taxels, update_motion
 from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
@@ -115,13 +122,18 @@ def _process(
     track_changes(layout, memory, readings, f, time, after_gap)
     # Half a period of tolerance: the rounding of times moves no sample.
     elapsed = time - levels[f, at.FIRST_TIME] + 0.5 * layout.period
+    # Saturated: a reading at low or at high.
+    at_limit, is_saturated = 0, least <= low or most >= high
+    if is_saturated:
+        at_limit = taxels_outside(readings, ignored, first, last, low, high)
+        if counts[f, at.N_TARED] < 0 and last - first <= N_MASK_BITS:
+            new = at_limit & ~counts[f, at.MASKED]
+            note_saturated(memory.masks, memory.previous, readings, first, last, new)
     if not _update_tare(layout, memory, readings, f, elapsed):
         return at.TARE, faults, bits
     faults, bits = faults | counts[f, at.TAXEL_FAULTS], bits | counts[f, at.FAULTY_TAXELS]
-    # Saturated: a reading at low or at high.
-    if least <= low or most >= high:
-        faults |= SATURATED
-        bits |= taxels_outside(readings, ignored, first, last, low, high)
+    if is_saturated:
+        faults, bits = faults | SATURATED, bits | at_limit
     enough = True
     if faults | counts[f, at.MASKED] | counts[f, at.FADING]:
         enough = mask_taxels(layout, memory, readings, f, bits, time)

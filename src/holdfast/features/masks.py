@@ -29,8 +29,30 @@ FADE_SECONDS = 2.0
 features."""
 FADED_TO_NOISE = 0.1
 """What fades is gone below this share of the noise of a reading."""
+STILL_CHANGES = 2
+"""Changes of a finger from which a taxel that did not change with them is still the same."""
 LOST_SECONDS = 0.5
 """A taxel without a valid reading for this long in the tare is left out until the next [s]."""
+
+
+@compiled_step
+def note_saturated(
+    masks: Array, previous: Array, readings: Array, first: int, last: int, bits: int
+) -> None:
+    """Let taxels count for their last reading, where that of this sample is at a limit.
+
+    Args:
+        masks: memory of all taxels; is changed.
+        previous: readings of the sample before.
+        readings: of this sample.
+        first: first taxel of the finger.
+        last: one past its last taxel.
+        bits: of the taxels that are at a limit now, and were not masked before.
+    """
+    for i in range(first, last):
+        if bits & bit_of(i - first):
+            for axis in range(3):
+                masks[i, at.FADE + axis] += previous[i, axis] - readings[i, axis]
 
 
 @compiled_step
@@ -207,7 +229,8 @@ def _is_unweighed(memory: Memory, f: int, i: int, bit: int) -> bool:
     if memory.counts[f, at.MASKED] & bit:
         return bool(memory.masks[i, at.UNWEIGHED] > 0.0)
     unknown = (memory.counts[f, at.NOISY_TAXELS] | memory.counts[f, at.LOST]) & bit
-    return bool(unknown != 0 or memory.taxels[i, at.N_CHANGED] == 0.0)
+    still = memory.masks[i, at.UNWEIGHED] > 0.0  # since a mask before
+    return bool(unknown != 0 or still or memory.taxels[i, at.N_CHANGED] == 0.0)
 
 
 @compiled_step
@@ -228,7 +251,9 @@ def _change_mask(
             masks[i, at.FADE] = masks[i, at.FADE + 1] = masks[i, at.FADE + 2] = 0.0
             if before & bit == 0:
                 masks[i, at.MASKED_AT] = time
-        elif before & bit:
+        elif counts[f, at.N_CHANGES] - memory.taxels[i, at.CHANGED_AT] < STILL_CHANGES:
+            masks[i, at.UNWEIGHED] = 0.0
+        if before & bit & ~bits:
             _return_taxel(layout, memory, readings, f, i, time)
             x, y, z = _beyond_rest(layout.rotations, memory.reference, memory.baseline, readings, i)
             x, y, z = (

@@ -143,7 +143,8 @@ class ArrivalDetector:
     """Detector that takes arrivals instead of samples.
 
     It buffers the first half second until it has measured the rate of the source, then
-    processes the buffer. Of a sample-and-hold sensor it uses the true updates. It resamples a source whose rate is not within 20 % of the model's.
+    processes the buffer. Of a sample-and-hold sensor it uses the true updates. It resamples a
+    source whose rate is not within 20 % of the model's.
     A finger is UNKNOWN while the source reports a fault of it. Modules that the model does
     not use are ignored. All other samples give the same estimates as in a recording of the same
     rate: a recording has the rate of all its samples, a stream that of its first half second.
