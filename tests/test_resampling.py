@@ -8,8 +8,8 @@ from holdfast.detector import detect
 from holdfast.devices.sources.base import Arrival
 from holdfast.errors import StreamError
 from holdfast.live.arrival_detector import ArrivalDetector
-from holdfast.recordings import Label, Recording, Tactile
 from holdfast.model import Model
+from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import Resampler, UpdateFilter, resample, rows_per_update, true_updates
 from holdfast.sensors import Sensor
 from holdfast.twin.simulation import Grasp, simulate

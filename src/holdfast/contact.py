@@ -123,7 +123,8 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
         instability: sigma, the standard deviation of the Haar details [unit of the readings];
             NaN without a full window.
         force: F_tip = (F_x, F_y, F_z) in the fingertip frame [unit of the readings].
-        faults: faults of the readings, or of their arrival.
+        faults: faults of the readings, or of their arrival. The state may be known: a finger goes
+            on without faulty taxels that carry less than half of its load.
         faulty_taxels: indices in the readings of the module, from 0, of the taxels that are
             faulty by themselves; empty where the finger as a whole is faulty. Documents and
             messages have the numbers of these taxels, from 1 (`sensors.taxel_numbers`).
