@@ -85,7 +85,7 @@ class TestReasons:
     @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
     def test_a_sample_that_is_not_finite(self, bad):
         values = lively(60)
-        values[40, 1, 2] = bad
+        values[40, :, 2] = bad
         estimates = feed(Detector(model(("thumb",))), values)
         expected = [("tare", 20), ("warm_up", 5), ("", 15), ("fault", 1), ("warm_up", 5), ("", 14)]
         assert runs(estimates, lambda e: e.reason) == expected

@@ -156,7 +156,7 @@ def test_too_little_is_refused():
 def test_faults_are_refused():
     module = handling_module(0)
     readings = np.array(module.readings)
-    readings[400:700, 0, 0] = np.nan
+    readings[400:700, :, 0] = np.nan
     broken = Recording("broken", {"thumb": Tactile(PAD, module.times, readings)})
     with pytest.raises(
         TrainingError,

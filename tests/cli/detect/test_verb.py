@@ -159,7 +159,8 @@ def test_faults_are_named(capsys, save):
     readings[400, 3, 2] = np.inf
     module = replace(recording.modules["thumb"], readings=readings)
     got, _ = lines(capsys, NOISE_FLOOR, save(Recording("a", {"thumb": module})))
-    assert (got[400]["reason"], got[400]["faults"]) == ("fault", [Fault.NOT_FINITE])
+    assert (got[400]["reason"], got[400]["faults"]) == ("", [Fault.NOT_FINITE])
+    assert (got[400]["state"] != "UNKNOWN", got[400]["faulty_taxels"]) == (True, [4])
 
 
 def test_label_files_are_not_read(capsys, save):
