@@ -35,7 +35,7 @@ def rows_per_update(changed: Sequence[bool] | Flags) -> float:
     One that rests, or whose noise is less than a step, changes them at random.
 
     Args:
-        changed: whether each row differs from the one before.
+        changed: whether each row differs from the one before; the first does not count.
 
     Example:
         >>> rows_per_update([True, False, False, False] * 6)
@@ -43,7 +43,7 @@ def rows_per_update(changed: Sequence[bool] | Flags) -> float:
         >>> rows_per_update([True, True, True, False] * 6)
         1.0
     """
-    steps = np.diff(np.flatnonzero(changed))
+    steps = np.diff(np.flatnonzero(changed[1:]))  # the sensor may have held the first before
     if len(steps) < MIN_HELD_UPDATES:
         return 1.0
     n_of = np.bincount(steps, minlength=3)
