@@ -22,7 +22,7 @@ EVEN_SHARE = 0.95
 """Minimum share of the changes of such a sensor that follow after even numbers of rows."""
 MIN_HELD_UPDATES = 4
 """Minimum number of steps between changes that show how a sensor updates."""
-LATE_UPDATE = 1.5
+LATE_UPDATE = 1.6
 """Periods of the updates after which a reading that is still the same counts as a sample."""
 HELD_ROWS = 4096
 """Rows at the begin of a recording that show whether its sensors hold their samples."""
