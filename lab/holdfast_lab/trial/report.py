@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section, join_lines
-from holdfast_lab.report.result_tables import ResultTable, number_text
+from holdfast_lab.report.result_tables import number_text
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import BASELINE_LAW, GOALS, OWN, TrialResults
+from holdfast_lab.trial.document import BASELINE_LAW, OWN, TrialResults
 from holdfast_lab.trial.figures import (
     course_figure,
     distribution_figure,
@@ -18,14 +18,11 @@ from holdfast_lab.trial.tables import (
     ALL_COLUMNS,
     NUMBER_COLUMNS,
     LawColumn,
-    drops_table,
     fingers_table,
-    forces_table,
     kinds_table,
-    laws_table,
+    law_tables,
     objects_table,
     paired_table,
-    slips_table,
 )
 
 WHAT = """Each law of grip force runs on the same trials of the twin. In a trial the hand grips an
@@ -103,7 +100,7 @@ def report_sections(
     return [
         Section(SUMMARY, summary_text(document)),
         Section("One trial, lost and saved", *_example(example)),
-        Section("All laws", text, _law_tables(document), [trade_off_figure(document)]),
+        Section("All laws", text, law_tables(document), [trade_off_figure(document)]),
         Section("In pairs", PAIRED, [table for table in paired if table.rows]),
         Section("Slip and reaction", "", [], [distribution_figure(results)]),
         Section(
@@ -117,11 +114,6 @@ def report_sections(
     ]
 
 
-def _law_tables(document: Mapping[str, Any]) -> list[ResultTable]:
-    tables = (laws_table, slips_table, forces_table, drops_table)
-    return [table(document) for table in tables]
-
-
 PAIRED = (
     "The trials differ more than the laws do, so each law is compared with another on the same "
     "trials. A value below 0 means that the law of the line has less."
@@ -132,7 +124,8 @@ def summary_text(document: Mapping[str, Any]) -> str:
     """Return the main results: one sentence on all, then the goals, as a list."""
     laws = document["laws"]
     law = OWN if OWN in laws else next(iter(laws))
-    lines = [_main(document, law), *_goals(laws[law], law, document["unseen_objects"][law])]
+    goals = _goals(laws[law], law, document["unseen_objects"][law], document["goals"])
+    lines = [_main(document, law), *goals]
     return "\n".join(f"- {line}" for line in lines)
 
 
@@ -146,12 +139,12 @@ def _main(document: Mapping[str, Any], law: str) -> str:
     return f"On {row['n']} trials of the twin, {', '.join(parts)}."
 
 
-def _goals(row: Summary, law: str, unseen: Summary) -> Iterator[str]:
+def _goals(row: Summary, law: str, unseen: Summary, goals: Mapping[str, float]) -> Iterator[str]:
     """Yield a sentence for each number that has a goal."""
     columns = {column.field: column for column in reversed(ALL_COLUMNS)}
-    for column in (columns[field] for field in GOALS):
-        value, goal = row[column.field]["value"], GOALS[column.field]
-        missing = bool(column.n_field and not row[column.n_field])
+    for column in (columns[field] for field in goals):
+        value, goal = row[column.field]["value"], goals[column.field]
+        missing = value is None and bool(column.n_field and not row.get(column.n_field))
         verdict = "nothing slipped" if missing else "reached" if _within(value, goal) else "missed"
         yield (
             f"{column.head}: {_text(row, column)} for {law}, on the six other objects "

@@ -76,10 +76,7 @@ SHORT = NUMBER_COLUMNS[:4]
 def all_tables(document: Mapping[str, Any]) -> list[ResultTable]:
     """Return all tables of the report, in its order."""
     return [
-        laws_table(document),
-        slips_table(document),
-        forces_table(document),
-        drops_table(document),
+        *law_tables(document),
         objects_table(document),
         *(
             paired_table(document, other)
@@ -89,6 +86,16 @@ def all_tables(document: Mapping[str, Any]) -> list[ResultTable]:
         kinds_table(document),
         fingers_table(document),
     ]
+
+
+def law_tables(document: Mapping[str, Any]) -> list[ResultTable]:
+    """Return the tables of all laws over all trials.
+
+    The document of an older run has the first of them only.
+    """
+    tables = (laws_table, slips_table, forces_table, drops_table)
+    has_all = all("drops" in summary for summary in document["laws"].values())
+    return [table(document) for table in (tables if has_all else tables[:1])]
 
 
 def laws_table(document: Mapping[str, Any]) -> ResultTable:
@@ -189,7 +196,8 @@ def _rows(
 
 def _row(keys: dict[str, Key], summary: Summary, column: LawColumn) -> Row:
     number = summary[column.field]
-    missing = math.inf if column.n_field and summary[column.n_field] else None
+    n_known = summary.get(column.n_field, summary.get("n_slipped", 0)) if column.n_field else 0
+    missing = math.inf if n_known else None
     value, interval = number["value"], number["interval"]
     ends = None
     if interval is not None:

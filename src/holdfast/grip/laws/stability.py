@@ -18,9 +18,9 @@ Five rules, each without units, so that they carry over between counts and newto
 3. Fall. Where friction falls, all contacts begin to slide smoothly, and no finger alone looks
    unstable. So there is a step as well when nearly all fingers are less than calm while the hand
    carries less than in the calm grip.
-4. Memory. Where a finger slides, the ratio T/N shows its friction. From then on the force stays
-   above what the load needs at this friction, and a margin; the friction is forgotten slowly. A
-   reaction without such a slip leaves a floor: the force at which it began, and the margin.
+4. Memory. Where a finger slides, the ratio T/N shows its friction. From then on the force does not
+   fall below what the load needs at this friction, and a margin; the friction is forgotten slowly.
+   A reaction without such a slip leaves a floor: the force at which it began, and the margin.
 5. Relaxation. In a contact that is stable again the force falls, the faster the more stable, to
    the floor.
 
@@ -314,8 +314,6 @@ class Stability(Law):
             needed = min(finger.needed(), self.most * self._base)
             if needed > scale * (1.0 + DEADBAND):
                 return needed, GripReason.LOAD
-        if finger.floor(1.0) > scale * (1.0 + DEADBAND):
-            return min(finger.floor(self.margin), self.most * self._base), GripReason.LOAD
         if not touch.known or time - self._unsettled_at <= self.settle_time:
             return scale, _NONE
         finger.calm_load += min(dt / FOLLOW_TIME, 1.0) * (finger.load - finger.calm_load)
