@@ -106,7 +106,7 @@ class TestStart:
         """The thumb carries half of all normal forces, the ring finger a sixth."""
         controller = GripController(Limits())
         restless = {finger: {"state": ContactState.UNSTABLE, "normal": normal}}
-        for k in range(60):
+        for k in range(170):
             controller.update(hand(k / RATE, ContactState.UNSTABLE, **restless), k / RATE)
         assert (controller.state is not LoopState.IDLE) == begins
         assert ("ring" in controller.loaded_fingers) == begins
@@ -117,7 +117,7 @@ class TestStart:
             "ring": {"state": ContactState.UNSTABLE, "normal": 30.0},
             "index": {"state": ContactState.UNKNOWN},
         }
-        for k in range(60):
+        for k in range(170):
             controller.update(hand(k / RATE, ContactState.UNSTABLE, **changes), k / RATE)
         assert controller.state is LoopState.IDLE
 

@@ -79,10 +79,6 @@ class _Finger:
         self.target = 0.0
         self.friction = math.inf
 
-    def floor(self, margin: float) -> float:
-        """Return the scale that the load needs at the friction that was found; 0 if none was."""
-        return margin * self.load / (self.friction * self.start) if self.start > 0 else 0.0
-
     def learn(self) -> None:
         """Take the ratio T/N at a slip as the friction, if it is lower than the known one."""
         if self.press > 0:
@@ -184,6 +180,7 @@ class Stability(Law):
         self._forget(dt / self.memory)
         pairs = zip(self._fingers, touches, strict=True)
         self._moves = second < self.calm
+        self._needed = self._needed_by_friction()
         wishes = [self._wish(finger, touch, lowest, time, dt) for finger, touch in pairs]
         return wishes if self._thumb < 0 else self._balance(touches, wishes)
 
@@ -197,6 +194,18 @@ class Stability(Law):
         self._alone = 0.0
         was_falling, self._is_falling = self._is_falling, self._load_falls(time)
         return was_falling and self._is_falling
+
+    def _needed_by_friction(self) -> float:
+        """Return the scale that the load of the fingers needs at their friction; 0 if not known.
+
+        It is one for all fingers: floors of their own would unbalance a hand that relaxes.
+        """
+        needed = start = 0.0
+        for finger in self._fingers:
+            if finger.friction < math.inf:
+                needed += finger.load / finger.friction
+                start += finger.start
+        return self.margin * needed / start if start > 0 else 0.0
 
     def _forget(self, share: float) -> None:
         """Forget a share of the floor and of what slips have shown of the friction."""
@@ -319,7 +328,7 @@ class Stability(Law):
         finger.calm_load += min(dt / FOLLOW_TIME, 1.0) * (finger.load - finger.calm_load)
         finger.calm_scale = scale  # the load grows from here on: a fall is no growth
         sure = min((lowest - self.settled) / self.settled, 1.0)
-        floor = max(self._floor, finger.floor(self.margin), 1.0)
+        floor = max(self._floor, self._needed, 1.0)
         return min(scale, max(scale * (1.0 - self.fall * sure * dt), floor)), _RELAX
 
     def _balance(self, touches: Sequence[Touch], wishes: list[Wish]) -> list[Wish]:
