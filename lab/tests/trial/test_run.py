@@ -68,5 +68,4 @@ def test_true_slips_replace_the_estimates():
 
 def test_a_law_that_knows_the_load_presses_by_its_multiple():
     weak, strong = (run_trial(CAN, f"true-load-{multiple}") for multiple in ("1.5", "2"))
-    assert weak.static_ratio < strong.static_ratio < 2.3
-    assert strong.static_ratio == pytest.approx(2.0, abs=0.25)
+    assert 1.4 < weak.static_ratio < strong.static_ratio < 2.1
