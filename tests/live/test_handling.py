@@ -164,7 +164,7 @@ def test_undo_puts_back_the_model_of_the_start():
     found = [e.fingers["thumb"].stable_probability for e in after]
     assert found == pytest.approx([expected[e.time] for e in after], abs=1e-3)
     assert set(hand.stream.thresholds.values()) == {0.95}
-    with pytest.raises(StreamError, match="^there is no calibration to undo$"):
+    with pytest.raises(StreamError, match=r"^there is no calibration to undo$"):
         hand.calibration.cancel()
 
 
@@ -235,7 +235,7 @@ def test_an_armed_hand_refuses_everything_that_changes_the_model():
     assert document.calibrated
     hand.session.lock = "the hand is armed"
     for work in (hand.calibration.start, hand.calibration.cancel):
-        with pytest.raises(StreamError, match="^the hand is armed$"):
+        with pytest.raises(StreamError, match=r"^the hand is armed$"):
             work()
     assert hand.calibration.document().calibrated
 
@@ -243,12 +243,12 @@ def test_an_armed_hand_refuses_everything_that_changes_the_model():
 def test_one_at_a_time_and_only_after_a_start(tmp_path):
     hand = Stepped(handled(), folder=tmp_path)
     for work in (hand.calibration.encoded_model, hand.calibration.save):
-        with pytest.raises(StreamError, match="^there is no calibrated model: calibrate first$"):
+        with pytest.raises(StreamError, match=r"^there is no calibrated model: calibrate first$"):
             work()
-    with pytest.raises(StreamError, match="^no calibration is running"):
+    with pytest.raises(StreamError, match=r"^no calibration is running"):
         hand.calibration.finish()
     hand.calibration.start()
-    with pytest.raises(StreamError, match="^a calibration is running already$"):
+    with pytest.raises(StreamError, match=r"^a calibration is running already$"):
         hand.calibration.start()
 
 
