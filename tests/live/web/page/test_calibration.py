@@ -29,7 +29,7 @@ def test_from_the_press_to_the_undo(visit, service):
     assert not page.locator("#calibration-panel").is_visible()
     page.locator("#calibrate").click()
     shows(page, "#calibration-held", r"Held 0\ss of 60\ss")
-    shows(page, "#calibration-told", "^Hold an object and handle it as usual")
+    shows(page, "#calibration-told", "^Hold an object firmly and handle it as usual")
     assert page.locator("#calibration-finish").is_disabled()
     progress(service, 12.3)
     shows(page, "#calibration-finish", r"^Use 12\ss$")

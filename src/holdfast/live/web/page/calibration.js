@@ -4,7 +4,7 @@ import { addressWithToken, callService } from "../web/api.js";
 import { byId, setText } from "../web/dom.js";
 import { LOCKED, toast } from "./controls.js";
 
-const HINT = "Hold an object and handle it as usual: grasp, carry, turn, put down. No slip, no labels.";
+const HINT = "Hold an object firmly and handle it as usual: grasp, carry, turn, put down. Nothing needs a label.";
 const SHORT = "30 s or more are better, with the arm in motion.";
 
 const whole = (seconds) => `${Math.floor(seconds)}\u202fs`;
@@ -22,7 +22,7 @@ export function panelOf({ state, seconds, least, enough, most, calibrated, refus
   if (state === "fitting") {
     return { told: "Fitting the model to this handling …", warning: "", progress: false, button: "Fitting …", buttons: [] };
   }
-  const shown = { told: text, warning: calibrated && !refused ? warnings.join(" ") : "", progress: false, refused };
+  const shown = { told: text, warning: calibrated && !refused ? warnings.map((line) => `${line}.`).join(" ") : "", progress: false, refused };
   if (calibrated) return { ...shown, button: "Calibrated", buttons: ["save", "download", "again", "undo", "close"] };
   return { ...shown, button: "Calibrate", buttons: text ? ["again", "close"] : [] };
 }
