@@ -213,7 +213,7 @@ def test_an_empty_hand_is_refused(monkeypatch):
     assert hand.calibration.document().state == "recording"
     hand.calibration.cancel()
     assert hand.calibration.document().state == "idle"
-    monkeypatch.setattr("holdfast.live.handling.MAX_SECONDS", 10.0)
+    monkeypatch.setattr("holdfast.live.handling.MAX_WAITING", 10.0)
     hand = Stepped(handled(force=0.0))
     hand.calibration.start()
     hand.play()

@@ -29,7 +29,7 @@ from holdfast.training.own_handling import ENOUGH_HANDLING, MIN_HANDLING
 
 HELD_SECONDS = 60.0
 """Held time after which the handling ends by itself [s]."""
-MAX_SECONDS = 300.0
+MAX_WAITING = 300.0
 """Time after which it ends by itself, however little is held [s]."""
 MAX_HANDLING_BYTES = 1 << 28
 """Size of the samples at which it ends by itself [bytes]."""
@@ -67,7 +67,7 @@ class HandlingBuffer:
         """Whether nothing more is needed, or can be kept."""
         return (
             self.seconds >= HELD_SECONDS
-            or self._end - self._start >= MAX_SECONDS
+            or self._end - self._start >= MAX_WAITING
             or self._n_bytes >= MAX_HANDLING_BYTES
         )
 
@@ -294,7 +294,7 @@ def _fitted(model: Model, buffer: HandlingBuffer) -> CalibratedModel:
     """
     if buffer.seconds < MIN_HANDLING:
         raise StreamError(
-            f"{buffer.seconds:.1f} s held in {MAX_SECONDS:.0f} s, at least {MIN_HANDLING:g} s "
+            f"{buffer.seconds:.1f} s held in {MAX_WAITING:.0f} s, at least {MIN_HANDLING:g} s "
             "expected"
         )
     return calibrate_with_report(model, [buffer.recording()])
