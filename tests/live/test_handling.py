@@ -122,6 +122,25 @@ def test_a_stream_that_begins_in_contact(pressed):
     hand.play()
     hand.calibration.finish()
     assert hand.fitted().calibrated
+    assert "the arm moved (the force changed by " in hand.calibration.text  # newtons have a zero
+
+
+def test_counts_that_begin_in_contact_have_no_load():
+    counts = handled()
+    skin = replace(next(iter(counts.modules.values())).sensor, unit="count")
+    modules = {
+        name: replace(module, sensor=skin, unit="count", readings=1000 * module.readings)
+        for name, module in part_of(counts, 4.0, 20.0).modules.items()
+    }
+    hand = Stepped(replace(counts, modules=modules), in_contact=True)
+    hand.play(6.0)
+    hand.calibration.start()
+    hand.play()
+    hand.calibration.finish()
+    assert hand.fitted().calibrated
+    assert "how much the arm moved is not known, as the hand has not been open" in (
+        hand.calibration.text
+    )
 
 
 def test_states_continue_without_a_new_warm_up():
