@@ -15,7 +15,7 @@ pushes, and the third is tested.
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby, islice
 from pathlib import Path
 from typing import NamedTuple
@@ -44,7 +44,7 @@ UPDATE_INTERVAL = 20
 """Number of samples after which the detector has the new values."""
 BOUNDS = ((1.0, 2.0), (0.5, 1.5))
 """Largest move of a location, in scales, and largest factor of a scale."""
-MINUTES = (0, 1, 3, 10)
+MINUTES = (0, 1, 3)
 
 
 class Moments(NamedTuple):
@@ -143,19 +143,20 @@ class RunningHandling:
         self.seconds += step
 
 
-def after(
-    model: Model, recordings: Sequence[Recording], minutes: float, bounds: tuple[float, float]
-) -> Model:
-    """Return the model after some minutes of holding, of each finger, in recordings."""
+def followed(
+    model: Model, recordings: Sequence[Recording], bounds: tuple[float, float]
+) -> Iterator[Model]:
+    """Yield the model after each of `MINUTES` of holding, of each finger, in recordings."""
     running = RunningHandling(model, bounds)
     n_fingers = max(len(recording.modules) for recording in recordings)
-    while running.seconds < 60 * minutes * n_fingers:
-        before = running.seconds
-        for recording in recordings:
-            running.play(recording)
-        if running.seconds - before < 1.0:
-            break
-    return running.current()
+    for minutes in MINUTES:
+        learned = math.inf
+        while running.seconds < 60 * minutes * n_fingers and learned >= 1.0:
+            before = running.seconds
+            for recording in recordings:
+                running.play(recording)
+            learned = running.seconds - before
+        yield running.current()
 
 
 def print_boxes(folder: Path, model: Model) -> None:
@@ -164,11 +165,15 @@ def print_boxes(folder: Path, model: Model) -> None:
     print("|---|---|--:|--:|--:|")
     for start in ("default", "calibrated"):
         for bounds in BOUNDS:
-            for minutes in MINUTES:
+            models: dict[tuple[str, ...], list[Model]] = {}
+            for k, minutes in enumerate(MINUTES):
 
-                def model_for(handling, start=start, bounds=bounds, minutes=minutes):
-                    first = model if start == "default" else calibrate(model, handling)
-                    return after(first, handling, minutes, bounds)
+                def model_for(handling, start=start, bounds=bounds, models=models, k=k):
+                    key = tuple(item.name for item in handling)
+                    if key not in models:
+                        first = model if start == "default" else calibrate(model, handling)
+                        models[key] = list(followed(first, handling, bounds))
+                    return models[key][k]
 
                 found = box_figures(model_for, recordings)
                 stable = found["boxes: stable called STABLE"]
@@ -182,20 +187,19 @@ def print_hands(folder: Path, model: Model, n: int) -> None:
     print(f"\n{len(hands)} hands, bounds {BOUNDS[0]}\n")
     print("| minutes held | still called STABLE | sliding not called STABLE | slips not found |")
     print("|--:|--:|--:|--:|")
-    for minutes in MINUTES:
-        rows = [hand_figures(model, hand, minutes) for hand in hands]
-        still, sliding, missed = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-        print(
-            f"| {minutes} | {still.mean():.3f} | {sliding.mean():.3f} | {missed.mean():.3f} |",
-            flush=True,
-        )
+    rows = [
+        [hand_figures(followed_model, tested) for followed_model in followed(model, own, BOUNDS[0])]
+        for *own, tested in hands
+    ]
+    for minutes, parts in zip(MINUTES, zip(*rows, strict=True), strict=True):
+        values = [np.concatenate(part).mean() for part in zip(*parts, strict=True)]
+        print(f"| {minutes} | {' | '.join(f'{value:.3f}' for value in values)} |")
 
 
-def hand_figures(model: Model, hand: Sequence[Recording], minutes: float) -> list[np.ndarray]:
+def hand_figures(model: Model, tested: Recording) -> list[np.ndarray]:
     """Return whether still samples are STABLE, sliding ones are not, and slips are not found."""
-    *handling, tested = hand
     still, sliding, missed = [], [], []
-    for name, trace in detect(after(model, handling, minutes, BOUNDS[0]), tested).fingers.items():
+    for name, trace in detect(model, tested).fingers.items():
         truth = slip_truth(tested, name, trace.times)
         if truth is None:
             continue
