@@ -306,16 +306,21 @@ class ArrivalDetector:
         Without it, the tare of the recording would be what the hand holds now.
         """
         if self._detector is None:
-            return {}
+            return self._declared(self._baselines) if self._loaded else {}
         if self._detector.knows_zero:
             baselines = self._detector.baselines()
-            for name, taxels in (self._ignore or {}).items():
-                if name in baselines:
-                    baselines[name][list(taxels)] = 0.0
-            stated = {name: values.tolist() for name, values in baselines.items()}
-            return {STARTS_LOADED: True, BASELINES: stated} if stated else {}
+            return self._declared(baselines) if baselines else {}
         fingers = () if self._last is None else self._last.fingers.values()
         return {STARTS_LOADED: True} if any(_touches(finger) for finger in fingers) else {}
+
+    def _declared(self, baselines: Mapping[str, npt.NDArray[np.float64]]) -> dict[str, Any]:
+        """Return the metadata of samples that are load over some readings without contact."""
+        stated = {}
+        for name, values in baselines.items():
+            kept = values.copy()
+            kept[list((self._ignore or {}).get(name, ()))] = 0.0
+            stated[name] = kept.tolist()
+        return {STARTS_LOADED: True, **({BASELINES: stated} if stated else {})}
 
     def without_ignored(self, name: str, readings: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return (n, n_taxels, 3) readings of a finger, 0 in the taxels that are ignored."""
