@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.recordings import Recording
     from holdfast.training import Trained
+    from holdfast.twin.simulation import Grasp
 
 DEMO_MODEL = "builtin:twin"
 """The model of the demo: the best one that ships for the sensor of the simulated hand."""
@@ -95,17 +96,22 @@ def demo(
     """
     require_extras("twin", "train", "parquet")
     from holdfast.cli.real_clip import show_clip
+    from holdfast.cli.simulate import plan_grasps
     from holdfast.files import refuse_overwrite
     from holdfast.model import Model
     from holdfast.training import evaluate
+    from holdfast.twin.objects import OTHER_OBJECTS
 
     check_speed("twin:", speed)
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     refuse_overwrite(model, force=force)
+    grasps = plan_grasps(
+        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
+    )
     real = show_clip(speed, print_message)
-    recordings = _simulate(folder, seed, force)
+    recordings = _simulate(grasps, folder, force)
     print_message(f"3/5  evaluating {DEMO_MODEL}, which was not trained on these objects")
     print_message("     (the first run on a machine compiles the detector here)")
     ours = Model.load(DEMO_MODEL)
@@ -130,15 +136,11 @@ def demo(
     _print_next_steps(out, folder / f"{shown.name}.parquet", time.monotonic() - start)
 
 
-def _simulate(folder: Path, seed: int, force: bool) -> "Sequence[Recording]":
+def _simulate(grasps: "Sequence[Grasp]", folder: Path, force: bool) -> "Sequence[Recording]":
     """Simulate grasps with and without disturbances; return those that did not fail."""
-    from holdfast.cli.simulate import plan_grasps, simulate_grasps
+    from holdfast.cli.simulate import simulate_grasps
     from holdfast.io import load_dataset
-    from holdfast.twin.objects import OTHER_OBJECTS
 
-    grasps = plan_grasps(
-        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
-    )
     names = DEMO_OBJECTS.replace(",", " and ")
     print_message(f"2/5  simulating {len(grasps)} grasps: {names}, Allegro hand, uSkin fingertips")
     simulate_grasps(grasps, folder, jobs=-1, force=force, report=_report_grasp)
