@@ -425,7 +425,7 @@ def test_node_forces_of_another_skin_are_refused():
         ("limits", (1.0, 1.0), "limits: numbers like .* expected"),
         ("lag_shares", (0.6, 0.5), "lag_shares: at most 1 in sum expected, .* given"),
         ("n_averaged", 0, "n_averaged: above 0 expected, 0.0 given"),
-        ("n_averaged", 1.5, "n_averaged and scan_line: integers expected, 1.5 given"),
+        ("n_averaged", 1.5, "n_averaged: an integer expected, 1.5 given"),
         ("scan_time", -0.01, "scan_time: finite, not negative expected"),
     ],
 )
