@@ -21,13 +21,13 @@ from holdfast_lab.skin.situations import Marked
 
 CHANGE_TIMES = (0.017, 0.033, 0.067, 0.133, 0.267, 0.533, 1.067, 2.133)
 """Times over which the change of a reading is measured [s]."""
-TREMOR_BAND, MOTION_BAND = (8.0, 12.0), (2.0, 12.0)
+HAND_TREMOR_BAND, HAND_MOTION_BAND = (8.0, 12.0), (2.0, 12.0)
 """Bands of a person's tremor, and of motion [Hz]."""
 MIN_RUN_SECONDS = 0.25
 """Parts of a quiet hold that are shorter are not used [s]."""
 MIN_BAND_SECONDS = 1.0
 """Parts of a hold that are shorter have no spectrum [s]."""
-HELD = ("quiet", "moving")
+HANDLED = ("quiet", "moving")
 """Situations of ordinary handling."""
 
 
@@ -83,7 +83,7 @@ def finger_streams(recordings: Iterable[Marked], model: Model) -> Iterator[Finge
 
 def _held(masks: dict[str, Flags], n: int) -> Flags:
     held = np.zeros(n, dtype=bool)
-    for name in HELD:
+    for name in HANDLED:
         held |= masks.get(name, False)
     return held
 
@@ -129,7 +129,7 @@ def _bands(module: Tactile, held: Flags) -> tuple[float, float]:
         rates = np.fft.rfftfreq(b - a, module.period)
         middle = force[a:b] - force[a:b].mean(axis=0)
         power = 2 * (np.abs(np.fft.rfft(middle, axis=0)) ** 2).sum(axis=1) / (b - a)
-        for place, (low, high) in enumerate((TREMOR_BAND, MOTION_BAND)):
+        for place, (low, high) in enumerate((HAND_TREMOR_BAND, HAND_MOTION_BAND)):
             powers[place] += power[(rates >= low) & (rates < high)].sum()
         noise += float((np.diff(force[a:b], axis=0) ** 2).sum() / 2)
         n += b - a
