@@ -33,6 +33,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 /* Functions are part of each source file; -DHOLDFAST_API=extern makes a library of the header. */
@@ -140,6 +141,12 @@ static inline void hf_fill_i(int64_t *values, int64_t n, int64_t value)
 }
 
 @FUNCTIONS@
+
+/* Return the size of a detector [bytes], for callers that cannot read this header. */
+HOLDFAST_API size_t holdfast_size(void)
+{
+    return sizeof(holdfast_detector);
+}
 
 /* Initialise a detector, or reset it. */
 HOLDFAST_API void holdfast_init(holdfast_detector *d)
