@@ -94,8 +94,7 @@ class Program:
             translation = Statements(self, function, values)
             text = translation.definition(name)
             self.definitions.append(text)
-            has_detector = any(isinstance(x, CRecord) and not x.is_constant for x in values)
-            self._functions[key] = CFunction(name, has_detector, translation.result)
+            self._functions[key] = CFunction(name, _needs_detector(values), translation.result)
         return self._functions[key]
 
     def note_store(self, field: str, kind: str) -> None:
@@ -104,11 +103,15 @@ class Program:
             self.new_time_fields.add(field)
 
 
+def _needs_detector(values: Sequence[CValue]) -> bool:
+    return any(isinstance(x, CArray | CRecord) and x.needs_detector for x in values)
+
+
 def _argument(value: CValue) -> Iterator[str]:
     """Yield the C arguments of a value: nothing for what the function knows."""
     if isinstance(value, CNumber) and value.known is None:
         yield value.text
-    elif isinstance(value, CArray):
+    elif isinstance(value, CArray) and not value.is_whole:
         yield value.text
         yield from (length.text for length in value.shape if length.known is None)
 
@@ -202,7 +205,7 @@ class Statements:
     def _parameters(self) -> list[str]:
         """Return the C parameters, and set the values of the Python parameters."""
         words = []
-        if any(isinstance(x, CRecord) and not x.is_constant for x in self.values):
+        if _needs_detector(self.values):
             words.append("holdfast_detector *d")
         for argument, value in zip(self.tree.args.args, self.values, strict=True):
             name = argument.arg
@@ -211,7 +214,7 @@ class Statements:
                 words.append(f"{C_TYPES[value.kind]} {_c_name(name)}")
             elif isinstance(value, CNumber) and self._n_stores[name] > 1:
                 self._assign_name(name, value)
-            elif isinstance(value, CArray):
+            elif isinstance(value, CArray) and not value.is_whole:
                 words.append(f"{value.c_type}{_c_name(name)}")
                 words += [
                     f"int64_t {_c_name(name)}_length_{axis}"
@@ -224,7 +227,7 @@ class Statements:
         """Return the value of a parameter within the function."""
         if isinstance(value, CNumber):
             return value if value.known is not None else CNumber(value.kind, _c_name(name))
-        if isinstance(value, CArray):
+        if isinstance(value, CArray) and not value.is_whole:
             shape = tuple(
                 CNumber(INTEGER, f"{_c_name(name)}_length_{axis}") if x.known is None else x
                 for axis, x in enumerate(value.shape)

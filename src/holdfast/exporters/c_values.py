@@ -58,12 +58,22 @@ class CArray(NamedTuple):
         """What a function that receives it depends on."""
         choices = None if self.choices is None else self.choices.tobytes()
         shape = tuple(length.known for length in self.shape)
-        return (self.kind, shape, self.strides, self.field, choices)
+        return (self.kind, shape, self.strides, self.field, self.is_whole, choices)
 
     @property
     def text(self) -> str:
         """C expression of a pointer to the first element."""
         return f"({' + '.join((self.base, *self.offsets))})" if self.offsets else self.base
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is an array of the header, which every function reaches by its name."""
+        return not self.offsets and self.base in (f"d->{self.field}", self.field)
+
+    @property
+    def needs_detector(self) -> bool:
+        """Whether a function reaches it by the detector."""
+        return self.is_whole and self.base.startswith("d->")
 
     @property
     def c_type(self) -> str:
@@ -94,6 +104,11 @@ class CRecord(NamedTuple):
     def key(self) -> object:
         """What a function that receives it depends on."""
         return self.name
+
+    @property
+    def needs_detector(self) -> bool:
+        """Whether a function reaches its fields by the detector."""
+        return not self.is_constant
 
 
 CValue = CNumber | CArray | CTuple | CRecord

@@ -62,8 +62,8 @@ typedef @REAL@ holdfast_real;
 /* Results of holdfast_update. */
 enum {
     HOLDFAST_OK = 0,
-    HOLDFAST_WRONG_TIME = -1,  /* not finite, or not after the last; the sample is ignored */
-    HOLDFAST_WRONG_HEADER = -2 /* the detector was not initialised, or by another header */
+    HOLDFAST_WRONG_TIME = -1,  /* not finite, or not after the last */
+    HOLDFAST_WRONG_HEADER = -2 /* not initialised, or by another header */
 };
 
 /* Estimate of one finger; a probability is NaN where there is none. */
@@ -91,6 +91,7 @@ typedef struct {
 /* All memory of a detector. */
 typedef struct {
     uint32_t header_id;
+    int64_t hand; /* its state */
     double last_time;
 @STATE@
 } holdfast_detector;
@@ -151,6 +152,7 @@ HOLDFAST_API size_t holdfast_size(void)
 /* Initialise a detector, or reset it. */
 HOLDFAST_API void holdfast_init(holdfast_detector *d)
 {
+    d->hand = HOLDFAST_UNKNOWN;
     d->last_time = -INFINITY;
 @INIT@
     d->header_id = HOLDFAST_HEADER_ID;
@@ -196,24 +198,40 @@ static inline void hf_write(holdfast_detector *d, int f, holdfast_finger_estimat
     }
 }
 
-/* Process one sample of the hand. Return HOLDFAST_OK, or why the sample is ignored. */
+/* Write an estimate without any knowledge. */
+static inline void hf_write_unknown(holdfast_estimate *estimate)
+{
+    const holdfast_finger_estimate finger = {
+        NAN, HOLDFAST_UNKNOWN, 0, 0, 0, 0, HF_NAN, HF_NAN, HF_NAN, HF_NAN, HF_NAN,
+        {HF_NAN, HF_NAN, HF_NAN}};
+    estimate->time = NAN;
+    estimate->state = HOLDFAST_UNKNOWN;
+    for (int f = 0; f < HOLDFAST_N_FINGERS; ++f) {
+        estimate->finger[f] = finger;
+    }
+}
+
+/* Process one sample of the hand. Return HOLDFAST_OK, or why the sample is ignored: the estimate
+ * is then that of the last sample. */
 HOLDFAST_API int holdfast_update(
     holdfast_detector *d, double time, const holdfast_real *readings, holdfast_estimate *estimate)
 {
     if (d->header_id != HOLDFAST_HEADER_ID) {
+        hf_write_unknown(estimate);
         return HOLDFAST_WRONG_HEADER;
     }
-    if (!(time > d->last_time && time < INFINITY)) {
-        return HOLDFAST_WRONG_TIME;
+    const bool is_later = time > d->last_time && time < INFINITY;
+    if (is_later) {
+        d->last_time = time;
+        hf_receive(d, readings);
+        d->hand = @STEP@;
     }
-    d->last_time = time;
-    hf_receive(d, readings);
-    estimate->state = (int)@STEP@;
-    estimate->time = time;
+    estimate->time = d->last_time;
+    estimate->state = (int)d->hand;
     for (int f = 0; f < HOLDFAST_N_FINGERS; ++f) {
         hf_write(d, f, &estimate->finger[f]);
     }
-    return HOLDFAST_OK;
+    return is_later ? HOLDFAST_OK : HOLDFAST_WRONG_TIME;
 }
 
 /* An array of rows, constant or not, is received by its first reading. */
