@@ -38,9 +38,7 @@ def main() -> None:
         ],
         align=True,
     )  # fmt: skip
-    hand = np.dtype(
-        [("time", "f8"), ("state", "i4"), ("finger", finger, len(sensors))], align=True
-    )
+    hand = np.dtype([("time", "f8"), ("state", "i4"), ("finger", finger, len(sensors))], align=True)
     estimate = np.zeros((), dtype=hand)
     with tempfile.TemporaryDirectory() as folder:
         library = compiled(header_of(model, sensors, recording.rate).text, Path(folder))

@@ -68,7 +68,7 @@ def test_a_controller_of_ros2_control_asks_for_force(tmp_path):
         "    for (auto & x : c.state_interfaces_)\n"
         "      x.value = 33000 + rand() % 5 + (k > 300 ? rand() % 900 : 0);\n"
         "    c.update(rclcpp::Time{k / 150.0}, rclcpp::Duration());\n"
-        "    if (k == 299 || k == 599) std::printf(\"%g \", c.command_interfaces_[0].value);\n"
+        '    if (k == 299 || k == 599) std::printf("%g ", c.command_interfaces_[0].value);\n'
         "  }\n}\n"
     )
     program = built(tmp_path, "builtin:twin", "uskin-curved", "4", main, "c++", "-std=c++17")

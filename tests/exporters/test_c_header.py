@@ -161,7 +161,7 @@ def test_a_long_stream_of_large_times_gives_the_same(tmp_path):
         compare(python, c, samples, 1.7e9 + k / rate)
 
 
-@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac", "eflesh_slip"])
+@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac", "gtac_v2"])
 def test_real_recordings_give_the_same(format_, data_folder, tmp_path):
     folder = data_folder / format_
     if not folder.is_dir():
@@ -171,7 +171,7 @@ def test_real_recordings_give_the_same(format_, data_folder, tmp_path):
     model = built_in("any")
     sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
     python, c = both(model, sensors, recording.rate, tmp_path)
-    modules = {name: m.slice(m.times[0], m.times[0] + 30.0) for name, m in
+    modules = {name: m.slice(0, 2500) for name, m in
                recording.modules.items() if name in sensors}  # fmt: skip
     run_recording(python, c, type(recording)(recording.name, modules))
 
@@ -238,7 +238,16 @@ def test_an_update_may_receive_constant_and_other_arrays(tmp_path):
         "holdfast_update(&d, 0.0, open, &e); holdfast_update(&d, 1.0, fixed, &e);\n"
         "return e.finger[HOLDFAST_FINGER_A].state == HOLDFAST_UNKNOWN ? 0 : 1; }\n"
     )
-    words = ["cc", "-std=c99", "-O2", *WARNINGS, tmp_path / "main.c", "-o", tmp_path / "main", "-lm"]
+    words = [
+        "cc",
+        "-std=c99",
+        "-O2",
+        *WARNINGS,
+        tmp_path / "main.c",
+        "-o",
+        tmp_path / "main",
+        "-lm",
+    ]
     subprocess.run(words, check=True)
     assert subprocess.run([tmp_path / "main"]).returncode == 0
 
@@ -259,7 +268,8 @@ def uses_of(names, monkeypatch):
     for name in names:
         model, sensors, rate = made(name)
         header_of(model, sensors, rate)
-        header_of(model, sensors, rate, in_contact=True)
+    header_of(*made("rich"), in_contact=True)
+    header_of(*made("any-newton"), in_contact=True)
     monkeypatch.setattr(Program, "use", plain)
     return uses
 
@@ -314,19 +324,24 @@ class Quiet:
 
 
 def test_a_statement_that_is_deleted_changes_the_header(monkeypatch):
-    uses = uses_of(["paper", "twin", "any", "any-two-sensors", "rich"], monkeypatch)
+    uses = uses_of(["twin", "any-two-sensors", "rich"], monkeypatch)
     trees = {function: c_functions.function_tree(function)[0] for function in uses}
     assert len(uses) > 60
     unchanged, n_statements = [], 0
     for function, ways in uses.items():
-        plain = [translation(monkeypatch, p, function, v, trees[function]) for p, v in ways]
+        plain = []  # text of each use, when it is needed
         for place in range(1000):
             tree, statement = without_statement(trees[function], place)
             if tree is None:
                 break
             n_statements += 1
-            tried = (translation(monkeypatch, p, function, v, tree) for p, v in ways)
-            if all(text == before for text, before in zip(tried, plain, strict=True)):
+            for k, (program, values) in enumerate(ways):
+                if k == len(plain):
+                    text = translation(monkeypatch, program, function, values, trees[function])
+                    plain.append(text)
+                if translation(monkeypatch, program, function, values, tree) != plain[k]:
+                    break
+            else:
                 unchanged.append((function.__name__, ast.unparse(statement)))
     assert n_statements > 300
     assert unchanged == []
@@ -338,8 +353,8 @@ def test_a_line_of_the_kernel_that_is_deleted_breaks_parity(monkeypatch, tmp_pat
     def changed(function):
         tree, first = plain(function)
         if function.__name__ == "add_squares":
-            tree, statement = without_statement(tree, 3)
-            assert "value +=" in ast.unparse(statement)
+            candidates = (without_statement(tree, place) for place in range(9))
+            tree = next(t for t, x in candidates if ast.unparse(x).startswith("value +="))
         return tree, first
 
     monkeypatch.setattr(c_functions, "function_tree", changed)
@@ -385,7 +400,9 @@ def test_the_header_says_what_it_was_made_of():
 def test_the_size_of_the_state_is_that_of_the_struct(tmp_path):
     for single in (False, True):
         header = header_of(paper(), HAND, 150.0, single=single)
-        c = CDetector(header, tmp_path, HAND, single=single)
+        folder = tmp_path / f"single-{single}"  # a library is loaded once from a path
+        folder.mkdir()
+        c = CDetector(header, folder, HAND, single=single)
         assert 0 <= len(c.memory.raw) - header.state_size < 32
 
 

@@ -29,7 +29,9 @@ def export(
     ] = None,
     single: Annotated[
         bool,
-        typer.Option("--float", help="Numbers of single precision in the header; times stay double."),
+        typer.Option(
+            "--float", help="Numbers of single precision in the header; times stay double."
+        ),
     ] = False,
     in_contact: Annotated[
         bool | None,

@@ -22,7 +22,17 @@ def code_size(header: CHeader) -> int | None:
     with TemporaryDirectory() as folder:
         source, compiled = Path(folder) / "model.h", Path(folder) / "model.o"
         source.write_text(header.text)
-        words = ["-std=c99", "-O2", "-DHOLDFAST_API=extern", "-x", "c", "-c", source, "-o", compiled]
+        words = [
+            "-std=c99",
+            "-O2",
+            "-DHOLDFAST_API=extern",
+            "-x",
+            "c",
+            "-c",
+            source,
+            "-o",
+            compiled,
+        ]
         try:
             subprocess.run([compiler, *words], check=True, **_QUIET)
             sections = subprocess.run([size, "-A", compiled], check=True, **_QUIET).stdout

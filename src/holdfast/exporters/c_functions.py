@@ -357,9 +357,7 @@ class Statements:
             self._loop_over(node, self.expressions.array(node.iter))
         return False
 
-    def _loop(
-        self, node: ast.For, name: str, begin: CNumber, end: CNumber, step: CNumber
-    ) -> None:
+    def _loop(self, node: ast.For, name: str, begin: CNumber, end: CNumber, step: CNumber) -> None:
         """Translate a loop over a range."""
         if step.known is None or step.known <= 0:
             self.expressions.refuse(node, "a step that is not known to be above 0")

@@ -155,9 +155,7 @@ def _translate(program: Program, arrays: DetectorArrays) -> dict[str, str]:
     """Translate all that a header needs. Return the texts of its calls."""
     state = {name: _state_array(program, name, values) for name, values in arrays.arrays()}
     records = {
-        name: CRecord(
-            name, {f: state[f"{name}_{f}"] for f in values._fields}, is_constant=False
-        )
+        name: CRecord(name, {f: state[f"{name}_{f}"] for f in values._fields}, is_constant=False)
         for name, values in arrays.state.items()
     } | {name: _constant_record(name, values) for name, values in arrays.constants.items()}
     layout, memory, output, rule, decision = (
@@ -245,8 +243,9 @@ def _assembled(
         "VERSION": version("holdfast"),
         "MODEL": re.sub(r"[^\w.:-]", "_", model.name or "model"),
         "MODEL_DIGEST": model.digest,
-        "FINGERS": ", ".join(f"{_plain(n)} ({_plain(s.name)}, {s.n_taxels} taxels)"
-                             for n, s in sensors.items()),  # fmt: skip
+        "FINGERS": ", ".join(
+            f"{_plain(n)} ({_plain(s.name)}, {s.n_taxels} taxels)" for n, s in sensors.items()
+        ),  # fmt: skip
         "RATE": f"{model.rate or rate:.6g}",
         "PRECISION": "single, times double" if single else "double",
         "REAL": "float" if single else "double",

@@ -71,9 +71,7 @@ def export(
         write_whole(target, content, force=force)
         return ExportedModel(target, outputs, len(content))
     if target.suffix != HEADER_SUFFIX:
-        raise ValueError(
-            f"{target}: a model is exported as {HEADER_SUFFIX} (C99) or {ONNX_SUFFIX}"
-        )
+        raise ValueError(f"{target}: a model is exported as {HEADER_SUFFIX} (C99) or {ONNX_SUFFIX}")
     header, names = _header(model, like, fingers, single=single, in_contact=in_contact)
     data = header.text.encode()
     write_whole(target, data, force=force)
