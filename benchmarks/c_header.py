@@ -22,9 +22,9 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
-from exporters.c_detector import both, compare, random_samples  # noqa: E402
 from rich_update import FINGERS, RATE, paper_model  # noqa: E402
 
+from exporters.c_detector import both, compare, random_samples  # noqa: E402
 from holdfast.detector import Detector  # noqa: E402
 from holdfast.exporters import header_of  # noqa: E402
 from holdfast.exporters.c_compiler import code_size  # noqa: E402

@@ -25,6 +25,7 @@ def compiled(text: str, folder: Path) -> ctypes.CDLL:
 
 
 def main() -> None:
+    """Compare both over a synthetic grasp."""
     recording = synthetic_recording("grasp", seed=1)
     sensors = {name: module.sensor for name, module in recording.modules.items()}
     model = holdfast.Model.load("builtin:twin")

@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-pytest.importorskip("onnx", reason="onnx is not installed")
-onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
-
 from exporters.models import HAND, built_in, paper, rich
 from holdfast.classifiers import OnnxClassifier
 from holdfast.classifiers.linear import log_odds
@@ -14,6 +11,9 @@ from holdfast.classifiers.slip import add_squares
 from holdfast.errors import ModelError
 from holdfast.exporters import export
 from holdfast.exporters.onnx_head import onnx_of
+
+pytest.importorskip("onnx", reason="onnx is not installed")
+onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
 
 
 def session(content):

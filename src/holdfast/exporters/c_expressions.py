@@ -315,22 +315,30 @@ class Expressions:
             return result
         if thing is len:
             return self.array(node.args[0]).shape[0]
-        numbers = [self.number(argument) for argument in node.args]
-        if thing in (min, max):
-            return self._extreme("min" if thing is min else "max", numbers)
-        if thing in CASTS:
-            return self._cast(CASTS[thing], numbers[0])
-        if thing is abs:
-            return self._magnitude(numbers[0])
-        if thing in TESTS:
-            is_known = numbers[0].known is not None
-            test = CNumber(BOOL, f"({TESTS[thing]}({numbers[0].text}) != 0)")
-            return known(thing(numbers[0].known)) if is_known else test
-        if thing is round and numbers[0].known is not None:
-            return known(round(numbers[0].known))
-        if thing not in MATHS:
+        result = self._known_function(thing, [self.number(x) for x in node.args])
+        if result is None:
             self.refuse(node, "a call of this function")
-        return self._math(thing, numbers)
+        return result
+
+    def _known_function(self, thing: Any, numbers: Sequence[CNumber]) -> CNumber | None:  # noqa: ANN401
+        """Return the result of a function of Python, math or NumPy; None if it is not known."""
+        first = numbers[0]
+        if thing in MATHS:
+            result = self._math(thing, numbers)
+        elif thing in (min, max):
+            result = self._extreme("min" if thing is min else "max", numbers)
+        elif thing in CASTS:
+            result = self._cast(CASTS[thing], first)
+        elif thing is abs:
+            result = self._magnitude(first)
+        elif thing in TESTS:
+            test = CNumber(BOOL, f"({TESTS[thing]}({first.text}) != 0)")
+            result = test if first.known is None else known(thing(first.known))
+        elif thing is round and first.known is not None:
+            result = known(round(first.known))
+        else:
+            return None
+        return result
 
     def _math(self, function: Callable[..., float], numbers: Sequence[CNumber]) -> CNumber:
         first = numbers[0].known

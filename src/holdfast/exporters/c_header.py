@@ -243,9 +243,7 @@ def _assembled(
         "VERSION": version("holdfast"),
         "MODEL": re.sub(r"[^\w.:-]", "_", model.name or "model"),
         "MODEL_DIGEST": model.digest,
-        "FINGERS": ", ".join(
-            f"{_plain(n)} ({_plain(s.name)}, {s.n_taxels} taxels)" for n, s in sensors.items()
-        ),  # fmt: skip
+        "FINGERS": _named(sensors),
         "RATE": f"{model.rate or rate:.6g}",
         "PRECISION": "single, times double" if single else "double",
         "REAL": "float" if single else "double",
@@ -279,6 +277,14 @@ def _assembled(
 def _plain(name: str) -> str:
     """Return a name without what would end a comment or a line."""
     return re.sub(r"[^\w ./:-]", "_", name, flags=re.ASCII).replace("*/", "__")
+
+
+def _named(sensors: Mapping[str, Sensor]) -> str:
+    parts = (
+        f"{_plain(name)} ({_plain(sensor.name)}, {sensor.n_taxels} taxels)"
+        for name, sensor in sensors.items()
+    )
+    return ", ".join(parts)
 
 
 def _reachable(definitions: Sequence[str], roots: Sequence[str]) -> list[str]:

@@ -135,7 +135,8 @@ def fingers_of_sensor(name: str, fingers: str) -> dict[str, Sensor]:
         names = [f"finger{n + 1}" for n in range(int(fingers))]
     if not all(names) or len(set(names)) < len(names) or names == ["0"]:
         raise ValueError(
-            f"fingers: a number from 1 on or different names with commas expected, {fingers!r} given"
+            f"fingers: a number from 1 on or different names with commas expected; {fingers!r} "
+            "given"
         )
     return dict.fromkeys(names, used)
 
