@@ -34,12 +34,17 @@ def code_size(header: CHeader) -> int | None:
             compiled,
         ]
         try:
-            subprocess.run([compiler, *words], check=True, **_QUIET)
-            sections = subprocess.run([size, "-A", compiled], check=True, **_QUIET).stdout
+            _run([compiler, *map(str, words)])
+            sections = _run([size, "-A", str(compiled)])
         except (OSError, subprocess.SubprocessError):
             return None
     lines = [line.split() for line in sections.splitlines()]
     return sum(int(words[1]) for words in lines if words and words[0].startswith(".text"))
 
 
-_QUIET = {"capture_output": True, "text": True, "timeout": COMPILE_SECONDS}
+def _run(command: list[str]) -> str:
+    """Run a program, and return what it prints."""
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=COMPILE_SECONDS, check=True
+    )
+    return done.stdout

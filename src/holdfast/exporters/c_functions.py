@@ -280,7 +280,8 @@ class Statements:
         if isinstance(value, CNumber):
             self._write(f"return {self.expressions.text(value)};")
         elif isinstance(self.result, CTuple):
-            self._return_members(self._unpacked(value), self.result.kinds)
+            members = [x for x in self._unpacked(value) if isinstance(x, CNumber)]
+            self._return_members(members, self.result.kinds)
         return True
 
     def _return_members(self, members: Sequence[CNumber], kinds: str) -> None:
@@ -497,7 +498,8 @@ class Statements:
             self._write(f"const hf_tuple_{value.kinds} {_c_name(name)} = {value.text};")
             return CTuple(value.members, _c_name(name))
         kind = widest(REAL, *value.kinds)
-        text = ", ".join(self.expressions.text(member) for member in value.members)
+        numbers = [member for member in value.members if isinstance(member, CNumber)]
+        text = ", ".join(map(self.expressions.text, numbers))
         n = len(value.members)
         self._write(f"const {C_TYPES[kind]} {_c_name(name)}[{n}] = {{{text}}};")
         return CArray(kind, _c_name(name), (known(n),), (1,), _c_name(name))

@@ -171,7 +171,7 @@ def _translate(program: Program, arrays: DetectorArrays) -> dict[str, str]:
         _python(decision_rule.fill_report), [memory, output, decision, state["report"], finger]
     )
     code = CNumber(INTEGER, "(int64_t)row[HF_REPORT_CODE]")
-    split = program.call(decision_rule.split_code, [code])
+    split = program.call(_plain_function(decision_rule.split_code), [code])
     if not (isinstance(step, CNumber) and isinstance(split, CTuple)):
         raise TypeError("the kernel returns something else")
     return {
@@ -185,6 +185,11 @@ def _translate(program: Program, arrays: DetectorArrays) -> dict[str, str]:
 def _python(compiled: Any) -> Any:  # noqa: ANN401 (a function that numba compiles)
     """Return the function of Python that a compiled function was made from."""
     return compiled.py_func
+
+
+def _plain_function(function: Any) -> Any:  # noqa: ANN401
+    """Return a function of Python that is not compiled by itself."""
+    return function
 
 
 def _time_kind(program: Program) -> str:
