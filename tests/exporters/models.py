@@ -25,8 +25,9 @@ def paper(**options):
 
 def rich(**options):
     """A model of every feature, with slip and speed rules, for two fingers."""
-    return model(features=RICH, which=PATCH, slips=("thumb", "index"), own=(*SLIP_OWN, *TAXELS),
-                 speeds=("index",), threshold=60.0, **options)  # fmt: skip
+    options = {"slips": ("thumb", "index"), "speeds": ("index",)} | options
+    own = (*SLIP_OWN, *TAXELS)
+    return model(features=RICH, which=PATCH, own=own, threshold=60.0, **options)
 
 
 def built_in(name, **options):

@@ -93,6 +93,7 @@ def header_of(
     single: bool = False,
     in_contact: bool = False,
     baselines: Mapping[str, npt.ArrayLike] | None = None,
+    ignore: Mapping[str, Sequence[int]] | None = None,
 ) -> CHeader:
     """Return the header of a model for the fingers of a hand; it does what a `Detector` does.
 
@@ -103,11 +104,14 @@ def header_of(
         single: numbers are of single precision; times stay double.
         in_contact: the first samples are load, and not an open hand.
         baselines: (n_taxels, 3) readings without contact by finger, if `in_contact`.
+        ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
 
     Raises:
         ModelError: a part of the model has no translation, or the fingers do not fit.
     """
-    arrays = detector_arrays(model, fingers, rate, in_contact=in_contact, baselines=baselines)
+    arrays = detector_arrays(
+        model, fingers, rate, in_contact=in_contact, baselines=baselines, ignore=ignore
+    )
     time_fields: frozenset[str] = frozenset()
     while True:
         program = Program(single=single, time_fields=time_fields)
@@ -125,6 +129,7 @@ def detector_arrays(
     *,
     in_contact: bool = False,
     baselines: Mapping[str, npt.ArrayLike] | None = None,
+    ignore: Mapping[str, Sequence[int]] | None = None,
 ) -> DetectorArrays:
     """Return the arrays of a new detector, if a header can hold all of it."""
     sensors = model.fingers_of(fingers)
@@ -136,6 +141,7 @@ def detector_arrays(
             )
     declared = declared_baselines({BASELINES: baselines}, sensors)
     plan = replace(model.plan(sensors, rate), in_contact=in_contact, baselines=declared)
+    plan = replace(plan, ignore=ignore or {})
     if plan.tare.kind == "interval":
         raise ModelError(
             f"the model's tare is the interval {model.tare} s of a recording; a header holds a "
