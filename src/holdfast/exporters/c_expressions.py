@@ -17,9 +17,9 @@ import numpy as np
 from holdfast.exporters.c_values import (
     BOOL,
     C_TYPES,
+    EXACT_TIME,
     INTEGER,
     REAL,
-    TIME,
     CArray,
     CNumber,
     CRecord,
@@ -239,7 +239,7 @@ class Expressions:
     ) -> CNumber:
         """Return a result, as a time if it is one: a difference of times or a ratio is none."""
         text = f"({one} {symbol} {two})"
-        if kind == TIME:
+        if kind == EXACT_TIME:
             both = left.kind == right.kind
             scaled = symbol == "*" and left.known is None and right.known is None
             if symbol == "/" or scaled or (symbol == "-" and both):
@@ -351,13 +351,13 @@ class Expressions:
     def _magnitude(self, value: CNumber) -> CNumber:
         if value.known is not None:
             return known(abs(value.known))
-        name = {INTEGER: "hf_magnitude", TIME: "fabs"}.get(value.kind, "HF_MATH(fabs)")
+        name = {INTEGER: "hf_magnitude", EXACT_TIME: "fabs"}.get(value.kind, "HF_MATH(fabs)")
         return CNumber(value.kind, f"{name}({value.text})")
 
     def _cast(self, kind: str, value: CNumber) -> CNumber:
         if value.known is not None:
             return known({INTEGER: int, REAL: float, BOOL: bool}[kind](value.known))
-        if value.kind == kind or (kind, value.kind) == (REAL, TIME):
+        if value.kind == kind or (kind, value.kind) == (REAL, EXACT_TIME):
             return value
         if kind == BOOL:
             return CNumber(BOOL, f"({value.text} != 0)")

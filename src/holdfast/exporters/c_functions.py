@@ -18,9 +18,9 @@ from holdfast.exporters.c_expressions import Expressions
 from holdfast.exporters.c_values import (
     BOOL,
     C_TYPES,
+    EXACT_TIME,
     INTEGER,
     REAL,
-    TIME,
     CArray,
     CNumber,
     CRecord,
@@ -99,7 +99,7 @@ class Program:
 
     def note_store(self, field: str, kind: str) -> None:
         """Note that a number was stored to an array."""
-        if self.single and kind == TIME and field not in self.time_fields:
+        if self.single and kind == EXACT_TIME and field not in self.time_fields:
             self.new_time_fields.add(field)
 
 

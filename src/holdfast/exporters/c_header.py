@@ -20,9 +20,9 @@ from holdfast.exporters.c_functions import Program
 from holdfast.exporters.c_values import (
     BOOL,
     C_TYPES,
+    EXACT_TIME,
     INTEGER,
     REAL,
-    TIME,
     CArray,
     CNumber,
     CRecord,
@@ -37,10 +37,10 @@ from holdfast.model import Model
 from holdfast.recordings import BASELINES
 from holdfast.sensors import Sensor
 
-Array = npt.NDArray[Any]
+AnyArray = npt.NDArray[Any]
 KIND_OF_DTYPE = {"b": BOOL, "i": INTEGER, "f": REAL}
 """Kinds of elements by the kind of their NumPy type."""
-COLUMNS = ("REPORT_TIME", "REPORT_PROBABILITY", "REPORT_SIGMA", "REPORT_FORCE", "REPORT_SLIP",
+FRAME_COLUMNS = ("REPORT_TIME", "REPORT_PROBABILITY", "REPORT_SIGMA", "REPORT_FORCE", "REPORT_SLIP",
            "REPORT_SPEED", "REPORT_DISTANCE", "REPORT_WIDTH")  # fmt: skip
 """Columns of the report that the frame of the header reads."""
 WORDS_OF_LINE = 6
@@ -73,7 +73,7 @@ class DetectorArrays(NamedTuple):
     constants: Mapping[str, Any]
     state: Mapping[str, Any]
 
-    def arrays(self) -> Iterator[tuple[str, Array]]:
+    def arrays(self) -> Iterator[tuple[str, AnyArray]]:
         """Yield name and first values of all arrays of the state."""
         layout = self.constants["layout"]
         n_fingers, n_taxels = len(layout.windows), len(layout.rotations)
@@ -199,17 +199,17 @@ def _plain_function(function: Any) -> Any:  # noqa: ANN401
 
 
 def _time_kind(program: Program) -> str:
-    return TIME if program.single else REAL
+    return EXACT_TIME if program.single else REAL
 
 
-def _state_array(program: Program, name: str, values: Array) -> CArray:
+def _state_array(program: Program, name: str, values: AnyArray) -> CArray:
     kind = KIND_OF_DTYPE[values.dtype.kind]
     if name in program.time_fields:
-        kind = TIME
+        kind = EXACT_TIME
     return _array(kind, f"d->{name}", name, values)
 
 
-def _array(kind: str, base: str, field: str, values: Array, choices: Any = None) -> CArray:  # noqa: ANN401
+def _array(kind: str, base: str, field: str, values: AnyArray, choices: Any = None) -> CArray:  # noqa: ANN401
     strides = [int(np.prod(values.shape[axis + 1 :])) for axis in range(values.ndim)]
     shape = tuple(known(int(length)) for length in values.shape)
     return CArray(kind, base, shape, tuple(strides), field, choices=choices)
@@ -246,7 +246,7 @@ def _assembled(
         and (re.search(rf"\b{(field := f'hf_{record}_{name}')}\b", used) or name == "offsets")
     ]
     kinds = {name: _state_array(program, name, values).kind for name, values in arrays.arrays()}
-    sizes = {BOOL: 1, INTEGER: 8, REAL: 4 if single else 8, TIME: 8}
+    sizes = {BOOL: 1, INTEGER: 8, REAL: 4 if single else 8, EXACT_TIME: 8}
     state_size = sum(max(v.size, 1) * sizes[kinds[name]] for name, v in arrays.arrays()) + 16
     constants_size = sum(v.size * sizes[KIND_OF_DTYPE[v.dtype.kind]] for _, v in constants)
     sensors = model.fingers_of(fingers)
@@ -330,7 +330,7 @@ def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     yield _enum("HOLDFAST_FAULT_", faults)
     causes = [("NONE", 0), *((cause.name, place + 1) for place, cause in enumerate(Cause))]
     yield _enum("HOLDFAST_CAUSE_", causes)
-    columns = [(name, getattr(rule_at, name)) for name in (*COLUMNS, "REPORT_CODE")]
+    columns = [(name, getattr(rule_at, name)) for name in (*FRAME_COLUMNS, "REPORT_CODE")]
     own = [("STATUS_WIDTH", at.STATUS_WIDTH), ("TAXELS", at.TAXELS)]
     yield _enum("HF_", [*columns, *own])
 
@@ -340,7 +340,7 @@ def _enum(prefix: str, members: Sequence[tuple[str, int]]) -> str:
     return f"enum {{\n{lines}\n}};"
 
 
-def _constant(name: str, values: Array, *, single: bool) -> str:
+def _constant(name: str, values: AnyArray, *, single: bool) -> str:
     """Return the definition of a constant array."""
     words = [literal(value, single=single) for value in values.ravel().tolist()] or ["0"]
     rows = [
@@ -352,7 +352,7 @@ def _constant(name: str, values: Array, *, single: bool) -> str:
     return f"static const {kind} {name}[{len(words)}] = {{\n{body}\n}};"
 
 
-def _first_values(name: str, values: Array, kind: str, *, single: bool) -> Iterator[str]:
+def _first_values(name: str, values: AnyArray, kind: str, *, single: bool) -> Iterator[str]:
     """Yield the statements that set an array of the state to its first values."""
     flat = values.ravel()
     n = max(flat.size, 1)

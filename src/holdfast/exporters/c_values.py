@@ -11,20 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Number = bool | int | float
-BOOL, INTEGER, REAL, TIME = "bird"
-"""Kinds of numbers. TIME is a real number that keeps double precision in a header of single."""
-C_TYPES = {BOOL: "bool", INTEGER: "int64_t", REAL: "holdfast_real", TIME: "double"}
+KnownNumber = bool | int | float
+BOOL, INTEGER, REAL, EXACT_TIME = "bird"
+"""Kinds of numbers. EXACT_TIME is a real number that stays double in a header of single precision."""
+C_TYPES = {BOOL: "bool", INTEGER: "int64_t", REAL: "holdfast_real", EXACT_TIME: "double"}
 LEAST_SINGLE = float(np.finfo(np.float32).tiny)
 """Constants closer to zero become this number in a header of single precision."""
 
 
 class CNumber(NamedTuple):
-    """Number: its kind and its C expression, or its value if that is known."""
+    """KnownNumber: its kind and its C expression, or its value if that is known."""
 
     kind: str
     text: str
-    known: Number | None = None
+    known: KnownNumber | None = None
 
     @property
     def key(self) -> object:
@@ -114,7 +114,7 @@ class CRecord(NamedTuple):
 CValue = CNumber | CArray | CTuple | CRecord
 
 
-def known(value: Number) -> CNumber:
+def known(value: KnownNumber) -> CNumber:
     """Return a number whose value is known."""
     kind = BOOL if isinstance(value, bool) else INTEGER if isinstance(value, int) else REAL
     return CNumber(kind, "", value)
@@ -125,7 +125,7 @@ def widest(*kinds: str) -> str:
     return max(kinds, key="bird".index)
 
 
-def literal(value: Number, *, single: bool) -> str:
+def literal(value: KnownNumber, *, single: bool) -> str:
     """Return a number as C source.
 
     Example:
