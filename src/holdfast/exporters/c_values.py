@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 KnownNumber = bool | int | float
 BOOL, INTEGER, REAL, EXACT_TIME = "bird"
-"""Kinds of numbers. EXACT_TIME is a real number that stays double in a header of single precision."""
+"""Kinds of numbers. EXACT_TIME is a real number that stays double in single precision."""
 C_TYPES = {BOOL: "bool", INTEGER: "int64_t", REAL: "holdfast_real", EXACT_TIME: "double"}
 LEAST_SINGLE = float(np.finfo(np.float32).tiny)
 """Constants closer to zero become this number in a header of single precision."""
