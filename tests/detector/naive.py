@@ -418,9 +418,6 @@ class Finger:
         if self.empty:
             self.probability = 0.0
             return "NO_CONTACT"
-        if self.leaving:
-            self.probability = 0.0
-            return "UNSTABLE"
         rule = self.part.classifier
         z = rule.intercept
         for value, c, mean, scale in zip(
@@ -428,6 +425,8 @@ class Finger:
         ):
             z += c * (value - mean) / scale
         self.probability = 1 / (1 + math.exp(min(-(rule.slope * z + rule.offset), 700)))
+        if self.leaving:
+            return "UNSTABLE"
         limit = rule.threshold
         if self.state == "STABLE":
             limit -= hysteresis

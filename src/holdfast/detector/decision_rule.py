@@ -420,7 +420,7 @@ def _decide(
     by_load, unloaded = not math.isnan(limits[rule_at.LOAD_LIMIT]), contact == WITHOUT_CONTACT
     state = NO_CONTACT
     decided[rule_at.PROBABILITY] = 0.0
-    if contact == IN_CONTACT or (by_load and unloaded):
+    if by_load or not unloaded:
         # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[rule_at.PROBABILITY] = linear_probability(output.features[f], weights)
@@ -441,7 +441,7 @@ def _decide(
             codes[rule_at.STATE],
         )
         if contact == LEAVING:
-            state = UNSTABLE
+            state = UNSTABLE  # the force decides; the probability stays that of the features
         if state == UNSTABLE and rule.causes.shape[1] > 0:
             # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
             codes[rule_at.CAUSE] = add_scores(
