@@ -302,9 +302,10 @@ class Finger:
                 self.status = ""
             return
         state = self.contact_state(features, debounce.hysteresis)
-        if state == "UNSTABLE":
+        begins = state != "NO_CONTACT" and self.candidate == "NO_CONTACT"
+        if state == "UNSTABLE" or begins:
             self.unstable_at = time
-        elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
+        if state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
             state = "UNSTABLE"
         self.debounce(state, time, debounce.min_duration)
         self.decide_slip(features, fingers, time)

@@ -354,8 +354,8 @@ def _find_contact(
     if not math.isnan(limits[rule_at.LOAD_LIMIT]):
         # By the load of relative features: load < limit noise, at rest.
         return contact_by_load(
-            memory.motion[f], limits[rule_at.LOAD_LIMIT], codes[rule_at.CANDIDATE], time,
-            layout.zero_unknown,
+            memory.motion[f], layout.normals[f], limits[rule_at.LOAD_LIMIT],
+            codes[rule_at.CANDIDATE], time, layout.zero_unknown,
         )  # fmt: skip
     # By F_a: load < threshold; a drift of the tare is a fault.
     noise, values = memory.levels[f, at.NOISE], output.values[f]
@@ -447,7 +447,9 @@ def _decide(
             codes[rule_at.CAUSE] = add_scores(
                 output.features[f], rule.causes[f], decision.scores[f]
             )
-        state = hold_unstable(state, decided, rule.hold, time, period)
+        state = hold_unstable(
+            state, codes[rule_at.CANDIDATE], decided, rule.hold, time, period
+        )
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
     if unloaded:
@@ -614,12 +616,25 @@ def classify_contact(probability: float, threshold: float, hysteresis: float, re
 
 
 @compiled_step
-def hold_unstable(state: int, decided: Array, hold: float, time: float, period: float) -> int:
-    """Return UNSTABLE while it is held, else the state."""
+def hold_unstable(
+    state: int, latest: int, decided: Array, hold: float, time: float, period: float
+) -> int:
+    """Return UNSTABLE while it is held, else the state.
+
+    A contact that has just begun closes: its first sample counts as unstable for the hold time.
+
+    Args:
+        state: of a finger in contact.
+        latest: the state of the last sample, before debouncing.
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        hold: hold time [s].
+        time: of the sample [s].
+        period: of the samples [s].
+    """
     # UNSTABLE until t - t_unstable reaches the hold time.
-    if state == UNSTABLE:
+    if state == UNSTABLE or latest == NO_CONTACT:
         decided[rule_at.LAST_UNSTABLE] = time
-    elif _is_held(time, decided[rule_at.LAST_UNSTABLE], hold, period):
+    if _is_held(time, decided[rule_at.LAST_UNSTABLE], hold, period):
         return UNSTABLE
     return state
 

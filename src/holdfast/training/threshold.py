@@ -384,7 +384,7 @@ def _replay(
                 state = classify_contact(stable, threshold, hysteresis, codes[STATE])
                 if raw[k] == UNSTABLE:
                     state = UNSTABLE
-                state = hold_unstable(state, decided, hold, times[k], period)
+                state = hold_unstable(state, codes[CANDIDATE], decided, hold, times[k], period)
             debounce(codes, decided, state, min_duration, times[k], period)
         out[k] = codes[STATE]
 
