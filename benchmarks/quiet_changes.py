@@ -5,7 +5,8 @@
     holdfast simulate hands/ --randomize --repeats 300 --measured all
     python benchmarks/quiet_changes.py twin/ slips/ --hands hands/ --real DATA
 
-Quiet is a hold from 1 s after its beginning to its end:
+Quiet is a hold from 1 s after its beginning to half a second before its end, where what ends it
+may have begun:
 
 - folders of grasps of the twin: STABLE by the truth;
 - hands: the same in randomized hands, while the arm stands still;
@@ -39,8 +40,8 @@ from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 
-SETTLED = 1.0
-"""Time from the beginning of a hold after which it is quiet [s]."""
+SETTLED, ENDING = 1.0, 0.5
+"""Times from the beginning and before the end of a hold between which it is quiet [s]."""
 STILL_SECONDS, STILL_DEVIATION = 1.0, 0.5
 """An arm stands still while gravity, as the palm feels it, has at most this standard deviation
 [m/s^2] over this time [s]; arms vibrate."""
@@ -140,7 +141,7 @@ def count(trace: FingerTrace, quiet: np.ndarray) -> Counts:
 
 
 def quiet_by_truth(recording: Recording, finger: str, times: np.ndarray) -> np.ndarray:
-    """Return where a finger holds, from 1 s on, and the arm does not move, by the truth."""
+    """Return where a finger quietly holds and the arm does not move, by the truth."""
     if recording.truth is None:
         raise SystemExit(f"{recording.name}: a recording with truth expected")
     labels = labels_from_truth(recording.truth, finger, LabelRule(margin=0.0))
@@ -151,7 +152,8 @@ def quiet_by_truth(recording: Recording, finger: str, times: np.ndarray) -> np.n
         held &= still[places]
     quiet = np.zeros_like(held)
     for first, end in runs(held):
-        quiet[np.searchsorted(times, times[first] + SETTLED) : end] = True
+        inside = times[first] + SETTLED, times[end - 1] - ENDING
+        quiet[slice(*np.searchsorted(times, inside))] = True
     return quiet
 
 

@@ -41,20 +41,27 @@ def contact_threshold(noise: float, limits: Array) -> float:
 
 @compiled_step
 def contact_by_load(
-    motion: Array, normal: Array, limit: float, latest: int, time: float, zero_unknown: bool
+    motion: Array,
+    decided: Array,
+    normal: Array,
+    limit: float,
+    latest: int,
+    time: float,
+    zero_unknown: bool,
 ) -> int:
     """Return IN_CONTACT, LEAVING or WITHOUT_CONTACT: by the load, and whether the force rests.
 
     Args:
         motion: of the finger, as in `Memory`.
+        decided: of the finger, as in `DecisionMemory`; is changed.
         normal: (3,) of the finger.
         limit: threshold of contact, as a multiple of the noise.
         latest: the state of the last sample, before debouncing.
         time: of the sample [s].
         zero_unknown: whether the stream began in contact, with a load that is not known.
     """
-    # No contact: load < limit noise, or a small share of the peak; it begins after 0.2 s without
-    # motion, and ends with the load alone.
+    # No contact: load < limit noise, or a small share of the peak. It begins after 0.2 s of that
+    # without motion, and ends with the load alone.
     threshold, peak = limit * motion[at.NOISE_NOW], motion[at.PEAK_CONTACT_LOAD]
     if zero_unknown:
         # fall = -zero . n: the load of the start, once it has gone.
@@ -65,8 +72,10 @@ def contact_by_load(
             return IN_CONTACT
         peak = max(peak, fall)
     if not _is_unloaded(motion[at.CONTACT_LOAD], peak, threshold, latest):
+        decided[rule_at.LOADED_AT] = time
         return IN_CONTACT
-    if latest == NO_CONTACT or time - motion[at.MOVED_AT] > REST_SECONDS:
+    rest = time - max(motion[at.MOVED_AT], decided[rule_at.LOADED_AT])
+    if latest == NO_CONTACT or rest > REST_SECONDS:
         return WITHOUT_CONTACT
     # Leaving: a grip was seen, peak >= 100 noise. A stream may begin in contact undeclared.
     return LEAVING if peak >= NOISE_WEIGHT * motion[at.NOISE_NOW] else IN_CONTACT

@@ -285,7 +285,7 @@ def new_decision_memory(
         slip_limits = np.full((n_fingers, rule_at.SLIP_LIMITS_WIDTH), np.nan)
     values = np.full((n_fingers, rule_at.DECIDED_WIDTH), np.nan)
     values[:, rule_at.REST : rule_at.PEAK + 1] = 0.0
-    values[:, rule_at.SHAKEN_AT] = -np.inf
+    values[:, [rule_at.SHAKEN_AT, rule_at.LOADED_AT]] = -np.inf
     has_no_rule = np.isnan(slip_limits)
     values[has_no_rule[:, rule_at.SLIP_THRESHOLD], rule_at.SLIP_PROBABILITY] = rule_at.NO_SLIP_RULE
     has_no_speed = has_no_rule[:, rule_at.HIGHEST_SPEED]
@@ -354,7 +354,7 @@ def _find_contact(
     if not math.isnan(limits[rule_at.LOAD_LIMIT]):
         # By the load of relative features: load < limit noise, at rest.
         return contact_by_load(
-            memory.motion[f], layout.normals[f], limits[rule_at.LOAD_LIMIT],
+            memory.motion[f], decided, layout.normals[f], limits[rule_at.LOAD_LIMIT],
             codes[rule_at.CANDIDATE], time, layout.zero_unknown,
         )  # fmt: skip
     # By F_a: load < threshold; a drift of the tare is a fault.
