@@ -447,9 +447,7 @@ def _decide(
             codes[rule_at.CAUSE] = add_scores(
                 output.features[f], rule.causes[f], decision.scores[f]
             )
-        state = hold_unstable(
-            state, codes[rule_at.CANDIDATE], decided, rule.hold, time, period
-        )
+        state = hold_unstable(state, codes[rule_at.CANDIDATE], decided, rule.hold, time, period)
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
     if unloaded:
