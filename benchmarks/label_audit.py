@@ -1,4 +1,4 @@
-"""Measure which wrong labels an audit finds: the table of docs/labels.md, as Markdown.
+"""Measure which wrong labels an audit finds: a table of docs/study/labels-by-rules.md, as Markdown.
 
     holdfast simulate twin/reference --profile finger-reference --seed 0
     python benchmarks/label_audit.py twin/reference --recordings 24

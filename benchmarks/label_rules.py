@@ -1,4 +1,6 @@
-"""Measure the quality of labels by rules, and of models trained on them: tables of docs/labels.md.
+"""Measure the quality of labels by rules and of models trained on them.
+
+The tables are in docs/study/labels-by-rules.md.
 
     holdfast simulate twin/reference --profile finger-reference --seed 0
     holdfast simulate twin/vigorous --profile finger-vigorous --seed 0

@@ -70,10 +70,11 @@ def links_of(path: Path) -> list[tuple[str, str]]:
 
 
 def anchors_of(path: Path) -> set[str]:
-    """The anchors of the headings of a page, as GitHub makes them."""
+    """The anchors of a page: its own, and those of its headings as GitHub makes them."""
     text = FENCE.sub("", path.read_text("utf-8"))
     titles = re.findall(r"^#+ (.*)$", text, re.M)
-    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+    own = set(re.findall(r'<a id="([^"]+)">', text))
+    return own | {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 def run_page(

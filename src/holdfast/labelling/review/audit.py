@@ -181,8 +181,8 @@ def audit(
 def default_setting(recordings: Sequence[Recording]) -> Setting:
     """Return how an audit trains: on holdfast's features for counts, on the paper's for newton.
 
-    Holdfast's features locate edges much better (docs/labels.md has figures); their scale is that
-    of counts.
+    Holdfast's features locate edges much better (docs/study/labels-by-rules.md has figures); their
+    scale is that of counts.
     """
     units = {m.unit for r in recordings[:1] for m in r.modules.values()}
     if units == {"count"}:
