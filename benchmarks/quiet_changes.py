@@ -31,6 +31,7 @@ from real_sets import QUIET_FROM
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.detector import FingerTrace, detect
+from holdfast.errors import HoldfastError
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
 from holdfast.metrics import pool_events
@@ -108,13 +109,17 @@ def streams(options: argparse.Namespace) -> Iterator[tuple[str, Iterable[Recordi
 
 
 def quiet_figures(model: Model, recordings: Iterable[Recording], quiet: Quiet) -> tuple[str, ...]:
-    """Return the cells of a stream."""
-    parts = [
-        count(trace, quiet(recording, name, trace.times))
-        for recording in recordings
-        for name, trace in detect(model, recording).fingers.items()
-    ]
-    parts = [part for part in parts if part.seconds > 0]
+    """Return the cells of a stream; of recordings whose sensors the model knows."""
+    parts = []
+    for recording in recordings:
+        try:
+            traces = detect(model, recording).fingers
+        except HoldfastError:
+            continue
+        counts = (count(t, quiet(recording, name, t.times)) for name, t in traces.items())
+        parts += [part for part in counts if part.seconds > 0]
+    if not parts:
+        return ("0", *["-"] * (len(QUIET_HEADS) - 3))
     minutes = sum(part.seconds for part in parts) / 60
     states = sum(part.states for part in parts)
     shares = 100 * np.asarray(states) / np.sum(states)
