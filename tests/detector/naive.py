@@ -442,9 +442,10 @@ class Finger:
                 self.status = ""
             return
         state = self.contact_state(features, debounce.hysteresis)
-        if state == "UNSTABLE":
+        begins = state != "NO_CONTACT" and self.candidate == "NO_CONTACT"
+        if state == "UNSTABLE" or begins:
             self.unstable_at = time
-        elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
+        if state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
             state = "UNSTABLE"
         self.debounce(state, time, debounce.min_duration)
         self.decide_slip(features, fingers, time)
@@ -558,9 +559,6 @@ class Finger:
         if self.empty:
             self.probability = 0.0
             return "NO_CONTACT"
-        if self.leaving:
-            self.probability = 0.0
-            return "UNSTABLE"
         rule = self.part.classifier
         z = rule.intercept
         for value, c, mean, scale in zip(
@@ -568,6 +566,8 @@ class Finger:
         ):
             z += c * (value - mean) / scale
         self.probability = 1 / (1 + math.exp(min(-(rule.slope * z + rule.offset), 700)))
+        if self.leaving:
+            return "UNSTABLE"
         limit = rule.threshold
         if self.state == "STABLE":
             limit -= hysteresis

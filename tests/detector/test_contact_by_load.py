@@ -1,13 +1,15 @@
 """Contact by the load of the stream, as `builtin:any` decides it."""
 
+import msgspec
 import numpy as np
 import pytest
 
-from holdfast.contact import NO_CONTACT, STABLE
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
 from holdfast.detector import detect
-from holdfast.model import Model
+from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
+from holdfast.training.threshold import ThresholdReplay, with_threshold
 
 RATE = 100.0
 SENSOR = sensor("papillarray")
@@ -17,11 +19,14 @@ LOADED = np.array([0.05, -0.03, 0.2])
 
 def states_of(forces, noise=1e-3, seed=0):
     """Codes of the states, for (n, 3) the force on each taxel."""
+    return detect(Model.load("builtin:any"), recording_of(forces, noise, seed)).fingers["a"].state
+
+
+def recording_of(forces, noise=1e-3, seed=0):
     rng = np.random.default_rng(seed)
     readings = np.asarray(forces)[:, None, :] + rng.normal(0, noise, (len(forces), 9, 3))
     module = Tactile(SENSOR, np.arange(len(forces)) / RATE, readings, "N")
-    recording = Recording("made", {"a": module})
-    return detect(Model.load("builtin:any"), recording).fingers["a"].state
+    return Recording("made", {"a": module})
 
 
 def steps(*parts):
@@ -65,3 +70,67 @@ def test_a_finger_is_not_stable_once_its_force_has_gone(rest):
     gone = round(RATE * 5.5)
     assert (states[gone:] != STABLE).all()
     assert (states[gone + 45 :] == NO_CONTACT).all()
+
+
+def test_shear_that_draws_the_normal_force_down_is_held():
+    """As a magnetic skin: the shear grows, and its normal readings fall at some taxels."""
+    n = round(6 * RATE)
+    rng = np.random.default_rng(3)
+    grown = np.clip(np.arange(n) / RATE, 0, 1)[:, None, None]
+    force = np.zeros((9, 3))
+    force[:, 0], force[:6, 2], force[6:, 2] = 0.3, -0.05, 0.08
+    readings = grown * force + rng.normal(0, 1e-3, (n, 9, 3))
+    recording = Recording("sheared", {"a": Tactile(SENSOR, np.arange(n) / RATE, readings, "N")})
+    states = detect(Model.load("builtin:any"), recording).fingers["a"].state
+    assert (states[150:] == STABLE).all()
+
+
+def loads(shares):
+    """(n, 3) forces by a share of the load at each sample."""
+    return np.asarray(shares)[:, None] * LOADED
+
+
+def test_a_short_dip_of_the_load_is_no_loss_of_contact():
+    shares = np.concatenate(
+        [np.zeros(100), np.full(300, 0.05), np.full(15, 0.002), np.full(200, 0.05)]
+    )
+    states = states_of(loads(shares))
+    assert (states[110:] != NO_CONTACT).all()
+
+
+def test_a_load_that_stays_low_is_a_loss_of_contact():
+    shares = np.concatenate([np.zeros(100), np.full(300, 0.05), np.full(200, 0.002)])
+    states = states_of(loads(shares))
+    assert (states[300:400] == STABLE).all()
+    assert (states[450:] == NO_CONTACT).all()
+
+
+def test_a_finger_that_touches_is_unstable_at_first():
+    states = states_of(steps((1, 0), (1, 0.06), (2, 0.06)))
+    first = int(np.argmax(states[1:] != NO_CONTACT)) + 1
+    assert 100 <= first < 200
+    assert (states[first : first + 10] == UNSTABLE).all()
+    assert (states[330:] == STABLE).all()
+
+
+def test_a_force_that_leaves_keeps_its_probability():
+    """It is UNSTABLE by its force: the probability is that of the features."""
+    model = Model.load("builtin:any")
+    raw = msgspec.structs.replace(with_threshold(model, 0.0), debounce=Debounce())
+    trace = detect(raw, recording_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (2, 0)))).fingers[
+        "a"
+    ]
+    leaving = trace.state == UNSTABLE
+    assert leaving.any() and (trace.stable_probability[leaving] > 0).all()
+
+
+@pytest.mark.parametrize("threshold", [0.05, 0.4, 0.9])
+def test_a_replay_of_the_threshold_has_the_states_of_the_detector(threshold):
+    model = Model.load("builtin:any")
+    recording = recording_of(
+        steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (1, 0), (1, 0.06), (1, 0.06))
+    )
+    replay = ThresholdReplay.of(model, recording)
+    trace = detect(with_threshold(model, threshold), recording).fingers["a"]
+    assert {NO_CONTACT, UNSTABLE} <= set(trace.state.tolist())
+    np.testing.assert_array_equal(replay.states(replay.raw.fingers["a"], threshold), trace.state)

@@ -75,7 +75,7 @@ def test_a_grip_that_gives_a_little_is_still_held(name):
 def test_a_pull_is_unstable():
     shares = np.concatenate([np.ones(200), 1 + 0.5 * np.sin(np.arange(100) / 4)])
     trace = detect(Model.load("builtin:any"), held(shares), in_contact=True).fingers["a"]
-    assert (trace.state[220:] == UNSTABLE).mean() > 0.7
+    assert (trace.state[220:] == UNSTABLE).mean() > 0.6
 
 
 def test_the_metadata_declare_it():

@@ -59,8 +59,9 @@ NO_SPEED_RULE = -1.0
     SLID_AT,  # time of the last sample that slides [s]; NaN while it does not slide
     FILTERED,  # log odds of stable to unstable by the forward filter; NaN before the first sample
     FILTERED_AT,  # time of that sample [s]
+    LOADED_AT,  # when the load of the stream was last that of a contact [s]
     DECIDED_WIDTH,
-) = range(19)  # fmt: skip
+) = range(20)  # fmt: skip
 
 # Rows of the report, one for each finger.
 (

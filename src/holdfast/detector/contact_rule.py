@@ -7,7 +7,7 @@ that is released and relaxes.
 import math
 
 from holdfast.compiled import compiled_step, inlined
-from holdfast.contact import STABLE, UNSTABLE
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
 from holdfast.detector import arrays as rule_at
 from holdfast.features import arrays as at
 from holdfast.features.motion import LOAD_DECAY_SECONDS, NOISE_WEIGHT, RELEASED_SHARE
@@ -41,28 +41,41 @@ def contact_threshold(noise: float, limits: Array) -> float:
 
 @compiled_step
 def contact_by_load(
-    motion: Array, limit: float, latest: int, time: float, zero_unknown: bool
+    motion: Array,
+    decided: Array,
+    normal: Array,
+    limit: float,
+    latest: int,
+    time: float,
+    zero_unknown: bool,
 ) -> int:
     """Return IN_CONTACT, LEAVING or WITHOUT_CONTACT: by the load, and whether the force rests.
 
     Args:
         motion: of the finger, as in `Memory`.
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        normal: (3,) of the finger.
         limit: threshold of contact, as a multiple of the noise.
         latest: the state of the last sample, before debouncing.
         time: of the sample [s].
         zero_unknown: whether the stream began in contact, with a load that is not known.
     """
-    # No contact: 0.2 s without motion, and load < limit noise, or a small share of the peak.
-    threshold, peak = limit * motion[at.NOISE_NOW], motion[at.PEAK_LOAD]
+    # No contact: load < limit noise, or a small share of the peak. It begins after 0.2 s of that
+    # without motion, and ends with the load alone.
+    threshold, peak = limit * motion[at.NOISE_NOW], motion[at.PEAK_CONTACT_LOAD]
     if zero_unknown:
-        # fall = first F . n - least F . n: the load of the start, once it has gone.
-        fall = -motion[at.LEAST_NORMAL]
+        # fall = -zero . n: the load of the start, once it has gone.
+        fall = 0.0
+        for axis in range(3):
+            fall -= motion[at.ZERO + axis] * normal[axis]
         if fall < NOISE_WEIGHT * motion[at.NOISE_NOW]:
             return IN_CONTACT
         peak = max(peak, fall)
-    if not _is_unloaded(motion[at.LOAD], peak, threshold, latest):
+    if not _is_unloaded(motion[at.CONTACT_LOAD], peak, threshold, latest):
+        decided[rule_at.LOADED_AT] = time
         return IN_CONTACT
-    if time - motion[at.MOVED_AT] > REST_SECONDS:
+    rest = time - max(motion[at.MOVED_AT], decided[rule_at.LOADED_AT])
+    if latest == NO_CONTACT or rest > REST_SECONDS:
         return WITHOUT_CONTACT
     # Leaving: a grip was seen, peak >= 100 noise. A stream may begin in contact undeclared.
     return LEAVING if peak >= NOISE_WEIGHT * motion[at.NOISE_NOW] else IN_CONTACT

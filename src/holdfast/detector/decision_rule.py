@@ -304,7 +304,7 @@ def new_decision_memory(
         slip_limits = np.full((n_fingers, rule_at.SLIP_LIMITS_WIDTH), np.nan)
     values = np.full((n_fingers, rule_at.DECIDED_WIDTH), np.nan)
     values[:, rule_at.REST : rule_at.PEAK + 1] = 0.0
-    values[:, rule_at.SHAKEN_AT] = -np.inf
+    values[:, [rule_at.SHAKEN_AT, rule_at.LOADED_AT]] = -np.inf
     has_no_rule = np.isnan(slip_limits)
     values[has_no_rule[:, rule_at.SLIP_THRESHOLD], rule_at.SLIP_PROBABILITY] = rule_at.NO_SLIP_RULE
     has_no_speed = has_no_rule[:, rule_at.HIGHEST_SPEED]
@@ -373,8 +373,8 @@ def _find_contact(
     if not math.isnan(limits[rule_at.LOAD_LIMIT]):
         # By the load of relative features: load < limit noise, at rest.
         return contact_by_load(
-            memory.motion[f], limits[rule_at.LOAD_LIMIT], codes[rule_at.CANDIDATE], time,
-            layout.zero_unknown,
+            memory.motion[f], decided, layout.normals[f], limits[rule_at.LOAD_LIMIT],
+            codes[rule_at.CANDIDATE], time, layout.zero_unknown,
         )  # fmt: skip
     # By F_a: load < threshold; a drift of the tare is a fault.
     noise, values = memory.levels[f, at.NOISE], output.values[f]
@@ -439,7 +439,7 @@ def _decide(
     by_load, unloaded = not math.isnan(limits[rule_at.LOAD_LIMIT]), contact == WITHOUT_CONTACT
     state = NO_CONTACT
     decided[rule_at.PROBABILITY] = 0.0
-    if contact == IN_CONTACT or (by_load and unloaded):
+    if by_load or not unloaded:
         # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[rule_at.PROBABILITY] = linear_probability(output.features[f], weights)
@@ -460,13 +460,13 @@ def _decide(
             codes[rule_at.STATE],
         )
         if contact == LEAVING:
-            state = UNSTABLE
+            state = UNSTABLE  # the force decides; the probability stays that of the features
         if state == UNSTABLE and rule.causes.shape[1] > 0:
             # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
             codes[rule_at.CAUSE] = add_scores(
                 output.features[f], rule.causes[f], decision.scores[f]
             )
-        state = hold_unstable(state, decided, rule.hold, time, period)
+        state = hold_unstable(state, codes[rule_at.CANDIDATE], decided, rule.hold, time, period)
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
     if unloaded:
@@ -633,12 +633,25 @@ def classify_contact(probability: float, threshold: float, hysteresis: float, re
 
 
 @compiled_step
-def hold_unstable(state: int, decided: Array, hold: float, time: float, period: float) -> int:
-    """Return UNSTABLE while it is held, else the state."""
+def hold_unstable(
+    state: int, latest: int, decided: Array, hold: float, time: float, period: float
+) -> int:
+    """Return UNSTABLE while it is held, else the state.
+
+    A contact that has just begun closes: its first sample counts as unstable for the hold time.
+
+    Args:
+        state: of a finger in contact.
+        latest: the state of the last sample, before debouncing.
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        hold: hold time [s].
+        time: of the sample [s].
+        period: of the samples [s].
+    """
     # UNSTABLE until t - t_unstable reaches the hold time.
-    if state == UNSTABLE:
+    if state == UNSTABLE or latest == NO_CONTACT:
         decided[rule_at.LAST_UNSTABLE] = time
-    elif _is_held(time, decided[rule_at.LAST_UNSTABLE], hold, period):
+    if _is_held(time, decided[rule_at.LAST_UNSTABLE], hold, period):
         return UNSTABLE
     return state
 

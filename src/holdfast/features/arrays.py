@@ -163,8 +163,11 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     PRESSURE_SQUARES,  # sum of their squares
     NORMAL_FLOOR,  # |normal force| beyond the reference and ten times its noise
     TANGENT, _, _,  # direction of the tangential force, in three components
+    ZERO, _, _,  # F_tip without contact: of the tare, or of a release since, in three components
+    CONTACT_LOAD,  # force beyond ZERO
+    PEAK_CONTACT_LOAD,  # the largest CONTACT_LOAD so far, slowly forgotten
     MOTION_WIDTH,
-) = range(24)  # fmt: skip
+) = range(29)  # fmt: skip
 
 # Layout.families: which relative kinds a lag needs, of those lists of holdfast.features.specs.
 (

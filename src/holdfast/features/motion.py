@@ -39,6 +39,9 @@ MOVE_SECONDS, MOVED_TO_NOISE = 0.133, 5.0
 """A force moves if it changes within this time [s] by this many times its noise."""
 RELEASED_SHARE = 0.08
 """Share of the largest load that a released skin may still show."""
+LEAST_FALL = 0.25
+"""Share of a released force that is normal, at least: friction held the rest. It allows for a
+friction of 2, and for readings that show shear twice as much."""
 PRESSURE_FLOOR = 1e-3
 """Least shift of the centre of pressure, in radii of the patch."""
 ONE_AXIS, TWO_AXES = 1.0 / 3.0, 2.0 / 3.0
@@ -76,6 +79,7 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
     step = period if n < 2 else time - times[_place(now, 1, length)]
     _update_noise(layout, memory.motion, memory.counts, f, time)
     _update_load(layout, memory, f, now, step)
+    _update_contact_load(layout, memory, f, now, step)
     _update_movement(layout, memory, f, now, time)
     if layout.has_ratios:
         _update_ratio(layout, memory, f, now)
@@ -269,6 +273,56 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int, step: float) 
     motion[f, at.PEAK_TAXEL_LOAD] = max(
         motion[f, at.TAXEL_LOAD], keep * motion[f, at.PEAK_TAXEL_LOAD]
     )
+
+
+@inlined
+def _update_contact_load(layout: Layout, memory: Memory, f: int, now: int, step: float) -> None:
+    """Update the force without contact, and the load beyond it, by which contact is decided.
+
+    A shear draws the normal force of a magnetic skin below that of the tare, while it is held. So
+    only a release counts: of a tare under load, all taxels fall.
+    """
+    track, motion = memory.track, memory.motion
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    x, y, z = track[f, 0, now], track[f, 1, now], track[f, 2, now]
+    normal = x * nx + y * ny + z * nz
+    # zero: F at the least F . n so far of a release.
+    least = motion[f, at.ZERO] * nx + motion[f, at.ZERO + 1] * ny + motion[f, at.ZERO + 2] * nz
+    if normal < least and _is_release(layout, memory, f, now, normal, x * x + y * y + z * z):
+        motion[f, at.ZERO], motion[f, at.ZERO + 1], motion[f, at.ZERO + 2] = x, y, z
+    x, y, z = x - motion[f, at.ZERO], y - motion[f, at.ZERO + 1], z - motion[f, at.ZERO + 2]
+    # load = |F - zero|, peak as above.
+    load = math.sqrt(x * x + y * y + z * z)
+    motion[f, at.CONTACT_LOAD] = load
+    keep = math.exp(-step / LOAD_DECAY_SECONDS)
+    motion[f, at.PEAK_CONTACT_LOAD] = max(load, keep * motion[f, at.PEAK_CONTACT_LOAD])
+
+
+@inlined
+def _is_release(
+    layout: Layout, memory: Memory, f: int, now: int, normal: float, square: float
+) -> bool:
+    """Return whether a force below the tare is that of a skin which was let go.
+
+    Args:
+        layout: of the stream.
+        memory: of the stream.
+        f: the finger.
+        now: place of the newest sample.
+        normal: normal force beyond the tare, below 0.
+        square: |F|^2 beyond the tare.
+    """
+    # Friction held what fell: -F . n >= 1/4 |F|. And what rises is at most an echo:
+    # sum max(g_i . n, 0) <= 0.08 sum max(-g_i . n, 0).
+    if normal * normal < LEAST_FALL * LEAST_FALL * square:
+        return False
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    risen = 0.0
+    for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
+        forces = memory.taxel_forces
+        pressed = forces[now, i, 0] * nx + forces[now, i, 1] * ny + forces[now, i, 2] * nz
+        risen += max(pressed, 0.0)
+    return risen <= RELEASED_SHARE * (risen - normal)
 
 
 @inlined

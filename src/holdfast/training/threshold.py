@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.detector.arrays import CANDIDATE, FILTERED, LAST_UNSTABLE, STATE
 from holdfast.detector.decision_rule import (
     classify_contact,
@@ -66,7 +66,8 @@ class ThresholdReplay:
     """Decisions about one recording, for any threshold.
 
     Attributes:
-        raw: decisions without debouncing, hold and hysteresis.
+        raw: decisions without debouncing, hold and hysteresis, at the threshold 0: what is UNSTABLE
+            then is so by its force, whatever the threshold.
         debounce: of the model.
         period: of the samples [s].
         n_model_fingers: number of fingers of the model.
@@ -84,7 +85,8 @@ class ThresholdReplay:
         Raises:
             ModelError: the recording has other fingers or sensors.
         """
-        raw = compute_decisions(msgspec.structs.replace(model, debounce=Debounce()), recording)
+        plain = msgspec.structs.replace(with_threshold(model, 0.0), debounce=Debounce())
+        raw = compute_decisions(plain, recording)
         n_fingers = len(raw.fingers) if "*" in model.fingers else len(model.fingers)
         period = 1 / (model.rate or recording.rate)
         return cls(raw, model.debounce, period, n_fingers)
@@ -358,7 +360,8 @@ def _replay(
     Args:
         times: (n,) [s].
         probability: (n,) of stability.
-        raw: (n,) states without debouncing; UNKNOWN and NO_CONTACT do not depend on the threshold.
+        raw: (n,) states without debouncing at the threshold 0: UNKNOWN, NO_CONTACT, STABLE, or
+            UNSTABLE of a force that leaves.
         limits: threshold, hysteresis, hold [s], minimum duration [s], period [s] and switching
             [1/s].
         codes: as in `DecisionMemory`; is changed.
@@ -379,7 +382,9 @@ def _replay(
                 if switching > 0.0:
                     stable = filter_probability(decided, stable, threshold, switching, times[k])
                 state = classify_contact(stable, threshold, hysteresis, codes[STATE])
-                state = hold_unstable(state, decided, hold, times[k], period)
+                if raw[k] == UNSTABLE:
+                    state = UNSTABLE
+                state = hold_unstable(state, codes[CANDIDATE], decided, hold, times[k], period)
             debounce(codes, decided, state, min_duration, times[k], period)
         out[k] = codes[STATE]
 
