@@ -144,9 +144,9 @@ def _version(law: str, modules: tuple[str, ...]) -> str:
         modules: that make the result.
     """
     law_modules = {type(factory()).__module__ for factory in LAWS.values()}
-    own = type(LAWS[law]()).__module__
+    own = type(law_named(law)).__module__
     source = source_digest((*modules, own), (*sorted(law_modules - {own}), laws.__name__))
-    constants = msgspec.json.encode(_contents(LAWS[law]()), order="deterministic")
+    constants = msgspec.json.encode(_contents(law_named(law)), order="deterministic")
     return sha256(source.encode() + constants).hexdigest()
 
 

@@ -336,9 +336,9 @@ def _report_findings(imported: Sequence[_Imported]) -> None:
 
 def _hint(task: _ImportTask) -> str | None:
     """Return the option that helps with the recordings of the format; None for our own."""
-    from holdfast.io.importers import HINTS
+    from holdfast.io.importers import import_hint
 
-    return None if task.data_format is None else HINTS.get(task.data_format)
+    return None if task.data_format is None else import_hint(task.data_format)
 
 
 def _print(recordings: list[dict[str, Any]], out: Path, hint: str | None, as_json: bool) -> None:
