@@ -77,7 +77,7 @@ def test_names_are_listed_after_our_own(parts, caplog):
     assert recipe_names() == ("logreg", "svm", "none", "same")
     with pytest.raises(ValueError, match=r"there are fixed.*holdfast; of plug-ins: twice, wrong$"):
         law_named("thrice")
-    with pytest.raises(ValueError, match="ros1:KIND; of plug-ins: grab$"):
+    with pytest.raises(ValueError, match=r"ros1:KIND; of plug-ins: grab$"):
         open_hand("grip:left")
     assert reports(caplog) == [
         "plug-in gtac (sensors of acme 1.2) is skipped: holdfast itself has gtac; another name "
@@ -110,7 +110,7 @@ def test_nothing_is_imported_before_it_is_used(parts):
     ],
 )  # fmt: skip
 def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason):
-    with pytest.raises(ValueError, match="unknown|cannot be used; holdfast doctor says why"):
+    with pytest.raises(ValueError, match=r"unknown|cannot be used; holdfast doctor says why"):
         use()
     assert any(text.startswith(f"plug-in {reason}") for text in reports(caplog))
 
@@ -118,7 +118,7 @@ def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason
 def test_a_broken_importer_does_not_hinder_the_others(parts, caplog, capsys):
     (parts / "a.txt").write_text("hello")
     for _ in range(2):
-        with pytest.raises(RecordingError, match="is of no supported format.*plug-ins: broken, h"):
+        with pytest.raises(RecordingError, match=r"is of no supported format.*plug-ins: broken, h"):
             import_recordings(parts / "a.txt")
     broken, half = reports(caplog)
     assert broken == "plug-in broken (importers of acme 1.2) is skipped: RuntimeError: no device"

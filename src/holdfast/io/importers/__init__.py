@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from holdfast.errors import RecordingError, require_extras
-from holdfast.files import check_regular
+from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
@@ -161,7 +161,19 @@ def _format_of(
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
+        _refuse_pointers(path)
         return name or _detected_format(path)
+
+
+def _refuse_pointers(path: Path) -> None:
+    """Check that a file, or each file in a folder, is no pointer of Git LFS.
+
+    Raises:
+        RecordingError: it is one; the clone was made without the data.
+    """
+    for file in [path] if path.is_file() else sorted(path.iterdir()):
+        if is_lfs_pointer(file):
+            raise RecordingError(refusal_of_lfs_pointer(file))
 
 
 def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> Iterator[Recording]:
