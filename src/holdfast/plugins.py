@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-LOGGER = logging.getLogger("holdfast.plugins")
+_LOGGER = logging.getLogger("holdfast.plugins")
 GROUP_PREFIX = "holdfast."
 """Begin of the names of all groups of entry points: `holdfast.sensors`."""
 
@@ -125,7 +125,7 @@ class PluginGroup(Generic[T]):
         text = f"plug-in {point.name} ({self.kind} of {_package(point)}) is skipped: {reason}"
         if text not in self._reported:
             self._reported.add(text)
-            LOGGER.warning("%s", text)
+            _LOGGER.warning("%s", text)
 
 
 def _package(point: "EntryPoint") -> str:

@@ -161,6 +161,8 @@ def test_bad_input(capsys, made_up):
         "(https://github.com/ARQ-CRISP); there are also uskin-pick-move, eflesh-tugs, gtac-grasps, "
         "gtac-manipulation, arq-slip-2021, made-up"
     )
+    text = refused(capsys, "get", "made-up", "out", "--mirror", "ftp://x")
+    assert text == "--mirror: an address such as http://HOST:8000 expected, 'ftp://x' given"
     made_up.replaced["made-up/two.csv"] = csv_of(1).encode() + b"2.0,a\n"
     text = refused(capsys, "get", "made-up", "out")
     assert f"{find_cache()}/two.csv" in text

@@ -163,6 +163,10 @@ def _get(
     from holdfast.datasets.download import check_space, download, download_folder
     from holdfast.parallel import Engine
 
+    if mirror is not None and not mirror.startswith(("http://", "https://")):
+        raise ValueError(
+            f"--mirror: an address such as http://HOST:8000 expected, {mirror!r} given"
+        )
     folder = download_folder(public.name)
     address = None if mirror is None else f"{mirror.rstrip('/')}/{public.name}/"
     check_space(files, folder)

@@ -27,9 +27,9 @@ MAX_UNKNOWN_SIZE = 1_000_000_000
 """Size above which a file whose size is not known is refused [bytes]."""
 DOWNLOAD_CHUNK = 1 << 16
 """Number of bytes that are written at once."""
-CONNECT_TIMEOUT, READ_TIMEOUT = 10.0, 60.0
-"""Times after which a server that is silent is given up [s]."""
-MAX_TRIES = 3
+SERVER_TIMEOUTS = (10.0, 60.0)
+"""Times after which a server that does not connect, or is silent, is given up [s]."""
+MAX_DOWNLOAD_TRIES = 3
 """Number of times that a file is continued after the connection was lost."""
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -175,7 +175,7 @@ class _Download:
         from requests import Timeout
         from requests.exceptions import ChunkedEncodingError
 
-        for tries_left in reversed(range(MAX_TRIES)):
+        for tries_left in reversed(range(MAX_DOWNLOAD_TRIES)):
             try:
                 self._load(url)
                 break
@@ -203,8 +203,7 @@ class _Download:
         headers = {"Accept-Encoding": "identity"}
         if n_done:
             headers["Range"] = f"bytes={n_done}-"
-        timeouts = (CONNECT_TIMEOUT, READ_TIMEOUT)
-        with requests.get(url, headers=headers, stream=True, timeout=timeouts) as answer:
+        with requests.get(url, headers=headers, stream=True, timeout=SERVER_TIMEOUTS) as answer:
             if n_done and answer.status_code == requests.codes.requested_range_not_satisfiable:
                 self._part.unlink()
                 raise requests.ConnectionError("the incomplete file does not fit; begin again")
