@@ -105,11 +105,8 @@ def format_size(n_bytes: int) -> str:
     """
     for unit, name in ((10**9, "GB"), (10**6, "MB"), (10**3, "kB")):
         if n_bytes >= unit:
-            return (
-                f"{n_bytes / unit:.2g} {name}"
-                if n_bytes < 10 * unit
-                else (f"{n_bytes / unit:.0f} {name}")
-            )
+            digits = ".2g" if n_bytes < 10 * unit else ".0f"
+            return f"{n_bytes / unit:{digits}} {name}"
     return f"{n_bytes} bytes"
 
 
