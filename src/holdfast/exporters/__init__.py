@@ -1,0 +1,6 @@
+"""Exports: a model for programs without Python."""
+
+from holdfast.exporters.c_header import CHeader, header_of
+from holdfast.exporters.model_export import ExportedModel, export, fingers_of_sensor
+
+__all__ = ["CHeader", "ExportedModel", "export", "fingers_of_sensor", "header_of"]
