@@ -26,6 +26,7 @@ VERBS = {
     "simulate": "Simulate recordings of grasps with the physical twin.",
     "record": "Record a source; a crash loses at most the last half second.",
     "import": "Import recordings from other formats.",
+    "export": "Export recordings to other tools.",
     "info": "Show the content of a recording, a folder of them, or a model.",
     "label": "Label recordings on a page or by a rule, and check labels.",
     "train": "Train a model from labelled recordings.",

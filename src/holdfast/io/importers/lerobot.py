@@ -79,7 +79,9 @@ def parts(path: Path) -> list[Path]:
         RecordingError: it is none.
     """
     if not can_read(path):
-        raise RecordingError(f"{path} has no {INFO_PATH}; the folder of a LeRobot data set expected")
+        raise RecordingError(
+            f"{path} has no {INFO_PATH}; the folder of a LeRobot data set expected"
+        )
     return [path]
 
 
