@@ -124,9 +124,7 @@ def _scalars(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[It
         (SLIP_TOPIC, "slip_probability"),
         (SPEED_TOPIC, "slip_speed"),
     ):
-        columns = {
-            finger: (trace.times, getattr(trace, column)) for finger, trace in traces.items()
-        }
+        columns = {name: (trace.times, getattr(trace, column)) for name, trace in traces.items()}
         topics[topic] = {name: track for name, track in columns.items() if track[1] is not None}
     topics[TRUE_SPEED_TOPIC] = _true_speeds(recording)
     return [_series(topic, tracks) for topic, tracks in topics.items() if tracks]
@@ -193,10 +191,10 @@ def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Ite
             parts.append(_state_messages(topic, module.times, codes, _state_of_label))
     truth = recording.truth
     if truth is not None and "phase" in truth.hand and truth.hand["phase"].dtype.kind == "U":
-        phases, codes = np.unique(truth.hand["phase"], return_inverse=True)
+        phases, numbers = np.unique(truth.hand["phase"], return_inverse=True)
         parts.append(
             _state_messages(
-                PHASE_TOPIC, truth.times, codes[None], lambda code: {"state": str(phases[code])}
+                PHASE_TOPIC, truth.times, numbers[None], lambda code: {"state": str(phases[code])}
             )
         )
     return parts
@@ -288,9 +286,7 @@ def _arrows(
             k = module.sample_at(time, 1 / SCENE_RATE)
             times, codes = states[name]
             row = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
-            colour = ARROW_COLOURS[
-                STATE_BY_CODE[codes[row]] if len(codes) else ContactState.UNKNOWN
-            ]
+            colour = ARROW_COLOURS[STATE_BY_CODE[codes[row]]]
             drawn = [] if k is None else _module_arrows(module, k, scale, places[name], colour)
             entities.append(_entity(name, stamp(time), arrows=drawn))
         yield Message(time, ARROWS_TOPIC, {"deletions": [], "entities": entities})

@@ -179,9 +179,9 @@ def _rows(modules: Mapping[str, Tactile]) -> Iterator[str]:
     for start in range(0, len(times), ROWS_AT_ONCE):
         cut = slice(start, start + ROWS_AT_ONCE)
         columns = [module.readings[cut].reshape(len(times[cut]), -1) for module in modules.values()]
-        parts = [map(repr, times[cut].tolist())]
+        parts: list[Iterable[str]] = [map(repr, times[cut].tolist())]
         parts += [map(_numbers_text, column.tolist()) for column in columns]
-        parts += [iter(cells[cut]) for cells in labels]
+        parts += [cells[cut] for cells in labels]
         yield "".join(",".join(row) + "\n" for row in zip(*parts, strict=True))
 
 

@@ -72,9 +72,10 @@ configs:
 - config_name: default
   data_files: data/*/*.parquet
 ---
-Tactile recordings in the LeRobot format {version}, written by holdfast. `observation.tactile.MODULE`
-has the newest samples of a module up to each frame, `.time` their times, and `.new` how many of
-them, at the end, are later than the frame before. `holdfast import` makes recordings of it again.
+Tactile recordings in the LeRobot format {version}, written by holdfast. The newest samples of a
+module up to each frame are `observation.tactile.MODULE`, their times `.time`, and the number of
+them, at the end, that are later than the frame before `.new`. `holdfast import` makes recordings
+of it again.
 """
 
 
@@ -396,11 +397,12 @@ class _Stats:
         kept = np.where(finite, numbers, 0.0)
         if self._shift is None:  # variances of large numbers need it
             self._shift = np.where(finite.any(axis=0), kept.max(axis=0, initial=0.0), 0.0)
-        off = np.where(finite, kept - self._shift, 0.0)
         self._n_frames += len(numbers)
         self._n += finite.sum(axis=0)
-        self._sum += off.sum(axis=0)
-        self._squares += np.square(off).sum(axis=0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = np.where(finite, kept - self._shift, 0.0)
+            self._sum += off.sum(axis=0)
+            self._squares += np.square(off).sum(axis=0)
         self._min = np.minimum(self._min, np.where(finite, numbers, np.inf).min(axis=0))
         self._max = np.maximum(self._max, np.where(finite, numbers, -np.inf).max(axis=0))
 
@@ -408,13 +410,14 @@ class _Stats:
         """Return the statistics; 0 where there is no number."""
         known, n = self._n > 0, np.maximum(self._n, 1)
         shift = 0.0 if self._shift is None else self._shift
-        mean = self._sum / n
-        std = np.sqrt(np.maximum(self._squares / n - np.square(mean), 0.0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean = self._sum / n
+            std = np.sqrt(np.maximum(self._squares / n - np.square(mean), 0.0))
         return {
             "min": np.where(known, self._min, 0.0).tolist(),
             "max": np.where(known, self._max, 0.0).tolist(),
-            "mean": np.where(known, mean + shift, 0.0).tolist(),
-            "std": std.tolist(),
+            "mean": np.nan_to_num(np.where(known, mean + shift, 0.0)).tolist(),
+            "std": np.nan_to_num(std).tolist(),
             "count": [self._n_frames],
         }
 

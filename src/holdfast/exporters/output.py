@@ -32,9 +32,21 @@ def whole_folder(
         )
     with _staging_beside(out) as staging:
         yield staging
-        if out.exists():
-            out.replace(staging.with_name(f"{staging.name}.old"))
+        _replace(out, staging)
+
+
+def _replace(out: Path, staging: Path) -> None:
+    """Move a folder to `out`; what is there goes beside it, and comes back after an error."""
+    before = staging.with_name(f"{staging.name}.before")
+    existed = out.exists()
+    if existed:
+        out.replace(before)
+    try:
         staging.replace(out)
+    except OSError:
+        if existed:
+            before.replace(out)
+        raise
 
 
 @contextmanager

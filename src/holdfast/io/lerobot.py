@@ -132,7 +132,7 @@ def joined_windows(values: npt.NDArray[Any], n_new: Integers) -> npt.NDArray[Any
     width = values.shape[1]
     if ((n_new < 0) | (n_new > width)).any():
         raise ValueError(f"0 to {width} new samples in a frame expected")
-    return values[np.arange(width) >= width - n_new[:, None]]
+    return np.asarray(values[np.arange(width) >= width - n_new[:, None]])
 
 
 def text_codes(array: npt.NDArray[Any]) -> tuple[list[str], Integers]:
@@ -148,6 +148,6 @@ def texts_of(texts: Mapping[str, Sequence[str]], column: str, codes: Integers) -
         ValueError: there is no text of a number.
     """
     known = np.array(texts.get(column, ()), dtype=str)
-    if codes.size and not (0 <= codes.min() and codes.max() < len(known)):
+    if codes.size and not (codes.min() >= 0 and codes.max() < len(known)):
         raise ValueError(f"{column}: a number without a text; there are {len(known)} texts")
     return known[codes] if len(known) else np.empty(codes.shape, dtype="U1")

@@ -60,7 +60,7 @@ class _Info(msgspec.Struct, frozen=True):
 class _Episode(NamedTuple):
     """An episode: its number and length, its data file, and the recording without its arrays."""
 
-    index: int
+    number: int
     length: int
     path: Path
     header: Header
@@ -79,9 +79,7 @@ def parts(path: Path) -> list[Path]:
         RecordingError: it is none.
     """
     if not can_read(path):
-        raise RecordingError(
-            f"{path} has no {INFO_PATH}; the folder of a LeRobot data set expected"
-        )
+        raise RecordingError(f"{path} has no {INFO_PATH}; a LeRobot data set expected")
     return [path]
 
 
@@ -158,7 +156,7 @@ def _recording(path: Path, episode: _Episode) -> Recording:
     recording = recording_from(episode.header, arrays, path)
     if recording.digest != episode.header.digest:
         raise RecordingError(
-            f"{path} is damaged: the samples of episode {episode.index} do not match their digest"
+            f"{path} is damaged: the samples of episode {episode.number} do not match their digest"
         )
     return replace(recording, name=episode.header.name)
 
@@ -185,12 +183,12 @@ class _EpisodeTable:
         if missing := [name for name in names if name not in file.schema_arrow.names]:
             raise RecordingError(f"{episode.path}: column {missing[0]!r} is missing")
         _check_memory(ReadBudget(episode.path), file)
-        of_episode = [("episode_index", "=", episode.index)]
+        of_episode = [("episode_index", "=", episode.number)]
         self._table = pq.read_table(episode.path, columns=names, filters=of_episode)
         if len(self._table) != episode.length:
             raise RecordingError(
                 f"{episode.path} is damaged: {len(self._table)} frames of episode "
-                f"{episode.index}, {episode.length} expected"
+                f"{episode.number}, {episode.length} expected"
             )
 
     def times(self, track: str) -> npt.NDArray[Any]:
