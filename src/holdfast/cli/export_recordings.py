@@ -78,8 +78,8 @@ def export_recordings(
     if as_json:
         print_json({"out": out, "format": options.format, **document})
         return
-    counts = ", ".join(f"{n} {name}" for name, n in document.items() if isinstance(n, int))
-    print_line(f"{out}: {counts}")
+    counts = [f"{n} {name}" for name, n in document.items() if isinstance(n, int)]
+    print_line(f"{out}: {', '.join(counts)}")
 
 
 def _check(out: Path, options: RecordingOptions) -> None:
@@ -108,7 +108,7 @@ def _to_lerobot(
 
     rate = lerobot.DEFAULT_FPS if fps is None else fps
     totals = lerobot.export(recordings, out, fps=rate, force=force, progress=_writing)
-    return {"fps": rate, **totals}
+    return {**totals, "fps": rate}
 
 
 def _to_foxglove(
@@ -133,7 +133,7 @@ def _to_csv(recordings: "Dataset", out: Path, *, force: bool) -> dict[str, Any]:
         options = " ".join(f"--sensor {text}" for text in written.sensors)
         print_message(f"hint: to import it again, give {options}")
     return {
-        "n_files": len(written.files),
+        "tables": len(written.files),
         "files": written.files,
         "sensors": written.sensors,
         "left_out": written.left_out,
