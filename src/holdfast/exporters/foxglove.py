@@ -86,7 +86,7 @@ def write_recording(recording: Recording, path: Path, model: "Model | None") -> 
     detection = None if model is None else detect(model, recording)
     frames, origin = frames_of(recording)
     with path.open("wb") as stream:
-        log = _Log(Writer(stream, EXPORT_CHUNK_SIZE, CompressionType.ZSTD), recording)
+        log = _MessageFile(Writer(stream, EXPORT_CHUNK_SIZE, CompressionType.ZSTD), recording)
         log.describe(recording, detection, origin)
         for message in messages(recording, frames, detection, log.stamp):
             log.write(message)
@@ -94,7 +94,7 @@ def write_recording(recording: Recording, path: Path, model: "Model | None") -> 
     return log.n_messages
 
 
-class _Log:
+class _MessageFile:
     """MCAP file of JSON messages; a time before 1970 is shifted to it.
 
     Attributes:

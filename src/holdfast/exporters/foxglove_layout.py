@@ -42,8 +42,8 @@ def layout(fingers: Collection[str], topics: Collection[str]) -> dict[str, objec
         topics: topics of all recordings; panels without one are left out.
 
     Example:
-        >>> layout(["thumb"], ["/holdfast/force"])["content"]["items"][0]["content"]["panelType"]
-        'ThreeDee'
+        >>> layout(["thumb"], ["/holdfast/force"])["content"]["direction"]
+        'row'
     """
     plots = [
         _plot(title, topic, fingers)

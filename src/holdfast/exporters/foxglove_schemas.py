@@ -10,9 +10,9 @@ from typing import Any
 
 Schema = dict[str, Any]
 
-SCALARS, STATE = "holdfast.Scalars", "holdfast.State"
-LOG, SCENE = "foxglove.Log", "foxglove.SceneUpdate"
-TRANSFORMS = "foxglove.FrameTransforms"
+SCALARS_SCHEMA, STATE_SCHEMA = "holdfast.Scalars", "holdfast.State"
+LOG_SCHEMA, SCENE_SCHEMA = "foxglove.Log", "foxglove.SceneUpdate"
+TRANSFORMS_SCHEMA = "foxglove.FrameTransforms"
 
 FORCE_TOPIC, INSTABILITY_TOPIC = "/holdfast/force", "/holdfast/instability"
 STABLE_TOPIC, SLIP_TOPIC = "/holdfast/stable_probability", "/holdfast/slip_probability"
@@ -31,7 +31,7 @@ def finger_topic(prefix: str, finger: str) -> str:
         >>> finger_topic("/holdfast/state/", "index/1")
         '/holdfast/state/index/1'
         >>> finger_topic("/holdfast/state/", "left hand")
-        '/holdfast/state/left_hand_32ea57c7'
+        '/holdfast/state/left_hand_17e0c719'
     """
     plain = _NOT_IN_TOPICS.sub("_", finger)
     if plain != finger or not finger.strip("/"):
@@ -93,16 +93,16 @@ _TRANSFORM = _object(
 )  # fmt: skip
 
 SCHEMAS: Mapping[str, Schema] = {
-    SCALARS: _object(
+    SCALARS_SCHEMA: _object(
         timestamp=_TIME,
         scalars=_array(_object(label=_TEXT, value={"type": ["number", "null"]})),
     ),
-    STATE: _object(timestamp=_TIME, state=_TEXT, reason=_TEXT, cause=_TEXT),
-    LOG: _object(
+    STATE_SCHEMA: _object(timestamp=_TIME, state=_TEXT, reason=_TEXT, cause=_TEXT),
+    LOG_SCHEMA: _object(
         timestamp=_TIME, level=_INTEGER, message=_TEXT, name=_TEXT, file=_TEXT, line=_INTEGER
     ),
-    SCENE: _object(deletions=_array(_DELETION), entities=_array(_ENTITY)),
-    TRANSFORMS: _object(transforms=_array(_TRANSFORM)),
+    SCENE_SCHEMA: _object(deletions=_array(_DELETION), entities=_array(_ENTITY)),
+    TRANSFORMS_SCHEMA: _object(transforms=_array(_TRANSFORM)),
 }
 """JSON schemas by name."""
 
@@ -110,12 +110,12 @@ SCHEMAS: Mapping[str, Schema] = {
 def schema_of(topic: str) -> str:
     """Return the name of the schema of a topic."""
     known = {
-        LOG_TOPIC: LOG,
-        ARROWS_TOPIC: SCENE,
-        TAXELS_TOPIC: SCENE,
-        TRANSFORMS_TOPIC: TRANSFORMS,
-        PHASE_TOPIC: STATE,
+        LOG_TOPIC: LOG_SCHEMA,
+        ARROWS_TOPIC: SCENE_SCHEMA,
+        TAXELS_TOPIC: SCENE_SCHEMA,
+        TRANSFORMS_TOPIC: TRANSFORMS_SCHEMA,
+        PHASE_TOPIC: STATE_SCHEMA,
     }
     if topic.startswith((STATE_TOPIC, LABEL_TOPIC)):
-        return STATE
-    return known.get(topic, SCALARS)
+        return STATE_SCHEMA
+    return known.get(topic, SCALARS_SCHEMA)

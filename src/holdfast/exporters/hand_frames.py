@@ -21,7 +21,7 @@ N_ALLEGRO_JOINTS = 16
 SIDE_GAP = 1.5
 """Distance between modules that are shown side by side, as a multiple of the widest."""
 
-Pose = tuple[Array, Array]
+RigidPose = tuple[Array, Array]
 """Position (3,) [m] and rotation matrix (3, 3)."""
 
 
@@ -101,13 +101,13 @@ def quaternions(rotations: Array) -> Array:
     return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))
 
 
-def allegro_links(joints: Array) -> dict[str, Pose]:
+def allegro_links(joints: Array) -> dict[str, RigidPose]:
     """Return the pose of each link of the right Allegro hand in the frame of its palm.
 
     Args:
         joints: (16,) angles in the order of the driver [rad].
     """
-    poses: dict[str, Pose] = {PALM_LINK: (np.zeros(3), np.eye(3))}
+    poses: dict[str, RigidPose] = {PALM_LINK: (np.zeros(3), np.eye(3))}
     for row in _allegro_table():
         place, rotation = poses[row["parent"]]
         joint = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
@@ -164,18 +164,18 @@ def _table_link(known: Hand, name: str) -> str:
     return f"link_{FIRST_JOINTS[finger] + int(number)}.0"
 
 
-def _mount(known: Hand, name: str) -> Pose:
+def _mount(known: Hand, name: str) -> RigidPose:
     """Return the pose of the frame of a sensor on its link."""
     module = known.modules[name]
     rotation = module.rotations[0] @ module.sensor.rotations[0].T
     return module.positions[0] - rotation @ module.sensor.positions[0], rotation
 
 
-def _chained(outer: Pose, inner: Pose) -> Pose:
+def _chained(outer: RigidPose, inner: RigidPose) -> RigidPose:
     return outer[0] + outer[1] @ inner[0], outer[1] @ inner[1]
 
 
-def _pose(pose: Pose) -> Array:
+def _pose(pose: RigidPose) -> Array:
     return np.concatenate([pose[0], quaternions(pose[1])])
 
 

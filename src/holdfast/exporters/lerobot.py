@@ -17,9 +17,9 @@ from holdfast.errors import RecordingError
 from holdfast.exporters.output import whole_folder
 from holdfast.io.header import Header, encode_header, header_of
 from holdfast.io.lerobot import (
-    CHUNK_SIZE,
     DATA_PATH,
     EPISODES_PATH,
+    FILES_PER_FOLDER,
     HEADER_COLUMN,
     INFO_PATH,
     STATS_PATH,
@@ -79,7 +79,7 @@ of it again.
 """
 
 
-class FeatureSpec(NamedTuple):
+class ColumnSpec(NamedTuple):
     """Column of the data set: number type, and shape of the value of a frame."""
 
     number: str
@@ -87,7 +87,7 @@ class FeatureSpec(NamedTuple):
 
 
 @dataclass
-class Layout:
+class SharedColumns:
     """Columns that all recordings of a data set share.
 
     Attributes:
@@ -99,7 +99,7 @@ class Layout:
     """
 
     fps: int
-    values: dict[str, FeatureSpec] = field(default_factory=dict)
+    values: dict[str, ColumnSpec] = field(default_factory=dict)
     widths: dict[str, int] = field(default_factory=dict)
     tracks: dict[str, str] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -134,7 +134,7 @@ class Layout:
 
     def _add_values(self, recording: str, spec: ArraySpec) -> None:
         name, number = feature_name(spec), stored_type(spec)
-        known = self.values.get(name, FeatureSpec(number, spec.shape))
+        known = self.values.get(name, ColumnSpec(number, spec.shape))
         common = _common_type(known.number, number)
         if known.shape != spec.shape or common is None:
             raise RecordingError(
@@ -144,22 +144,22 @@ class Layout:
             )
         if len(spec.shape) >= _LIMIT_AXES:
             raise RecordingError(f"{recording}: {name} has {len(spec.shape)} axes; at most 4")
-        self.values[name] = FeatureSpec(common, spec.shape)
+        self.values[name] = ColumnSpec(common, spec.shape)
         self.tracks[name] = track_name(spec)
 
-    def features(self) -> dict[str, FeatureSpec]:
+    def features(self) -> dict[str, ColumnSpec]:
         """Return all columns of the data, in their order."""
         columns = {
-            name: FeatureSpec(spec.number, (self.widths[self.tracks[name]], *spec.shape))
+            name: ColumnSpec(spec.number, (self.widths[self.tracks[name]], *spec.shape))
             for name, spec in self.values.items()
         }
         for track, width in self.widths.items():
-            columns[time_name(track)] = FeatureSpec("float64", (width,))
-            columns[count_name(track)] = FeatureSpec("int64", (1,))
-        columns |= dict.fromkeys(self.labelled.values(), FeatureSpec("int64", (1,)))
-        columns["timestamp"] = FeatureSpec("float32", (1,))
+            columns[time_name(track)] = ColumnSpec("float64", (width,))
+            columns[count_name(track)] = ColumnSpec("int64", (1,))
+        columns |= dict.fromkeys(self.labelled.values(), ColumnSpec("int64", (1,)))
+        columns["timestamp"] = ColumnSpec("float32", (1,))
         for name in ("frame_index", "episode_index", "index", "task_index"):
-            columns[name] = FeatureSpec("int64", (1,))
+            columns[name] = ColumnSpec("int64", (1,))
         return columns
 
 
@@ -227,7 +227,7 @@ def export(
     if not 1 <= fps <= MAX_FPS:
         raise ValueError(f"--fps: a whole number from 1 to {MAX_FPS} expected, {fps} given")
     with whole_folder(out, force=force, is_replaceable=_is_data_set) as folder:
-        layout = Layout(fps)
+        layout = SharedColumns(fps)
         for recording in recordings:
             layout.add(recording)
         with _Writer(folder, layout) as writer:
@@ -243,7 +243,7 @@ def _is_data_set(folder: Path) -> bool:
 class _Writer(ExitStack):
     """Writer of the files of a data set, one episode after the other."""
 
-    def __init__(self, folder: Path, layout: Layout) -> None:
+    def __init__(self, folder: Path, layout: SharedColumns) -> None:
         super().__init__()
         self._folder, self._layout = folder, layout
         self._features = layout.features()
@@ -277,7 +277,7 @@ class _Writer(ExitStack):
         self._n_frames += frames.n
 
     def _episode(self, recording: Recording, header: Header, frames: "_Frames") -> dict[str, Any]:
-        chunk, number = divmod(self._n_files - 1, CHUNK_SIZE)
+        chunk, number = divmod(self._n_files - 1, FILES_PER_FOLDER)
         return {
             "episode_index": len(self._episodes),
             "tasks": [_task(recording)],
@@ -297,7 +297,7 @@ class _Writer(ExitStack):
         if self._file is not None and self._path.stat().st_size < MAX_FILE_SIZE * 1e6:
             return self._file
         self._close_file()
-        chunk, number = divmod(self._n_files, CHUNK_SIZE)
+        chunk, number = divmod(self._n_files, FILES_PER_FOLDER)
         self._path = self._folder / DATA_PATH.format(chunk_index=chunk, file_index=number)
         self._path.parent.mkdir(parents=True, exist_ok=True)
         self._file = pq.ParquetWriter(
@@ -330,7 +330,7 @@ class _Writer(ExitStack):
 class _Frames:
     """Frames of a recording, as arrays by column."""
 
-    def __init__(self, recording: Recording, header: Header, layout: Layout) -> None:
+    def __init__(self, recording: Recording, header: Header, layout: SharedColumns) -> None:
         self._layout = layout
         self._span = _Span.of(recording, layout.fps)
         self.n = self._span.n_frames
@@ -453,7 +453,7 @@ def _task(recording: Recording) -> str:
     return f"grasp {item}" if isinstance(item, str) and item else UNKNOWN_TASK
 
 
-def _arrow_type(spec: FeatureSpec) -> pa.DataType:
+def _arrow_type(spec: ColumnSpec) -> pa.DataType:
     """Return the type of a column, in the form in which the library `datasets` writes it."""
     number = pa.bool_() if spec.number == "bool" else pa.from_numpy_dtype(np.dtype(spec.number))
     if spec.shape == (1,):
@@ -465,7 +465,7 @@ def _arrow_type(spec: FeatureSpec) -> pa.DataType:
     return number
 
 
-def _nested(values: npt.NDArray[Any], spec: FeatureSpec) -> pa.Array:
+def _nested(values: npt.NDArray[Any], spec: ColumnSpec) -> pa.Array:
     """Return values (n_frames, ...) as nested lists."""
     array = pa.array(np.ascontiguousarray(values).reshape(-1))
     if spec.shape == (1,):
@@ -478,7 +478,7 @@ def _nested(values: npt.NDArray[Any], spec: FeatureSpec) -> pa.Array:
     return array
 
 
-def _schema(features: Mapping[str, FeatureSpec]) -> pa.Schema:
+def _schema(features: Mapping[str, ColumnSpec]) -> pa.Schema:
     return pa.schema([(name, _arrow_type(spec)) for name, spec in features.items()])
 
 
@@ -502,12 +502,12 @@ def _write_tasks(path: Path, tasks: Mapping[str, int]) -> None:
     pq.write_table(table.replace_schema_metadata(metadata), str(path))
 
 
-def _info(fps: int, features: Mapping[str, FeatureSpec], totals: Mapping[str, int]) -> object:
+def _info(fps: int, features: Mapping[str, ColumnSpec], totals: Mapping[str, int]) -> object:
     return {
         "codebase_version": VERSION,
         "robot_type": None,
         **{f"total_{name}": n for name, n in totals.items()},
-        "chunks_size": CHUNK_SIZE,
+        "chunks_size": FILES_PER_FOLDER,
         "data_files_size_in_mb": MAX_FILE_SIZE,
         "video_files_size_in_mb": MAX_VIDEO_SIZE,
         "fps": fps,

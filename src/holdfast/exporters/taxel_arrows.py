@@ -9,7 +9,7 @@ from holdfast.features.tare import Tare, baseline_of, offline_tare
 from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors.types import Array, Integers
 
-TARE_SECONDS = 0.5
+BASELINE_SECONDS = 0.5
 """Time at the start whose mean is subtracted, unless the metadata have the baseline [s]."""
 LONGEST_ARROW = 0.02
 """Length of the arrow of a strong reading [m]."""
@@ -98,7 +98,7 @@ def _baseline(recording: Recording, name: str, module: Tactile) -> Array:
     if name in declared:
         return declared[name]
     is_known = module.unit == "N" and recording.metadata.get(STARTS_LOADED) is True
-    how = Tare("none") if is_known else offline_tare(TARE_SECONDS, module)
+    how = Tare("none") if is_known else offline_tare(BASELINE_SECONDS, module)
     try:
         return baseline_of(module.readings, module.times, how, module.period)[0]
     except ValueError:

@@ -21,7 +21,7 @@ VERSION = "v3.0"
 INFO_PATH, TASKS_PATH, STATS_PATH = "meta/info.json", "meta/tasks.parquet", "meta/stats.json"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-CHUNK_SIZE = 1000
+FILES_PER_FOLDER = 1000
 """Maximum number of files in a folder."""
 
 HEADER_COLUMN, TEXTS_COLUMN = "holdfast.header", "holdfast.texts"
