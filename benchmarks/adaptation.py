@@ -1,4 +1,4 @@
-"""Measure what labelled recordings of a hand add to builtin:any: tables of docs/study/adaptation.md.
+"""Measure what labelled recordings of a hand add to builtin:any: docs/study/adaptation.md.
 
     holdfast simulate adaptation/ --randomize --repeats 12 --grasps 24 --seed 200
     python benchmarks/adaptation.py adaptation/ --real "$HOLDFAST_DATA"

@@ -215,7 +215,7 @@ def publish(run: Path, docs: Path, real: Path | None = None) -> None:
         summary["tables"] |= of_real
         folders |= dict.fromkeys(of_real, real)
     target = docs / "study"
-    for old in [*target.glob("*.csv"), *target.glob("*.md")]:
+    for old in target.glob("*.csv"):
         old.unlink()
     for name, folder in folders.items():
         shutil.copyfile(folder / "tables" / f"{name}.csv", target / f"{name}.csv")

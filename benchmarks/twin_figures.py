@@ -1,4 +1,4 @@
-"""Make the tables and the picture of docs/twin.md; tables are printed as Markdown.
+"""Make the tables and the picture of docs/study/twin.md; tables are printed as Markdown.
 
     python benchmarks/twin_figures.py make twin            simulate the recordings, with times
     python benchmarks/twin_figures.py count twin           number of recordings, and failed grasps

@@ -49,7 +49,7 @@ def test_simulates_trains_and_replays(capsys, tmp_path):
     assert result["shipped"]["model"] == verb.DEMO_MODEL
     assert result["shipped"]["metrics"]["events"]["hand"]["onsets"] == "truth"
     assert result["seconds"] > 0
-    for step in ("1/4", "2/4", "3/4", "4/4  replaying mug-case2-1"):
+    for step in ("1/5", "2/5", "3/5", "4/5", "5/5  replaying mug-case2-1"):
         assert step in err
     assert "STABLE      the hand holds the object" in err
     assert "     mug-case1-1\n" in err

@@ -22,7 +22,7 @@ from holdfast.cli.terminal.console import print_error, print_line
 from holdfast.errors import HoldfastError, missing_extra
 
 VERBS = {
-    "demo": "Simulate grasps, detect and train on them, and replay one.",
+    "demo": "Detect on a real recording and on simulated grasps, train, and replay one grasp.",
     "simulate": "Simulate recordings of grasps with the physical twin.",
     "record": "Record a source; a crash loses at most the last half second.",
     "import": "Import recordings from other formats.",

@@ -1,4 +1,4 @@
-"""`holdfast demo`: the whole chain, from simulation to replay, on simulated data."""
+"""`holdfast demo`: a real recording, then the whole chain on simulated data."""
 
 import sys
 import time
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.recordings import Recording
     from holdfast.training import Trained
+    from holdfast.twin.simulation import Grasp
 
 DEMO_MODEL = "builtin:twin"
 """The model of the demo: the best one that ships for the sensor of the simulated hand."""
@@ -80,12 +81,13 @@ def demo(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate grasps, detect and train on them, and replay one.
+    """Detect on a real recording and on simulated grasps, train, and replay one grasp.
 
-    Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships
-    with holdfast on them; it has not seen these objects. Train a model with the features of the
-    paper on them. Replay one recording sample by sample, as a hand would send it, on a web page
-    or in the terminal.
+    Run the detector on a recording of a real robot that loses a box, with one sentence for
+    each event. Simulate grasps of a mug and a carton with the physical twin. Evaluate the model
+    that ships with holdfast on them; it has not seen these objects. Train a model with the
+    features of the paper on them. Replay one recording sample by sample, as a hand would send
+    it, on a web page or in the terminal.
 
     Example:
       holdfast demo
@@ -93,17 +95,24 @@ def demo(
       holdfast demo results/ --speed 0 --json
     """
     require_extras("twin", "train", "parquet")
+    from holdfast.cli.real_clip import show_clip
+    from holdfast.cli.simulate import plan_grasps
     from holdfast.files import refuse_overwrite
     from holdfast.model import Model
     from holdfast.training import evaluate
+    from holdfast.twin.objects import OTHER_OBJECTS
 
     check_speed("twin:", speed)
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     refuse_overwrite(model, force=force)
-    recordings = _simulate(folder, seed, force)
-    print_message(f"2/4  evaluating {DEMO_MODEL}, which was not trained on these objects")
+    grasps = plan_grasps(
+        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
+    )
+    real = show_clip(speed, print_message)
+    recordings = _simulate(grasps, folder, force)
+    print_message(f"3/5  evaluating {DEMO_MODEL}, which was not trained on these objects")
     print_message("     (the first run on a machine compiles the detector here)")
     ours = Model.load(DEMO_MODEL)
     metrics = evaluate(ours, recordings)
@@ -113,6 +122,7 @@ def demo(
     if as_json:
         print_json(
             {
+                "real": [event._asdict() for event in real],
                 "recordings": folder,
                 "model": model,
                 "accuracy": trained.cross_validation.pooled.accuracy,
@@ -126,17 +136,13 @@ def demo(
     _print_next_steps(out, folder / f"{shown.name}.parquet", time.monotonic() - start)
 
 
-def _simulate(folder: Path, seed: int, force: bool) -> "Sequence[Recording]":
+def _simulate(grasps: "Sequence[Grasp]", folder: Path, force: bool) -> "Sequence[Recording]":
     """Simulate grasps with and without disturbances; return those that did not fail."""
-    from holdfast.cli.simulate import plan_grasps, simulate_grasps
+    from holdfast.cli.simulate import simulate_grasps
     from holdfast.io import load_dataset
-    from holdfast.twin.objects import OTHER_OBJECTS
 
-    grasps = plan_grasps(
-        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
-    )
     names = DEMO_OBJECTS.replace(",", " and ")
-    print_message(f"1/4  simulating {len(grasps)} grasps: {names}, Allegro hand, uSkin fingertips")
+    print_message(f"2/5  simulating {len(grasps)} grasps: {names}, Allegro hand, uSkin fingertips")
     simulate_grasps(grasps, folder, jobs=-1, force=force, report=_report_grasp)
     return load_dataset(folder)
 
@@ -153,7 +159,7 @@ def _train(recordings: "Sequence[Recording]", path: Path, seed: int, force: bool
 
     from holdfast.training import Setting, train
 
-    print_message("3/4  training a model with the features of the paper, one grasp left out")
+    print_message("4/5  training a model with the features of the paper, one grasp left out")
     trained = train(recordings, Setting(trials=0, seed=seed))
     named = replace(trained, model=msgspec.structs.replace(trained.model, name="demo"))
     named.model.save(path, force=force)
@@ -171,7 +177,7 @@ def _on_page(browser: bool | None, speed: float, *, as_json: bool) -> bool:
 def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, page: bool) -> int:
     """Replay a recording on a page or in the terminal; return the number of estimates."""
     at_speed = f" at speed {speed:g}" if speed else ""
-    print_message(f"4/4  replaying {recording.name} sample by sample{at_speed}")
+    print_message(f"5/5  replaying {recording.name} sample by sample{at_speed}")
     path = out / "recordings" / f"{recording.name}.parquet"
     if page:
         _replay_on_page(model, path, out, speed)

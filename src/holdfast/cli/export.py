@@ -20,7 +20,7 @@ def export(
 
     Formats: lerobot, a LeRobot data set (v3.0), which `holdfast import` brings back without loss;
     foxglove, MCAP files with plots, states, a log and an arrow for each taxel, and a layout for
-    them; csv, the generic CSV of docs/formats.md.
+    them; csv, the generic CSV of docs/importing.md.
 
     Example:
       holdfast export grasps/ dataset/ --format lerobot

@@ -111,7 +111,7 @@ def import_(
 ) -> None:
     r"""Import recordings from other formats.
 
-    Formats: those of docs/formats.md, and recordings of holdfast itself. From an .mcap file that
+    Formats: those of docs/importing.md, and recordings of holdfast itself. From an .mcap file that
     was cut off, everything up to the cut is recovered. Write OUT/NAME.parquet for each recording.
     If one of them fails, none is written.
 

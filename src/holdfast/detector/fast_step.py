@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from numba import config
+
 from holdfast.compiled import compiled_step
 from holdfast.detector.address_table import kept_by, reader_of
 from holdfast.detector.arrays import REPORT_CODE, STATE, DecisionMemory, DecisionRule
@@ -69,7 +71,13 @@ STEP_SIGNATURE = "int64(int64[:, ::1], float64, int64)"
 
 
 def compiled_fast_step() -> Callable[[Integers, float, int], int]:
-    """Return `fast_step` for its argument types: a call need not find them out."""
+    """Return `fast_step` for its argument types: a call need not find them out.
+
+    Where numba is told not to compile (`NUMBA_DISABLE_JIT=1`), `Detector.run` works, slowly, and
+    `update` does not: it needs the addresses that only compiled code can read.
+    """
     dispatcher: Any = fast_step
-    entry: Callable[[Integers, float, int], int] = dispatcher.compile(STEP_SIGNATURE)
+    entry: Callable[[Integers, float, int], int] = dispatcher
+    if not getattr(config, "DISABLE_JIT", 0):
+        entry = dispatcher.compile(STEP_SIGNATURE)
     return entry

@@ -1,4 +1,4 @@
-"""Export of recordings as the generic CSV of docs/formats.md, which `holdfast import` reads."""
+"""Export of recordings as the generic CSV of docs/importing.md, which `holdfast import` reads."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,7 @@
 """Relative features: how force and taxels move, relative to load or noise. Compiled, no objects.
 
 They look back by a lag in seconds, and have no unit: counts, newtons, gains and grips cancel, so
-that they carry over from one hand to another. `docs/training.md` has the equations.
+that they carry over from one hand to another. Decision 10 says why they are as they are.
 """
 
 import math

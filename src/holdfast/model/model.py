@@ -306,7 +306,7 @@ def built_in(name: str) -> Model:
 
 
 def _shipped(name: str) -> Model:
-    """Return a model whose file is part of the package, see docs/training.md."""
+    """Return a model whose file is part of the package, see docs/models.md."""
     data = (resources.files("holdfast") / "models" / f"{name}.json").read_bytes()
     return msgspec.structs.replace(decode(data, Model), name=f"builtin:{name}")
 

@@ -23,7 +23,7 @@ FORMATS = {
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
     "lerobot": "LeRobot data sets (v3.0) that holdfast export wrote (extra: parquet)",
-    "csv": "the generic CSV of docs/formats.md, and CSV of any other logger",
+    "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order."""
 EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags", "lerobot": "parquet"}

@@ -1,4 +1,4 @@
-"""Import of CSV files: the generic CSV of docs/formats.md, and files of any other logger.
+"""Import of CSV files: the generic CSV of docs/importing.md, and files of any other logger.
 
 In the generic CSV the names of the columns are fixed. The columns of any other file are given
 (`Columns`), or guessed from its header; what was guessed is reported.
@@ -143,7 +143,7 @@ def _generic(
     table, cells = read_table(path, [name for name in names if _TEXT.fullmatch(name)])
     layout, settings = _layout(table), _settings(table)
     times = table.columns([TIME])[:, 0]
-    if not settings:  # not the format of docs/formats.md, in which times are in s
+    if not settings:  # not the format of docs/importing.md, in which times are in s
         unit = unit_of_column(TIME, times, str(path))
         times = times * TIME_UNITS[unit]
         if unit != "s":

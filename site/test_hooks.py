@@ -1,0 +1,58 @@
+"""What stops a strict build of the site, and what the generated pages hold."""
+
+import logging
+
+import hooks
+import pytest
+
+import holdfast
+from holdfast.cli.app import VERBS
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        ("```sh\nholdfast squeeze hand\n```", "page.md names the verb squeeze"),
+        ("`holdfast detect m.json r --fast`", "holdfast detect has no option --fast"),
+        ("```\nuv run holdfast train d \\\n  --quickly\n```", "has no option --quickly"),
+    ],
+)
+def test_a_command_that_does_not_exist_is_a_warning(caplog, text, warning):
+    with caplog.at_level(logging.WARNING):
+        hooks._check_commands(f"Run\n\n{text}\n", "page.md")
+    assert warning in caplog.text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "```sh\nholdfast detect m.json r --json > out  # states\n```",
+        "`holdfast --version`",
+        "holdfast squeezes nothing",
+        "```python\nimport holdfast as hf\n```",
+    ],
+)
+def test_what_exists_is_none(caplog, text):
+    hooks._check_commands(f"Run\n\n{text}\n", "page.md")
+    assert caplog.text == ""
+
+
+def test_every_verb_and_every_public_name_has_a_page():
+    pages = "".join(hooks._package_page(package) for package in hooks._packages())
+    assert all(f".{name}\n" in pages for name in holdfast.__all__ if not name.startswith("__"))
+    for verb in VERBS:
+        assert f"Usage: holdfast {verb}" in hooks._verb_page(verb)
+
+
+def test_a_list_after_a_paragraph_gets_an_empty_line():
+    assert hooks._spaced("Two:\n- a\n- b\n") == "Two:\n\n- a\n- b\n"
+    assert hooks._spaced("```\nx\n- a\n```\n") == "```\nx\n- a\n```\n"
+
+
+def test_links_out_of_the_folder_lead_to_copies():
+    page = hooks.DOCS / "live.md"
+    assert hooks._relinked("../SECURITY.md#scope", page, "live.md") == "files/SECURITY.md#scope"
+    assert hooks._relinked("grip.md#safety", page, "live.md") == "grip.md#safety"
+    assert hooks._relinked("https://x.org/", page, "live.md") == "https://x.org/"
+    deep = hooks.DOCS / "study" / "skin.md"
+    assert hooks._relinked("../../README.md", deep, "study/skin.md") == "../index.md"
