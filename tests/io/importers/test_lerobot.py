@@ -167,3 +167,8 @@ def test_only_the_folder_of_a_data_set_is_recognised(data_set):
     assert not lerobot.can_read(data_set / "data")
     assert not lerobot.can_read(data_set / "meta/info.json")
     assert "has no meta/info.json" in refusal(data_set / "data")
+
+
+def test_a_data_set_that_takes_too_much_memory_is_refused(data_set, monkeypatch):
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "100000")
+    assert "set HOLDFAST_MAX_BYTES to read it anyway" in refusal(data_set)
