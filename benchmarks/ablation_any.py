@@ -1,6 +1,7 @@
 """Ablation of builtin:any: target, normalisation and families of features; twin and real.
 
-    holdfast simulate hands/ --randomize --measured all --repeats 150 --grasps 3 --seed 0
+    holdfast simulate hands/ --randomize --measured scan,filter,noise,vibration \\
+        --repeats 150 --grasps 3 --seed 0
     python benchmarks/ablation_any.py hands/ --real "$HOLDFAST_DATA"
 
 The weights are fitted as in `train_any.py`, on four fifths of the hands for the simulated figures,

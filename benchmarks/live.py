@@ -123,7 +123,7 @@ def _serve(session: Session, model: Model) -> None:
     async def run() -> None:
         from aiohttp import ClientSession, web
 
-        runner = web.AppRunner(LiveService(session, model, Guard("127.0.0.1")).app)
+        runner = web.AppRunner(LiveService(session, Guard("127.0.0.1")).app)
         await runner.setup()
         site = web.TCPSite(runner, "127.0.0.1", 0)
         await site.start()

@@ -1,7 +1,7 @@
 """Compare the skin of the twin with real skins: the distribution of every feature, by situation.
 
     holdfast simulate plain/ --randomize --repeats 48
-    holdfast simulate measured/ --randomize --repeats 48 --measured all
+    holdfast simulate measured/ --randomize --repeats 48 --measured scan,filter,noise,vibration
     python benchmarks/skin_distances.py plain/ measured/ --picture pictures/
 
 The real recordings are those of DATA (`--data`, or HOLDFAST_DATA, or ../shared/data): boxes that
@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.io import save_recording
-from holdfast.twin.randomized.drawing import MEASURED, SENSOR_KINDS
+from holdfast.twin.randomized.drawing import SENSOR_KINDS
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 from holdfast_lab.skin.readout import ReadoutFigures, readout_figures
 from holdfast_lab.skin.situations import (
@@ -51,6 +51,8 @@ COMPARED = (
 """Sets and situations that are compared."""
 FROM_OPEN_HAND = "GTac V2"
 """The set that begins with an open hand: it is compared with such recordings of the twin."""
+SKIN_MECHANISMS = ("scan", "filter", "noise", "vibration")
+"""Mechanisms with which the hands have the same events and stamps as those of the plain twin."""
 N_SMALL = 12
 FAMILIES = ("any", "A", "B", "C", "D", "txd2", "W9")
 COLOURS = ("black", "tab:blue", "tab:orange", "tab:green")
@@ -62,7 +64,7 @@ def main(arguments: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as place:
         folders = arguments.twin or [
             simulated(Path(place), name, mechanisms, arguments.kind)
-            for name, mechanisms in (("plain", ()), ("measured", MEASURED))
+            for name, mechanisms in (("plain", ()), ("measured", SKIN_MECHANISMS))
         ]
         holds = {folder.name: list(twin_holds(folder, arguments.largest)) for folder in folders}
         grasps = {folder.name: list(twin_grasps(folder, arguments.largest)) for folder in folders}

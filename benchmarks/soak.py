@@ -127,7 +127,7 @@ class Soak:
         self._source = Day(round(seconds * RATE))
         model = Model.load("builtin:twin")
         self._session = Session(StreamDetector(model, self._source))
-        self._service = LiveService(self._session, model, Guard("127.0.0.1"), None)
+        self._service = LiveService(self._session, Guard("127.0.0.1"), None)
         self._times = np.full(20_000, np.nan)
         self._dropped = self._n_recordings = self._n_read = 0
         self._ended = threading.Event()

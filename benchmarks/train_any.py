@@ -1,6 +1,7 @@
 """Train builtin:any on randomized hands of the twin, and evaluate it on hands left out.
 
-    holdfast simulate hands/ --randomize --measured all --repeats 150 --grasps 3 --seed 0
+    holdfast simulate hands/ --randomize --measured scan,filter,noise,vibration \\
+        --repeats 150 --grasps 3 --seed 0
     python benchmarks/train_any.py hands/ -o any.json
     python benchmarks/train_slips.py any.json hands/ -o any.json
     python benchmarks/train_causes.py any.json hands/ -o src/holdfast/models/any.json

@@ -4,7 +4,8 @@
     holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
     python benchmarks/train_slips.py builtin:twin twin/ slips/ --own-features \
         -o src/holdfast/models/twin.json
-    holdfast simulate hands/ --randomize --measured all --repeats 150 --grasps 3 --seed 0
+    holdfast simulate hands/ --randomize --measured scan,filter,noise,vibration \\
+        --repeats 150 --grasps 3 --seed 0
     python benchmarks/train_slips.py any.json hands/ -o any.json
     python benchmarks/train_slips.py builtin:twin twin/ slips/ --only-speed \
         -o src/holdfast/models/twin.json

@@ -293,6 +293,7 @@ class TestRandomizedHands:
             (
                 ("--randomize", "--measured", "scan,glue"),
                 "--measured: unknown mechanism 'glue'; there are scan, filter, noise, vibration, "
+                "colour, steps, updates, stamps, carry, person, "
                 "all",
             ),
         ],

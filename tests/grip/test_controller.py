@@ -93,8 +93,33 @@ class TestStart:
     @pytest.mark.parametrize("state", [s for s in ContactState if s != "STABLE"])
     def test_it_does_not_begin_otherwise(self, state):
         controller = GripController(Limits())
+        fingers = {name: {"state": state} for name in FINGERS}
         for k in range(100):
-            assert controller.update(hand(k / RATE, state), k / RATE).state is LoopState.IDLE
+            estimate = hand(k / RATE, state, **fingers)
+            assert controller.update(estimate, k / RATE).state is LoopState.IDLE
+
+    @pytest.mark.parametrize(
+        ("finger", "normal", "begins"),
+        [("ring", 30.0, True), ("ring", 1000.0, True), ("thumb", 3000.0, False)],
+    )
+    def test_a_finger_that_carries_little_does_not_block_it(self, finger, normal, begins):
+        """The thumb carries half of all normal forces, the ring finger a sixth."""
+        controller = GripController(Limits())
+        restless = {finger: {"state": ContactState.UNSTABLE, "normal": normal}}
+        for k in range(170):
+            controller.update(hand(k / RATE, ContactState.UNSTABLE, **restless), k / RATE)
+        assert (controller.state is not LoopState.IDLE) == begins
+        assert ("ring" in controller.loaded_fingers) == begins
+
+    def test_a_finger_without_an_estimate_blocks_it(self):
+        controller = GripController(Limits())
+        changes = {
+            "ring": {"state": ContactState.UNSTABLE, "normal": 30.0},
+            "index": {"state": ContactState.UNKNOWN},
+        }
+        for k in range(170):
+            controller.update(hand(k / RATE, ContactState.UNSTABLE, **changes), k / RATE)
+        assert controller.state is LoopState.IDLE
 
     def test_fingers_without_contact_are_not_loaded(self):
         controller = GripController(Limits())

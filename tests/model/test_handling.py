@@ -115,8 +115,22 @@ def test_default_handling_is_mean_and_scale_of_the_classifiers():
 def test_another_sensor_has_default_handling():
     assert CALIBRATED.for_sensor("other") is CALIBRATED
     assert OWN.for_sensor("tiny") is OWN  # it holds no own handling any more
-    assert model().without_handling([sensor(), sensor(name="other")]) == ["other"]
-    assert model(PART).without_handling([sensor()]) == []
+    hand = {"thumb": sensor(), "index": sensor(name="other")}
+    assert model().without_handling(hand) == ["other"]
+    assert model().handling_advice(hand) == (
+        "the model was calibrated on tiny, not on other: default handling is used "
+        "(holdfast calibrate)"
+    )
+    assert model(PART).without_handling({"thumb": sensor()}) == []
+    assert model().handling_advice({"thumb": sensor()}) == ""
+
+
+def test_another_finger_has_default_handling():
+    fingers = {"thumb": CALIBRATED, "index": PART}
+    named = replace(model(), fingers=fingers, sensors={})
+    hand = {"thumb": sensor(), "index": sensor()}
+    assert named.handled_sensors == ("thumb (tiny)",)
+    assert named.without_handling(hand) == ["index (tiny)"]
 
 
 def test_thresholds_may_be_those_of_the_model():

@@ -9,7 +9,14 @@ from holdfast.features import fingertip_force
 from holdfast.io import import_recordings
 from holdfast.sensors import sensor
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin import Uskin, UskinParameters, taxel_shares, with_server_effects
+from holdfast.twin.uskin import (
+    Uskin,
+    UskinParameters,
+    kept_in_gaps,
+    last_updates,
+    taxel_shares,
+    with_server_effects,
+)
 from holdfast.twin.uskin_readout import saturated
 
 TIP = sensor("uskin-curved")
@@ -278,13 +285,14 @@ def test_drift_is_smooth_at_the_scale_of_a_sample():
 
 
 READ_IN_TURN = replace(REAL, n_averaged=3, scan_time=0.012, noise_by_axis=(1.0, 1.0, 2.0))
+COLOURED = replace(READ_IN_TURN, slow_share=0.7, walk=0.8, step=3, still_share=0.2)
 
 
 @settings(deadline=None)
 @given(
     st.lists(st.integers(1, 40), min_size=1, max_size=8),
     st.integers(0, 1000),
-    st.sampled_from([REAL, READ_IN_TURN]),
+    st.sampled_from([REAL, READ_IN_TURN, COLOURED]),
 )
 def test_fed_in_pieces_it_sends_the_same(pieces, seed, parameters):
     n = sum(pieces)
@@ -312,6 +320,60 @@ def test_averaged_noise_has_its_own_floor_at_each_lag(n_averaged):
         change = np.sqrt(((values[lag:] - values[:-lag]) ** 2).mean() / 2)
         expected = 3.0 * np.sqrt(min(lag, n_averaged) / n_averaged)
         assert change == pytest.approx(expected, rel=0.04)
+
+
+def changes(parameters, n=20000):
+    """Return the rms change over lags of 1 to 64 samples, over the root of 2 [count]."""
+    counts = tip(parameters).counts(np.zeros((n, 30, 3)), np.arange(n) / RATE).astype(float)
+    lags = 2 ** np.arange(7)
+    return lags / RATE, np.array(
+        [np.sqrt(((counts[k:] - counts[:-k]) ** 2).mean() / 2) for k in lags]
+    )
+
+
+@pytest.mark.parametrize("share", [0.4, 1.0])
+def test_slow_noise_has_the_variance_asked_for_and_grows_over_its_time(share):
+    parameters = replace(IDEAL, noise_counts=5.0, slow_share=share, slow_time=0.06)
+    times, sizes = changes(parameters)
+    slow = share * (1 - np.exp(-times / parameters.slow_time))
+    np.testing.assert_allclose(sizes, 5.0 * np.sqrt(1 - share + slow), rtol=0.03)
+
+
+@pytest.mark.parametrize("n_averaged", [1, 6])
+def test_noise_wanders_with_the_root_of_time_whether_averaged_or_not(n_averaged):
+    parameters = replace(IDEAL, noise_counts=5.0, walk=2.0, n_averaged=n_averaged)
+    times, sizes = changes(parameters)
+    expected = 5.0 * np.sqrt(1 + 2.0**2 * times / 2)
+    np.testing.assert_allclose(sizes[4:], expected[4:], rtol=0.05)
+
+
+def test_colour_draws_nothing_from_the_generator_of_other_noise():
+    """Warming, and all that is drawn after the readings, stay as they are."""
+    generators = [np.random.default_rng(1) for _ in range(2)]
+    for parameters, generator in zip((REAL, COLOURED), generators, strict=True):
+        skin = Uskin(parameters, TIP, SKIN.nodes, np.random.default_rng(0))
+        skin.counts(np.zeros((50, 30, 3)), np.arange(50) / RATE, generator)
+    assert generators[0].random() == generators[1].random()
+
+
+@pytest.mark.parametrize("step", [1, 7])
+def test_readings_are_multiples_of_the_step(step):
+    counts = tip(replace(REAL, noise_counts=9.0, step=step)).counts(
+        np.zeros((500, 30, 3)), np.arange(500) / RATE
+    )
+    assert not (counts % step).any()
+    assert np.gcd.reduce(counts.ravel().astype(int)) == step
+
+
+def test_still_taxels_have_no_noise_and_still_feel_forces():
+    skin = tip(replace(IDEAL, noise_counts=3.0, still_share=0.3, limits=(1e3, 1e3, 1e3)))
+    times = clock(2.0)
+    counts = skin.counts(on_z(0.5 * (times > 1)), times).astype(float)
+    before = counts[times <= 1]
+    still = (before == before[0]).all(axis=(0, 2))
+    assert 1 <= still.sum() <= 20
+    risen = (counts[-1] - counts[0])[still, 2]
+    np.testing.assert_allclose(risen, 0.5 * IDEAL.counts_per_newton[2], atol=1.0)
 
 
 def test_noise_of_each_axis_is_that_asked_for():
@@ -425,8 +487,13 @@ def test_node_forces_of_another_skin_are_refused():
         ("limits", (1.0, 1.0), "limits: numbers like .* expected"),
         ("lag_shares", (0.6, 0.5), "lag_shares: at most 1 in sum expected, .* given"),
         ("n_averaged", 0, "n_averaged: above 0 expected, 0.0 given"),
-        ("n_averaged", 1.5, "n_averaged and scan_line: integers expected, 1.5 given"),
+        ("n_averaged", 1.5, "n_averaged: an integer expected, 1.5 given"),
         ("scan_time", -0.01, "scan_time: finite, not negative expected"),
+        ("slow_share", 1.1, "slow_share: at most 1 expected, 1.1 given"),
+        ("slow_time", 0.0, "slow_time: above 0 expected, 0.0 given"),
+        ("step", 0, "step: above 0 expected, 0.0 given"),
+        ("step", 2.5, "step: an integer expected, 2.5 given"),
+        ("still_share", 2.0, "still_share: at most 1 expected, 2.0 given"),
     ],
 )
 def test_bad_parameters_are_refused(field, value, message):
@@ -446,6 +513,32 @@ def test_server_times_increase_and_packets_stay_in_order(n, seed, jitter):
     assert set(np.diff(sent).tolist()) <= {0, 1, 2}
     assert not ((np.diff(sent)[1:] == 0) & (np.diff(sent)[:-1] == 0)).any()
     assert (sent <= np.arange(n)).all()  # nothing is sent before it is measured
+
+
+@settings(deadline=None)
+@given(st.floats(1.0, 5.0), st.floats(0.0, 1.0), st.integers(1, 300))
+def test_rows_show_the_last_update_and_none_of_the_future(rows, phase, n):
+    shown = last_updates(np.arange(n) / RATE, RATE / rows, phase)
+    assert shown[0] == 0
+    assert (shown <= np.arange(n)).all()
+    assert (np.arange(n) - shown < rows + 1).all()
+    assert (np.diff(shown) >= 0).all()
+    assert len(np.unique(shown)) == pytest.approx(n / rows, abs=2)
+
+
+def test_gaps_lose_all_rows_of_their_time():
+    times = np.arange(50_000) / 500
+    kept = kept_in_gaps(times, 0.5, (0.019, 0.025), np.random.default_rng(2))
+    gaps = np.diff(times[kept])
+    gaps = gaps[gaps > 1.5 / 500]
+    assert 30 <= len(gaps) <= 70
+    assert gaps.max() < 0.06
+    assert np.median(gaps) == pytest.approx(0.022 + 1 / 500, abs=0.002)
+    assert kept[[0, -1]].all()
+
+
+def test_without_gaps_all_rows_are_kept():
+    assert kept_in_gaps(np.arange(90.0), 0.0, (0.0, 0.0), np.random.default_rng(0)).all()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.075, 0.3])

@@ -17,9 +17,9 @@ OWN, BASELINE_LAW = "holdfast", "fixed"
 """The law of holdfast, and the hand without control; each other law is compared with both."""
 GOALS = {
     "dropped": 5.0,
-    "reaction_median": 0.04,
-    "slip_median": 0.003,
-    "force_ratio_mean": 1.5,
+    "slip_p90": 0.005,
+    "friction_reaction_median": 0.06,
+    "force_ratio_mean": 2.1,
     "false_reactions_per_minute": 1.0,
 }
 """Largest values that the law of holdfast should reach, by the field of `trial.json`."""
@@ -47,6 +47,7 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
             if other in results
         },
         "example": None if example is None else _example(results, example),
+        "infeasible": infeasible_of(results),
         "trials": [_plain(one) for each in results.values() for one in each],
         "n_trials": plan.n,
         "model": plan.model if plan.model.startswith("builtin:") else Path(plan.model).name,
@@ -69,6 +70,15 @@ def example_of(results: TrialResults) -> int | None:
     return next(saved, None)
 
 
+def infeasible_of(results: TrialResults) -> list[dict[str, Any]]:
+    """Return the trials that no force can hold, which are left out for every law."""
+    return [
+        {"number": result.number, "object": result.object, "kind": result.kind}
+        for result in next(iter(results.values()), ())
+        if not result.feasible
+    ]
+
+
 def trials_csv(results: TrialResults) -> str:
     """Return a line for each trial with each law; `inf` is infinite, an empty field unknown."""
     names = list(TrialResult.__struct_fields__)
@@ -83,7 +93,7 @@ def _known(value: object) -> object:
 
 
 def _is_saved(result: TrialResult) -> bool:
-    return result.held and not result.dropped
+    return result.held and result.feasible and not result.dropped
 
 
 def _summaries(

@@ -214,10 +214,10 @@ def distribution_figure(results: TrialResults) -> ReportFigure:
         for law, trials in results.items()
     }
     groups = {
-        "slip distance [mm]": Distribution(slips, 0.01, 30.0, 1e3 * GOALS["slip_median"]),
+        "slip distance [mm]": Distribution(slips, 0.01, 30.0, 1e3 * GOALS["slip_p90"]),
         "reaction time after the onset of slip [ms]": Distribution(
             {law: values[~np.isnan(values)] for law, values in times.items()},
-            1.0, 1000.0, 1e3 * GOALS["reaction_median"],
+            1.0, 1000.0, 1e3 * GOALS["friction_reaction_median"],
         ),
     }  # fmt: skip
     return ReportFigure(

@@ -9,7 +9,7 @@ import msgspec
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
 from holdfast.grip import laws
-from holdfast.grip.laws import LAWS, law_named
+from holdfast.grip.laws import LAWS
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.twin.hand import FINGERS
@@ -17,6 +17,7 @@ from holdfast_lab.source_digest import source_digest
 from holdfast_lab.tasks import Task
 from holdfast_lab.trial.course import TrialCourse, follow
 from holdfast_lab.trial.film import film
+from holdfast_lab.trial.reference_rows import REFERENCE_ROWS, row_named
 from holdfast_lab.trial.run import TrialResult, run_trial
 from holdfast_lab.trial.trials import draw_trial
 
@@ -24,6 +25,8 @@ SIMULATION = ("holdfast_lab.trial.run", "holdfast_lab.trial.trials")
 """Modules that draw and run a trial."""
 COURSE = (*SIMULATION, "holdfast_lab.trial.course")
 FILM = (*COURSE, "holdfast_lab.trial.film")
+ALL_ROWS = (*LAWS, *REFERENCE_ROWS)
+"""Laws, and the rows beside them."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +44,14 @@ class TrialPlan:
         ModelError: the model does not exist, or does not fit the hand of the twin.
     """
 
-    laws: tuple[str, ...] = tuple(LAWS)
+    laws: tuple[str, ...] = ALL_ROWS
     n: int = 240
     seed: int = 0
     model: str = "builtin:any"
 
     def __post_init__(self) -> None:
         for name in self.laws:
-            law_named(name)
+            row_named(name)
         twice = [name for name in self.laws if self.laws.count(name) > 1]
         if twice:
             raise ValueError(f"the law {twice[0]!r} is given twice")
@@ -144,9 +147,10 @@ def _version(law: str, modules: tuple[str, ...]) -> str:
         modules: that make the result.
     """
     law_modules = {type(factory()).__module__ for factory in LAWS.values()}
-    own = type(LAWS[law]()).__module__
+    law_row = row_named(law)
+    own = type(law_row).__module__
     source = source_digest((*modules, own), (*sorted(law_modules - {own}), laws.__name__))
-    constants = msgspec.json.encode(_contents(LAWS[law]()), order="deterministic")
+    constants = msgspec.json.encode(_contents(law_row), order="deterministic")
     return sha256(source.encode() + constants).hexdigest()
 
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section, join_lines
 from holdfast_lab.report.result_tables import number_text
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import BASELINE_LAW, GOALS, OWN, TrialResults
+from holdfast_lab.trial.document import BASELINE_LAW, OWN, TrialResults
 from holdfast_lab.trial.figures import (
     course_figure,
     distribution_figure,
@@ -15,11 +15,12 @@ from holdfast_lab.trial.figures import (
 )
 from holdfast_lab.trial.summary import Summary
 from holdfast_lab.trial.tables import (
+    ALL_COLUMNS,
     NUMBER_COLUMNS,
     LawColumn,
     fingers_table,
     kinds_table,
-    laws_table,
+    law_tables,
     objects_table,
     paired_table,
 )
@@ -32,17 +33,23 @@ unloaded object, were fixed before any law but "fixed" ran on them. docs/grip.md
 of each law and of its constants."""
 MEANINGS = """- Dropped: lost after the load or the loop began. Trials whose object was lost before
 both are left out of everything; trial.json counts them in n_not_held.
-- Slip: the largest distance that a fingertip slid after the load began. A drop counts as infinite.
-- Reaction: time from the first sample at which a fingertip slides faster than 1 mm/s to the first
-command that is 2 % above that at the load; 0 if the force rose before. No reaction counts as
-infinite, and so does a drop, whatever the force did. Where nothing slipped there is no onset, so
-such a trial has no reaction time: the median is over the others, which trial.json counts in
-n_slipped. The command acts one sample (6.7 ms) later.
-- Force / least: mean normal force over the mean of the least force by Coulomb friction, at each
-instant with its load, from the start of the loop until the end or the drop. Peak: the largest of
-one over the largest of the other.
-- False reactions: rises of force in the quiet hold before the load, per minute. The hold is not
-quiet for 0.3 s after a fingertip slid, as it does when the controller of the hand jerks.
+- Slip: the largest distance that a fingertip slid after the loop began. A drop counts as infinite.
+- Reaction: time from the first sample at which a fingertip slides faster than 1 mm/s under the load
+to the next command that is 2 % higher. If the force had already risen since the load came, nothing
+reacted to that slip, and the trial has no reaction time; trial.json counts it in n_raised_before.
+No reaction counts as infinite, and so does a drop. The command acts one sample (6.7 ms) later.
+- Force / least: mean normal force over the mean of the least force that stops a slide, at each
+instant with its load, from the start of the loop until the end or the drop. The least force is
+found by linear programming: forces and moments balance, with kinetic friction, at the contacts
+right before the load, which are those of the first grip for every law. The friction cones are
+pyramids of 16 edges inside them, so it is at most 2 % too high. Trials in which no force can stop
+a slide for 0.1 s are left out for every law, and trial.json names them.
+- Drops by reason: the loop never began, a finger was at the highest scale, or neither (slip).
+- False reactions: rises of force in the quiet hold before the load, per minute, each of them, also
+those that follow another at once. The hold is not quiet for 0.3 s after a fingertip slid, as it
+does when the controller of the hand jerks, and for 0.3 s after the loop began.
+- fixed-1.5 and fixed-2 are constant forces. true-slips is the law of holdfast with the true slips
+of the twin; true-load-1.5 and true-load-2 press by this multiple of the least force that holds.
 - Intervals: 95 %, by bootstrap over trials. All laws share the resamples. Where none of n trials
 was dropped the interval is 0 to 0, but a true share of up to about 3 in n is still plausible."""
 LIMITS_OF_TWIN = """These are results of a simulation. Its parameters have physical grounds and were
@@ -93,7 +100,7 @@ def report_sections(
     return [
         Section(SUMMARY, summary_text(document)),
         Section("One trial, lost and saved", *_example(example)),
-        Section("All laws", text, [laws_table(document)], [trade_off_figure(document)]),
+        Section("All laws", text, law_tables(document), [trade_off_figure(document)]),
         Section("In pairs", PAIRED, [table for table in paired if table.rows]),
         Section("Slip and reaction", "", [], [distribution_figure(results)]),
         Section(
@@ -117,7 +124,8 @@ def summary_text(document: Mapping[str, Any]) -> str:
     """Return the main results: one sentence on all, then the goals, as a list."""
     laws = document["laws"]
     law = OWN if OWN in laws else next(iter(laws))
-    lines = [_main(document, law), *_goals(laws[law], law, document["unseen_objects"][law])]
+    goals = _goals(laws[law], law, document["unseen_objects"][law], document["goals"])
+    lines = [_main(document, law), *goals]
     return "\n".join(f"- {line}" for line in lines)
 
 
@@ -131,13 +139,12 @@ def _main(document: Mapping[str, Any], law: str) -> str:
     return f"On {row['n']} trials of the twin, {', '.join(parts)}."
 
 
-def _goals(row: Summary, law: str, unseen: Summary) -> Iterator[str]:
+def _goals(row: Summary, law: str, unseen: Summary, goals: Mapping[str, float]) -> Iterator[str]:
     """Yield a sentence for each number that has a goal."""
-    for column in NUMBER_COLUMNS:
-        if column.field not in GOALS:
-            continue
-        value, goal = row[column.field]["value"], GOALS[column.field]
-        missing = bool(column.n_field and not row[column.n_field])
+    columns = {column.field: column for column in reversed(ALL_COLUMNS)}
+    for column in (columns[field] for field in goals):
+        value, goal = row[column.field]["value"], goals[column.field]
+        missing = value is None and bool(column.n_field and not row.get(column.n_field))
         verdict = "nothing slipped" if missing else "reached" if _within(value, goal) else "missed"
         yield (
             f"{column.head}: {_text(row, column)} for {law}, on the six other objects "

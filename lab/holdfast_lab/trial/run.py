@@ -2,6 +2,7 @@
 
 import math
 from functools import cache
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -20,6 +21,8 @@ from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
+from holdfast_lab.trial.needed_force import needed_force
+from holdfast_lab.trial.reference_rows import TRUE_SLIPS, KnownLoad, row_named, true_estimate
 from holdfast_lab.trial.trials import Trial
 
 LIMITS = Limits()
@@ -34,11 +37,15 @@ NEWTONS_PER_FINGERTIP_COUNT = (
 tangential axes of the fingertip frame [N/count]."""
 RISE = 1.02
 """Ratio of a force scale to that at the start of the load from which it counts as a reaction."""
-REST_TIME = 0.3
-"""A new rise of force later than this after the last one is another reaction [s]."""
+START_TIME = 0.3
+"""Time after the loop began in which a rise of force is the law's start, and no reaction [s]."""
+LIMIT_SHARE = 0.99
+"""Share of the highest scale from which a finger is at its limit of force."""
 SLIP_MEMORY = 0.3
 """A reaction within this time after a fingertip slid is not false [s]: glitches of the hand's
 controller make fingertips slide before the load comes."""
+NEVER_BEGAN, AT_LIMIT, WHILE_SLIPPING = DROP_REASONS = ("never began", "limit of force", "slip")
+"""Why an object was lost: the loop never began, a finger was at the highest scale, or neither."""
 Mask = npt.NDArray[np.bool_]
 UP = np.array([0.0, 0.0, GRAVITY])
 """Acceleration that carries a weight [m/s^2]."""
@@ -58,15 +65,24 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
         n_fingers: number of fingers of the grip.
         held: False if the object was lost before the load, and before the loop had begun: the
             first grip failed, and nothing is scored.
+        feasible: whether the object can be held at all, see `NeededForce.feasible`.
         dropped: whether the object was lost afterwards.
-        slip: largest sliding distance of a fingertip [m]; infinite if dropped.
-        slipped: whether a fingertip slid faster than `SLIP_SPEED`.
-        reaction: time from the onset of slip to the rise of the commanded force, 0 if it rose
-            before [s]; infinite without a rise, NaN if nothing slipped.
-        force_ratio: mean normal force over the mean of the least force, until the drop.
-        peak_ratio: largest normal force over the largest least force.
+        drop_reason: why; empty if it was not dropped.
+        slip: largest sliding distance of a fingertip since the loop began or the load came,
+            whichever was first [m]; infinite if dropped.
+        slipped: whether a fingertip slid faster than `SLIP_SPEED` under the load.
+        raised_before: whether the force had risen since the load began when the first fingertip
+            slid: then there is no reaction to that slip.
+        reaction: time from the onset of slip to the next rise of the commanded force [s];
+            infinite without one, NaN if nothing slipped or the force had risen before.
+        force_ratio: mean normal force over the mean of the least force that stops a slide, by
+            linear programming (`needed_force`), until the drop.
+        static_ratio: the same with static friction, the least force that holds without a slide.
+        coulomb_ratio: the same over the least force without contacts and moments, by Coulomb
+            friction at rest (`least_force_at`).
+        peak_ratio: largest normal force over the largest least force that stops a slide.
         quiet_time: time of control before the load in which nothing slid shortly before [s].
-        n_false: number of reactions in this time.
+        n_false: number of rises of force in this time.
     """
 
     number: int
@@ -76,11 +92,16 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     n_fingers: int
     held: bool
+    feasible: bool = True
     dropped: bool = True
+    drop_reason: str = ""
     slip: float = math.inf
     slipped: bool = False
+    raised_before: bool = False
     reaction: float = math.nan
     force_ratio: float = math.nan
+    static_ratio: float = math.nan
+    coulomb_ratio: float = math.nan
     peak_ratio: float = math.nan
     quiet_time: float = 0.0
     n_false: int = 0
@@ -124,8 +145,9 @@ class RunningTrial:
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
         self._detector = Detector(_model(model), sensors)
+        self._law, self._sees_truth = row_named(law), law == TRUE_SLIPS
         self._controller = GripController(
-            LIMITS, law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
+            LIMITS, self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
         )
         self.scales = np.ones(len(FINGERS))
 
@@ -144,6 +166,10 @@ class RunningTrial:
         self.simulation.step(self.scales)
         time = (self.simulation.n_samples - 1) / RATE
         estimate = self._detector.update(self.simulation.read(), time)
+        if self._sees_truth:
+            estimate = true_estimate(estimate, self.simulation)
+        if isinstance(self._law, KnownLoad):
+            self._law.know(self.simulation, self.trial)
         command = self._controller.update(estimate, time)
         self.scales = np.array([_scale(command, finger) for finger in FINGERS])
         return command
@@ -174,16 +200,38 @@ def least_force_at(trial: Trial, held_for: float) -> float:
     return max(across / (item.mu_static * load.friction), abs(along))
 
 
+class _Sample(NamedTuple):
+    """Numbers of one sample of a trial.
+
+    Attributes:
+        held_for: time since the lock [s].
+        force: sum of the normal forces [N].
+        to_hold: least sum that holds by static friction [N].
+        to_stop: least sum that stops a slide [N].
+        coulomb: least sum without contacts and moments [N].
+        slip_speed: largest slip speed of a fingertip in contact [m/s].
+    """
+
+    held_for: float
+    force: float
+    to_hold: float
+    to_stop: float
+    coulomb: float
+    slip_speed: float
+
+
 class _TrialLog:
     """Numbers of a trial, sample by sample."""
 
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
-        self._rows: list[tuple[float, float, float, float]] = []  # time, force, least, slip speed
+        self._needed = needed_force(trial)
+        self._samples: list[_Sample] = []
         self._scales: list[Array] = []
         self._slid = np.zeros(len(FINGERS))
         self._began_at = math.nan
-        self._rising_at = self._slid_at = -math.inf
+        self._slid_at = -math.inf
+        self._was_rising = self._at_limit = False
         self._quiet_time = 0.0
         self._n_false = 0
 
@@ -192,32 +240,36 @@ class _TrialLog:
         held_for = simulation.held_for
         if held_for < 0:
             return
-        if command.state is not LoopState.IDLE and math.isnan(self._began_at):
+        began = command.state is not LoopState.IDLE
+        if began and math.isnan(self._began_at):
             self._began_at = held_for
         tips = simulation.world.contact.tips
         speeds = np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0)
-        if held_for >= self._trial.load.start:
+        is_loaded = held_for >= self._trial.load.start
+        if began or is_loaded:
             self._slid += np.where(speeds > SLIP_SPEED, speeds, 0.0) / RATE
-        elif command.state is not LoopState.IDLE:
+        if began and not is_loaded:
             self._add_quiet(held_for, command, slides=bool(speeds.max() > SLIP_SPEED))
-        least = least_force_at(self._trial, held_for)
-        self._rows.append((held_for, float(tips[:, TIP_LOAD].sum()), least, float(speeds.max())))
+        self._was_rising = command.state is LoopState.REACT
+        self._at_limit = bool((scales >= LIMIT_SHARE * LIMITS.max_scale).any())
+        least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
+        force = float(tips[:, TIP_LOAD].sum())
+        self._samples.append(_Sample(held_for, force, *least, float(speeds.max())))
         self._scales.append(scales)
 
     def _add_quiet(self, held_for: float, command: GripCommand, *, slides: bool) -> None:
-        """Count reactions before the load, and the time in which one would be false."""
+        """Count rises before the load, and the time in which one would be false."""
         if slides:
             self._slid_at = held_for
-        quiet = held_for - self._slid_at > SLIP_MEMORY
+        quiet = held_for - self._slid_at > SLIP_MEMORY and held_for - self._began_at > START_TIME
         self._quiet_time += quiet / RATE
-        if command.state is LoopState.REACT:
-            self._n_false += quiet and held_for - self._rising_at > REST_TIME
-            self._rising_at = held_for
+        if command.state is LoopState.REACT and not self._was_rising:
+            self._n_false += quiet
 
     def result(self, law: str, *, lost: bool) -> TrialResult:
         """Return the result of the trial."""
         trial = self._trial
-        rows = np.array(self._rows).reshape(-1, 4)
+        rows = np.array(self._samples).reshape(-1, len(_Sample._fields))
         loaded = rows[:, 0] >= trial.load.start
         controlled = rows[:, 0] >= self._began_at
         base = TrialResult(
@@ -228,31 +280,56 @@ class _TrialLog:
             kind=trial.load.kind.value,
             n_fingers=trial.n_fingers,
             held=False,
+            feasible=self._needed.feasible,
         )
         if not (loaded.any() or controlled.any()):
             return base
-        scored = loaded | controlled
-        force, least = rows[scored, 1], rows[scored, 2]
-        slipping = loaded & (rows[:, 3] > SLIP_SPEED)
+        slipping = loaded & (rows[:, -1] > SLIP_SPEED)
+        raised_before, reaction = self._reaction(rows[:, 0], loaded, slipping)
         return msgspec.structs.replace(
             base,
             held=True,
             dropped=lost,
+            drop_reason=self._drop_reason() if lost else "",
             slip=math.inf if lost else float(self._slid.max()),
             slipped=bool(slipping.any()),
-            reaction=self._reaction(rows[:, 0], loaded, slipping),
-            force_ratio=float(force.mean() / least.mean()),
-            peak_ratio=float(force.max() / least.max()),
+            raised_before=raised_before,
+            reaction=reaction,
             quiet_time=self._quiet_time,
             n_false=self._n_false,
+            **_force_ratios(rows[loaded | controlled]),
         )
 
-    def _reaction(self, times: Array, loaded: Mask, slipping: Mask) -> float:
+    def _drop_reason(self) -> str:
+        """Return why the object was lost: the loop never began, the limit of force, or a slip."""
+        if math.isnan(self._began_at):
+            return NEVER_BEGAN
+        return AT_LIMIT if self._at_limit else WHILE_SLIPPING
+
+    def _reaction(self, times: Array, loaded: Mask, slipping: Mask) -> tuple[bool, float]:
+        """Return whether the force rose before the first slip, and the reaction to it [s]."""
         if not slipping.any():
-            return math.nan
+            return False, math.nan
         scales = np.array(self._scales)
-        first = scales[np.argmax(loaded)]  # slipping is loaded: there is a sample
-        risen = loaded & (scales > RISE * first).any(axis=1)
-        if not risen.any():
-            return math.inf
-        return max(0.0, float(times[np.argmax(risen)] - times[np.argmax(slipping)]))
+        onset, start = int(np.argmax(slipping)), int(np.argmax(loaded))
+        if (scales[onset - 1] > RISE * scales[start - 1]).any():
+            return True, math.nan
+        risen = (scales[onset:] > RISE * scales[onset - 1]).any(axis=1)
+        return False, float(
+            times[onset + np.argmax(risen)] - times[onset]
+        ) if risen.any() else math.inf
+
+
+def _force_ratios(rows: Array) -> dict[str, float]:
+    """Return the ratios of the force to the least ones, where these are finite."""
+    finite = np.isfinite(rows).all(axis=1)
+    _, force, to_hold, to_stop, coulomb, _ = rows[finite].T
+    if not finite.any():
+        return {}
+    mean = float(force.mean())
+    return {
+        "force_ratio": mean / float(to_stop.mean()),
+        "static_ratio": mean / float(to_hold.mean()),
+        "coulomb_ratio": mean / float(coulomb.mean()),
+        "peak_ratio": float(force.max() / to_stop.max()),
+    }

@@ -2,10 +2,12 @@
 
 All laws run on the same trials, and the same resamples serve all of them. A drop counts as an
 infinite slip and an infinite reaction time, and so does no reaction. A trial in which nothing
-slipped has no onset of slip, so it has no reaction time; `n_slipped` counts the others.
+slipped has no onset of slip, and where the force had risen before the slip nothing reacted to it:
+neither has a reaction time. `n_reacting` counts the others.
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,20 +21,26 @@ from holdfast.metrics.statistics import (
     ratio_of_sums,
 )
 from holdfast.sensors.types import Array
+from holdfast.twin.loads import LoadKind
 from holdfast_lab.trial.run import TrialResult
 
 Summary = dict[str, Any]
+LONG_SLIP = 0.003
+"""Sliding distance of a fingertip that a trial should not exceed [m]."""
 
 
 def summarize(results: Sequence[TrialResult]) -> Summary:
     """Return the numbers of one law, as `trial.json` has them.
 
     Trials whose object was lost before the load and before the loop had begun are counted in
-    `n_not_held`, and in nothing else.
+    `n_not_held`, trials that no force can hold in `n_infeasible`, and both in nothing else.
 
     Returns:
-        `n`, `n_not_held`, `n_slipped`, `dropped` [%], `slip_median` [m], `reaction_median` [s],
-        `force_ratio_mean`, `peak_ratio_mean` and `false_reactions_per_minute`. Each number is
+        `n`, `n_not_held`, `n_infeasible`, `n_slipped`, `n_raised_before`, `n_reacting`,
+        `n_friction_reacting` and `drops`, their number by reason; `dropped` [%], `slip_median`,
+        `slip_p75` and `slip_p90` [m], `slipped_over_3mm` [%], `reaction_median` and, of friction
+        trials, `friction_reaction_median` [s], `force_ratio_mean`, `static_ratio_mean`,
+        `coulomb_ratio_mean`, `peak_ratio_mean` and `false_reactions_per_minute`. Each of these is
         {"value": x, "interval": [low, high]}, null where it is infinite or not known.
 
     Example:
@@ -42,26 +50,46 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         >>> summarize([held, held])["dropped"]
         {'value': 100.0, 'interval': [100.0, 100.0]}
     """
-    held = [result for result in results if result.held]
-    reactions = [time for one in held if not math.isnan(time := reaction_time(one))]
-    ones = [1.0] * len(held)
+    held = [result for result in results if result.held and result.feasible]
+    slips = [result.slip for result in held]
+    reactions = _reaction_times(held)
+    friction_reactions = _reaction_times(
+        [result for result in held if result.kind == LoadKind.FRICTION]
+    )
     return {
         "n": len(held),
-        "n_not_held": len(results) - len(held),
-        "n_slipped": len(reactions),
-        "dropped": _ratio([100.0 * one.dropped for one in held], ones),
-        "slip_median": _median([one.slip for one in held]),
-        "reaction_median": _median(reactions),
-        "force_ratio_mean": _ratio([one.force_ratio for one in held], ones),
-        "peak_ratio_mean": _ratio([one.peak_ratio for one in held], ones),
+        "n_not_held": sum(result.feasible and not result.held for result in results),
+        "n_infeasible": sum(not result.feasible for result in results),
+        "n_slipped": sum(result.slipped for result in held),
+        "n_raised_before": sum(result.raised_before for result in held),
+        "n_reacting": len(reactions),
+        "n_friction_reacting": len(friction_reactions),
+        "drops": dict(Counter(result.drop_reason for result in held if result.dropped)),
+        "dropped": _mean([100.0 * result.dropped for result in held]),
+        "slip_median": _quantile(slips, 0.5),
+        "slip_p75": _quantile(slips, 0.75),
+        "slip_p90": _quantile(slips, 0.9),
+        "slipped_over_3mm": _mean([100.0 * (slip > LONG_SLIP) for slip in slips]),
+        "reaction_median": _quantile(reactions, 0.5),
+        "friction_reaction_median": _quantile(friction_reactions, 0.5),
+        "force_ratio_mean": _mean_of_known([result.force_ratio for result in held]),
+        "static_ratio_mean": _mean_of_known([result.static_ratio for result in held]),
+        "coulomb_ratio_mean": _mean_of_known([result.coulomb_ratio for result in held]),
+        "peak_ratio_mean": _mean_of_known([result.peak_ratio for result in held]),
         "false_reactions_per_minute": _ratio(
-            [60.0 * one.n_false for one in held], [one.quiet_time for one in held]
+            [60.0 * result.n_false for result in held], [result.quiet_time for result in held]
         ),
     }
 
 
+def _reaction_times(results: Sequence[TrialResult]) -> list[float]:
+    return [time for result in results if not math.isnan(time := reaction_time(result))]
+
+
 def reaction_time(result: TrialResult) -> float:
-    """Return the reaction time [s]: infinite after a drop, NaN if nothing slipped."""
+    """Return the reaction time [s]: infinite after a drop, NaN if there was no slip to react to."""
+    if result.raised_before:
+        return math.nan
     return math.inf if result.dropped else result.reaction
 
 
@@ -81,11 +109,11 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
         `slid_less`, `slid_more` [%] and, of those in which something slipped under both laws,
         `reacted_sooner` and `reacted_later` [%]. Each number is {"value": x, "interval": ...}.
     """
-    by_number = {one.number: one for one in others if one.held}
+    by_number = {one.number: one for one in others if one.held and one.feasible}
     pairs = [
         (result, by_number[result.number])
         for result in results
-        if result.held and result.number in by_number
+        if result.held and result.feasible and result.number in by_number
     ]
     ones = [1.0] * len(pairs)
     reactions = [(reaction_time(one), reaction_time(other)) for one, other in pairs]
@@ -137,10 +165,18 @@ def _ratio(parts: Sequence[float], wholes: Sequence[float]) -> Summary:
     return _number(value, interval)
 
 
-def _median(values: Sequence[float]) -> Summary:
-    each: list[Array] = [np.array([value]) for value in values]
-    value = quantile(np.sort(np.array(values)), 0.5)
-    return _number(value, bootstrap_interval(quantile_of(each, 0.5), len(values)))
+def _mean(values: Sequence[float]) -> Summary:
+    return _ratio(values, [1.0] * len(values))
+
+
+def _mean_of_known(values: Sequence[float]) -> Summary:
+    return _mean([value for value in values if not math.isnan(value)])
+
+
+def _quantile(values: Sequence[float], share: float) -> Summary:
+    single: list[Array] = [np.array([value]) for value in values]
+    value = quantile(np.sort(np.array(values)), share)
+    return _number(value, bootstrap_interval(quantile_of(single, share), len(values)))
 
 
 def _number(value: float | None, interval: tuple[float | None, float | None] | None) -> Summary:

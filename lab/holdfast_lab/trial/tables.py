@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.trial.run import DROP_REASONS
 from holdfast_lab.trial.summary import Summary
 
 By = Mapping[str, Summary]
@@ -32,12 +33,31 @@ class LawColumn(NamedTuple):
 NUMBER_COLUMNS = (
     LawColumn("dropped [%]", "dropped"),
     LawColumn("slip [mm]", "slip_median", 1e3, 2, "n"),
-    LawColumn("reaction [ms]", "reaction_median", 1e3, 0, "n_slipped"),
+    LawColumn("reaction [ms]", "reaction_median", 1e3, 0, "n_reacting"),
     LawColumn("force / least", "force_ratio_mean", digits=2),
-    LawColumn("peak / least peak", "peak_ratio_mean", digits=2),
     LawColumn("false reactions per minute", "false_reactions_per_minute"),
 )
 """Numbers of a law."""
+SLIP_COLUMNS = (
+    LawColumn("slip, 75 % below [mm]", "slip_p75", 1e3, 1, "n"),
+    LawColumn("90 % below [mm]", "slip_p90", 1e3, 1, "n"),
+    LawColumn("over 3 mm [%]", "slipped_over_3mm"),
+    LawColumn(
+        "reaction when friction falls [ms]",
+        "friction_reaction_median",
+        1e3,
+        0,
+        "n_friction_reacting",
+    ),
+)
+"""Numbers of a law on long slips and on friction that falls."""
+FORCE_COLUMNS = (
+    LawColumn("force / least that stops", "force_ratio_mean", digits=2),
+    LawColumn("force / least that holds", "static_ratio_mean", digits=2),
+    LawColumn("force / least by Coulomb", "coulomb_ratio_mean", digits=2),
+    LawColumn("peak / least peak", "peak_ratio_mean", digits=2),
+)
+"""Numbers of a law on force, over three least forces."""
 DIFFERENCES = (
     LawColumn("dropped [points]", "dropped"),
     LawColumn("slid less in [%]", "slid_less", digits=0),
@@ -48,6 +68,7 @@ DIFFERENCES = (
     LawColumn("false reactions per minute", "false_reactions_per_minute"),
 )
 """Paired differences of a law to another."""
+ALL_COLUMNS = (*NUMBER_COLUMNS, *SLIP_COLUMNS, *FORCE_COLUMNS, *DIFFERENCES)
 SHORT = NUMBER_COLUMNS[:4]
 """Numbers in tables of parts of the trials."""
 
@@ -55,7 +76,7 @@ SHORT = NUMBER_COLUMNS[:4]
 def all_tables(document: Mapping[str, Any]) -> list[ResultTable]:
     """Return all tables of the report, in its order."""
     return [
-        laws_table(document),
+        *law_tables(document),
         objects_table(document),
         *(
             paired_table(document, other)
@@ -67,6 +88,16 @@ def all_tables(document: Mapping[str, Any]) -> list[ResultTable]:
     ]
 
 
+def law_tables(document: Mapping[str, Any]) -> list[ResultTable]:
+    """Return the tables of all laws over all trials.
+
+    The document of an older run has the first of them only.
+    """
+    tables = (laws_table, slips_table, forces_table, drops_table)
+    has_all = all("drops" in summary for summary in document["laws"].values())
+    return [table(document) for table in (tables if has_all else tables[:1])]
+
+
 def laws_table(document: Mapping[str, Any]) -> ResultTable:
     """Return the table of all laws over all trials."""
     return _table(
@@ -75,6 +106,33 @@ def laws_table(document: Mapping[str, Any]) -> ResultTable:
         "Medians of slip and reaction; a drop counts as infinite in both.",
         _rows(document["laws"], NUMBER_COLUMNS),
     )
+
+
+def slips_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of long slips, and of the reaction to friction that falls."""
+    note = "A drop counts as infinite, and so does no reaction."
+    rows = _rows(document["laws"], SLIP_COLUMNS)
+    return _table("slips", "Long slips, and friction that falls", note, rows)
+
+
+def forces_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of force over each least force."""
+    note = (
+        "Least forces by linear programming with the contacts before the load: with kinetic "
+        "friction (stops a slide), with static friction (holds without one); and by Coulomb "
+        "friction at rest without contacts and moments. Peak: over the least that stops."
+    )
+    return _table("forces", "Force over the least", note, _rows(document["laws"], FORCE_COLUMNS))
+
+
+def drops_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of drops by reason."""
+    rows = [
+        Row({"law": law, "figure": reason}, summary["drops"].get(reason, 0), None, summary["n"])
+        for law, summary in document["laws"].items()
+        for reason in DROP_REASONS
+    ]
+    return _table("drops", "Number of drops by reason", "", iter(rows))
 
 
 def objects_table(document: Mapping[str, Any]) -> ResultTable:
@@ -115,7 +173,7 @@ def fingers_table(document: Mapping[str, Any]) -> ResultTable:
 def _table(name: str, title: str, note: str, rows: Iterator[Row], *lines: str) -> ResultTable:
     return ResultTable(
         name, title, note, list(rows), (*lines, "law"),
-        digits_of={column.head: column.digits for column in (*NUMBER_COLUMNS, *DIFFERENCES)},
+        digits_of={column.head: column.digits for column in ALL_COLUMNS},
         counted="trials", has_paper=False,
     )  # fmt: skip
 
@@ -138,7 +196,8 @@ def _rows(
 
 def _row(keys: dict[str, Key], summary: Summary, column: LawColumn) -> Row:
     number = summary[column.field]
-    missing = math.inf if column.n_field and summary[column.n_field] else None
+    n_known = summary.get(column.n_field, summary.get("n_slipped", 0)) if column.n_field else 0
+    missing = math.inf if n_known else None
     value, interval = number["value"], number["interval"]
     ends = None
     if interval is not None:

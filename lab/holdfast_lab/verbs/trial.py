@@ -24,7 +24,8 @@ N_TRIALS, N_QUICK_TRIALS = 240, 60
 def trial(
     out: OutOption,
     laws: Annotated[
-        str, typer.Option("--laws", help="Laws to compare, separated by commas; all by default.")
+        str,
+        typer.Option("--laws", help="Laws or reference rows, separated by commas; all by default."),
     ] = "",
     model: Annotated[str, typer.Option("--model", help="Model of the detector.")] = "builtin:any",
     quick: QuickOption = False,
@@ -51,12 +52,11 @@ def trial(
       holdfast trial --out trials --laws fixed,holdfast --n 12 --json
       holdfast trial --out trials --engine dask:tcp://10.0.0.1:8786
     """
-    from holdfast.grip.laws import LAWS
     from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.trial.experiment import COMPARISON, run_trials
-    from holdfast_lab.trial.plan import TrialPlan
+    from holdfast_lab.trial.plan import ALL_ROWS, TrialPlan
 
-    names = tuple(name.strip() for name in laws.split(",")) if laws else tuple(LAWS)
+    names = tuple(name.strip() for name in laws.split(",")) if laws else ALL_ROWS
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
     plan = TrialPlan(names, number, seed, model)
     check_output_folder(out, COMPARISON, force=force)
@@ -85,7 +85,7 @@ def _print_table(laws: Mapping[str, Mapping[str, Any]]) -> None:
         numbers = [
             _text(row["dropped"], 1.0, 9, 1),
             _text(row["slip_median"], 1e3, 9, 2, infinite=row["n"] > 0),
-            _text(row["reaction_median"], 1e3, 10, 0, infinite=row["n_slipped"] > 0),
+            _text(row["reaction_median"], 1e3, 10, 0, infinite=row["n_reacting"] > 0),
             _text(row["force_ratio_mean"], 1.0, 7, 2),
             _text(row["false_reactions_per_minute"], 1.0, 8, 1),
         ]

@@ -12,8 +12,10 @@ def invented(trial, law, model="builtin:any"):
     return TrialResult(
         number=trial.number, law=law, object=trial.grasp.object, unseen=trial.unseen,
         kind=trial.load.kind.value, n_fingers=trial.n_fingers, held=trial.number != 4,
-        dropped=lost, slip=math.inf if lost else 0.001 * (1 + trial.number % 2), slipped=True,
-        reaction=math.inf if law == "fixed" else 0.03, force_ratio=1.4, peak_ratio=1.1,
+        dropped=lost, drop_reason="slip" if lost else "",
+        slip=math.inf if lost else 0.001 * (1 + trial.number % 2), slipped=True,
+        reaction=math.inf if law == "fixed" else 0.03, force_ratio=1.4, static_ratio=1.8,
+        coulomb_ratio=1.9, peak_ratio=1.1,
         quiet_time=2.0, n_false=int(law == "pr2"),
     )  # fmt: skip
 

@@ -23,12 +23,22 @@ def test_numbers_of_the_contract(document):
     for row in document["laws"].values():
         assert (row["n"], row["n_not_held"]) == (11, 1)
         for name in (
-            "dropped", "slip_median", "reaction_median", "force_ratio_mean",
+            "dropped", "slip_median", "reaction_median", "force_ratio_mean", "slip_p90",
+            "friction_reaction_median", "static_ratio_mean", "coulomb_ratio_mean",
             "false_reactions_per_minute",
         ):  # fmt: skip
             assert row[name].keys() == {"value", "interval"}
     assert document["seed"] == 0
     assert len(document["trials"]) == 36
+
+
+def test_trials_that_no_force_holds_are_named(document):
+    assert document["infeasible"] == []
+    results = results_of(("fixed",), 3)
+    results["fixed"][1] = msgspec.structs.replace(results["fixed"][1], feasible=False)
+    found = document_of(TrialPlan(("fixed",), 3), results, None)
+    assert [trial["number"] for trial in found["infeasible"]] == [1]
+    assert found["laws"]["fixed"]["n"] == 2
 
 
 def test_parts_add_up_to_the_whole(document):

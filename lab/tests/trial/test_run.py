@@ -39,8 +39,10 @@ def fixed():
 def test_a_fixed_grip_drops_what_is_too_heavy(fixed):
     assert (fixed.held, fixed.dropped, fixed.slipped) == (True, True, True)
     assert fixed.slip == fixed.reaction == math.inf
+    assert fixed.drop_reason == "slip" and fixed.feasible
+    assert fixed.force_ratio < fixed.static_ratio < fixed.coulomb_ratio + 0.1
     assert fixed.n_false == 0
-    assert 1.0 < fixed.force_ratio < 2.0
+    assert 0.8 < fixed.force_ratio < 2.0
 
 
 def test_the_same_trial_gives_the_same_result(fixed):
@@ -52,3 +54,18 @@ def test_trials_of_any_law_begin_alike(fixed):
     assert (other.held, other.quiet_time) == (fixed.held, fixed.quiet_time)
     assert other.slip < math.inf or other.dropped
     assert draw_trials(1)[0].number == 0
+
+
+def test_a_constant_force_is_no_false_reaction():
+    double = run_trial(CAN, "fixed-2")
+    assert double.n_false == 0 and double.static_ratio > 1.5
+
+
+def test_true_slips_replace_the_estimates():
+    result = run_trial(CAN, "true-slips")
+    assert result.held and not result.dropped
+
+
+def test_a_law_that_knows_the_load_presses_by_its_multiple():
+    weak, strong = (run_trial(CAN, f"true-load-{multiple}") for multiple in ("1.5", "2"))
+    assert 1.4 < weak.static_ratio < strong.static_ratio < 2.1

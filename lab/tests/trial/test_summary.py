@@ -95,3 +95,35 @@ def test_rates_of_false_reactions_may_have_other_quiet_times():
     assert found["interval"] == pytest.approx([-20.0, -20.0])
     nothing = compare([], [])["false_reactions_per_minute"]
     assert nothing == {"value": None, "interval": None}
+
+
+def test_a_trial_that_no_force_holds_is_left_out_for_every_law():
+    infeasible = result(number=1, feasible=False, dropped=True, slip=math.inf)
+    found = summarize([result(), infeasible])
+    assert (found["n"], found["n_infeasible"], found["n_not_held"]) == (1, 1, 0)
+    assert found["dropped"]["value"] == 0.0
+    assert compare([result(), infeasible], [result(), result(number=1)])["n"] == 1
+
+
+def test_a_rise_before_the_slip_is_no_reaction():
+    raised = result(raised_before=True, reaction=math.nan)
+    found = summarize([raised, result(), result(reaction=0.04), result(reaction=0.06)])
+    assert (found["n_slipped"], found["n_raised_before"], found["n_reacting"]) == (4, 1, 3)
+    assert found["reaction_median"]["value"] == 0.04
+    lost = result(raised_before=True, dropped=True, slip=math.inf)
+    assert summarize([lost])["n_reacting"] == 0
+
+
+def test_friction_trials_have_a_reaction_of_their_own():
+    found = summarize([result(reaction=0.01), result(kind="friction", reaction=0.09)])
+    assert found["friction_reaction_median"]["value"] == 0.09
+    assert found["n_friction_reacting"] == 1
+
+
+def test_long_slips_and_drops_have_their_shares_and_reasons():
+    slips = [result(slip=slip) for slip in (0.001, 0.002, 0.004)]
+    lost = result(dropped=True, drop_reason="limit of force", slip=math.inf)
+    found = summarize([*slips, lost])
+    assert found["slipped_over_3mm"]["value"] == 50.0
+    assert found["slip_p90"]["value"] is None
+    assert found["drops"] == {"limit of force": 1}

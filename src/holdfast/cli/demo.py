@@ -205,7 +205,7 @@ def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None
                 "     Ctrl-C stops it" if stay else "     it stops at the end of the recording"
             )
 
-        run_page(model, session, announce, port=0, folder=out / "recorded", stay=stay)
+        run_page(session, announce, port=0, folder=out / "recorded", stay=stay)
 
 
 def _print_results(metrics: "Metrics", trained: "Trained", n: int) -> None:

@@ -6,7 +6,7 @@ that takes one has all its options (see `spread_groups` of `app.py`).
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -202,7 +202,7 @@ class DetectorOptions:
             model, source, strict=strict, ignore=taxels, in_contact=self.in_contact
         )
         report_missing_fingers(model, source.name, source.sensors)
-        report_other_handling(model, stream.fingers.values())
+        report_other_handling(model, stream.fingers)
         report_blind_features(model, stream.fingers)
         return stream
 
@@ -327,20 +327,17 @@ def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, obje
         )
 
 
-def report_other_handling(model: "Model", sensors: "Iterable[Sensor]") -> None:
-    """Print the sensors without own handling, if the model has that of other sensors."""
-    if missing := model.without_handling(sensors):
-        print_message(
-            f"{model.name} was calibrated on {', '.join(model.handled_sensors)}, not on "
-            f"{', '.join(missing)}: default handling is used (holdfast calibrate)"
-        )
+def report_other_handling(model: "Model", sensors: "Mapping[str, Sensor]") -> None:
+    """Print the sensors without own handling, if the model has that of others."""
+    if advice := model.handling_advice(sensors):
+        print_message(advice)
 
 
 def report_handling(model: "Model", recordings: "Sequence[Recording]") -> None:
     """Print the sensors of the first recording without own handling, as `report_other_handling`."""
     if model.handled_sensors and recordings:
         sensors = {name: module.sensor for name, module in recordings[0].modules.items()}
-        report_other_handling(model, model.fingers_of(sensors).values())
+        report_other_handling(model, model.fingers_of(sensors))
 
 
 def report_blind_features(model: "Model", sensors: Mapping[str, "Sensor"]) -> None:

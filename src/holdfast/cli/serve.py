@@ -104,7 +104,7 @@ def serve(
         _publish(session, grip, ros2=ros2, ros1=ros1),
     ):
         run_page(
-            loaded, session, announce, host=access.host, port=access.port,
+            session, announce, host=access.host, port=access.port,
             guard=guard, folder=record_to, grip=grip, stay=not once,
         )  # fmt: skip
 
@@ -197,7 +197,6 @@ def _create_publishers(
 
 
 def run_page(
-    model: "Model",
     session: "Session",
     announce: Callable[[str], None],
     *,
@@ -211,7 +210,6 @@ def run_page(
     """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
 
     Args:
-        model: the model of the session.
         session: it is started here; the caller stops it.
         announce: function that is called with the URL when the page can be opened.
         host: address to listen on.
@@ -229,7 +227,7 @@ def run_page(
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
-    service = LiveService(session, model, guard or Guard(host), folder, print_message, grip)
+    service = LiveService(session, guard or Guard(host), folder, print_message, grip)
     session.start()
     run_server(
         service.app, host, port, announce,

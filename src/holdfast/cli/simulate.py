@@ -64,7 +64,7 @@ class GraspOptions:
         str,
         typer.Option(
             help="Mechanisms of real skins and arms for --randomize hands, separated by commas: "
-            "scan, filter, noise, vibration; or all."
+            "scan, filter, noise, vibration, colour, steps, updates, stamps, carry, person; or all."
         ),
     ] = ""
     server: Annotated[

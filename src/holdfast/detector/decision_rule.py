@@ -164,6 +164,25 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     )
 
 
+def replace_values(rule: DecisionRule, new: DecisionRule) -> bool:
+    """Copy the arrays of another rule into those of a rule, whose addresses stay.
+
+    Returns:
+        Whether the rules differ in the values of their arrays alone; else nothing is copied.
+    """
+    arrays, settings = [], []
+    for before, after in zip(rule, new, strict=True):
+        if isinstance(before, np.ndarray) and isinstance(after, np.ndarray):
+            arrays.append((before, after))
+        else:
+            settings.append(before == after)
+    if not all(settings) or any(before.shape != after.shape for before, after in arrays):
+        return False
+    for before, after in arrays:
+        before[...] = after
+    return True
+
+
 def _n_weights(part: FingerModel) -> int:
     """Return the number of weights; of a classifier that is not linear, the offset alone."""
     is_linear = isinstance(part.classifier, LinearClassifier)

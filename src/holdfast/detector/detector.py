@@ -28,6 +28,7 @@ from holdfast.detector.decision_rule import (
     ProbabilityFeeder,
     TraceRows,
     new_decision_memory,
+    replace_values,
     rule_of,
     run,
     split_code,
@@ -216,6 +217,40 @@ class Detector:
             )
         for finger, threshold in thresholds.items():
             self._rule.limits[self._slots[finger][0], THRESHOLD] = threshold
+
+    @property
+    def knows_zero(self) -> bool:
+        """Whether the readings without contact are known, if the first samples were load."""
+        return not self._stream.layout.zero_unknown
+
+    def set_model(self, model: Model) -> None:
+        """Change weights and thresholds to those of another model, from the next sample on.
+
+        Features, states and filters continue: nothing warms up again. `reset` keeps the model.
+
+        Args:
+            model: of the same features and the same debouncing, such as the model of the detector
+                with own handling.
+
+        Raises:
+            ModelError: the model has other features or another debouncing, or a classifier that
+                is not linear; nothing has changed then.
+        """
+        plan = self._stream.plan
+        features = {name: model.finger(name).all_features for name in plan.sensors}
+        parts = [model.finger(*finger) for finger in plan.sensors.items()]
+        is_linear = all(isinstance(part.classifier, LinearClassifier) for part in parts)
+        if self._feeder is not None or not is_linear or features != dict(plan.features):
+            raise ModelError(
+                f"{model.name or 'the model'} has other features than the model of the detector, "
+                "or a classifier that is not linear; open the source again with it"
+            )
+        if not replace_values(self._rule, rule_of(model, plan)):
+            raise ModelError(
+                f"{model.name or 'the model'} decides by another rule than the model of the "
+                "detector; open the source again with it"
+            )
+        self._parts = parts
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.

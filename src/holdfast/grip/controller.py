@@ -19,6 +19,11 @@ OVERLOAD = 1.5
 """Multiple of `Limits.max_force` at which a measured force is a fault."""
 STABLE_TIME_BEFORE_GRIP = 0.2
 """Time for which the hand has been STABLE when the grip begins [s]."""
+CALM_TIME_BEFORE_GRIP = 1.0
+"""The same, for which fingers with `CALM_SHARE` of the force have been STABLE: longer than a person
+takes to let go of the object [s]."""
+CALM_SHARE = 0.7
+"""Share of the normal force on STABLE fingers from which a grip may begin."""
 DETECTOR_RATE = 150.0
 """Rate of the samples, if no sensor is given [Hz]."""
 MIN_FINGERS = 2
@@ -34,11 +39,12 @@ _HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
 class GripController:
     """Controller of the grip force of one hand, estimate by estimate.
 
-    The grip begins when the hand has been STABLE for 0.2 s: forces and scales refer to this
-    moment, and the fingers in contact are the loaded fingers. The controller reads the raw
-    probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
-    changes without a new sample. No input raises an exception or gives a command outside the
-    limits.
+    The grip begins when the hand has been STABLE for 0.2 s, or when for 1 s the fingers that are
+    STABLE, two at least, carried 70 % of the normal force and no finger was UNKNOWN. Forces and
+    scales refer to this moment, and the fingers in contact are the loaded fingers. The controller
+    reads the raw probability of every sample, not the debounced state. UNKNOWN never lowers a
+    force, and no force changes without a new sample. No input raises an exception or gives a
+    command outside the limits.
 
     Args:
         limits: limits of the commands.
@@ -99,7 +105,7 @@ class GripController:
         self._time = self._estimated_at = math.nan
         self._shift = 0.0  # of the law's clock, which continues where that of the source jumped
         self._clock_is_new = False
-        self._stable_since = math.nan
+        self._stable_since = self._calm_since = math.nan
         self._valid_since = math.nan
         self._raised_at = -math.inf
         self._fault = self._reported = GripReason.NONE
@@ -200,18 +206,39 @@ class GripController:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
         commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
         self._commands = commands
-        if estimate.state is not ContactState.STABLE or not math.isfinite(time):
-            self._stable_since = math.nan
-        elif not self._stable_since <= time:
-            self._stable_since = time
-        elif time - self._stable_since >= STABLE_TIME_BEFORE_GRIP:
+        is_stable = estimate.state is ContactState.STABLE
+        self._stable_since = _since(self._stable_since, time, still=is_stable)
+        is_calm = is_stable or self._is_calm(estimate)
+        self._calm_since = _since(self._calm_since, time, still=is_calm)
+        if (
+            time - self._stable_since >= STABLE_TIME_BEFORE_GRIP
+            or time - self._calm_since >= CALM_TIME_BEFORE_GRIP
+        ):
             self._begin(estimate, time)
         return GripCommand(time, self.state, dict(commands))
+
+    def _is_calm(self, estimate: HandEstimate) -> bool:
+        """Return whether the fingers that are STABLE carry nearly all of an UNSTABLE hand."""
+        if estimate.state is not ContactState.UNSTABLE:
+            return False
+        total = calm = 0.0
+        n_stable = 0
+        for name, finger in estimate.fingers.items():
+            touch = self._new_touch(name)
+            if finger.state is _UNKNOWN or not touch.read(finger):
+                return False
+            total += touch.normal
+            if finger.state is ContactState.STABLE:
+                calm, n_stable = calm + touch.normal, n_stable + 1
+        return n_stable >= MIN_FINGERS and calm >= CALM_SHARE * total
+
+    def _new_touch(self, name: str) -> Touch:
+        return Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
 
     def _begin(self, estimate: HandEstimate, time: float) -> None:
         held = (ContactState.STABLE, ContactState.UNSTABLE)
         touches = [
-            Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
+            self._new_touch(name)
             for name, finger in estimate.fingers.items()
             if finger.state in held
         ]
@@ -340,6 +367,13 @@ class GripController:
     def _change(self, state: LoopState, time: float, reason: GripReason = GripReason.NONE) -> None:
         self.state = state
         self._events.append(GripEvent(time, state, "", math.nan, reason))
+
+
+def _since(since: float, time: float, *, still: bool) -> float:
+    """Return since when something holds, NaN if it does not; a clock that went back starts anew."""
+    if not (still and math.isfinite(time)):
+        return math.nan
+    return since if since <= time else time
 
 
 def _three(vector: Array) -> Three:

@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactState, Fault, HandEstimate, Reason, StateChanges, with_faults
+from holdfast.contact import (
+    ContactEstimate,
+    ContactState,
+    Fault,
+    HandEstimate,
+    Reason,
+    StateChanges,
+    with_faults,
+)
 from holdfast.detector import Detector
 from holdfast.detector.detector import check_thresholds
 from holdfast.devices.sources.base import Arrival, ModuleSamples
@@ -17,7 +25,7 @@ from holdfast.features import Tare
 from holdfast.features.loaded_start import begins_in_contact, declared_baselines
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
-from holdfast.recordings import GAP_PERIODS
+from holdfast.recordings import BASELINES, GAP_PERIODS, STARTS_LOADED
 from holdfast.resampling import Resampler
 from holdfast.sensors import Sensor
 
@@ -125,6 +133,10 @@ class StreamEstimate(NamedTuple):
 
     estimate: HandEstimate
     updated_fingers: tuple[str, ...]
+
+
+def _touches(finger: ContactEstimate) -> bool:
+    return finger.state in (ContactState.STABLE, ContactState.UNSTABLE)
 
 
 class ArrivalDetector:
@@ -253,11 +265,7 @@ class ArrivalDetector:
         """
         if self._detector is None or self._last is None:
             return
-        touching = [
-            name
-            for name, finger in self._last.fingers.items()
-            if finger.state in (ContactState.STABLE, ContactState.UNSTABLE)
-        ]
+        touching = [name for name, finger in self._last.fingers.items() if _touches(finger)]
         if touching:
             raise StreamError(
                 f"{', '.join(touching)} in contact: open the hand, then take the tare"
@@ -280,6 +288,48 @@ class ArrivalDetector:
         if self._detector is not None:
             self._detector.set_thresholds(wanted)
         self.thresholds = wanted
+
+    def set_model(self, model: Model) -> None:
+        """Change the model to one of the same features; its thresholds replace those of now.
+
+        Raises:
+            ModelError: it has other features or another debouncing; nothing has changed then.
+        """
+        if self._detector is not None:
+            self._detector.set_model(model)
+        self.model = model
+        self.thresholds = self._own_thresholds()
+
+    def start_metadata(self) -> dict[str, Any]:
+        """Return the metadata of a recording that begins now, which has the zero of this stream.
+
+        Without it, the tare of the recording would be what the hand holds now.
+        """
+        if self._detector is None:
+            return self._declared(self._baselines) if self._loaded else {}
+        if self._detector.knows_zero:
+            baselines = self._detector.baselines()
+            return self._declared(baselines) if baselines else {}
+        fingers = () if self._last is None else self._last.fingers.values()
+        return {STARTS_LOADED: True} if any(_touches(finger) for finger in fingers) else {}
+
+    def _declared(self, baselines: Mapping[str, npt.NDArray[np.float64]]) -> dict[str, Any]:
+        """Return the metadata of samples that are load over some readings without contact."""
+        stated = {}
+        for name, values in baselines.items():
+            kept = values.copy()
+            kept[list((self._ignore or {}).get(name, ()))] = 0.0
+            stated[name] = kept.tolist()
+        return {STARTS_LOADED: True, **({BASELINES: stated} if stated else {})}
+
+    def without_ignored(self, name: str, readings: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return (n, n_taxels, 3) readings of a finger, 0 in the taxels that are ignored."""
+        taxels = list((self._ignore or {}).get(name, ()))
+        if not taxels:
+            return readings
+        kept = readings.copy()
+        kept[:, taxels] = 0
+        return kept
 
     def _own_thresholds(self) -> dict[str, float]:
         return {

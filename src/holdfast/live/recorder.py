@@ -290,6 +290,23 @@ class Recorder(Closable):
         self._rate = (after - before) / (end - begin) if end > begin else 0.0
 
 
+def output_path(folder: Path | None, stem: str, suffix: str) -> Path:
+    """Return the path of a file that a client of the service has named; make its folder.
+
+    Raises:
+        OutputError: there is no folder, it cannot be made, or the name is no valid file name.
+    """
+    if folder is None:
+        raise OutputError("no folder for recordings: start with --record-to FOLDER")
+    if not _FILE_NAME.fullmatch(stem):
+        raise OutputError(f"a name of letters, digits, _, - and . expected, {stem!r} given")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        raise OutputError(f"cannot write to {folder}: {cause.strerror}") from cause
+    return folder / f"{stem}{suffix}"
+
+
 class SessionRecorder:
     """Start and stop recordings of a session, one at a time, from any thread.
 
@@ -364,18 +381,10 @@ class SessionRecorder:
             recorder.put(update.arrival)
 
     def _new_recorder(self, name: str) -> Recorder:
-        if self._folder is None:
-            raise OutputError("no folder for recordings: start with --record-to FOLDER")
         if self.current is not None:
             raise OutputError(f"{self.current.path} is being recorded already")
-        if not _FILE_NAME.fullmatch(name):
-            raise OutputError(f"a name of letters, digits, _, - and . expected, {name!r} given")
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-        except OSError as cause:
-            raise OutputError(f"cannot write to {self._folder}: {cause.strerror}") from cause
         source = self._session.source
-        path = self._folder / f"{name}.mcap"
+        path = output_path(self._folder, name, ".mcap")
         return Recorder(path, source.sensors, metadata=dict(source.metadata))
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from holdfast.devices.sources import Arrival
 from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
+from holdfast.model import Model
 
 Work = Callable[[], None]
 MAX_LATENCIES = 8192
@@ -218,7 +219,7 @@ class Session:
             StreamError: a finger is in contact, or the session is locked.
             SourceError: the source has ended or is silent.
         """
-        self._check_lock()
+        self.check_lock()
         if self.ended:
             raise SourceError("the source has ended: no tare can be taken")
         self._request(self._restart_tare, "no tare can be taken")
@@ -234,13 +235,32 @@ class Session:
             SourceError: the source has ended or is silent.
             ValueError: the threshold is not from 0 to 1.
         """
-        self._check_lock()
+        self.check_lock()
         consequence = "the threshold was not changed"
         if self.ended:
             raise SourceError(f"the source has ended: {consequence}")
         self._request(lambda: self.stream.set_threshold(threshold), consequence)
 
-    def _check_lock(self) -> None:
+    def set_model(self, model: Model) -> None:
+        """Change the model to one of the same features; states continue.
+
+        Raises:
+            StreamError: the session is locked.
+            SourceError: the source has ended or is silent.
+            ModelError: the model has other features or another debouncing.
+        """
+        self.check_lock()
+        consequence = "the model was not changed"
+        if self.ended:
+            raise SourceError(f"the source has ended: {consequence}")
+        self._request(lambda: self.stream.set_model(model), consequence)
+
+    def check_lock(self) -> None:
+        """Check that tare, thresholds and model may be changed.
+
+        Raises:
+            StreamError: they may not, and why.
+        """
         if self.lock:
             raise StreamError(self.lock)
 

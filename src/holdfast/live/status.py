@@ -8,9 +8,11 @@ import numpy as np
 
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.detector.slips import SlipWatch
+from holdfast.errors import ModelError
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
+from holdfast.live.handling import SessionCalibration
 from holdfast.live.loop.live_grip import LiveGrip
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
@@ -18,6 +20,7 @@ from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor
+from holdfast.training.calibration import check_normalised
 
 MAX_BUFFERED_UPDATES = 4096
 """Maximum number of updates between two documents; older ones are dropped."""
@@ -37,6 +40,7 @@ class StatusPublisher:
         session: to publish.
         report: called with the text of each notice about a fault or by the service.
         grip: the grip loop; None if no hand is controlled.
+        calibration: of the session; None where it is not possible.
     """
 
     def __init__(
@@ -44,9 +48,12 @@ class StatusPublisher:
         session: Session,
         report: Callable[[str], None] = lambda _: None,
         grip: LiveGrip | None = None,
+        calibration: SessionCalibration | None = None,
     ) -> None:
         self._session = session
         self._grip = grip
+        self._calibration = calibration
+        self._told = ""
         self._report = report
         self._faults = FaultWatch()
         self._slips = SlipWatch()
@@ -67,6 +74,7 @@ class StatusPublisher:
 
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
+        self._watch_calibration()
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
         estimates = [estimate for _, update in updates for estimate in update.estimates]
         self._watch_faults(estimates)
@@ -95,6 +103,7 @@ class StatusPublisher:
             ],
             thresholds=dict(self._session.stream.thresholds),
             grip=None if self._grip is None else self._grip.document(),
+            calibration=None if self._calibration is None else self._calibration.document(),
             slips=[
                 schema.SlipDocument(*slip)
                 for estimate, updated in estimates
@@ -102,6 +111,13 @@ class StatusPublisher:
                 for slip in self._slips.update(name, [estimate.fingers[name]])
             ],
         )
+
+    def _watch_calibration(self) -> None:
+        """Add a notice when a calibration has a result."""
+        text = "" if self._calibration is None else self._calibration.text
+        if text and text != self._told:
+            self.add_notice(text)
+        self._told = text
 
     def _watch_faults(self, estimates: list[StreamEstimate]) -> None:
         for estimate, _ in estimates:
@@ -137,11 +153,10 @@ class StatusPublisher:
         return (after - before) / (end - begin) if end > begin else np.nan
 
 
-def hello_document(
-    model: Model, session: Session, started: float, can_record: bool
-) -> schema.HelloDocument:
+def hello_document(session: Session, started: float, can_record: bool) -> schema.HelloDocument:
     """Return the first document of a connection."""
     source, stream = session.source, session.stream
+    model = stream.model
     return schema.HelloDocument(
         model=model.name or "a model without a name",
         source=source.name,
@@ -160,7 +175,18 @@ def hello_document(
             hold=model.debounce.hold,
         ),
         operating_points=operating_points(model),
+        not_calibratable=not_calibratable(model),
+        advice=[advice] if (advice := model.handling_advice(stream.fingers)) else [],
     )
+
+
+def not_calibratable(model: Model) -> str:
+    """Return why own handling cannot calibrate a model; empty if it can."""
+    try:
+        check_normalised(model)
+    except ModelError as refusal:
+        return str(refusal)
+    return ""
 
 
 def operating_points(model: Model) -> list[schema.OperatingPoint]:

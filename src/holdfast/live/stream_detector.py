@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -165,6 +165,29 @@ class StreamDetector:
             ValueError: the threshold is not from 0 to 1.
         """
         self._detector.set_threshold(threshold)
+
+    @property
+    def model(self) -> Model:
+        """The model that decides now."""
+        return self._detector.model
+
+    def set_model(self, model: Model) -> None:
+        """Change the model to one of the same features, such as the model with own handling.
+
+        States and filters continue: nothing warms up again. The thresholds are those of the model.
+
+        Raises:
+            ModelError: it has other features or another debouncing; nothing has changed then.
+        """
+        self._detector.set_model(model)
+
+    def start_metadata(self) -> dict[str, Any]:
+        """Return the metadata of a recording that begins now, which has the zero of this stream."""
+        return self._detector.start_metadata()
+
+    def without_ignored(self, name: str, readings: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return (n, n_taxels, 3) readings of a finger, 0 in the taxels that are ignored."""
+        return self._detector.without_ignored(name, readings)
 
     def read(self) -> StreamUpdate:
         """Read the source once, and process what arrived.

@@ -1,7 +1,7 @@
 """The model of a hand: features, classifiers and decision rule."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from hashlib import sha256
 from importlib import resources
@@ -163,15 +163,44 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def handled_sensors(self) -> tuple[str, ...]:
-        """Names of the sensors whose own handling the model has."""
-        names = (name for part in self.fingers.values() for name in part.own_handling)
+        """Sensors whose own handling the model has; with the finger, unless it is for any."""
+        names = (
+            _sensor_of(finger, name)
+            for finger, part in self.fingers.items()
+            for name in part.own_handling
+        )
         return tuple(dict.fromkeys(names))
 
-    def without_handling(self, sensors: Iterable[Sensor]) -> list[str]:
-        """Return the names of those sensors that lack own handling, while the model has others."""
+    def without_handling(self, sensors: Mapping[str, Sensor]) -> list[str]:
+        """Return the sensors that lack own handling, as `handled_sensors`, while others have it.
+
+        Args:
+            sensors: sensor of each finger on which the model is used.
+        """
         known = self.handled_sensors
-        names = dict.fromkeys(sensor.name for sensor in sensors)
+        any_finger = ANY_FINGER in self.fingers
+        names = dict.fromkeys(
+            _sensor_of(ANY_FINGER if any_finger else finger, sensor.name)
+            for finger, sensor in sensors.items()
+        )
         return [name for name in names if known and name not in known]
+
+    def handling_advice(self, sensors: Mapping[str, Sensor]) -> str:
+        """Return that default handling is used on some sensors, while others have their own.
+
+        Args:
+            sensors: sensor of each finger on which the model is used.
+
+        Returns:
+            A sentence for the user; empty if there is nothing to say.
+        """
+        missing = self.without_handling(sensors)
+        if not missing:
+            return ""
+        return (
+            f"{self.name or 'the model'} was calibrated on {', '.join(self.handled_sensors)}, not "
+            f"on {', '.join(missing)}: default handling is used (holdfast calibrate)"
+        )
 
     def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
         """Return the fingers that the model estimates on a hand, and their sensors.
@@ -287,6 +316,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"{name}: the taxels of {sensor.name} have other rotations than those of the "
                 "training"
             )
+
+
+def _sensor_of(finger: str, sensor_name: str) -> str:
+    """Return the name of a sensor, with its finger unless the model is for any."""
+    return sensor_name if finger == ANY_FINGER else f"{finger} ({sensor_name})"
 
 
 def _other_sensor(text: str) -> ModelError:

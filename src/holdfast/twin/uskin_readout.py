@@ -56,10 +56,15 @@ class UskinParameters:
             last reading of each. With 0 they are all read when the packet is sent.
         scan_line: number of taxels that share a line and are read in turn; lines are read at the
             same time.
+        slow_share: share of the noise's variance that changes slowly, from 0 to 1.
+        slow_time: correlation time of that part [s].
+        walk: random walk of a reading, rms in a second, in multiples of the noise.
+        step: step of the readings [count]; they are multiples of it.
+        still_share: share of taxels that are read without noise.
 
     Raises:
         ValueError: a parameter has another number of values, is not finite or is negative; a
-            limit, scale or time is 0; the lag shares add up to more than 1; or a number of
+            limit, scale, time or step is 0; shares add up to more than 1; or a number of
             readings or taxels is no integer.
     """
 
@@ -82,6 +87,11 @@ class UskinParameters:
     n_averaged: int = 1
     scan_time: float = 0.0
     scan_line: int = 8
+    slow_share: float = 0.0
+    slow_time: float = 0.06
+    walk: float = 0.0
+    step: int = 1
+    still_share: float = 0.0
 
     def __post_init__(self) -> None:
         for part in fields(self):
@@ -95,9 +105,12 @@ class UskinParameters:
                 raise ValueError(f"{part.name}: finite, not negative expected, {values} given")
             if positive and not (values > 0).all():
                 raise ValueError(f"{part.name}: above 0 expected, {values} given")
-        for number in (self.n_averaged, self.scan_line):
-            if number != int(number):
-                raise ValueError(f"n_averaged and scan_line: integers expected, {number} given")
+        for name in ("n_averaged", "scan_line", "step"):
+            if (number := getattr(self, name)) != int(number):
+                raise ValueError(f"{name}: an integer expected, {number} given")
+        for name in ("slow_share", "still_share"):
+            if (share := getattr(self, name)) > 1:
+                raise ValueError(f"{name}: at most 1 expected, {share} given")
         if sum(self.lag_shares) > 1:
             raise ValueError(f"lag_shares: at most 1 in sum expected, {self.lag_shares} given")
 
@@ -122,6 +135,8 @@ _ABOVE_ZERO = (
     "thermal_time",
     "n_averaged",
     "scan_line",
+    "slow_time",
+    "step",
 )
 
 
@@ -139,11 +154,13 @@ class Taxels(NamedTuple):
         mixing: (n_taxels, 3, 3) gain and cross-talk, from a force to a reading by axis.
         baseline: (n_taxels, 3) reading at rest [count].
         thermal: (n_taxels, 3) drift of the baseline [count/K].
+        noise: (n_taxels,) factor on the noise.
     """
 
     mixing: Array
     baseline: Array
     thermal: Array
+    noise: Array
 
 
 class _Constants(NamedTuple):
@@ -160,6 +177,7 @@ class _Constants(NamedTuple):
         n_averaged: number of readings that are averaged.
         scan: time in which the taxels of a line are read [s]; 0: all with the packet.
         line: number of taxels on a line.
+        step: of the readings [count].
         spread: standard deviation of the rate of warming [K/s].
         thermal_time: its correlation time [s].
     """
@@ -174,6 +192,7 @@ class _Constants(NamedTuple):
     n_averaged: int
     scan: float
     line: int
+    step: float
     spread: float
     thermal_time: float
 
@@ -190,6 +209,7 @@ class _State(NamedTuple):
         readings: (n_averaged, n_taxels, 3) last readings of each taxel [count].
         n_read: (n_taxels,) number of readings so far.
         shown: (n_taxels, 3) counts of the last sample.
+        colour: (2, 3 n_taxels) slow part and random walk of the noise, in multiples of the noise.
     """
 
     force: Array
@@ -199,6 +219,7 @@ class _State(NamedTuple):
     readings: Array
     n_read: Integers
     shown: Counts
+    colour: Array
 
 
 _TIME, _RATE, _WARMTH = range(3)
@@ -210,8 +231,10 @@ class Readout:
     def __init__(
         self, parameters: UskinParameters, taxels: Taxels, generator: np.random.Generator
     ) -> None:
+        self._parameters = parameters
         self._constants = _constants(parameters, taxels)
         self._generator = generator
+        self._colour_generator = generator.spawn(1)[0]
         shape = taxels.baseline.shape
         self._state = _State(
             force=np.zeros(shape),
@@ -221,6 +244,7 @@ class Readout:
             readings=np.zeros((int(parameters.n_averaged), *shape)),
             n_read=np.zeros(len(taxels.baseline), dtype=np.int64),
             shown=np.zeros(shape, dtype=np.uint16),
+            colour=np.zeros((2, len(taxels.baseline) * 3)),
         )
 
     @property
@@ -234,8 +258,20 @@ class Readout:
         counts = np.empty(forces.shape, dtype=np.uint16)
         if len(clock):
             drawn = self._generator.standard_normal((len(clock), 1 + self._state.force.size))
+            if self._parameters.slow_share or self._parameters.walk:
+                self._colour(clock, drawn)
             _read_out(forces, clock, drawn, self._constants, self._state, counts)
         return counts
+
+    def _colour(self, clock: Array, drawn: Array) -> None:
+        """Colour the noise, with random numbers of its own."""
+        parameters = self._parameters
+        shape = (len(clock), *self._state.colour.shape)
+        fresh = self._colour_generator.standard_normal(shape)
+        _write_coloured(
+            clock, self._state.numbers[_TIME], parameters.slow_share, parameters.slow_time,
+            parameters.walk, 1 / math.sqrt(parameters.n_averaged), fresh, self._state.colour, drawn,
+        )  # fmt: skip
 
     def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
         forces = np.ascontiguousarray(taxel_forces, dtype=np.float64)
@@ -266,6 +302,7 @@ def _constants(parameters: UskinParameters, taxels: Taxels) -> _Constants:
         int(parameters.n_averaged),
         parameters.scan_time,
         int(parameters.scan_line),
+        float(parameters.step),
         parameters.warming_rate,
         parameters.thermal_time,
     )
@@ -328,6 +365,47 @@ def _read_out(
 
 
 @compiled
+def _write_coloured(
+    times: Array,
+    last: float,
+    share: float,
+    tau: float,
+    walk: float,
+    scale: float,
+    fresh: Array,
+    colour: Array,
+    drawn: Array,
+) -> None:
+    """Write coloured noise over white noise: white, a slow part, and a random walk.
+
+    The slow part is an Ornstein-Uhlenbeck process, which begins with its stationary variance:
+    y <- e y + sqrt(1 - e^2) n, with e = exp(-h / tau) over a step h. The walk begins at 0.
+
+    Args:
+        times: (n,) times [s].
+        last: time before them [s]; NaN at the start.
+        share: of the variance that is slow.
+        tau: correlation time of the slow part [s].
+        walk: rms of the random walk in a second.
+        scale: factor on the slow part and the walk: averaging lowers only white noise.
+        fresh: (n, 2, m) normal random numbers.
+        colour: (2, m) state; it is written.
+        drawn: (n, 1 + m) is written from its second column on.
+    """
+    for k in range(len(times)):
+        step = np.inf if np.isnan(last) else times[k] - last
+        keep = np.exp(-step / tau)
+        kick = np.sqrt(1 - keep * keep)
+        wander = 0.0 if np.isnan(last) else walk * np.sqrt(step)
+        for i in range(colour.shape[1]):
+            colour[0, i] = keep * colour[0, i] + kick * fresh[k, 0, i]
+            colour[1, i] += wander * fresh[k, 1, i]
+            slow = np.sqrt(share) * colour[0, i] + colour[1, i]
+            drawn[k, 1 + i] = np.sqrt(1 - share) * drawn[k, 1 + i] + scale * slow
+        last = times[k]
+
+
+@compiled
 def _rest(forces: Array, state: _State) -> None:
     """Set the state of a silicone at rest under forces."""
     for i in range(forces.shape[0]):
@@ -383,7 +461,7 @@ def _write_counts(
     for i in range(n_taxels):
         for axis in range(n_axes):
             value = _reading(constants, forces, i, axis, warmth, drawn[i * n_axes + axis])
-            out[i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)
+            out[i, axis] = _whole(value, constants.step)
 
 
 @compiled
@@ -411,7 +489,7 @@ def _write_last_counts(
                 reading = _reading(constants, state.passed, i, axis, warmth, random)
                 state.readings[place, i, axis] = reading
                 mean = state.readings[:n_known, i, axis].sum() / n_known
-                state.shown[i, axis] = min(max(np.rint(mean), 0.0), UINT16_MAX)
+                state.shown[i, axis] = _whole(mean, constants.step)
         for axis in range(n_axes):
             out[i, axis] = state.shown[i, axis]
             state.passed[i, axis] = forces[i, axis]
@@ -434,6 +512,13 @@ def _share_of_step(constants: _Constants, i: int, time: float, state: _State) ->
 
 
 @compiled_inside
+def _whole(value: float, step: float) -> float:
+    """Return a reading as a multiple of a step, between 0 and the largest number [count]."""
+    whole: float = min(max(np.rint(value / step) * step, 0.0), UINT16_MAX)
+    return whole
+
+
+@compiled_inside
 def _reading(
     constants: _Constants, forces: Array, i: int, axis: int, warmth: float, random: float
 ) -> float:
@@ -444,5 +529,5 @@ def _reading(
         newtons += taxels.mixing[i, axis, other] * forces[i, other]
     value: float = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
     value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
-    value += constants.noise[axis] * random
+    value += constants.noise[axis] * taxels.noise[i] * random
     return value

@@ -165,11 +165,67 @@ class TestStability:
         assert first.reason is second.reason is GripReason.UNSTABLE
 
     def test_a_finger_that_is_unstable_alone_must_be_so_for_some_time(self):
-        one, other = touch(probability=0.1), touch(name="middle")
-        law = started("holdfast", [one, other])
-        scales = [wanted(law, [one, other], k * DT, DT)[0].scale for k in range(20)]
+        touches = [touch(probability=0.1), *(touch(name=name) for name in ("a", "b", "c"))]
+        law = started("holdfast", touches)
+        scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(20)]
         first = next(k for k, scale in enumerate(scales) if scale > 1.0)
         assert first * DT == pytest.approx(law.alone_time, abs=2 * DT)
+
+    def test_fingers_with_much_of_the_load_start_a_reaction_at_once(self):
+        thumb, other = touch(name="thumb", probability=0.1), touch()
+        law = started("holdfast", [thumb, other])
+        assert wanted(law, [thumb, other], 0.0, DT)[0].scale > 1.0
+
+    def test_a_slip_starts_a_reaction_whatever_the_stability(self):
+        one = touch(probability=0.9)
+        one.slides, one.slip_probability = True, 0.2
+        (wish,) = wanted(started("holdfast", [one]), [one], 0.0, DT)
+        assert wish.scale > 1.0 and wish.reason is GripReason.UNSTABLE
+        one.slides = False
+        (wish,) = wanted(started("holdfast", [one]), [one], 0.0, DT)
+        assert wish.scale == 1.0
+
+    def test_a_more_probable_slip_gives_a_larger_step(self):
+        def step(probability):
+            one = touch(probability=0.9)
+            one.slides, one.slip_probability = True, probability
+            return wanted(started("holdfast", [one]), [one], 0.0, DT)[0].scale
+
+        assert step(0.2) < step(0.6) < step(1.0)
+
+    def test_all_fingers_that_are_a_little_restless_start_a_reaction_together(self):
+        """Where friction falls, all contacts slide smoothly: no finger alone is unstable."""
+        names = ("thumb", "index", "middle")
+
+        def last_scale(tangential, probabilities):
+            touches = [touch(name=name, probability=0.9) for name in names]
+            law = started("holdfast", touches)
+            for one, probability in zip(touches, probabilities, strict=True):
+                one.tangential, one.probability = tangential, probability
+            return [wanted(law, touches, k * DT, DT)[0].scale for k in range(9)][-1]
+
+        assert last_scale(0.5, [0.6] * 3) > 1.3
+        assert last_scale(0.6, [0.6] * 3) == 1.0, "it carries what it carried before"
+        assert last_scale(0.5, [0.9, 0.6, 0.6]) == 1.0, "a third of the load is calm"
+
+    def test_after_a_slip_the_floor_follows_the_load(self):
+        """At the friction that the slip has shown, half of the load needs half of the force."""
+        one = touch(normal=2.0, tangential=1.0)
+        one.slides, one.slip_probability = True, 0.9
+        law = started("holdfast", [one])
+        (wish,) = wanted(law, [one], 0.0, DT)
+        one.scale, one.slides, one.slip_probability = wish.scale, False, 0.0
+        one.normal = 2.0 * one.scale
+
+        def settled(seconds, start):
+            for k in range(round(seconds / DT)):
+                one.scale = min(one.scale, wanted(law, [one], start + k * DT, DT)[0].scale)
+                one.normal = 2.0 * one.scale
+            return one.scale
+
+        assert settled(2.0, DT) == pytest.approx(1.15, rel=0.15)
+        one.tangential = 0.3
+        assert settled(2.0, 2.0 + DT) == 1.0
 
     def test_a_finger_that_carries_nothing_starts_no_reaction(self):
         one, idle = touch(), touch(name="middle", normal=0.01, probability=0.0)

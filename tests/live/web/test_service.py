@@ -41,7 +41,7 @@ async def served(
     model = model or build.model()
     session = Session(StreamDetector(model, source))
     report = [].append if reports is None else reports.append
-    service = LiveService(session, model, Guard(host, token), folder, report, grip)
+    service = LiveService(session, Guard(host, token), folder, report, grip)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()

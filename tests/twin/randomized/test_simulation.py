@@ -8,6 +8,7 @@ from holdfast.twin.randomized import simulation
 from holdfast.twin.randomized.drawing import (
     MEASURED,
     SENSOR_KINDS,
+    StreamEffects,
     draw_object,
     draw_sensor,
     with_measured,
@@ -114,13 +115,87 @@ def test_each_mechanism_is_drawn_the_same_with_and_without_the_others(kind):
             with_measured(plain, kind, names, np.random.default_rng(seed)).parameters
             for names in [(), *((name,) for name in MEASURED), MEASURED]
         ]
-        none, scan, filtered, noise, vibration, together = drawn
-        assert none == vibration == plain.parameters
+        none, scan, filtered, noise, vibration, colour, steps, updates, *rest, together = drawn
+        assert none == vibration == updates == plain.parameters
+        assert all(parameters == none for parameters in rest)
+        slow = [(x.slow_share, x.slow_time, x.walk) for x in (colour, together)]
+        assert slow[0] == slow[1]
+        assert steps.still_share == together.still_share
+        assert 1 <= steps.step <= together.step
         assert (scan.scan_time, scan.scan_line) == (together.scan_time, together.scan_line)
         assert filtered.n_averaged == together.n_averaged
         assert noise.noise_counts == together.noise_counts >= plain.parameters.noise_counts
         assert noise.noise_by_axis == together.noise_by_axis
         assert (scan.scan_time > 0) == (kind != "papillarray")
+
+
+def test_streams_of_sensors_are_drawn_the_same_with_and_without_the_other_mechanisms():
+    plain = draw_sensor(np.random.default_rng(1), "anyskin")
+    streams = [
+        tuple(
+            with_measured(plain, "anyskin", names, np.random.default_rng(seed)).stream
+            for names in (("noise",), ("updates",), ("stamps",), MEASURED)
+        )
+        for seed in range(40)
+    ]
+    for none, updates, stamps, together in streams:
+        assert none == StreamEffects()
+        assert (updates.rows_per_update, updates.update_phase) == (
+            together.rows_per_update,
+            together.update_phase,
+        )
+        assert (stamps.jitter, stamps.gap_rate) == (together.jitter, together.gap_rate)
+        assert stamps.rows_per_update == 1.0
+        assert not updates.jitter
+    assert 2 <= sum(together.rows_per_update > 1 for *_, together in streams) <= 16
+    assert 14 <= sum(together.jitter > 0 for *_, together in streams) <= 34
+
+
+def hand_with(wanted, measured, numbers=range(40)):
+    """Return the number of the first hand whose sensor or carrier is as wanted."""
+    for number in numbers:
+        hold = RandomHold(number, seed=3, measured=measured)
+        kind = str(hold.generator("hand").choice(SENSOR_KINDS))
+        drawn = draw_sensor(hold.generator("sensor"), kind)
+        drawn = with_measured(drawn, kind, measured, hold.generator("measured"))
+        if wanted(drawn.stream, simulation._carrier(hold)):
+            return number
+    raise AssertionError("no such hand")
+
+
+def test_updates_and_gaps_leave_the_rest_of_a_hand_as_it_is():
+    """Rows are repeated or lost; those that remain are those of the hand without."""
+    measured = ("updates", "stamps")
+    number = hand_with(lambda s, _: s.rows_per_update > 1 and s.jitter > 0, measured)
+    plain = simulate_random(RandomHold(number, seed=3))
+    changed = simulate_random(RandomHold(number, seed=3, measured=measured))
+    assert plain.metadata.get("starts_loaded") == changed.metadata.get("starts_loaded")
+    for name, array in plain.truth.hand.items():
+        np.testing.assert_array_equal(changed.truth.hand[name], array)
+    for name, module in plain.modules.items():
+        other = changed.modules[name]
+        rows = {row.tobytes() for row in module.readings[:-1]}
+        known = np.mean([row.tobytes() in rows for row in other.readings[2:-1]])
+        assert known > 0.98
+        repeated = (np.diff(other.readings, axis=0) == 0).all(axis=(1, 2)).mean()
+        assert repeated > (np.diff(module.readings, axis=0) == 0).all(axis=(1, 2)).mean() + 0.1
+        assert (np.diff(other.times) > 0).all()
+        assert np.diff(other.times).std() > 0.05 * module.period
+
+
+@pytest.mark.parametrize("carrier", ["carry", "person"])
+def test_a_carried_hand_moves_all_the_time(carrier):
+    number = hand_with(lambda _, drawn: drawn == carrier, (carrier,))
+    plain = simulate_random(RandomHold(number, seed=3))
+    carried = simulate_random(RandomHold(number, seed=3, measured=(carrier,)))
+    assert carried.metadata["carrier"] == carrier
+    assert "carrier" not in plain.metadata
+    assert plain.metadata["object_mass"] == carried.metadata["object_mass"]
+    n = min(len(plain.truth.times), len(carried.truth.times))
+    change = carried.truth.hand["gravity"][:n] - plain.truth.hand["gravity"][:n]
+    assert np.abs(change).max() > 0.05
+    simulated_again = simulate_random(RandomHold(number, seed=3, measured=(carrier,)))
+    assert simulated_again.digest == carried.digest
 
 
 def test_an_unknown_mechanism_is_refused():

@@ -156,7 +156,7 @@ def _detect_recording(
             report_missing_fingers(model, part.name, part.modules)
             report_missing_slip_rules(model)
             used = model.fingers_of(sensors)
-            report_other_handling(model, used.values())
+            report_other_handling(model, used)
             report_blind_features(model, used)
             loaded = begins_in_contact(part.metadata, options.in_contact or None)
             readings = ReadingsMonitor(used, finds_pull=not loaded)

@@ -26,6 +26,9 @@ class Touch:
         touching: whether the finger is in contact.
         probability: probability that the contact is stable, of this sample, not debounced.
         cause: cause of the instability, where the model names one.
+        slides: whether the slip rule of the model decides that the finger slides; False without
+            such a rule.
+        slip_probability: probability that the finger slides; 0 without a slip rule.
         instability: sigma, in the unit of the readings times the mean factor.
         force: (F_x, F_y, F_z) in the fingertip frame [N with a calibration, else the readings'].
         normal: force along the normal of the skin, at least 0 [as `force`].
@@ -45,6 +48,8 @@ class Touch:
         "normal",
         "probability",
         "scale",
+        "slides",
+        "slip_probability",
         "start_normal",
         "tangential",
         "touching",
@@ -58,6 +63,7 @@ class Touch:
         self.known = self.touching = False
         self.probability = self.instability = math.nan
         self.cause: Cause | None = None
+        self.slides, self.slip_probability = False, 0.0
         self.force = (0.0, 0.0, 0.0)
         self.normal = self.tangential = 0.0
         self.start_normal = 0.0
@@ -76,11 +82,14 @@ class Touch:
         self.touching = estimate.state is not _NO_CONTACT
         self.probability = probability = estimate.stable_probability
         self.cause = estimate.cause
+        slip = estimate.slip_probability
+        self.slides = slip is not None and estimate.cause is Cause.SLIP
+        self.slip_probability = 0.0 if slip is None else slip
         self.instability = estimate.instability * (a + b + c) / 3
         self.force = (x, y, z)
         self.normal = along if along > 0.0 else 0.0
         self.tangential = math.sqrt(across) if across > 0.0 else 0.0
-        return square < math.inf and abs(probability) < math.inf
+        return square < math.inf and abs(probability) < math.inf and abs(slip or 0.0) <= 1.0
 
     def start(self) -> None:
         """Take the present force as that of the start of the grip."""

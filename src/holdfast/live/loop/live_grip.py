@@ -21,8 +21,8 @@ from holdfast.live.session import Session
 N_ENTRIES = 20
 """Number of newest events that are kept."""
 LOCK = (
-    "the hand is armed: the tare and the thresholds are locked; start again without --armed to "
-    "change them"
+    "the hand is armed: the tare, the thresholds and the model are locked; start again without "
+    "--armed to change them"
 )
 """Reason of the lock of a session whose estimates move a hand."""
 

@@ -82,6 +82,8 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
         faults: texts about every fault.
         debounce: of the model.
         operating_points: by increasing threshold; empty if the model has none.
+        not_calibratable: why own handling cannot calibrate the model; empty if it can.
+        advice: about the model on these fingers, such as own handling of another sensor.
     """
 
     model: str
@@ -94,6 +96,8 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
     faults: dict[Fault, FaultInfo] = {}
     debounce: DebounceInfo | None = None
     operating_points: list[OperatingPoint] = []
+    not_calibratable: str = ""
+    advice: list[str] = []
     schema: Literal["holdfast.live/1"] = "holdfast.live/1"
 
 
@@ -207,6 +211,35 @@ class RecordingInfo(Struct, frozen=True, kw_only=True, gc=False):
     n_dropped: int
 
 
+CalibrationState = Literal["idle", "recording", "fitting"]
+
+
+class CalibrationDocument(Struct, frozen=True, kw_only=True, gc=False):
+    """Progress and result of a calibration by own handling.
+
+    Attributes:
+        state: of the calibration; recording while the user handles objects.
+        seconds: held time so far, of the finger that holds longest [s].
+        least: held time from which it may be ended [s].
+        enough: held time from which that gives no warning [s].
+        most: held time at which it ends by itself [s].
+        calibrated: whether the running model has been calibrated, and that can be undone.
+        refused: whether the text is a refusal; the model is then as before.
+        text: what the last calibration saw and changed, or why it was refused.
+        warnings: of the last calibration.
+    """
+
+    state: CalibrationState
+    seconds: float
+    least: float
+    enough: float
+    most: float
+    calibrated: bool
+    refused: bool
+    text: str
+    warnings: list[str]
+
+
 class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="live"):
     """Current state, and everything since the previous document.
 
@@ -224,6 +257,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
         thresholds: probability from which each finger is stable now.
         grip: the grip loop; null if no hand is controlled.
         slips: that began or ended since the previous document.
+        calibration: by own handling; null where it is not possible.
     """
 
     time: Number
@@ -239,6 +273,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
     thresholds: dict[str, float] = {}
     grip: GripDocument | None = None
     slips: list[SlipDocument] = []
+    calibration: CalibrationDocument | None = None
 
 
 class EstimateDocument(

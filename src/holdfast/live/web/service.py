@@ -15,13 +15,13 @@ from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
 from holdfast.live.documents import finger_document
+from holdfast.live.handling import SessionCalibration
 from holdfast.live.loop.live_grip import LiveGrip
 from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
 from holdfast.live.status import StatusPublisher, hello_document, recording_info
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
-from holdfast.model import Model
 from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard
 
@@ -87,7 +87,6 @@ class LiveService:
 
     Args:
         session: to publish; the service neither starts nor stops it.
-        model: of the session.
         guard: check of every request.
         folder: for recordings; None if the service may not record.
         report: called with the text of each notice about a fault or by the service.
@@ -100,16 +99,15 @@ class LiveService:
     def __init__(
         self,
         session: Session,
-        model: Model,
         guard: Guard,
         folder: Path | None = None,
         report: Callable[[str], None] = lambda _: None,
         grip: LiveGrip | None = None,
     ) -> None:
         self._session = session
-        self._model = model
         self._recorder = SessionRecorder(session, folder)
-        self._status = StatusPublisher(session, report, grip)
+        self._calibration = SessionCalibration(session, folder)
+        self._status = StatusPublisher(session, report, grip, self._calibration)
         self._grip = grip
         if grip is not None:
             grip.add_listener(self._mark)
@@ -137,6 +135,7 @@ class LiveService:
             web.post("/api/v1/recording", self._post_recording),
             web.delete("/api/v1/recording", self._delete_recording),
             web.post("/api/v1/markers", self._post_marker),
+            *CalibrationRoutes(self._calibration, self._bodies).routes(),
             *GripRoutes(self._grip, self._status.add_notice).routes(),
         ]
 
@@ -220,7 +219,7 @@ class LiveService:
         return socket
 
     def _hello(self) -> schema.HelloDocument:
-        return hello_document(self._model, self._session, self._started, self._recorder.enabled)
+        return hello_document(self._session, self._started, self._recorder.enabled)
 
     async def _get_info(self, _: web.Request) -> web.Response:
         return _json(self._hello())
@@ -245,7 +244,7 @@ class LiveService:
         return answer
 
     async def _post_recording(self, request: web.Request) -> web.Response:
-        name = (await self._bodies.read(request, _RecordingRequest)).name
+        name = (await self._bodies.read(request, _FileRequest)).name
         return await _answer(lambda: self._start_recording(name))
 
     def _start_recording(self, name: str) -> dict[str, str]:
@@ -268,7 +267,7 @@ class _ThresholdRequest(msgspec.Struct, forbid_unknown_fields=True):
     value: Annotated[float, msgspec.Meta(ge=0, le=1)]
 
 
-class _RecordingRequest(msgspec.Struct, forbid_unknown_fields=True):
+class _FileRequest(msgspec.Struct, forbid_unknown_fields=True):
     name: str = ""
 
 
@@ -297,6 +296,59 @@ async def _get_schema(_: web.Request) -> web.Response:
     documents = (schema.HelloDocument, schema.LiveDocument, schema.EstimateDocument)
     schemas, components = msgspec.json.schema_components(documents)
     return _json({"anyOf": schemas, "$defs": components})
+
+
+class CalibrationRoutes:
+    """Routes of the calibration by own handling.
+
+    Args:
+        calibration: of the session.
+        bodies: reader of the bodies of requests.
+    """
+
+    def __init__(self, calibration: SessionCalibration, bodies: BodyReader) -> None:
+        self._calibration = calibration
+        self._bodies = bodies
+
+    def routes(self) -> list[web.AbstractRouteDef]:
+        """Return the routes."""
+        return [
+            web.get("/api/v1/calibration", self._get),
+            web.post("/api/v1/calibration", self._post),
+            web.delete("/api/v1/calibration", self._delete),
+            web.post("/api/v1/calibration/finish", self._post_finish),
+            web.get("/api/v1/calibration/model", self._get_model),
+            web.post("/api/v1/calibration/model", self._post_model),
+        ]
+
+    async def _get(self, _: web.Request) -> web.Response:
+        return _json(self._calibration.document())
+
+    async def _post(self, _: web.Request) -> web.Response:
+        return await self._change(self._calibration.start)
+
+    async def _delete(self, _: web.Request) -> web.Response:
+        return await self._change(self._calibration.cancel)
+
+    async def _post_finish(self, _: web.Request) -> web.Response:
+        return await self._change(self._calibration.finish)
+
+    async def _get_model(self, _: web.Request) -> web.Response:
+        answer = await _answer(lambda: msgspec.Raw(self._calibration.encoded_model()))
+        if answer.status == HTTPStatus.OK:
+            answer.headers["Content-Disposition"] = 'attachment; filename="calibrated.json"'
+        return answer
+
+    async def _post_model(self, request: web.Request) -> web.Response:
+        name = (await self._bodies.read(request, _FileRequest)).name
+        return await _answer(lambda: {"path": str(self._calibration.save(name))})
+
+    async def _change(self, work: Callable[[], None]) -> web.Response:
+        def changed() -> schema.CalibrationDocument:
+            work()
+            return self._calibration.document()
+
+        return await _answer(changed)
 
 
 class GripRoutes:

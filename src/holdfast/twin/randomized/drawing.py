@@ -31,9 +31,33 @@ _SCANNED = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin", "grid-3x3")
 """Sensors of magnetometers, which are read in turn; pillars are read at once."""
 _WEAK = ("anyskin", "grid-3x3")
 """Single magnetometers, whose noise may be large beside what the skin moves them."""
-MEASURED = ("scan", "filter", "noise", "vibration")
+MEASURED = (
+    "scan", "filter", "noise", "vibration",
+    "colour", "steps", "updates", "stamps", "carry", "person",
+)  # fmt: skip
 """Mechanisms of `measured.toml`: taxels are read in turn; readings are averaged; the noise is that
-of real skins; the arm vibrates more while it moves."""
+of real skins; the arm vibrates more while it moves; noise is slow and wanders; readings have
+coarser steps, and some taxels no noise; rows repeat until the sensor updates; stamps are unsteady,
+with gaps; an arm carries the hand all the time; a person does."""
+
+
+@dataclass(frozen=True)
+class StreamEffects:
+    """What comes between a sensor and the rows of a recording.
+
+    Attributes:
+        rows_per_update: rows in which an update of the sensor is shown; 1: it updates each row.
+        update_phase: of the updates, from 0 to 1.
+        jitter: standard deviation of a stamp, in periods.
+        gap_rate: of gaps in which rows are lost [1/s].
+        gap: range of their length [s].
+    """
+
+    rows_per_update: float = 1.0
+    update_phase: float = 0.0
+    jitter: float = 0.0
+    gap_rate: float = 0.0
+    gap: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -43,11 +67,12 @@ class SensorDraw:
     Attributes:
         sensor: layout, rate and unit.
         parameters: of the readout.
-        drift: scale of thermal drift.
+        stream: what comes between the sensor and the rows of a recording.
     """
 
     sensor: Sensor
     parameters: UskinParameters
+    stream: StreamEffects = StreamEffects()
 
 
 @cache
@@ -116,7 +141,49 @@ def with_measured(
     if "noise" in mechanisms:
         noise = drawn.parameters.noise_counts * (weak if kind in _WEAK else 1.0)
         changes |= {"noise_by_axis": (1.0, 1.0, normal), "noise_counts": noise}
-    return replace(drawn, parameters=replace(drawn.parameters, **changes))
+    read = replace(drawn.parameters, **changes)
+    read = replace(read, **_colour(mechanisms, generator), **_steps(read, mechanisms, generator))
+    return replace(drawn, parameters=read, stream=_stream(mechanisms, generator))
+
+
+def _colour(mechanisms: Collection[str], generator: np.random.Generator) -> dict[str, Any]:
+    """Draw slow noise and drift."""
+    span = measured_ranges()["colour"]
+    is_slow = generator.random() < span["share"]
+    slow, walk = uniform(generator, span["slow"]), log_uniform(generator, span["walk"])
+    time = log_uniform(generator, span["time"])
+    if "colour" not in mechanisms:
+        return {}
+    return {"slow_share": slow if is_slow else 0.0, "slow_time": time, "walk": walk}
+
+
+def _steps(
+    parameters: UskinParameters, mechanisms: Collection[str], generator: np.random.Generator
+) -> dict[str, Any]:
+    """Draw the step of the readings, and the share of taxels without noise."""
+    span = measured_ranges()["steps"]
+    ratio = log_uniform(generator, span["ratio"])
+    has_still = generator.random() < span["still_sensors"]
+    if "steps" not in mechanisms:
+        return {}
+    step = max(1, round(parameters.noise_counts / ratio))
+    return {"step": step, "still_share": span["still_taxels"] if has_still else 0.0}
+
+
+def _stream(mechanisms: Collection[str], generator: np.random.Generator) -> StreamEffects:
+    """Draw what comes between a sensor and the rows of a recording."""
+    updates, stamps = measured_ranges()["updates"], measured_ranges()["stamps"]
+    is_slow = generator.random() < updates["share"]
+    rows, phase = log_uniform(generator, updates["rows"]), float(generator.random())
+    is_unsteady = generator.random() < stamps["share"]
+    jitter, gap_rate = (log_uniform(generator, stamps[name]) for name in ("jitter", "gap_rate"))
+    effects = StreamEffects()
+    if "updates" in mechanisms and is_slow:
+        effects = replace(effects, rows_per_update=rows, update_phase=phase)
+    if "stamps" in mechanisms and is_unsteady:
+        low, high = stamps["gap"]
+        effects = replace(effects, jitter=jitter, gap_rate=gap_rate, gap=(low, high))
+    return effects
 
 
 def draw_moving_vibration(generator: np.random.Generator) -> float:

@@ -104,6 +104,7 @@ def palm_motion(
     vibration: float,
     duration: float,
     moving_factor: float = 1.0,
+    carrier: Array | float = 0.0,
 ) -> PalmMotion:
     """Tabulate the motion of the palm.
 
@@ -114,6 +115,7 @@ def palm_motion(
         vibration: of the arm, rms of the acceleration [m/s^2].
         duration: of the table [s].
         moving_factor: on the vibration while the palm moves.
+        carrier: (n, 3) acceleration of what carries the hand, added to all else [m/s^2].
     """
     times = np.arange(int(duration * GRID_RATE) + 1) / GRID_RATE
     acceleration = _vibration(generator, times, vibration)
@@ -129,7 +131,7 @@ def palm_motion(
         else:
             along = _acceleration(segment, elapsed)
             acceleration[rows] += segment.direction * along[:, None]
-    gravity = _down(orientation, spin) * GRAVITY - acceleration
+    gravity = _down(orientation, spin) * GRAVITY - (acceleration + carrier)
     return PalmMotion(gravity, spin, turn)
 
 

@@ -10,11 +10,12 @@ import numpy.typing as npt
 from holdfast.contact import Phase
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Integers
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.operator import draw_tremor, hold_wrench
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.randomized.arms import carrying_legs, draw_carrier, person_acceleration
 from holdfast.twin.randomized.drawing import (
     MEASURED,
     SENSOR_KINDS,
@@ -25,15 +26,16 @@ from holdfast.twin.randomized.drawing import (
     draw_object,
     draw_sensor,
     draw_skin,
+    measured_ranges,
     random_rotation,
     ranges,
     with_measured,
 )
 from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
-from holdfast.twin.randomized.palm import log_uniform, palm_motion, uniform
+from holdfast.twin.randomized.palm import Segment, log_uniform, palm_motion, uniform
 from holdfast.twin.randomized.scenario import Scenario, draw_events
 from holdfast.twin.simulation import generator_of
-from holdfast.twin.uskin import Uskin, with_server_effects
+from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
 from holdfast.twin.world import TruthLog
 
 MAX_TRIES = 12
@@ -178,9 +180,12 @@ class _Run:
         segments = [event.segment for event in self.events if event.segment is not None]
         vibration = log_uniform(generator, span["arm"]["vibration"])
         orientation = random_rotation(generator)
+        duration = plan.profile.hold + 1.0
+        self.carrier = _carrier(hold)
+        legs, acceleration = _carried(hold, self.carrier, orientation, duration)
         self.palm = palm_motion(
-            generator, segments, orientation, vibration, plan.profile.hold + 1.0,
-            _moving_factor(hold, vibration),
+            generator, segments + legs, orientation, vibration, duration,
+            _moving_factor(hold, vibration), acceleration,
         )  # fmt: skip
         self.holder = _Holder(world, self.scenario, tremors[0], plan.profile.tremor)
         uskin = hold.hand.generator("skin")
@@ -273,10 +278,12 @@ class _Run:
         for finger, skin, pile in zip(fingers, self.skins, self._forces, strict=True):
             stamps: Array = times
             readings = _readings(skin, np.array(pile), times, generator)
+            readings = readings[_shown(self.drawn, times)]
             if server:
                 stamps, readings = with_server_effects(
                     times, readings, generator, jitter=0.1 * self.period
                 )
+            stamps, readings = _sent(self.hold, self.drawn, stamps, readings)
             labels = labels_from_truth(truth, finger, LabelRule(margin=0.0))
             modules[finger] = Tactile(skin.sensor, stamps, readings, skin.sensor.unit, labels)
         whole = Recording(self.hold.name, modules, self._metadata(), truth)
@@ -315,6 +322,7 @@ class _Run:
             "hand": f"random-{self.hold.number}",
             **({} if self.hold.grasp is None else {"grasp": self.hold.grasp}),
             **({"measured": list(self.hold.measured)} if self.hold.measured else {}),
+            **({"carrier": self.carrier} if self.carrier else {}),
             "source": "twin",
             "locked_at": self.protocol.locked_at,
             "lost_at": self.protocol.lost_at,
@@ -326,6 +334,47 @@ def _moving_factor(hold: RandomHold, vibration: float) -> float:
     if "vibration" not in hold.measured:
         return 1.0
     return max(1.0, draw_moving_vibration(hold.hand.generator("vibration")) / vibration)
+
+
+def _carrier(hold: RandomHold) -> str | None:
+    """Return what carries the hand all the time, of the mechanisms of the hold."""
+    drawn = draw_carrier(hold.hand.generator("carrier"), measured_ranges())
+    return drawn if drawn in hold.measured else None
+
+
+def _carried(
+    hold: RandomHold, carrier: str | None, orientation: Array, duration: float
+) -> tuple[list[Segment], Array | float]:
+    """Return motions of the arm, and an acceleration, by what carries the hand [m/s^2]."""
+    if carrier is None:
+        return [], 0.0
+    generator, span = hold.generator(carrier), measured_ranges()[carrier]
+    if carrier == "carry":
+        return carrying_legs(generator, span, orientation, duration), 0.0
+    return [], person_acceleration(generator, span, orientation, duration)
+
+
+def _shown(drawn: SensorDraw, times: Array) -> Integers:
+    """Return the sample that each row shows: the last update of the sensor."""
+    effects = drawn.stream
+    if effects.rows_per_update == 1.0:
+        return np.arange(len(times))
+    rate = drawn.sensor.rate / effects.rows_per_update
+    return last_updates(times, rate, effects.update_phase)
+
+
+def _sent(
+    hold: RandomHold, drawn: SensorDraw, times: Array, readings: npt.NDArray[Any]
+) -> tuple[Array, npt.NDArray[Any]]:
+    """Return stamps and readings with jitter and gaps, the same for all fingers of a hold."""
+    effects = drawn.stream
+    if not effects.jitter:
+        return times, readings
+    generator = hold.generator("stamps")
+    kept = kept_in_gaps(times, effects.gap_rate, effects.gap, generator)
+    jitter = effects.jitter / drawn.sensor.rate
+    stamps, _ = with_server_effects(times, times, generator, jitter, repeat_share=0.0)
+    return stamps[kept], readings[kept]
 
 
 class _Holder(OperatorForce):

@@ -119,6 +119,8 @@ class Tape:
         self.change = {}  # finger -> fields to write over its part of a message
         self.slip_threshold = None  # without a slip rule
         self.slips_now = []  # slips of the next message
+        self.model = "builtin:twin"
+        self.advice = []  # about the model on these fingers
 
     def hello(self):
         fingers = {
@@ -136,13 +138,13 @@ class Tape:
             for name, track in self.tracks.items()
         }
         return {
-            "schema": "holdfast.live/1", "type": "hello", "model": "builtin:twin",
+            "schema": "holdfast.live/1", "type": "hello", "model": self.model,
             "source": "twin:?object=can&seed=1", "fingers": fingers,
             "modules": {name: track.layout.n_taxels for name, track in self.tracks.items()},
             "rate": 150.0, "started": time.time(), "can_record": True,
             "faults": {fault: text._asdict() for fault, text in FAULT_TEXTS.items()},
             "debounce": {"min_duration": 0.0, "hysteresis": 0.0, "hold": 0.1},
-            "operating_points": self.points,
+            "operating_points": self.points, "not_calibratable": "", "advice": self.advice,
         }  # fmt: skip
 
     def message(self, start, stop):
@@ -250,6 +252,16 @@ def explained(grip):
     return grip | {"fault": msgspec.to_builtins(fault)}
 
 
+IDLE = {
+    "state": "idle", "seconds": 0.0, "least": 5.5, "enough": 30.0, "most": 60.0,
+    "calibrated": False, "refused": False, "text": "", "warnings": [],
+}  # fmt: skip
+SEEN = (
+    "uskin-curved: held 42 s; the arm moved (the force changed by 7 % within half a second). 14 of "
+    "31 features are scaled anew, and 96 % of this handling is STABLE, 41 % before."
+)
+
+
 class Service:
     """Fake service with its own port and thread."""
 
@@ -260,6 +272,7 @@ class Service:
         self.recording = None
         self.threshold = 0.5
         self.grip = None  # document of the grip loop
+        self.calibration = dict(IDLE)
         self.stop_fails = False  # drop the connection of a stop without an answer
         self.patch = {}  # fields that replace those of every message
         self.notices = []
@@ -311,6 +324,11 @@ class Service:
         app.router.add_post("/api/v1/recording", self.start_recording)
         app.router.add_delete("/api/v1/recording", self.stop_recording)
         app.router.add_post("/api/v1/markers", self.marker)
+        app.router.add_post("/api/v1/calibration", self.start_calibration)
+        app.router.add_delete("/api/v1/calibration", self.end_calibration)
+        app.router.add_post("/api/v1/calibration/finish", self.finish_calibration)
+        app.router.add_get("/api/v1/calibration/model", self.get_model)
+        app.router.add_post("/api/v1/calibration/model", self.save_model)
         app.router.add_get("/api/v1/grip", self.get_grip)
         app.router.add_post("/api/v1/grip/stop", self.stop_grip)
         app.router.add_post("/api/v1/grip/reset", self.reset_grip)
@@ -370,6 +388,28 @@ class Service:
     async def marker(self, _):
         return web.json_response({})
 
+    async def start_calibration(self, _):
+        self.calibration |= {"state": "recording", "seconds": 0.0, "text": "", "refused": False}
+        return web.json_response(self.calibration)
+
+    async def finish_calibration(self, _):
+        self.calibration |= {"state": "idle", "calibrated": True, "text": SEEN}
+        self.tape.model = "builtin:any, calibrated"
+        return web.json_response(self.calibration)
+
+    async def end_calibration(self, _):
+        undone = self.calibration["state"] == "idle"
+        self.calibration = IDLE | ({"text": "calibration undone"} if undone else {})
+        self.tape.model = "builtin:any"
+        return web.json_response(self.calibration)
+
+    async def get_model(self, _):
+        headers = {"Content-Disposition": 'attachment; filename="calibrated.json"'}
+        return web.json_response({"model": "calibrated"}, headers=headers)
+
+    async def save_model(self, _):
+        return web.json_response({"path": "recordings/model-20261123-081500.json"})
+
     async def get_grip(self, _):
         return web.json_response(explained(self.grip))
 
@@ -406,6 +446,7 @@ class Service:
             message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
             message["notices"], self.notices = self.notices, []
             message["grip"] = explained(self.grip)
+            message["calibration"] = self.calibration
             if self.recording:
                 self.recording["seconds"] += PERIOD
                 self.recording["n_bytes"] += 14_000

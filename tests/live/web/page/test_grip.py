@@ -162,7 +162,8 @@ def test_tare_and_threshold_are_locked_while_armed(visit, holding):
     page = visit(holding.url)
     shows(page, "#grip-armed", "^ARMED$")
     page.click("#threshold-toggle")
-    shows(page, "#threshold-expected", "^The hand is armed: the tare and the thresholds are locked")
+    locked = "^The hand is armed: the tare, the thresholds and the model are locked"
+    shows(page, "#threshold-expected", locked)
     for name in ("tare", "threshold", "threshold-own"):
         assert page.locator(f"#{name}").is_disabled()
     for name in ("tare", "threshold"):

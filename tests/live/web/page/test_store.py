@@ -75,6 +75,36 @@ def test_a_gap_breaks_the_line(module):
     assert x == pytest.approx([-0.51, -0.5, -0.49, -0.25, -0.01, 0])
 
 
+def test_a_gap_in_a_bin_draws_no_line_across_it(module):
+    """A bin that begins with the gap has its value after it, not at the time of the gap."""
+    script = """async () => {
+      const { SampleStore, downsample } = await import("/page/store.js");
+      const found = [];
+      for (let n = 60; n < 68; n += 1) {
+        const store = new SampleStore(["a"], 1000);
+        for (const [first, value] of [[0, 9], [100, 1]]) {
+          const times = Array.from({ length: n }, (_, k) => first + k);
+          const values = times.map(() => value);
+          const own = { force: [values, values, values], state: times.map(() => 3) };
+          store.append({ times, fingers: { a: own } }, 3, 5);
+        }
+        const fx0 = [store.fingers.get("a").fx];
+        const { x, columns: [fx] } = downsample(store, 1000, 20, fx0);
+        const from = x.findLastIndex((t, k) => t < -n && fx[k] === 9), to = fx.indexOf(1);
+        found.push([fx.slice(from + 1, to).includes(null), x[to] >= -n, store.hand.includes(0)]);
+      }
+      return found;
+    }"""
+    assert module.evaluate(script) == [[True, True, True]] * 8
+
+
+def test_an_estimate_at_the_last_time_keeps_the_samples(module):
+    """A source that falls silent gives one: every finger is UNKNOWN from its last sample on."""
+    x, values = module.evaluate(FEED, [[[0, 0.01, 0.02], [0.02], [1.0, 1.01]], 0.05])
+    assert values == [1, 1, 1, 1, None, 1, 1]
+    assert x == pytest.approx([-1.01, -1.0, -0.99, -0.99, -0.5, -0.01, 0])
+
+
 def test_times_that_go_back_clear_the_store(module):
     x, _ = module.evaluate(FEED, [[[5, 5.1, 5.2], [0, 0.1]], 1])
     assert x == pytest.approx([-0.1, 0])

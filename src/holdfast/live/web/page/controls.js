@@ -6,8 +6,8 @@ import { clock, fileSize } from "./format.js";
 
 const TOAST_TIME = 6000; // [ms]
 const MAX_TOASTS = 4;
-/** Why tare and thresholds cannot be changed while the hand is armed. */
-export const LOCKED = "The hand is armed: the tare and the thresholds are locked";
+/** Why tare, thresholds and model cannot be changed while the hand is armed. */
+export const LOCKED = "The hand is armed: the tare, the thresholds and the model are locked";
 
 /** Show a short message; `kind` is "good" or "bad". */
 export function toast(text, kind) {

@@ -1,9 +1,11 @@
 // Connects the parts of the page: messages arrive at the service's pace, drawing follows the
 // browser's.
 
+import { callService } from "../web/api.js";
 import { byId, fillChoice, make, setPressed, setText } from "../web/dom.js";
 import { fingerColour, onTheme } from "../web/theme.js";
 import { HandBanner, HealthLine, showAlert } from "./banner.js";
+import { CalibrationPanel } from "./calibration.js";
 import { Cards } from "./cards.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
@@ -29,6 +31,8 @@ class Page {
     this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
     this.controls = new Controls((text) => this.addMarker(text));
     this.threshold = new ThresholdPanel();
+    this.calibration = new CalibrationPanel(() => this.refreshModel());
+    this.advised = new Set(); // advice that the list of notices has
     this.grip = new GripPanel((time, text) => this.events.addMarker(time, text, "grip"),
       (text) => this.notices.add({ time: Date.now() / 1000, text }));
     this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
@@ -43,7 +47,7 @@ class Page {
     listenToKeys({
       " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
       m: () => this.controls.mark(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
-      p: () => this.threshold.toggle(), k: () => this.togglePause(),
+      p: () => this.threshold.toggle(), c: () => this.calibration.press(), k: () => this.togglePause(),
       digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
     });
     onTheme(() => this.updateColours());
@@ -61,13 +65,33 @@ class Page {
     this.store = new SampleStore(names, capacityFor(hello.rate));
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.banner, this.cards, this.controls, this.threshold, this.grip]) part.start(hello);
+    for (const part of [this.banner, this.cards, this.controls, this.threshold, this.calibration, this.grip]) part.start(hello);
     this.plots.start(hello, this.store);
     const hasSlips = Object.values(hello.fingers).some(hasSlipRule);
     document.body.classList.toggle("has-slips", hasSlips);
     byId("slip-help").hidden = !hasSlips;
     this.fillFingers();
     this.showStream(hello);
+    this.showAdvice(hello.advice ?? []);
+  }
+
+  /** Show the model that decides now; the samples stay. */
+  async refreshModel() {
+    try {
+      const hello = await callService("GET", "info");
+      for (const part of [this.banner, this.threshold]) part.start(hello);
+      this.plots.fingers = hello.fingers;
+      this.showStream(hello);
+    } catch {
+      // The next connection has it.
+    }
+  }
+
+  showAdvice(texts) {
+    for (const text of texts.filter((one) => !this.advised.has(one))) {
+      this.advised.add(text);
+      this.notices.add({ time: Date.now() / 1000, text });
+    }
   }
 
   update(message) {
@@ -76,8 +100,9 @@ class Page {
     this.status.silent = Boolean(message.health?.silent);
     this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
     this.plots.thresholds = message.thresholds ?? {};
-    for (const part of [this.controls, this.threshold]) part.setLocked(Boolean(message.grip?.armed));
+    for (const part of [this.controls, this.threshold, this.calibration]) part.setLocked(Boolean(message.grip?.armed));
     this.threshold.update(message.thresholds);
+    this.calibration.update(message.calibration);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
     const { ended, silent } = this.status;
@@ -102,6 +127,7 @@ class Page {
     Object.assign(this.status, { link, reason });
     this.controls.setConnected(link === "open");
     this.threshold.setConnected(link === "open");
+    this.calibration.setConnected(link === "open");
     this.grip.setLink(link);
     this.showLink();
     if (link === "open") return;

@@ -44,9 +44,10 @@ export class SampleStore {
   append(series, hand, maxGap) {
     const times = series.times, last = this.latest;
     if (!times.length) return;
-    // Times that go back mean a restarted source: a replay in a loop, or another clock.
-    if (last !== null && times[0] <= last) this.clear();
-    else if (last !== null && times[0] - last > maxGap) this.appendGap(0.5 * (last + times[0]), hand);
+    // Times that go back mean a restarted source: a replay in a loop, or another clock. A source
+    // that falls silent gives an estimate at the time of its last sample: the samples stay.
+    if (last !== null && times[0] < last) this.clear();
+    else if (last !== null && times[0] - last > maxGap) this.appendGap(0.5 * (last + times[0]));
     const skipped = Math.max(0, times.length - this.capacity);
     this.removed += skipped;
     for (let k = skipped; k < times.length; k += 1) {
@@ -71,8 +72,8 @@ export class SampleStore {
   }
 
   // Append a sample without values, which breaks the lines of the plots.
-  appendGap(time, hand) {
-    const index = this.appendTime(time, hand);
+  appendGap(time) {
+    const index = this.appendTime(time, UNKNOWN);
     for (const columns of this.fingers.values()) writeSample(columns, index, undefined, 0);
   }
 
@@ -165,13 +166,14 @@ export function downsample(store, window, bins, arrays) {
 
 // Return the smallest and the largest value in their order; a missing value breaks the line.
 function extremes(array, start, stop) {
-  let low = -1, high = -1, broken = false;
+  let low = -1, high = -1, missing = -1;
   for (let k = start; k < stop; k += 1) {
-    if (Number.isNaN(array[k])) { broken = true; continue; }
+    if (Number.isNaN(array[k])) { missing = k; continue; }
     if (low < 0 || array[k] < array[low]) low = k;
     if (high < 0 || array[k] > array[high]) high = k;
   }
   if (low < 0) return [null, null];
   const pair = low <= high ? [array[low], array[high]] : [array[high], array[low]];
-  return broken ? [array[high], null] : pair;
+  if (missing < 0) return pair;
+  return missing < high ? [null, array[high]] : [array[high], null];
 }
