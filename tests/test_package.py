@@ -14,7 +14,7 @@ PUBLIC = [
     *("FEATURE_NAMES", "fingertip_force", "haar_features"),
     *("Hand", "Sensor", "sensor", "Label", "Recording", "Tactile", "Truth"),
     *("load_dataset", "load_recording", "save_recording"),
-    *("Model", "Detector", "StreamDetector", "detect"),
+    *("Model", "Detector", "StreamDetector", "detect", "export"),
     *("GripController", "GripCommand", "GripLoop", "HandDevice", "Limits"),
     *("ContactEstimate", "ContactEvent", "ContactState", "HandEstimate"),
     *("Cause", "Fault", "Reason"),

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from holdfast.errors import SourceError as SourceError
     from holdfast.errors import StreamError as StreamError
     from holdfast.errors import TrainingError as TrainingError
+    from holdfast.exporters import export as export
     from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
     from holdfast.features import fingertip_force as fingertip_force
     from holdfast.features import haar_features as haar_features
@@ -67,6 +68,7 @@ _NAMES = {
     "features": ("FEATURE_NAMES", "fingertip_force", "haar_features"),
     "sensors": ("Hand", "Sensor", "sensor"),
     "recordings": ("Label", "Recording", "Tactile", "Truth"),
+    "exporters": ("export",),
     "io": ("load_dataset", "load_recording", "save_recording"),
     "model": ("Model",),
     "detector": ("Detector", "detect"),

@@ -1,105 +1,58 @@
 import json
+import shutil
 
 import pytest
 
 from holdfast.cli import main
-from holdfast.io import load_recording, save_recording
+from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
-
-@pytest.fixture(scope="module")
-def grasps(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("grasps")
-    for k in range(2):
-        recording = synthetic_recording(f"grasp{k}", k, ("thumb", "index"))
-        save_recording(recording, folder / f"grasp{k}.parquet")
-    return folder
+pytestmark = pytest.mark.slow
 
 
-def exported(capsys, *words):
-    assert main(["export", *map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def refusal(capsys, *words):
-    assert main(["export", *map(str, words)]) == 2
+def run(capsys, *words):
+    code = main(["export", *map(str, words)])
     out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    return err.removeprefix("holdfast: ").rstrip("\n")
+    return code, out, err
 
 
-def test_a_data_set_goes_and_comes_back(capsys, grasps, tmp_path):
-    out = tmp_path / "set"
-    document = exported(capsys, grasps, out, "--format", "lerobot", "--fps", "15")
-    assert document == {
-        "out": str(out),
-        "format": "lerobot",
-        "fps": 15,
-        "episodes": 2,
-        "frames": 348,
-        "tasks": 2,
-    }
-    assert main(["import", str(out), str(tmp_path / "back")]) == 0
-    for k in range(2):
-        back = load_recording(tmp_path / "back" / f"grasp{k}.parquet")
-        first = load_recording(grasps / f"grasp{k}.parquet")
-        assert back.digest == first.digest
-        assert back.metadata == first.metadata
-        assert back.modules["thumb"].labels == first.modules["thumb"].labels
+def test_the_sizes_are_printed(capsys, tmp_path):
+    words = ("builtin:noise-floor", tmp_path / "model.h", "--sensor", "uskin-4x4", "--fingers", 2)
+    code, out, err = run(capsys, *words)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0].endswith("model.h: the detector of finger1, finger2")
+    assert [line.split()[0] for line in lines[1:]] == ["state", "constants", "code"]
 
 
-def test_files_for_foxglove_have_a_layout(capsys, grasps, tmp_path):
-    out = tmp_path / "view"
-    document = exported(
-        capsys, grasps, out, "--format", "foxglove", "--model", "builtin:noise-floor"
-    )
-    assert document["files"] == 2
-    assert document["layout"] == str(out / "holdfast-layout.json")
-    names = sorted(path.name for path in out.iterdir())
-    assert names == ["grasp0.mcap", "grasp1.mcap", "holdfast-layout.json"]
+def test_json_has_the_sizes(capsys, tmp_path):
+    save_recording(synthetic_recording("made", 0, ("thumb",)), tmp_path / "made.parquet")
+    words = ("builtin:any", tmp_path / "model.h", "--like", tmp_path / "made.parquet", "--float")
+    code, out, _ = run(capsys, *words, "--json")
+    document = json.loads(out)
+    assert code == 0 and document["fingers"] == ["thumb"]
+    assert document["state_size"] > 10_000 and "memory_track" in document["double_fields"]
+    assert (document["code_size"] is None) == (shutil.which("cc") is None)
 
 
-def test_tables_say_what_they_leave_out(capsys, grasps, tmp_path):
-    assert main(["export", str(grasps), str(tmp_path / "csv"), "--format", "csv"]) == 0
-    out, err = capsys.readouterr()
-    assert out == f"{tmp_path / 'csv'}: 2 tables\n"
-    assert err == "a CSV table has no metadata\n"
+def test_onnx(capsys, tmp_path):
+    pytest.importorskip("onnx", reason="onnx is not installed")
+    code, out, _ = run(capsys, "builtin:twin", tmp_path / "model.onnx")
+    assert code == 0 and out.endswith("outputs any_stable, any_slip\n")
 
 
-def test_options_must_fit(capsys, grasps, tmp_path):
-    out = tmp_path / "out"
-    cases = {
-        (): "--format: lerobot, foxglove, csv expected for recordings",
-        ("--format", "csv", "--fps", "3"): "--fps belongs to --format lerobot; csv given",
-        ("--format", "csv", "--model", "x"): "--model belongs to --format foxglove; csv given",
-        ("--format", "lerobot", "--fps", "0"): "--fps: a whole number from 1 to 1000 expected, 0 "
-        "given",
-    }
-    for words, message in cases.items():
-        assert refusal(capsys, grasps, out, *words) == message
-    message = refusal(capsys, grasps, tmp_path / "a.mcap", "--format", "foxglove")
-    assert (
-        message == f"{tmp_path / 'a.mcap'}: a folder expected for the format foxglove, a file given"
-    )
-    message = refusal(capsys, tmp_path / "none", out, "--format", "csv")
-    assert message == f"there is no folder {tmp_path / 'none'}; a folder of recordings expected"
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("builtin:any", "model.h"), "for any finger: a recording of the hand (--like)"),
+        (("builtin:any", "model.h", "--sensor", "gtac"), "either --like RECORDING or both"),
+        (("builtin:any", "model.h", "--like", "none.parquet"), "none.parquet"),
+        (("builtin:any", "model.c", "--sensor", "gtac", "--fingers", "1"), "exported as .h"),
+        (("builtin:none", "model.h"), "unknown model 'builtin:none'"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, tmp_path, monkeypatch, words, expected):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1) and expected in err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_model_that_does_not_fit_leaves_nothing(capsys, grasps, tmp_path):
-    message = refusal(
-        capsys, grasps, tmp_path / "out", "--format", "foxglove", "--model", tmp_path / "no.json"
-    )
-    assert "no.json" in message
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_nothing_is_overwritten(capsys, grasps, tmp_path):
-    words = (grasps, tmp_path / "csv", "--format", "csv")
-    exported(capsys, *words)
-    path = tmp_path / "csv" / "grasp0.csv"
-    assert refusal(capsys, *words) == (
-        f"{path} exists already: choose another name, or give --force"
-    )
-    exported(capsys, *words, "--force")

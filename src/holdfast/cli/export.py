@@ -1,30 +1,63 @@
-"""`holdfast export`: recordings in the formats of other tools."""
+"""`holdfast export`: a model for programs without Python, or recordings for other tools."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from holdfast.cli.export_model import HeaderOptions, export_model
 from holdfast.cli.export_recordings import RecordingOptions, export_recordings
 from holdfast.cli.options import ForceOption, JsonOption
 
+MODEL_OUTPUTS = (".h", ".onnx")
+"""Suffixes of what a model becomes."""
+
 
 def export(
-    source: Annotated[Path, typer.Argument(help="A recording, or a folder of them.")],
-    out: Annotated[Path, typer.Argument(help="Folder to write; a file for one CSV table.")],
-    options: RecordingOptions,
+    source: Annotated[
+        str, typer.Argument(help="A model file or builtin:NAME; or a recording, or a folder.")
+    ],
+    out: Annotated[
+        Path, typer.Argument(help="model.h or model.onnx; or a folder (a file for a CSV table).")
+    ],
+    header: HeaderOptions,
+    recordings: RecordingOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Export recordings to other tools.
+    """Export a model as C or ONNX, or recordings to other tools.
 
-    Formats: lerobot, a LeRobot data set (v3.0), which `holdfast import` brings back without loss;
-    foxglove, MCAP files with plots, states, a log and an arrow for each taxel, and a layout for
-    them; csv, the generic CSV of docs/importing.md.
+    A C99 header is the whole detector: tare, features, faults and decisions, with all memory in
+    one struct. It allocates nothing, and gives what holdfast detect gives at every sample. A
+    program calls holdfast_init once, and holdfast_update for every sample. A model for any finger
+    needs the fingers of the hand, from a recording or from --sensor and --fingers. An ONNX file
+    has the linear classifiers alone: features in, probabilities out.
+
+    Recordings need --format: lerobot is a LeRobot data set (v3.0), which holdfast import brings
+    back without loss; foxglove is MCAP files with plots, states, a log and an arrow for each
+    taxel, and a layout for them; csv is the generic CSV of docs/importing.md.
 
     Example:
+      holdfast export builtin:twin model.h --like grasp.parquet
+      holdfast export builtin:any model.h --sensor uskin-curved --fingers 4 --float
+      holdfast export builtin:twin model.onnx
       holdfast export grasps/ dataset/ --format lerobot
       holdfast export grasp.parquet view/ --format foxglove --model builtin:any
       holdfast export grasp.parquet grasp.csv --format csv
     """
-    export_recordings(source, out, options, force=force, as_json=as_json)
+    if _is_model(source, out):
+        if recordings != RecordingOptions():
+            raise ValueError(f"--format, --fps and --model are for recordings; {source} is a model")
+        export_model(source, out, header, force=force, as_json=as_json)
+        return
+    if header != HeaderOptions():
+        raise ValueError(
+            "--like, --sensor, --fingers, --float and --in-contact are for models; "
+            f"{source} is a recording or a folder"
+        )
+    export_recordings(Path(source), out, recordings, force=force, as_json=as_json)
+
+
+def _is_model(source: str, out: Path) -> bool:
+    is_named_so = source.startswith("builtin:") or source.endswith(".json")
+    return is_named_so or out.suffix in MODEL_OUTPUTS

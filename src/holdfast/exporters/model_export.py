@@ -1,0 +1,158 @@
+"""Export of a model to a file that other programs use: a C99 header or an ONNX file."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from holdfast.errors import ModelError
+from holdfast.exporters.c_header import CHeader, header_of
+from holdfast.exporters.onnx_head import onnx_of
+from holdfast.features.loaded_start import begins_in_contact, declared_baselines
+from holdfast.files import refuse_overwrite, write_whole
+from holdfast.model import ANY_FINGER, Model
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor, sensor
+
+HEADER_SUFFIX, ONNX_SUFFIX = ".h", ".onnx"
+
+
+class ExportedModel(NamedTuple):
+    """What was written.
+
+    Attributes:
+        path: of the file.
+        fingers: their names, in the order of the readings; of an ONNX file, its outputs.
+        size: of the file [bytes].
+        header: the header, if it is one.
+    """
+
+    path: Path
+    fingers: tuple[str, ...]
+    size: int
+    header: CHeader | None = None
+
+
+def export(
+    model: Model,
+    path: str | Path,
+    like: Recording | None = None,
+    *,
+    fingers: Mapping[str, Sensor] | None = None,
+    single: bool = False,
+    in_contact: bool | None = None,
+    force: bool = False,
+) -> ExportedModel:
+    """Write a model as a C99 header (`.h`) or its linear classifiers as an ONNX file (`.onnx`).
+
+    The header has tare, features, faults and decision rule: it gives what `Detector` gives. The
+    ONNX file expects features that something else has computed.
+
+    Args:
+        model: the model.
+        path: of the output.
+        like: recording with the fingers, sensors and rate of the hand. An ONNX file needs it only
+            for a model with own handling.
+        fingers: sensor of each finger instead of a recording; by default those that the model
+            names.
+        single: numbers of the header are of single precision; times stay double.
+        in_contact: the first samples are load; None if the metadata of the recording say it.
+        force: replace an existing file.
+
+    Raises:
+        ModelError: a part of the model cannot be exported, or the fingers do not fit.
+        OutputError: the file exists and `force` is not given, or it cannot be written.
+        ValueError: the suffix is none of these.
+    """
+    target = Path(path)
+    refuse_overwrite(target, force=force)
+    if target.suffix == ONNX_SUFFIX:
+        sensors = _fingers_like(model, like) if like is not None else dict(fingers or {})
+        content, outputs = onnx_of(model.with_handling_of(sensors) if sensors else model)
+        write_whole(target, content, force=force)
+        return ExportedModel(target, outputs, len(content))
+    if target.suffix != HEADER_SUFFIX:
+        raise ValueError(f"{target}: a model is exported as {HEADER_SUFFIX} (C99) or {ONNX_SUFFIX}")
+    header, names = _header(model, like, fingers, single=single, in_contact=in_contact)
+    data = header.text.encode()
+    write_whole(target, data, force=force)
+    return ExportedModel(target, names, len(data), header)
+
+
+def _header(
+    model: Model,
+    like: Recording | None,
+    fingers: Mapping[str, Sensor] | None,
+    *,
+    single: bool,
+    in_contact: bool | None,
+) -> tuple[CHeader, tuple[str, ...]]:
+    if like is None:
+        sensors = dict(fingers) if fingers is not None else named_fingers(model)
+        first = next(iter(model.fingers_of(sensors).values()))
+        loaded = in_contact is True
+        header = header_of(model, sensors, first.rate, single=single, in_contact=loaded)
+        return header, tuple(model.fingers_of(sensors))
+    sensors = _fingers_like(model, like)
+    header = header_of(
+        model, sensors, like.rate, single=single,
+        in_contact=begins_in_contact(like.metadata, in_contact),
+        baselines=declared_baselines(like.metadata, sensors),
+    )  # fmt: skip
+    return header, tuple(model.fingers_of(sensors))
+
+
+def named_fingers(model: Model) -> dict[str, Sensor]:
+    """Return the fingers that a model names, with their sensors.
+
+    Raises:
+        ModelError: the model is for any finger or sensor.
+    """
+    if ANY_FINGER in model.fingers or any(f.sensor is None for f in model.fingers.values()):
+        raise ModelError(
+            "the model is for any finger: a recording of the hand (--like), or its sensor and its "
+            "fingers (--sensor NAME --fingers N), are expected"
+        )
+    return {name: model.sensors[str(part.sensor)] for name, part in model.fingers.items()}
+
+
+def fingers_of_sensor(name: str, fingers: str) -> dict[str, Sensor]:
+    """Return fingers of one sensor: so many, or with names.
+
+    Args:
+        name: of the sensor.
+        fingers: a number, or names with commas between them.
+
+    Raises:
+        ValueError: the sensor is unknown, or the fingers are neither of these.
+
+    Example:
+        >>> list(fingers_of_sensor("uskin-curved", "2"))
+        ['finger1', 'finger2']
+    """
+    used = sensor(name)
+    names: Sequence[str] = [word.strip() for word in fingers.split(",")]
+    if fingers.strip().isdecimal() and int(fingers) > 0:
+        names = [f"finger{n + 1}" for n in range(int(fingers))]
+    if not all(names) or len(set(names)) < len(names) or names == ["0"]:
+        raise ValueError(
+            f"fingers: a number from 1 on or different names with commas expected; {fingers!r} "
+            "given"
+        )
+    return dict.fromkeys(names, used)
+
+
+def _fingers_like(model: Model, like: Recording) -> dict[str, Sensor]:
+    """Return the fingers of the model on the hand of a recording, which must have all of them."""
+    sensors = model.fingers_of({name: m.sensor for name, m in like.modules.items()})
+    missing = [name for name in sensors if name not in like.modules]
+    if missing:
+        raise ModelError(
+            f"recording {like.name!r} has {', '.join(like.modules)}; the model is for "
+            f"{', '.join(sensors)}: a recording with all of them expected"
+        )
+    if not model.rate_fits(like.rate):
+        raise ModelError(
+            f"recording {like.name!r} has {like.rate:.4g} Hz, the model expects {model.rate:.4g} "
+            "Hz: a header does not resample; a recording at the rate of the model expected"
+        )
+    return sensors
