@@ -33,7 +33,7 @@ VERBS = {
     "evaluate": "Evaluate a model on labelled recordings.",
     "calibrate": "Fit a model to a hand by a minute of its ordinary handling, without labels.",
     "tune": "Choose the threshold for a wanted rate of false alarms.",
-    "export": "Write a model as a C99 header, or its classifiers as ONNX.",
+    "export": "Export a model as C or ONNX, or recordings to other tools.",
     "detect": "Detect the contact state of every finger at every sample.",
     "serve": "Show the estimates of a source on a web page, and publish them.",
     "hold": "Control the grip force of a hand by the estimates of a source.",

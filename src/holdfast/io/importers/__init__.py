@@ -27,10 +27,11 @@ FORMATS = {
     "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
+    "lerobot": "LeRobot data sets (v3.0) that holdfast export wrote (extra: parquet)",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order."""
-EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags"}
+EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags", "lerobot": "parquet"}
 """Extras that formats need."""
 _IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
@@ -45,6 +46,7 @@ HINTS = {
     "anyskin-slip": f"{_IF_IN_CONTACT}; check the labels of contact with holdfast label",
     "arq-crisp": _IF_IN_CONTACT,
     "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
+    "lerobot": f"metadata say how the recordings begin; {_IF_IN_CONTACT}",
     "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, import with --columns signs=+--",
 }
 """Option that helps with the recordings of a format, for the person who imports them."""
