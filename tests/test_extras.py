@@ -38,6 +38,7 @@ CORE = [
     ["--version"],
     ["doctor"],
     ["sensors"],
+    ["datasets"],
     ["info", "builtin:any"],
     ["info", "grasp.mcap"],
     ["info", "."],
@@ -84,6 +85,8 @@ MISSING = {
     "bags": [["import", "run.bag", "others", "--format", "rosbag"]],
     "hdf5": [["import", "a.h5", "others", "--format", "arq-crisp"]],
     "ros2": [["detect", "builtin:any", "ros2:///xServTopic"]],
+    "datasets": [["datasets", "get", "uskin-pick-move"]],
+    "datasets,hdf5": [["datasets", "get", "arq-slip-2021"]],
     "serial": [["detect", "builtin:any", "serial:///dev/ttyACM0?sensor=anyskin"]],
     "cluster": [
         ["import", "log.csv", "others", "--sensor", "anyskin", "--engine", "dask:tcp://a:1"]

@@ -32,6 +32,7 @@ EXTRA_MODULES = {
     "hdf5": ("h5py",),
     "bench": ("pywt", "tsflex", "pandas", "sklearn", "scipy"),
     "onnx": ("onnx", "onnxruntime"),
+    "datasets": ("pooch", "requests"),
     "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""

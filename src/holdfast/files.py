@@ -19,6 +19,9 @@ _FORBIDDEN = frozenset('<>:"/\\|?*')
 """Characters that the name of a file must not have on some system."""
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE | re.ASCII)
 """Names that are devices on Windows."""
+MAX_POINTER_SIZE = 1024
+"""Size below which all pointers of Git LFS are [bytes]."""
+_LFS_BEGIN = b"version https://git-lfs.github.com/spec/"
 _MAX_ATTEMPTS = 100
 """Number of random names that are tried for a temporary file."""
 
@@ -168,6 +171,25 @@ def read_input(path: str | Path, max_size: int) -> bytes:
     if len(data) > max_size:
         raise OSError(errno.EFBIG, f"it has more than {max_size} bytes", str(path))
     return data
+
+
+def is_lfs_pointer(path: Path) -> bool:
+    """Return whether a file is a pointer of Git LFS in place of the data."""
+    try:
+        if not path.is_file() or path.stat().st_size >= MAX_POINTER_SIZE:
+            return False
+        with path.open("rb") as file:
+            return file.read(len(_LFS_BEGIN)) == _LFS_BEGIN
+    except OSError:
+        return False
+
+
+def refusal_of_lfs_pointer(path: Path) -> str:
+    """Return a message about a pointer of Git LFS."""
+    return (
+        f"{path} is a pointer of Git LFS ({path.stat().st_size} bytes), not the data: in a clone, "
+        "`git lfs pull` fetches them"
+    )
 
 
 def check_keys(text: bytes) -> None:

@@ -8,10 +8,13 @@ from holdfast.cli import app
 
 OTHER_MEANING = {
     "--false-alarms": "by labels of events, and of all alarms in handling without labels",
+    "--format": "of the input, and of exported recordings",
     "--hand": "the hand that play stands for is driven by another program",
+    "--in-contact": "a declaration, and for an exported model a choice of two",
     "--model": "the detector of trials, and a model whose decisions a figure shows",
     "--rate": "of a sensor, and of a source against its model",
     "--seconds": "record until it is stopped, and a minute of handling",
+    "--sensor": "of a CSV file, and of the fingers of an exported model",
     "--set": "metadata of a recording, and parameters of a rule",
     "--speed": "play cannot send as fast as possible",
     "--separate": "classifiers of the fingers, and sensors in a packet",

@@ -18,6 +18,7 @@ from holdfast.errors import install_command, is_installed
 
 if TYPE_CHECKING:
     from holdfast.cli.config import Config
+    from holdfast.plugins import Plugin
 
 EXTRA_PURPOSES = {
     "all": "all of the others but deep",
@@ -34,6 +35,7 @@ EXTRA_PURPOSES = {
     "ros2": "ROS 2 topics without a ROS installation",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
+    "datasets": "holdfast datasets get: downloads of public recordings",
 }
 """Purpose of each extra."""
 PROBE_TIMEOUT = 0.3
@@ -46,8 +48,8 @@ def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
     """Check the installation and the reachable sources.
 
     Report Python, the packages, the extras and how to install them, the compiled kernels, the
-    live sources that can be reached, the configuration file of the hand, and the folder in
-    HOLDFAST_DATA. The exit code is always 0.
+    live sources that can be reached, the plug-ins of other packages, the configuration file of
+    the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
 
     Example:
       holdfast doctor
@@ -75,7 +77,22 @@ def _report(context: typer.Context) -> dict[str, Any]:
         "data": _data(),
         "config": _config(context.obj),
         "sources": check_sources(),
+        "plugins": [plugin._asdict() for plugin in _plugins()],
     }
+
+
+def _plugins() -> "list[Plugin]":
+    """Load the plug-ins of other packages, and return why some of them are skipped."""
+    from holdfast.classifiers import CLASSIFIER_PLUGINS
+    from holdfast.devices.hands import HAND_PLUGINS
+    from holdfast.devices.uri import SOURCE_PLUGINS
+    from holdfast.grip.laws import LAW_PLUGINS
+    from holdfast.io.importers import IMPORTER_PLUGINS
+    from holdfast.sensors import SENSOR_PLUGINS
+
+    device_groups = (SENSOR_PLUGINS, SOURCE_PLUGINS, HAND_PLUGINS)
+    groups = (*device_groups, IMPORTER_PLUGINS, CLASSIFIER_PLUGINS, LAW_PLUGINS)
+    return [plugin for group in groups for plugin in group.states()]
 
 
 def _packages() -> dict[str, dict[str, str | None]]:
@@ -181,6 +198,15 @@ def _print(report: dict[str, Any]) -> None:
         ("extra", "purpose", "state"),
         [(name, x["purpose"], _extra_text(x)) for name, x in report["extras"].items()],
     )
+    if report["plugins"]:
+        print_line()
+        print_table(("plug-in", "kind", "package", "state"), map(_plugin_row, report["plugins"]))
+
+
+def _plugin_row(plugin: dict[str, str]) -> tuple[str, ...]:
+    error = plugin["error"]
+    state = f"SKIPPED: {error}" if error else "works"
+    return plugin["name"], plugin["kind"], plugin["package"], state
 
 
 def _data_text(data: dict[str, Any]) -> str:

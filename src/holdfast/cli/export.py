@@ -1,120 +1,63 @@
-"""`holdfast export`: a model as a C99 header, or its classifiers as ONNX."""
+"""`holdfast export`: a model for programs without Python, or recordings for other tools."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from holdfast.cli.options import ForceOption, JsonOption, ModelArgument
-from holdfast.cli.terminal.console import print_json, print_line
+from holdfast.cli.export_model import HeaderOptions, export_model
+from holdfast.cli.export_recordings import RecordingOptions, export_recordings
+from holdfast.cli.options import ForceOption, JsonOption
 
-if TYPE_CHECKING:
-    from holdfast.exporters import CHeader, ExportedModel
-    from holdfast.recordings import Recording
+MODEL_OUTPUTS = (".h", ".onnx")
+"""Suffixes of what a model becomes."""
 
 
 def export(
-    model: ModelArgument,
-    out: Annotated[Path, typer.Argument(help="model.h for C99, or model.onnx.")],
-    like: Annotated[
-        Path | None,
-        typer.Option(help="A recording with the fingers, sensors and rate of the hand."),
-    ] = None,
-    sensor: Annotated[
-        str | None, typer.Option(help="Sensor of every finger, without a recording.")
-    ] = None,
-    fingers: Annotated[
-        str | None,
-        typer.Option(help="Number of fingers, or their names with commas between them."),
-    ] = None,
-    single: Annotated[
-        bool,
-        typer.Option(
-            "--float", help="Numbers of single precision in the header; times stay double."
-        ),
-    ] = False,
-    in_contact: Annotated[
-        bool | None,
-        typer.Option(
-            "--in-contact/--open-hand",
-            help="Whether the object is held at the first sample.",
-            show_default="as the recording says, else open",
-        ),
-    ] = None,
+    source: Annotated[
+        str, typer.Argument(help="A model file or builtin:NAME; or a recording, or a folder.")
+    ],
+    out: Annotated[
+        Path, typer.Argument(help="model.h or model.onnx; or a folder (a file for a CSV table).")
+    ],
+    header: HeaderOptions,
+    recordings: RecordingOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a model as a C99 header, or its classifiers as ONNX.
+    """Export a model as C or ONNX, or recordings to other tools.
 
-    The header is the whole detector: tare, features, faults and decisions, with all memory in one
-    struct. It allocates nothing, and gives what holdfast detect gives at every sample. A program
-    calls holdfast_init once, and holdfast_update for every sample. A model for any finger needs
-    the fingers of the hand, from a recording or from --sensor and --fingers.
+    A C99 header is the whole detector: tare, features, faults and decisions, with all memory in
+    one struct. It allocates nothing, and gives what holdfast detect gives at every sample. A
+    program calls holdfast_init once, and holdfast_update for every sample. A model for any finger
+    needs the fingers of the hand, from a recording or from --sensor and --fingers. An ONNX file
+    has the linear classifiers alone: features in, probabilities out.
 
-    The ONNX file has the linear classifiers alone: features in, probabilities out.
+    Recordings need --format: lerobot is a LeRobot data set (v3.0), which holdfast import brings
+    back without loss; foxglove is MCAP files with plots, states, a log and an arrow for each
+    taxel, and a layout for them; csv is the generic CSV of docs/importing.md.
 
     Example:
       holdfast export builtin:twin model.h --like grasp.parquet
       holdfast export builtin:any model.h --sensor uskin-curved --fingers 4 --float
       holdfast export builtin:twin model.onnx
+      holdfast export grasps/ dataset/ --format lerobot
+      holdfast export grasp.parquet view/ --format foxglove --model builtin:any
+      holdfast export grasp.parquet grasp.csv --format csv
     """
-    from holdfast.exporters import export as write
-    from holdfast.exporters import fingers_of_sensor
-    from holdfast.model import Model
-
-    if (sensor is None) != (fingers is None) or (sensor is not None and like is not None):
-        raise ValueError(
-            "either --like RECORDING or both --sensor NAME and --fingers N expected, or none of "
-            "them for a model that names its fingers"
-        )
-    named = fingers_of_sensor(sensor, fingers) if sensor and fingers else None
-    written = write(
-        Model.load(model), out, _recording(like), fingers=named, single=single,
-        in_contact=in_contact, force=force,
-    )  # fmt: skip
-    if as_json:
-        print_json(_document(written))
-    else:
-        _print(written)
-
-
-def _recording(path: Path | None) -> "Recording | None":
-    if path is None:
-        return None
-    from holdfast.io import load_recording
-
-    return load_recording(path)
-
-
-def _document(written: "ExportedModel") -> dict[str, object]:
-    header = written.header
-    sizes: dict[str, object] = {}
-    if header is not None:
-        sizes = {
-            "state_size": header.state_size,
-            "constants_size": header.constants_size,
-            "code_size": _code_size(header),
-            "double_fields": header.double_fields,
-        }
-    return {"out": written.path, "fingers": written.fingers, "size": written.size, **sizes}
-
-
-def _print(written: "ExportedModel") -> None:
-    header = written.header
-    if header is None:
-        print_line(f"{written.path}: {written.size} bytes; outputs {', '.join(written.fingers)}")
+    if _is_model(source, out):
+        if recordings != RecordingOptions():
+            raise ValueError(f"--format, --fps and --model are for recordings; {source} is a model")
+        export_model(source, out, header, force=force, as_json=as_json)
         return
-    code = _code_size(header)
-    print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
-    print_line(f"  state      {header.state_size:9} bytes, one for each hand")
-    print_line(f"  constants  {header.constants_size:9} bytes")
-    known = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
-    print_line(f"  code       {known}")
-    if header.double_fields:
-        print_line(f"  double     {', '.join(header.double_fields)}: they hold times")
+    if header != HeaderOptions():
+        raise ValueError(
+            "--like, --sensor, --fingers, --float and --in-contact are for models; "
+            f"{source} is a recording or a folder"
+        )
+    export_recordings(Path(source), out, recordings, force=force, as_json=as_json)
 
 
-def _code_size(header: "CHeader") -> int | None:
-    from holdfast.exporters.c_compiler import code_size
-
-    return code_size(header)
+def _is_model(source: str, out: Path) -> bool:
+    is_named_so = source.startswith("builtin:") or source.endswith(".json")
+    return is_named_so or out.suffix in MODEL_OUTPUTS

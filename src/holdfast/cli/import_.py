@@ -128,9 +128,32 @@ def import_(
       holdfast import cut.mcap recovered/
       holdfast import /shared/logs /shared/out --engine dask:tcp://hub:8786
     """
+    imported = import_all(path, out, options, start_engine(engine, jobs), force=force)
+    if as_json:
+        print_json(imported.document())
+    else:
+        imported.print()
+    imported.print_messages()
+
+
+def import_all(
+    path: Path, out: Path, options: FormatOptions, started: "Engine", *, force: bool
+) -> "ImportResult":
+    """Import a file or folder; write all recordings, or none.
+
+    Args:
+        path: of the input.
+        out: folder for the recordings; it is created if missing.
+        options: formats.
+        started: engine that imports the parts.
+        force: replace existing files.
+
+    Raises:
+        RecordingError: the input cannot be read.
+        OutputError: a recording exists already, or cannot be written.
+    """
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
-    started = start_engine(engine, jobs)
     prefixes, task = _parts(started.path(path), options.task(started.path(out), force=force))
     with _staging_folder(task.out) as folder:
         results = started.map_ordered(_import_part, prefixes.items(), shared=(task, folder))
@@ -140,11 +163,50 @@ def import_(
             (folder / recording.file_name).replace(task.out / recording.file_name)
     for recording in imported:
         recording.document["path"] = out / recording.file_name
-    hint = _hint(task)
-    _print([recording.document for recording in imported], out, hint, as_json)
-    _report_findings(imported)
-    if hint:
-        print_message(f"hint: {hint}")
+    return ImportResult(imported, out, _hint(task))
+
+
+class ImportResult(NamedTuple):
+    """Recordings that were imported into a folder, and the hint of their format."""
+
+    imported: list[_Imported]
+    out: Path
+    hint: str | None
+
+    def document(self) -> dict[str, Any]:
+        """Return the result as JSON values."""
+        recordings = [recording.document for recording in self.imported]
+        return {
+            "out": self.out,
+            "n_recordings": len(recordings),
+            "n_modules": sum(len(recording["modules"]) for recording in recordings),
+            "n_samples": sum(recording["n_samples"] for recording in recordings),
+            "recordings": recordings,
+            "hint": self.hint,
+        }
+
+    def print(self) -> None:
+        """Print the result as a table."""
+        document = self.document()
+        print_table(
+            ("recording", "modules", "samples", "duration [s]", "labels"),
+            [
+                (x["name"], len(x["modules"]), x["n_samples"], f"{x['duration']:.2f}",
+                 x["n_labels"])
+                for x in document["recordings"]
+            ],
+        )  # fmt: skip
+        print_line()
+        n_recordings, n_modules, n_samples = (
+            _count(document[f"n_{what}s"], what) for what in ("recording", "module", "sample")
+        )
+        print_line(f"{n_recordings} with {n_modules} and {n_samples} in {self.out}")
+
+    def print_messages(self) -> None:
+        """Print the findings and the hint on stderr."""
+        _report_findings(self.imported)
+        if self.hint:
+            print_message(f"hint: {self.hint}")
 
 
 @dataclass(frozen=True)
@@ -336,36 +398,9 @@ def _report_findings(imported: Sequence[_Imported]) -> None:
 
 def _hint(task: _ImportTask) -> str | None:
     """Return the option that helps with the recordings of the format; None for our own."""
-    from holdfast.io.importers import HINTS
+    from holdfast.io.importers import import_hint
 
-    return None if task.data_format is None else HINTS.get(task.data_format)
-
-
-def _print(recordings: list[dict[str, Any]], out: Path, hint: str | None, as_json: bool) -> None:
-    n_modules = sum(len(recording["modules"]) for recording in recordings)
-    n_samples = sum(recording["n_samples"] for recording in recordings)
-    if as_json:
-        print_json(
-            {
-                "out": out,
-                "n_recordings": len(recordings),
-                "n_modules": n_modules,
-                "n_samples": n_samples,
-                "recordings": recordings,
-                "hint": hint,
-            }
-        )
-        return
-    print_table(
-        ("recording", "modules", "samples", "duration [s]", "labels"),
-        [
-            (x["name"], len(x["modules"]), x["n_samples"], f"{x['duration']:.2f}", x["n_labels"])
-            for x in recordings
-        ],
-    )
-    print_line()
-    counts = [_count(len(recordings), "recording"), _count(n_modules, "module")]
-    print_line(f"{' with '.join(counts)} and {_count(n_samples, 'sample')} in {out}")
+    return None if task.data_format is None else import_hint(task.data_format)
 
 
 def _count(n: int, what: str) -> str:

@@ -80,10 +80,10 @@ def find_sensor(name: str) -> "Sensor":
 
     if Path(name).suffix.lower() == ".json":
         return known.Sensor.from_json(name)
-    if name in known.built_in_sensors():
+    if name in (names := known.sensor_names()):
         return known.sensor(name)
     raise ValueError(
-        f"unknown sensor {name!r}; built in are {', '.join(known.built_in_sensors())}; or give a "
+        f"unknown sensor {name!r}; built in are {', '.join(names)}; or give a "
         ".json file (`holdfast sensors --template 3x3 > sensor.json` makes one)"
     )
 
@@ -141,11 +141,11 @@ def _find(name: str, base: str | None) -> "Sensor | Hand":
         return known.Sensor.from_json(name)
     if name in known.built_in_hands():
         return known.hand(name)
-    if name in known.built_in_sensors():
+    if name in (names := known.sensor_names()):
         return known.sensor(name)
     raise ValueError(
         f"unknown sensor or hand {name!r}; built in are "
-        f"{', '.join(known.built_in_sensors() + known.built_in_hands())}; "
+        f"{', '.join(names + known.built_in_hands())}; "
         "or give a .json or .urdf file"
     )
 
@@ -154,6 +154,7 @@ def _show_all(as_json: bool) -> None:
     from holdfast import sensors as known
 
     all_sensors = [known.sensor(name) for name in known.built_in_sensors()]
+    all_sensors += known.SENSOR_PLUGINS.load_all()
     all_hands = [known.hand(name) for name in known.built_in_hands()]
     if as_json:
         print_json(

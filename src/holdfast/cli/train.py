@@ -38,9 +38,9 @@ LEFT_OUT = {
 
 def _list_classifiers(name: str | None) -> str | None:
     if name == "list":
-        from holdfast.classifiers import RECIPES
+        from holdfast.classifiers import recipe_names
 
-        print_lines(RECIPES)
+        print_lines(recipe_names())
         raise typer.Exit
     return name
 

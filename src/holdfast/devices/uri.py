@@ -1,15 +1,16 @@
-"""Sources by name: the path of a recording, or a URI."""
+"""Sources by name: the path of a recording, or a URI, also of a plug-in."""
 
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
 from holdfast.errors import require_extras
-from holdfast.sensors import Sensor, built_in_sensors, sensor
+from holdfast.plugins import PluginGroup
+from holdfast.sensors import Sensor, sensor, sensor_names
 
 if TYPE_CHECKING:
     from holdfast.devices.sources.base import Source
@@ -91,14 +92,14 @@ class Address:
         """Return the sensor of `sensor=FILE.json` or `sensor=NAME`; None without the parameter.
 
         Raises:
-            ValueError: there is no such file or built-in sensor, or the file is not valid.
+            ValueError: there is no such file or sensor, or the file is not valid.
         """
         given = self.parameters.get("sensor")
         if given is None:
             return None
-        if not given.endswith(".json") and given not in built_in_sensors():
+        if not given.endswith(".json") and given not in (names := sensor_names()):
             raise ValueError(
-                f"{self.text}: sensor=FILE.json or one of {', '.join(built_in_sensors())} "
+                f"{self.text}: sensor=FILE.json or one of {', '.join(names)} "
                 f"expected, {given!r} given"
             )
         try:
@@ -121,10 +122,10 @@ def parse(text: str) -> tuple[str, Address]:
     """
     match = _SCHEME.match(text)
     scheme = match["scheme"] if match else ""
-    if scheme not in SCHEMES:
+    if scheme not in SCHEMES and scheme not in (others := SOURCE_PLUGINS.names()):
         raise ValueError(
             f"{text!r} is neither the path of a recording nor the URI of a source; there are "
-            + ", ".join(f"{name}:" for name in SCHEMES)
+            + ", ".join(f"{name}:" for name in (*SCHEMES, *others))
         )
     try:
         parts = urlsplit(text)
@@ -154,7 +155,7 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
     """Return the source of a path or URI; entering it connects.
 
     Args:
-        text: path of a recording, or URI with one of `SCHEMES`.
+        text: path of a recording, or URI with one of `SCHEMES`, or of a plug-in.
         speed: speed of a recording or of the twin: 1 is real time, 0 is as fast as samples
             are read. Devices ignore it.
         loop: start a recording again at its end; the twin grasps again. Devices ignore it.
@@ -178,6 +179,32 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
         from holdfast.devices.sources.twin import Twin
 
         return Twin(address, speed=speed, loop=loop)
-    module = import_module(f"holdfast.devices.sources.{DEVICE_MODULES[scheme]}")
-    make: Callable[[Address], Source] = module.source
-    return make(address)
+    return _source_maker(scheme)(address)
+
+
+def _source_maker(scheme: str) -> "Callable[[Address], Source]":
+    """Return the function that makes the sources of a scheme.
+
+    Raises:
+        ValueError: the plug-in of the scheme cannot be used.
+    """
+    if scheme in DEVICE_MODULES:
+        module = import_module(f"holdfast.devices.sources.{DEVICE_MODULES[scheme]}")
+        make: Callable[[Address], Source] = module.source
+        return make
+    plugin = SOURCE_PLUGINS.load(scheme)
+    if plugin is None:
+        raise ValueError(f"the plug-in of {scheme}: cannot be used; holdfast doctor says why")
+    return plugin
+
+
+def _plugin_source(name: str, loaded: Any) -> "Callable[[Address], Source]":  # noqa: ANN401
+    """Return the function of a plug-in that makes the source of an address."""
+    if not callable(loaded):
+        raise TypeError(f"a function source(address) expected for {name}:, {loaded!r} given")
+    make: Callable[[Address], Source] = loaded
+    return make
+
+
+SOURCE_PLUGINS = PluginGroup("sources", SCHEMES, _plugin_source)
+"""Sources of other packages, by the scheme of their URIs."""

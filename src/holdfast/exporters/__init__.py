@@ -1,4 +1,4 @@
-"""Exports: a model for programs without Python."""
+"""Exports: a model for programs without Python, recordings for other tools."""
 
 from holdfast.exporters.c_header import CHeader, header_of
 from holdfast.exporters.model_export import ExportedModel, export, fingers_of_sensor

@@ -143,7 +143,7 @@ def literal(value: KnownNumber, *, single: bool) -> str:
     elif single:
         if 0 < abs(value) < LEAST_SINGLE:
             value = math.copysign(LEAST_SINGLE, value)
-        text = f"{np.float32(value)}f"
+        text = str(np.float32(value)) + "f"
     else:
         text = repr(float(value))
     return f"({text})" if text.startswith("-") else text

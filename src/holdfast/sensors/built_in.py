@@ -1,11 +1,13 @@
-"""Built-in sensors and hands, made from the tables in the folder `tables`."""
+"""Built-in sensors and hands, made from the tables in the folder `tables`; those of plug-ins."""
 
 import csv
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import numpy as np
 
+from holdfast.plugins import PluginGroup
 from holdfast.sensors.types import Array, Hand, HandModule, Sensor, Unit
 
 UINT16 = (0.0, 65535.0)
@@ -17,18 +19,23 @@ fingertip frame (x palmar, z distal). Every finger has this mount: rpy (90, 0, 9
 
 
 def sensor(name: str) -> Sensor:
-    """Return the built-in sensor of this name.
+    """Return the built-in sensor of this name, or that of a plug-in.
 
     Raises:
-        ValueError: there is no built-in sensor of this name.
+        ValueError: there is no sensor of this name.
 
     Example:
         >>> sensor("uskin-curved").n_taxels
         30
     """
-    if name not in SENSORS:
-        raise ValueError(f"unknown sensor {name!r}; built in are {', '.join(SENSORS)}")
-    return SENSORS[name]()
+    if name in SENSORS:
+        return SENSORS[name]()
+    skin = SENSOR_PLUGINS.load(name)
+    if skin is None:
+        raise ValueError(
+            f"unknown sensor {name!r}; built in are {', '.join(SENSORS)}{SENSOR_PLUGINS.text()}"
+        )
+    return skin
 
 
 def hand(name: str) -> Hand:
@@ -49,6 +56,11 @@ def hand(name: str) -> Hand:
 def built_in_sensors() -> tuple[str, ...]:
     """Return the names of the built-in sensors."""
     return tuple(SENSORS)
+
+
+def sensor_names() -> tuple[str, ...]:
+    """Return the names of all sensors: the built-in ones, then those of plug-ins."""
+    return (*SENSORS, *SENSOR_PLUGINS.names())
 
 
 def built_in_hands() -> tuple[str, ...]:
@@ -158,6 +170,20 @@ SENSORS = {
 """Functions that make the built-in sensors, by name."""
 HANDS = {"allegro-uskin": _allegro_uskin}
 """Functions that make the built-in hands, by name."""
+
+
+def _plugin_sensor(name: str, loaded: Any) -> Sensor:  # noqa: ANN401
+    """Return the sensor of a plug-in: a `Sensor`, or a function that returns one."""
+    skin = loaded() if callable(loaded) else loaded
+    if not isinstance(skin, Sensor):
+        raise TypeError(f"a Sensor or a function that returns one expected, {skin!r} given")
+    if skin.name != name:
+        raise ValueError(f"a sensor with the name {name} expected, {skin.name} given")
+    return skin
+
+
+SENSOR_PLUGINS = PluginGroup("sensors", SENSORS, _plugin_sensor)
+"""Sensors of other packages."""
 
 
 def _module_order(name: str) -> tuple[bool, int, str]:

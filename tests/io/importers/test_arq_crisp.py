@@ -129,10 +129,17 @@ def test_bad_input_gives_one_line(tmp_path, n_taxels, changes, text):
 
 def test_files_that_are_not_a_data_set(tmp_path):
     path = tmp_path / "a.h5"
-    path.write_text("version https://git-lfs.github.com/spec/v1\n")
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:a2aef56b\n")
     for place, form in ((path, "arq-crisp"), (path, None), (tmp_path, None)):
-        with pytest.raises(RecordingError, match=r"is not an HDF5 file .for a Git LFS pointer"):
+        with pytest.raises(RecordingError) as caught:
             list(import_recordings(place, form))
+        assert str(caught.value) == (
+            f"{path} is a pointer of Git LFS (63 bytes), not the data: in a clone, `git lfs pull` "
+            "fetches them"
+        )
+    path.write_text("hello")
+    with pytest.raises(RecordingError, match=r"a\.h5 is not an HDF5 file$"):
+        list(import_recordings(path))
     path.unlink()
     write(path, [0, 1], tactile_data_raw=None)
     with pytest.raises(RecordingError, match="no group with tactile_data_raw in it"):

@@ -51,6 +51,17 @@ def test_a_folder_of_sequences_with_labels(tmp_path):
     assert first.metadata["clock"] == "none; 100 Hz assumed"
 
 
+def test_labels_as_the_authors_have_them(tmp_path):
+    for number in (0, 2, 3):
+        write(tmp_path / f"seq_{number}.pt")
+    (tmp_path / "labels").write_text("1\n0\n0\r\n")
+    slipped = [recording.metadata.get("slipped") for recording in import_recordings(tmp_path)]
+    assert slipped == [True, False, None]
+    (tmp_path / "labels").write_text("1\n\n2\n")
+    text = refusal(tmp_path / "seq_0.pt")
+    assert text == f"{tmp_path / 'labels'}, line 2: 0 or 1 expected, '' given"
+
+
 def test_labels_can_be_left_out(tmp_path):
     write(tmp_path / "seq_9.pt")
     (tmp_path / "labels.csv").write_text("sequence,slip\n9,1\n")

@@ -6,6 +6,9 @@ import pytest
 from holdfast.errors import RecordingError
 from holdfast.io import FORMATS, import_recordings
 
+FOLDERS = ("uskin-pick-move", "lerobot")
+"""Formats of folders only."""
+
 
 def test_unknown_formats(tmp_path):
     with pytest.raises(
@@ -37,7 +40,7 @@ def test_an_empty_folder(tmp_path, name):
         list(import_recordings(tmp_path, name))
 
 
-@pytest.mark.parametrize("name", [name for name in FORMATS if name != "uskin-pick-move"])
+@pytest.mark.parametrize("name", [name for name in FORMATS if name not in FOLDERS])
 def test_an_empty_file(tmp_path, name):
     (tmp_path / "a.csv").write_text("")
     with pytest.raises(RecordingError, match=r"a\.csv is (empty|not an HDF5 file)"):

@@ -1,7 +1,11 @@
-"""Hands that take commands, by URI."""
+"""Hands that take commands, by URI, also of a plug-in."""
+
+from collections.abc import Callable
+from typing import Any
 
 from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.claim import Claim
+from holdfast.plugins import PluginGroup
 
 HAND_SCHEMES = {
     "twin": "the twin, with the source twin:...",
@@ -20,8 +24,8 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
     """Return the hand of a URI; entering it connects.
 
     Args:
-        uri: `ros2:KIND?...`, `ros1:KIND?...`, `log:PATH` or `call:MODULE:FUNCTION`. `twin:` is a
-            hand and a source at once, see `holdfast.devices.live_twin`.
+        uri: `ros2:KIND?...`, `ros1:KIND?...`, `log:PATH`, `call:MODULE:FUNCTION`, or that of a
+            plug-in. `twin:` is a hand and a source at once, see `holdfast.devices.live_twin`.
         standby: whether a watchdog opens it, beside the controller that commands the hand.
 
     Raises:
@@ -41,7 +45,22 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
         from holdfast.devices.hands.ros.kinds import ros_hand
 
         return ros_hand(uri, standby=standby)
-    raise ValueError(
-        f"{uri!r} is no hand; there are twin:, log:PATH, call:MODULE:FUNCTION, ros2:KIND and "
-        "ros1:KIND"
-    )
+    make = HAND_PLUGINS.load(scheme)
+    if make is None:
+        raise ValueError(
+            f"{uri!r} is no hand; there are twin:, log:PATH, call:MODULE:FUNCTION, ros2:KIND and "
+            f"ros1:KIND{HAND_PLUGINS.text()}"
+        )
+    return make(uri)
+
+
+def _plugin_hand(name: str, loaded: Any) -> Callable[[str], HandDevice]:  # noqa: ANN401
+    """Return the function of a plug-in that makes the hand of a URI."""
+    if not callable(loaded):
+        raise TypeError(f"a function hand(uri) expected for {name}:, {loaded!r} given")
+    make: Callable[[str], HandDevice] = loaded
+    return make
+
+
+HAND_PLUGINS = PluginGroup("hands", HAND_SCHEMES, _plugin_hand)
+"""Hands of other packages, by the scheme of their URIs."""

@@ -1,6 +1,7 @@
 """Laws of grip force, one file each, behind one interface."""
 
 from collections.abc import Callable
+from typing import Any
 
 from holdfast.grip.laws.base import Law, Touch, Wish
 from holdfast.grip.laws.fixed import Fixed
@@ -8,6 +9,7 @@ from holdfast.grip.laws.friction_margin import FrictionMargin
 from holdfast.grip.laws.pr2 import Pr2
 from holdfast.grip.laws.stability import Stability
 from holdfast.grip.laws.wong_zhu import WongZhu
+from holdfast.plugins import PluginGroup
 
 LAWS: dict[str, Callable[[], Law]] = {
     "fixed": Fixed,
@@ -22,11 +24,26 @@ __all__ = ["LAWS", "Law", "Touch", "Wish", "law_named"]
 
 
 def law_named(name: str) -> Law:
-    """Return a new law.
+    """Return a new law, one of `LAWS` or of a plug-in.
 
     Raises:
         ValueError: there is no law of that name; the message lists the names.
     """
-    if name not in LAWS:
-        raise ValueError(f"unknown law {name!r}; there are {', '.join(LAWS)}")
-    return LAWS[name]()
+    if name in LAWS:
+        return LAWS[name]()
+    law = LAW_PLUGINS.load(name)
+    if law is None:
+        raise ValueError(f"unknown law {name!r}; there are {', '.join(LAWS)}{LAW_PLUGINS.text()}")
+    return law
+
+
+def _plugin_law(name: str, loaded: Any) -> Law:  # noqa: ANN401
+    """Return a new law of a plug-in: of a class, or of a function without arguments."""
+    law = loaded() if callable(loaded) else loaded
+    if law is loaded or not isinstance(law, Law):
+        raise TypeError(f"a subclass of Law expected for {name}, {loaded!r} given")
+    return law
+
+
+LAW_PLUGINS = PluginGroup("laws", LAWS, _plugin_law)
+"""Laws of other packages."""

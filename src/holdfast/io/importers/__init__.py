@@ -1,16 +1,21 @@
-"""Import of recordings in other formats; each format has a module, which is loaded by name."""
+"""Import of recordings in other formats; each format has a module, which is loaded by name.
+
+Formats of plug-ins have such a module too, in another package.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from holdfast.errors import RecordingError, require_extras
-from holdfast.files import check_regular
+from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
+from holdfast.plugins import PluginGroup
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
@@ -22,10 +27,11 @@ FORMATS = {
     "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
+    "lerobot": "LeRobot data sets (v3.0) that holdfast export wrote (extra: parquet)",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order."""
-EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags"}
+EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags", "lerobot": "parquet"}
 """Extras that formats need."""
 _IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
@@ -40,6 +46,7 @@ HINTS = {
     "anyskin-slip": f"{_IF_IN_CONTACT}; check the labels of contact with holdfast label",
     "arq-crisp": _IF_IN_CONTACT,
     "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
+    "lerobot": f"metadata say how the recordings begin; {_IF_IN_CONTACT}",
     "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, import with --columns signs=+--",
 }
 """Option that helps with the recordings of a format, for the person who imports them."""
@@ -143,8 +150,12 @@ def _format_of(
     """
     if name is None and (sensors or columns):
         name = "csv"
+    if name is not None and name not in FORMATS and name not in IMPORTER_PLUGINS.names():
+        raise ValueError(
+            f"unknown format {name!r}; there are {', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
+        )
     if name is not None and name not in FORMATS:
-        raise ValueError(f"unknown format {name!r}; there are {', '.join(FORMATS)}")
+        _importer(name)
     if name not in (None, "csv") and (sensors or columns):
         raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
     if not path.exists():
@@ -152,7 +163,19 @@ def _format_of(
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
+        _refuse_pointers(path)
         return name or _detected_format(path)
+
+
+def _refuse_pointers(path: Path) -> None:
+    """Check that a file, or each file in a folder, is no pointer of Git LFS.
+
+    Raises:
+        RecordingError: it is one; the clone was made without the data.
+    """
+    for file in [path] if path.is_file() else sorted(path.iterdir()):
+        if is_lfs_pointer(file):
+            raise RecordingError(refusal_of_lfs_pointer(file))
 
 
 def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> Iterator[Recording]:
@@ -161,7 +184,25 @@ def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> It
             yield recording if labels else _without_labels(recording)
 
 
+def import_hint(name: str) -> str | None:
+    """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
+    if name in FORMATS:
+        return HINTS[name]
+    hint: str | None = getattr(_importer(name), "HINT", None)
+    return hint
+
+
 def _importer(name: str) -> ModuleType:
+    """Return the module of a format.
+
+    Raises:
+        ValueError: the plug-in of the format cannot be used.
+    """
+    if name not in FORMATS:
+        plugin = IMPORTER_PLUGINS.load(name)
+        if plugin is None:
+            raise ValueError(f"the plug-in of {name} cannot be used; holdfast doctor says why")
+        return plugin
     module = {"csv": "generic_csv", "rosbag": "ros_bag"}.get(name, name.replace("-", "_"))
     return import_module(f"holdfast.io.importers.{module}")
 
@@ -170,12 +211,31 @@ def _detected_format(path: Path) -> str:
     for name in FORMATS:
         if _importer(name).can_read(path):
             return name
+    for name in IMPORTER_PLUGINS.names():
+        plugin = IMPORTER_PLUGINS.load(name)
+        if plugin is not None and plugin.can_read(path):
+            return name
     if _importer("csv").can_guess(path):
         return "csv"
+    names = f"{', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
     raise RecordingError(
-        f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
+        f"{path} is of no supported format; supported are {names} "
         "(choose one with --format; for a CSV file of any other logger give --sensor and --columns)"
     )
+
+
+def _plugin_importer(name: str, loaded: Any) -> ModuleType:  # noqa: ANN401
+    """Return the module of a plug-in, with the functions that every importer has."""
+    missing = [part for part in ("can_read", "parts", "read") if not hasattr(loaded, part)]
+    if not isinstance(loaded, ModuleType) or missing:
+        raise TypeError(
+            f"a module with can_read, parts and read expected for {name}, {loaded!r} given"
+        )
+    return loaded
+
+
+IMPORTER_PLUGINS = PluginGroup("importers", FORMATS, _plugin_importer)
+"""Formats of other packages."""
 
 
 def _without_labels(recording: Recording) -> Recording:

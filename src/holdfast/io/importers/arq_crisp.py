@@ -56,10 +56,7 @@ _HELD_BEFORE = (_RELEASE, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
 
 
 def can_read(path: Path) -> bool:
-    """Return whether `path` is an HDF5 file, or a folder with one.
-
-    A pointer of Git LFS under the name of such a file counts: `read` says how to get the data.
-    """
+    """Return whether `path` is an HDF5 file, or a folder with one."""
     return any(file.suffix in HDF5_SUFFIXES or _is_hdf5(file) for file in _files(path))
 
 
@@ -95,9 +92,7 @@ def read(path: Path) -> Iterator[Recording]:
     import h5py
 
     if not _is_hdf5(path):
-        raise RecordingError(
-            f"{path} is not an HDF5 file (for a Git LFS pointer, fetch the data by `git lfs pull`)"
-        )
+        raise RecordingError(f"{path} is not an HDF5 file")
     try:
         with h5py.File(path, "r") as file:
             budget = ReadBudget(path)

@@ -3,7 +3,8 @@
 A file `seq_N.pt` is a zip archive. Its member `data/0` has the values as they are in memory, its
 member `data.pkl` the program of a pickle that would build the tensor. The values are read, and
 the pickle is never run: only the name of the number type is looked up in its bytes.
-`labels.csv` beside the files has one label for each sequence.
+`labels.csv` beside the files has one label for each sequence, or `labels`, as the authors have it:
+line N, from 0, is that of `seq_N`.
 """
 
 import re
@@ -16,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
-from holdfast.files import check_regular
+from holdfast.files import check_regular, read_input
 from holdfast.io.importers.table import (
     SLIPPED,
     natural_order,
@@ -28,7 +29,9 @@ from holdfast.sensors import sensor
 
 SOURCE = "notvenky/eFlesh"
 TENSOR_SUFFIX = ".pt"
-LABELS_FILE = "labels.csv"
+LABELS_FILE, LABEL_LINES_FILE = "labels.csv", "labels"
+MAX_LABEL_LINES_SIZE = 1 << 20
+"""Size above which a file of label lines is refused [bytes]."""
 N_FINGERTIPS = 2
 N_MAGNETOMETERS = 5
 NUMBER_TYPE = np.dtype("<f4")
@@ -171,7 +174,8 @@ def _metadata(path: Path) -> dict[str, Any]:
         "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
         STARTS_LOADED: True,
     }
-    slipped = _labels(path.parent / LABELS_FILE).get(path.stem)
+    labels = _labels(path.parent / LABELS_FILE) or _label_lines(path.parent / LABEL_LINES_FILE)
+    slipped = labels.get(path.stem)
     return metadata if slipped is None else metadata | {SLIPPED: slipped}
 
 
@@ -193,4 +197,23 @@ def _labels(path: Path) -> dict[str, bool]:
                 "each once, with 0 or 1 expected"
             )
         labels[name] = bool(slip)
+    return labels
+
+
+def _label_lines(path: Path) -> dict[str, bool]:
+    """Return whether the object slipped, from lines of 0 or 1; empty without such a file.
+
+    Raises:
+        RecordingError: a line has something else.
+    """
+    if not path.is_file():
+        return {}
+    lines = read_input(path, MAX_LABEL_LINES_SIZE).decode("utf-8", "replace").split("\n")
+    labels: dict[str, bool] = {}
+    for number, line in enumerate(lines[:-1] if lines[-1] == "" else lines):
+        if line.strip() not in ("0", "1"):
+            raise RecordingError(
+                f"{path}, line {number + 1}: 0 or 1 expected, {line.strip()[:20]!r} given"
+            )
+        labels[f"seq_{number}"] = line.strip() == "1"
     return labels

@@ -1,5 +1,6 @@
 """From a seed and a number to a recording of a randomized hand, with exact truth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Phase
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array, Integers
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.operator import draw_tremor, hold_wrench
@@ -284,7 +285,9 @@ class _Run:
                     times, readings, generator, jitter=0.1 * self.period
                 )
             stamps, readings = _sent(self.hold, self.drawn, stamps, readings)
-            labels = labels_from_truth(truth, finger, LabelRule(margin=0.0))
+            labels = _until(
+                stamps[-1] + self.period, labels_from_truth(truth, finger, LabelRule(margin=0.0))
+            )
             modules[finger] = Tactile(skin.sensor, stamps, readings, skin.sensor.unit, labels)
         whole = Recording(self.hold.name, modules, self._metadata(), truth)
         return self._cut(whole, generator)
@@ -361,6 +364,11 @@ def _shown(drawn: SensorDraw, times: Array) -> Integers:
         return np.arange(len(times))
     rate = drawn.sensor.rate / effects.rows_per_update
     return last_updates(times, rate, effects.update_phase)
+
+
+def _until(end: float, labels: Sequence[Label]) -> tuple[Label, ...]:
+    """Return labels that end with the last sample that was sent, at the latest."""
+    return tuple(replace(label, end=min(label.end, end)) for label in labels if label.start < end)
 
 
 def _sent(

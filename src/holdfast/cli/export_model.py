@@ -1,0 +1,123 @@
+"""`holdfast export MODEL OUT`: a model as a C99 header, or its classifiers as ONNX."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from holdfast.cli.terminal.console import print_json, print_line
+
+if TYPE_CHECKING:
+    from holdfast.exporters import CHeader, ExportedModel
+    from holdfast.recordings import Recording
+
+
+@dataclass(frozen=True)
+class HeaderOptions:
+    """Group of options: the hand and the numbers of a C header."""
+
+    like: Annotated[
+        Path | None,
+        typer.Option(help="A recording with the fingers, sensors and rate of the hand."),
+    ] = None
+    sensor: Annotated[
+        str | None, typer.Option(help="Sensor of every finger, without a recording.")
+    ] = None
+    fingers: Annotated[
+        str | None,
+        typer.Option(help="Number of fingers, or their names with commas between them."),
+    ] = None
+    single: Annotated[
+        bool,
+        typer.Option(
+            "--float", help="Numbers of single precision in the header; times stay double."
+        ),
+    ] = False
+    in_contact: Annotated[
+        bool | None,
+        typer.Option(
+            "--in-contact/--open-hand",
+            help="Whether the object is held at the first sample.",
+            show_default="as the recording says, else open",
+        ),
+    ] = None
+
+
+def export_model(
+    model: str, out: Path, options: HeaderOptions, *, force: bool, as_json: bool
+) -> None:
+    """Write a model as a C99 header, or its classifiers as ONNX.
+
+    Args:
+        model: a model file or builtin:NAME.
+        out: `model.h` or `model.onnx`.
+        options: the hand, and the numbers of the header.
+        force: replace an existing file.
+        as_json: print JSON.
+
+    Raises:
+        ValueError: options contradict each other.
+        HoldfastError: the model cannot be exported.
+    """
+    from holdfast.exporters import export as write
+    from holdfast.exporters import fingers_of_sensor
+    from holdfast.model import Model
+
+    sensor, fingers = options.sensor, options.fingers
+    if (sensor is None) != (fingers is None) or (sensor is not None and options.like is not None):
+        raise ValueError(
+            "either --like RECORDING or both --sensor NAME and --fingers N expected, or none of "
+            "them for a model that names its fingers"
+        )
+    named = fingers_of_sensor(sensor, fingers) if sensor and fingers else None
+    written = write(
+        Model.load(model), out, _recording(options.like), fingers=named, single=options.single,
+        in_contact=options.in_contact, force=force,
+    )  # fmt: skip
+    if as_json:
+        print_json(_document(written))
+    else:
+        _print(written)
+
+
+def _recording(path: Path | None) -> "Recording | None":
+    if path is None:
+        return None
+    from holdfast.io import load_recording
+
+    return load_recording(path)
+
+
+def _document(written: "ExportedModel") -> dict[str, object]:
+    header = written.header
+    sizes: dict[str, object] = {}
+    if header is not None:
+        sizes = {
+            "state_size": header.state_size,
+            "constants_size": header.constants_size,
+            "code_size": _code_size(header),
+            "double_fields": header.double_fields,
+        }
+    return {"out": written.path, "fingers": written.fingers, "size": written.size, **sizes}
+
+
+def _print(written: "ExportedModel") -> None:
+    header = written.header
+    if header is None:
+        print_line(f"{written.path}: {written.size} bytes; outputs {', '.join(written.fingers)}")
+        return
+    code = _code_size(header)
+    print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
+    print_line(f"  state      {header.state_size:9} bytes, one for each hand")
+    print_line(f"  constants  {header.constants_size:9} bytes")
+    known = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
+    print_line(f"  code       {known}")
+    if header.double_fields:
+        print_line(f"  double     {', '.join(header.double_fields)}: they hold times")
+
+
+def _code_size(header: "CHeader") -> int | None:
+    from holdfast.exporters.c_compiler import code_size
+
+    return code_size(header)

@@ -1,0 +1,216 @@
+"""Export of recordings as the generic CSV of docs/importing.md, which `holdfast import` reads."""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from holdfast.csv_cells import csv_text
+from holdfast.errors import OutputError, RecordingError
+from holdfast.exporters.output import whole_files
+from holdfast.files import file_stem, whole_file
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_numbers
+from holdfast.sensors.types import Array
+
+CSV_SUFFIX, SENSOR_SUFFIX = ".csv", ".sensor.json"
+ROWS_AT_ONCE = 4096
+"""Number of rows that are text in memory at a time."""
+
+_PLAIN_NAME = re.compile(r"""[^\s=+\-@'",;#][^=",;#\r\n\t]*(?<!\s)""")
+"""Names of modules that a column and a comment of the CSV hold without loss."""
+
+
+class CsvExport(NamedTuple):
+    """Files that an export wrote.
+
+    Attributes:
+        files: names of the tables.
+        sensors: option `--sensor` that their import needs, for each sensor that is not built in.
+        left_out: what the recordings have and the tables have not.
+    """
+
+    files: list[str]
+    sensors: list[str]
+    left_out: list[str]
+
+
+def export(
+    recordings: Sequence[Recording],
+    out: Path,
+    *,
+    force: bool = False,
+    progress: Callable[[Iterable[Recording]], Iterable[Recording]] = iter,
+) -> CsvExport:
+    """Write a table for each recording, and for each clock of its modules.
+
+    The modules of a table have the same times; modules with other times get a table of their
+    own. Sensors that are not built in are files beside the tables.
+
+    Args:
+        recordings: such as a `Dataset`; they are loaded one at a time.
+        out: a folder; or a `.csv` file, for a recording whose modules have the same times.
+        force: replace existing files.
+        progress: wraps the recordings.
+
+    Raises:
+        RecordingError: the name of a module does not fit into a header, or its sensor differs
+            from that of another recording with the same name.
+        OutputError: a file exists already, cannot be written, or is not enough.
+    """
+    result = CsvExport([], [], [])
+    sensors: dict[str, Sensor] = {}
+    if out.suffix == CSV_SUFFIX and not out.is_dir():
+        _write_file(recordings, out, result, force=force)
+        return result
+    with whole_files(out, force=force) as folder:
+        for recording in progress(recordings):
+            for name, modules in _tables(recording).items():
+                _write_sensors(folder, out, modules, sensors, result)
+                _write_table(folder / f"{name}{CSV_SUFFIX}", modules)
+                result.files.append(f"{name}{CSV_SUFFIX}")
+            _note_left_out(recording, result)
+    return result
+
+
+def _write_file(
+    recordings: Sequence[Recording], out: Path, result: CsvExport, *, force: bool
+) -> None:
+    """Write the single table of a single recording."""
+    tables = _tables(recordings[0]) if len(recordings) == 1 else {}
+    modules = next(iter(tables.values()), {})
+    if len(tables) != 1 or any(not _is_built_in(m.sensor) for m in modules.values()):
+        raise OutputError(
+            f"{out} is one table; a folder expected for several recordings, for modules with "
+            "different times, and for sensors that are not built in"
+        )
+    with whole_file(out, force=force) as part:
+        _write_table(part, modules)
+    result.files.append(out.name)
+    _note_left_out(recordings[0], result)
+
+
+def _tables(recording: Recording) -> dict[str, dict[str, Tactile]]:
+    """Return the modules of each table, by the stem of its file."""
+    groups: list[dict[str, Tactile]] = []
+    for name, module in recording.modules.items():
+        if not _PLAIN_NAME.fullmatch(name):
+            raise RecordingError(
+                f"{recording.name}: module {name!r} cannot be the name of columns of a CSV file; "
+                "rename it, or choose another format"
+            )
+        if not module.n_samples:
+            continue
+        for group in groups:
+            if np.array_equal(next(iter(group.values())).times, module.times):
+                group[name] = module
+                break
+        else:
+            groups.append({name: module})
+    if len(groups) == 1:
+        return {file_stem(recording.name): groups[0]}
+    return {file_stem(f"{recording.name}_{next(iter(group))}"): group for group in groups}
+
+
+def _is_built_in(item: Sensor) -> bool:
+    """Return whether the importer finds this sensor by its name, apart from the unit."""
+    if item.name not in built_in_sensors():
+        return False
+    known = sensor(item.name)
+    calibrated = replace(known, unit=item.unit, limits=None)  # as `Tactile` makes it
+    return item in (known, calibrated)
+
+
+def _write_sensors(
+    folder: Path,
+    out: Path,
+    modules: Mapping[str, Tactile],
+    known: dict[str, Sensor],
+    result: CsvExport,
+) -> None:
+    """Write the sensors that are not built in.
+
+    Raises:
+        RecordingError: a module has another sensor than in a recording before.
+    """
+    for name, module in modules.items():
+        before = known.setdefault(name, module.sensor)
+        if before != module.sensor:
+            raise RecordingError(
+                f"{name} has the sensors {before.name} and {module.sensor.name} in different "
+                "recordings; export them apart"
+            )
+        file = f"{file_stem(name)}{SENSOR_SUFFIX}"
+        if not _is_built_in(module.sensor) and not (folder / file).exists():
+            text = msgspec.json.encode(module.sensor.to_dict())
+            (folder / file).write_bytes(msgspec.json.format(text))
+            result.sensors.append(f"{name}={out / file}")
+
+
+def _write_table(path: Path, modules: Mapping[str, Tactile]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for name, module in modules.items():
+            file.write(f"# sensor: {name}={module.sensor.name}\n# unit: {name}={module.unit}\n")
+        file.write(csv_text([_header(modules)]))
+        for block in _rows(modules):
+            file.write(block)
+
+
+def _header(modules: Mapping[str, Tactile]) -> list[str]:
+    names = ["time"]
+    for name, module in modules.items():
+        width = max(2, len(str(module.sensor.n_taxels)))
+        for number in taxel_numbers(range(module.sensor.n_taxels)):
+            names += [f"{name}.t{number:0{width}d}.{axis}" for axis in "xyz"]
+    for name, module in modules.items():
+        if module.labels:
+            names += [f"{name}.label", f"{name}.cause"]
+    return names
+
+
+def _rows(modules: Mapping[str, Tactile]) -> Iterator[str]:
+    """Yield the rows as text, in blocks."""
+    times: Array = next(iter(modules.values())).times
+    labels = [_label_cells(module) for module in modules.values() if module.labels]
+    for start in range(0, len(times), ROWS_AT_ONCE):
+        cut = slice(start, start + ROWS_AT_ONCE)
+        columns = [module.readings[cut].reshape(len(times[cut]), -1) for module in modules.values()]
+        parts: list[Iterable[str]] = [map(repr, times[cut].tolist())]
+        parts += [map(_numbers_text, column.tolist()) for column in columns]
+        parts += [cells[cut] for cells in labels]
+        yield "".join(",".join(row) + "\n" for row in zip(*parts, strict=True))
+
+
+def _numbers_text(row: list[float]) -> str:
+    return ",".join(map(repr, row))
+
+
+def _label_cells(module: Tactile) -> list[str]:
+    """Return the cells `label,cause` of each sample."""
+    cells = [","] * module.n_samples
+    for label in module.labels:
+        first, last = np.searchsorted(module.times, (label.start, label.end)).tolist()
+        cells[first:last] = [_cells_of(label)] * (last - first)
+    return cells
+
+
+def _cells_of(label: Label) -> str:
+    return f"{label.state.value.lower()},{label.cause or ''}"
+
+
+def _note_left_out(recording: Recording, result: CsvExport) -> None:
+    empty = [name for name, module in recording.modules.items() if not module.n_samples]
+    parts = {
+        "metadata": recording.metadata,
+        "truth": recording.truth,
+        "markers": recording.markers,
+        "media": recording.media,
+        "modules without samples": empty,
+    }
+    for name, part in parts.items():
+        if part and name not in result.left_out:
+            result.left_out.append(name)

@@ -1,0 +1,234 @@
+"""Where the sensors of a recording are: the frame of each module over time."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+
+import numpy as np
+
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Hand, hand
+from holdfast.sensors.types import Array
+
+WORLD, PALM_LINK = "world", "palm_link"
+"""Frames that others are given in."""
+OBJECT_FRAME = "object"
+ALLEGRO = "allegro-uskin"
+FIRST_JOINTS = {"index": 0, "middle": 4, "ring": 8, "thumb": 12}
+"""First joint of each finger of the Allegro hand, in the order of its driver."""
+N_ALLEGRO_JOINTS = 16
+SIDE_GAP = 1.5
+"""Distance between modules that are shown side by side, as a multiple of the widest."""
+
+RigidPose = tuple[Array, Array]
+"""Position (3,) [m] and rotation matrix (3, 3)."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Frame over time, in its parent frame.
+
+    Attributes:
+        name: of the frame.
+        parent: name of the frame that the poses are given in.
+        times: (n,) [s]; one for a frame that does not move.
+        poses: (n, 7) positions [m] and quaternions w x y z.
+    """
+
+    name: str
+    parent: str
+    times: Array
+    poses: Array
+
+    def at(self, time: float) -> Array:
+        """Return the latest pose up to a time, (7,); the first one before it."""
+        k = int(np.searchsorted(self.times, time, side="right")) - 1
+        return np.asarray(self.poses[max(k, 0)])
+
+
+def module_frame(module: str) -> str:
+    """Return the name of the frame of a module.
+
+    Example:
+        >>> module_frame("index/1")
+        'module/index/1'
+    """
+    return f"module/{module}"
+
+
+def frames_of(recording: Recording) -> tuple[list[Frame], str]:
+    """Return the frames of all modules, parents first, and in words where they are from.
+
+    Measured poses of the fingertips (`tip_pose` of the truth) come first, then the built-in
+    Allegro hand with its measured joints or, without them, with straight fingers. All other
+    modules are side by side.
+    """
+    truth = recording.truth
+    if truth is not None and len(truth.times):
+        tips = {
+            finger: np.asarray(arrays["tip_pose"], dtype=np.float64)
+            for finger, arrays in truth.fingers.items()
+            if finger in recording.modules and _are_poses(arrays.get("tip_pose"))
+        }
+        if tips:
+            frames = [Frame(module_frame(f), WORLD, truth.times, tips[f]) for f in tips]
+            rest = [name for name in recording.modules if name not in tips]
+            return [*frames, *_object(recording), *_side_by_side(recording, rest)], "measured poses"
+    return _of_built_in_hand(recording)
+
+
+def quaternions(rotations: Array) -> Array:
+    """Return unit quaternions w x y z of rotation matrices, (..., 3, 3) to (..., 4).
+
+    Example:
+        >>> quaternions(np.diag([1.0, -1.0, -1.0])).tolist()
+        [0.0, 1.0, 0.0, 0.0]
+    """
+    m = np.asarray(rotations)
+    trace = np.einsum("...ii", m)
+    # Four times the products of the components; the row of the largest one is exact.
+    products = np.empty((*m.shape[:-2], 4, 4))
+    products[..., 0, 0] = 1 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        products[..., i + 1, i + 1] = 1 + 2 * m[..., i, i] - trace
+        products[..., 0, i + 1] = products[..., i + 1, 0] = m[..., k, j] - m[..., j, k]
+        mixed = m[..., j, i] + m[..., i, j]
+        products[..., i + 1, j + 1] = products[..., j + 1, i + 1] = mixed
+    largest = np.einsum("...ii->...i", products).argmax(axis=-1)
+    rows = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))
+
+
+def allegro_links(joints: Array) -> dict[str, RigidPose]:
+    """Return the pose of each link of the right Allegro hand in the frame of its palm.
+
+    Args:
+        joints: (16,) angles in the order of the driver [rad].
+    """
+    poses: dict[str, RigidPose] = {PALM_LINK: (np.zeros(3), np.eye(3))}
+    for row in _allegro_table():
+        place, rotation = poses[row["parent"]]
+        joint = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
+        axis = np.array([float(row[f"axis_{a}"]) for a in "xyz"])
+        offset = np.array([float(row[a]) for a in "xyz"])
+        fixed = _fixed_axes(*(float(row[a]) for a in ("roll", "pitch", "yaw")))
+        turned = rotation @ fixed @ _about(axis, float(joints[joint]))
+        poses[row["link"]] = place + rotation @ offset, turned
+    return poses
+
+
+def _of_built_in_hand(recording: Recording) -> tuple[list[Frame], str]:
+    """Return the modules on the Allegro hand, and the others side by side."""
+    known = hand(ALLEGRO)
+    on_hand = [name for name, m in recording.modules.items() if _is_on(known, name, m)]
+    rest = [name for name in recording.modules if name not in on_hand]
+    if not on_hand:
+        return [*_side_by_side(recording, rest), *_object(recording)], "side by side"
+    times, joints, origin = _joints(recording)
+    tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
+    mounts = {name: _mount(known, name) for name in on_hand}
+    for angles in joints:
+        links = allegro_links(angles)
+        for name in on_hand:
+            tracks[name].append(_pose(_chained(links[_table_link(known, name)], mounts[name])))
+    frames = [
+        Frame(module_frame(name), PALM_LINK, times, np.array(track))
+        for name, track in tracks.items()
+    ]
+    palm = Frame(PALM_LINK, WORLD, times[:1], np.array([_pose((np.zeros(3), np.eye(3)))]))
+    return [palm, *frames, *_side_by_side(recording, rest)], origin
+
+
+def _is_on(known: Hand, name: str, module: Tactile) -> bool:
+    return name in known.modules and known.modules[name].sensor.name == module.sensor.name
+
+
+def _joints(recording: Recording) -> tuple[Array, Array, str]:
+    """Return times (n,) [s] and joints (n, 16) [rad] of the hand, and where they are from."""
+    truth = recording.truth
+    if truth is not None and len(truth.times):
+        joints = truth.hand.get("joints")
+        if joints is not None and joints.shape[1:] == (N_ALLEGRO_JOINTS,):
+            return truth.times, joints.astype(np.float64), "measured joints"
+    return np.array([recording.start]), np.zeros((1, N_ALLEGRO_JOINTS)), "straight fingers"
+
+
+def _table_link(known: Hand, name: str) -> str:
+    """Return the name of a module's link in the table of links."""
+    link = known.modules[name].link
+    if link == PALM_LINK:
+        return link
+    finger, number = link.split("_link")
+    return f"link_{FIRST_JOINTS[finger] + int(number)}.0"
+
+
+def _mount(known: Hand, name: str) -> RigidPose:
+    """Return the pose of the frame of a sensor on its link."""
+    module = known.modules[name]
+    rotation = module.rotations[0] @ module.sensor.rotations[0].T
+    return module.positions[0] - rotation @ module.sensor.positions[0], rotation
+
+
+def _chained(outer: RigidPose, inner: RigidPose) -> RigidPose:
+    return outer[0] + outer[1] @ inner[0], outer[1] @ inner[1]
+
+
+def _pose(pose: RigidPose) -> Array:
+    return np.concatenate([pose[0], quaternions(pose[1])])
+
+
+def _side_by_side(recording: Recording, names: list[str]) -> list[Frame]:
+    """Return modules in a row along x, with their normals along z."""
+    widths = [np.ptp(recording.modules[n].sensor.positions, axis=0).max() for n in names]
+    step = SIDE_GAP * max([*widths, 0.01])
+    frames = []
+    for k, name in enumerate(names):
+        rotation = _from_normal(recording.modules[name].sensor.normal)
+        pose = _pose((np.array([(k - (len(names) - 1) / 2) * step, 0.0, 0.0]), rotation))
+        frames.append(Frame(module_frame(name), WORLD, np.array([recording.start]), pose[None]))
+    return frames
+
+
+def _object(recording: Recording) -> list[Frame]:
+    truth = recording.truth
+    poses = None if truth is None or not len(truth.times) else truth.hand.get("object_pose")
+    if truth is None or poses is None or not _are_poses(poses):
+        return []
+    return [Frame(OBJECT_FRAME, WORLD, truth.times, poses.astype(np.float64))]
+
+
+def _are_poses(array: Array | None) -> bool:
+    return array is not None and array.shape[1:] == (7,) and bool(np.isfinite(array).all())
+
+
+def _from_normal(normal: Array) -> Array:
+    """Return a rotation that turns a unit vector to the z axis."""
+    if normal[2] > 1 - 1e-9:
+        return np.eye(3)
+    if normal[2] < 1e-9 - 1:
+        return np.diag([1.0, -1.0, -1.0])
+    x, y = normal[:2]
+    axis = np.array([y, -x, 0.0]) / np.hypot(x, y)
+    return _about(axis, float(np.arccos(normal[2])))
+
+
+def _about(axis: Array, angle: float) -> Array:
+    """Return the rotation about a unit axis by an angle [rad], by Rodrigues' formula."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+
+
+def _fixed_axes(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation about the fixed axes x, then y, then z, as in URDF [rad]."""
+    x, y, z = np.eye(3)
+    return _about(z, yaw) @ _about(y, pitch) @ _about(x, roll)
+
+
+def _allegro_table() -> list[Mapping[str, str]]:
+    """Return the links of the hand, parents first."""
+    path = resources.files("holdfast.twin").joinpath("tables", "allegro_right.csv")
+    lines = path.read_text("utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))

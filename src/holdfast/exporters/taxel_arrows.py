@@ -1,0 +1,105 @@
+"""Arrows of the taxels of a recording: where they are, where they point, how long they are."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from holdfast.features.loaded_start import declared_baselines
+from holdfast.features.tare import Tare, baseline_of, offline_tare
+from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
+from holdfast.sensors.types import Array, Integers
+
+BASELINE_SECONDS = 0.5
+"""Time at the start whose mean is subtracted, unless the metadata have the baseline [s]."""
+LONGEST_ARROW = 0.02
+"""Length of the arrow of a strong reading [m]."""
+STRONG_SHARE = 0.999
+"""Quantile of the largest readings of all samples that has the longest arrow."""
+SHORTEST_ARROW = 0.0004
+"""Arrows that are shorter are left out [m]."""
+
+
+class ModuleArrows(NamedTuple):
+    """Arrows of one module.
+
+    Attributes:
+        forces: (n, n_taxels, 3) readings without the baseline, in the fingertip frame [unit].
+        times: (n,) [s].
+        period: of the samples [s].
+    """
+
+    forces: Array
+    times: Array
+    period: float
+
+    def sample_at(self, time: float, tolerance: float) -> int | None:
+        """Return the index of the latest sample, unless it is a gap ago."""
+        k = int(np.searchsorted(self.times, time, side="right")) - 1
+        is_old = k < 0 or time - self.times[k] > GAP_PERIODS * self.period + tolerance
+        return None if is_old else k
+
+
+def module_forces(recording: Recording, instants: Array) -> dict[str, ModuleArrows]:
+    """Return the forces of all taxels at the latest samples of some instants, by module.
+
+    Args:
+        recording: the recording.
+        instants: (n,) increasing times [s].
+    """
+    arrows = {}
+    for name, module in recording.modules.items():
+        if not module.n_samples:
+            continue
+        rows = np.unique(np.searchsorted(module.times, instants, side="right") - 1)
+        kept: Integers = rows[rows >= 0]
+        forces = np.einsum("tij,ntj->nti", module.sensor.rotations, zeroed(recording, name, kept))
+        finite = np.nan_to_num(forces, nan=0.0, posinf=0.0, neginf=0.0)
+        arrows[name] = ModuleArrows(finite, module.times[kept], module.period)
+    return arrows
+
+
+def zeroed(recording: Recording, name: str, rows: Integers | slice = slice(None)) -> Array:
+    """Return readings of a module without their baseline, (n, n_taxels, 3) in taxel frames.
+
+    Args:
+        recording: the recording.
+        name: of the module.
+        rows: samples.
+    """
+    module = recording.modules[name]
+    readings = module.readings[rows].astype(np.float64)
+    return np.asarray(readings - _baseline(recording, name, module))
+
+
+def arrow_scale(arrows: dict[str, ModuleArrows]) -> float:
+    """Return the length of an arrow for a reading of 1, the same for all modules [m/unit]."""
+    largest = [np.linalg.norm(x.forces, axis=2).max(axis=1) for x in arrows.values()]
+    joined = np.concatenate(largest) if largest else np.empty(0)
+    strong = float(np.quantile(joined, STRONG_SHARE)) if len(joined) else 0.0
+    return LONGEST_ARROW / strong if strong > 0 else 0.0
+
+
+def orientations(directions: Array) -> Array:
+    """Return quaternions x y z w that turn the x axis to unit vectors, (n, 3) to (n, 4).
+
+    Example:
+        >>> orientations(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])).tolist()
+        [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]]
+    """
+    x, y, z = directions.T
+    turned = np.column_stack([np.zeros_like(x), -z, y, 1 + x])
+    turned[x < 1e-9 - 1] = (0.0, 0.0, 1.0, 0.0)
+    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True)) + 0.0
+
+
+def _baseline(recording: Recording, name: str, module: Tactile) -> Array:
+    """Return the readings without contact, (n_taxels, 3); 0 for a module without finite ones."""
+    declared = declared_baselines(recording.metadata, {name: module.sensor})
+    if name in declared:
+        return declared[name]
+    is_known = module.unit == "N" and recording.metadata.get(STARTS_LOADED) is True
+    how = Tare("none") if is_known else offline_tare(BASELINE_SECONDS, module)
+    try:
+        return baseline_of(module.readings, module.times, how, module.period)[0]
+    except ValueError:
+        return np.zeros((module.sensor.n_taxels, 3))

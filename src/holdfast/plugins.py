@@ -1,0 +1,140 @@
+"""Plug-ins: sensors, sources, importers, classifiers, laws and hands of other packages.
+
+A package declares them as entry points (docs/plugins.md). Its code is imported when a name is
+used that holdfast itself does not have, and by `holdfast doctor`. A plug-in that fails is named
+once by the logger `holdfast.plugins`, which prints on stderr by default, and is skipped.
+"""
+
+import logging
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+T = TypeVar("T")
+
+_LOGGER = logging.getLogger("holdfast.plugins")
+GROUP_PREFIX = "holdfast."
+"""Begin of the names of all groups of entry points: `holdfast.sensors`."""
+
+
+class Plugin(NamedTuple):
+    """A plug-in of an installed package.
+
+    Attributes:
+        kind: what it is: `sensors`, `sources`, ...
+        name: name under which it is used.
+        package: name and version of the package.
+        error: why it is skipped; empty if it can be used.
+    """
+
+    kind: str
+    name: str
+    package: str
+    error: str
+
+
+class PluginGroup(Generic[T]):
+    """Plug-ins of one kind.
+
+    Args:
+        kind: what they are; the group of their entry points is `holdfast.<kind>`.
+        built_in: names that holdfast itself has; a plug-in cannot replace them.
+        convert: function that returns the plug-in of a name and a loaded object. An error that
+            it raises is the reason to skip the plug-in.
+    """
+
+    def __init__(
+        self, kind: str, built_in: Collection[str], convert: Callable[[str, Any], T]
+    ) -> None:
+        self.kind = kind
+        self._built_in, self._convert = built_in, convert
+        self._reported: set[str] = set()
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the plug-ins, in order; no code of theirs is imported."""
+        return tuple(self._usable_points())
+
+    def text(self) -> str:
+        """Return the names for the end of a message; empty if there are none."""
+        names = self.names()
+        return f"; of plug-ins: {', '.join(names)}" if names else ""
+
+    def load(self, name: str) -> T | None:
+        """Return a plug-in; None if there is none of that name, or it is skipped."""
+        point = self._usable_points().get(name)
+        if point is None:
+            return None
+        try:
+            return self._convert(name, point.load())
+        except (Exception, SystemExit) as cause:
+            self._report(point, _reason(cause))
+            return None
+
+    def load_all(self) -> list[T]:
+        """Return all plug-ins that are not skipped."""
+        loaded = (self.load(name) for name in self.names())
+        return [plugin for plugin in loaded if plugin is not None]
+
+    def states(self) -> list[Plugin]:
+        """Load all plug-ins, and return each with the reason why it is skipped, if it is."""
+        return [
+            Plugin(self.kind, point.name, _package(point), refusal or self._error(point))
+            for point, refusal in self._points()
+        ]
+
+    def _error(self, point: "EntryPoint") -> str:
+        try:
+            self._convert(point.name, point.load())
+        except (Exception, SystemExit) as cause:
+            return _reason(cause)
+        return ""
+
+    def _points(self) -> "list[tuple[EntryPoint, str]]":
+        """Return the entry points, each with the reason why its name cannot be used, or ""."""
+        from importlib.metadata import entry_points  # it takes as long as all of `--help`
+
+        points = list(entry_points(group=f"{GROUP_PREFIX}{self.kind}"))
+        points.sort(key=lambda point: (point.name, _package(point)))
+        first: dict[str, EntryPoint] = {}
+        for point in points:
+            first.setdefault(point.name, point)
+        return [(point, self._refusal(point, first[point.name])) for point in points]
+
+    def _usable_points(self) -> "dict[str, EntryPoint]":
+        """Return the entry points by name; report those whose name is taken."""
+        usable: dict[str, EntryPoint] = {}
+        for point, refusal in self._points():
+            if refusal:
+                self._report(point, refusal)
+            else:
+                usable[point.name] = point
+        return usable
+
+    def _refusal(self, point: "EntryPoint", first: "EntryPoint") -> str:
+        """Return why the name of a plug-in cannot be used; empty if it can."""
+        if point.name in self._built_in:
+            return f"holdfast itself has {point.name}; another name expected"
+        if _package(first) != _package(point):
+            return f"{_package(first)} has {point.name} as well; another name expected"
+        return ""
+
+    def _report(self, point: "EntryPoint", reason: str) -> None:
+        """Report that a plug-in is skipped, each reason once."""
+        text = f"plug-in {point.name} ({self.kind} of {_package(point)}) is skipped: {reason}"
+        if text not in self._reported:
+            self._reported.add(text)
+            _LOGGER.warning("%s", text)
+
+
+def _package(point: "EntryPoint") -> str:
+    package = point.dist
+    return f"{package.name} {package.version}" if package else "an unknown package"
+
+
+def _reason(cause: BaseException) -> str:
+    """Return an error as one line of printable characters."""
+    text = " ".join(str(cause).split())
+    printable = "".join(character for character in text if character.isprintable())
+    return f"{type(cause).__name__}: {printable}" if printable else type(cause).__name__

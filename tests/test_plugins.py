@@ -1,0 +1,230 @@
+"""Plug-ins of other packages: found by name, loaded late, and named if they are skipped."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import holdfast
+from holdfast.classifiers import recipe, recipe_names
+from holdfast.cli import main
+from holdfast.devices.hands import open_hand
+from holdfast.devices.uri import open_source, parse
+from holdfast.errors import RecordingError
+from holdfast.grip.laws import law_named
+from holdfast.io import import_recordings
+from holdfast.io.importers import IMPORTER_PLUGINS
+from holdfast.plugins import PluginGroup
+from holdfast.sensors import SENSOR_PLUGINS, sensor, sensor_names
+from installed import install, install_project, on_the_path
+
+TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
+PROGRAM = "import sys; from holdfast.cli import main; sys.exit(main())"
+
+PARTS = '''
+from holdfast.classifiers import LogisticRegression
+from holdfast.grip.laws import Fixed
+from holdfast.sensors import flat_sensor
+
+same = LogisticRegression(name="same")
+
+class Twice(Fixed):
+    """Law."""
+
+def pad():
+    return flat_sensor("pad", 1, 2, 1e-3)
+
+class Hand:
+    def __init__(self, uri):
+        self.uri = uri
+'''
+POINTS = {
+    "holdfast.sensors": {"pad": "parts:pad", "gtac": "parts:pad", "other": "parts:pad"},
+    "holdfast.classifiers": {"same": "parts:same", "none": "parts:pad"},
+    "holdfast.laws": {"twice": "parts:Twice", "wrong": "parts:pad"},
+    "holdfast.hands": {"grab": "parts:Hand"},
+    "holdfast.sources": {"gone": "no_such_module:source", "number": "parts:__name__"},
+    "holdfast.importers": {"broken": "broken", "half": "parts"},
+}
+
+
+@pytest.fixture
+def parts(tmp_path, monkeypatch):
+    """A package with plug-ins of all kinds, some of which cannot be used."""
+    broken = "import sys\nprint('imported', file=sys.stderr)\nraise RuntimeError('no\\n\x1bdevice')"
+    install(tmp_path / "site", "acme", {"parts.py": PARTS, "broken.py": broken}, POINTS)
+    for group in (SENSOR_PLUGINS, IMPORTER_PLUGINS):
+        monkeypatch.setattr(group, "_reported", set())
+    with on_the_path(tmp_path / "site", monkeypatch):
+        yield tmp_path
+
+
+def reports(caplog):
+    return [record.getMessage() for record in caplog.records if record.name == "holdfast.plugins"]
+
+
+def test_each_kind_is_found_by_its_name(parts):
+    assert sensor("pad").n_taxels == 2
+    assert recipe("same").name == "same"
+    assert type(law_named("twice")).__name__ == "Twice"
+    assert open_hand("grab:left").uri == "grab:left"
+    assert parse("gone://host")[0] == "gone"
+
+
+def test_names_are_listed_after_our_own(parts, caplog):
+    assert sensor_names()[-2:] == ("other", "pad")
+    assert recipe_names() == ("logreg", "svm", "none", "same")
+    with pytest.raises(ValueError, match=r"there are fixed.*holdfast; of plug-ins: twice, wrong$"):
+        law_named("thrice")
+    with pytest.raises(ValueError, match=r"ros1:KIND; of plug-ins: grab$"):
+        open_hand("grip:left")
+    assert reports(caplog) == [
+        "plug-in gtac (sensors of acme 1.2) is skipped: holdfast itself has gtac; another name "
+        "expected"
+    ]
+
+
+def test_a_plug_in_cannot_replace_our_own(parts):
+    assert sensor("gtac").n_taxels == 15
+
+
+def test_nothing_is_imported_before_it_is_used(parts):
+    recipe_names(), sensor_names(), sensor("anyskin"), recipe("svm")
+    with pytest.raises(ValueError, match="unknown sensor"):
+        sensor("none")
+    assert "parts" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    ("use", "reason"),
+    [
+        (lambda: sensor("other"), "other (sensors of acme 1.2) is skipped: ValueError: a sensor "
+         "with the name other expected, pad given"),
+        (lambda: recipe("none"), "none (classifiers of acme 1.2) is skipped: TypeError: a recipe "),
+        (lambda: law_named("wrong"), "wrong (laws of acme 1.2) is skipped: TypeError: a subclass "),
+        (lambda: open_source("gone://h"), "gone (sources of acme 1.2) is skipped: "
+         "ModuleNotFoundError: No module named 'no_such_module'"),
+        (lambda: open_source("number:"), "number (sources of acme 1.2) is skipped: TypeError: a "
+         "function source(address) expected for number:, 'parts' given"),
+    ],
+)  # fmt: skip
+def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason):
+    with pytest.raises(ValueError, match=r"unknown|cannot be used; holdfast doctor says why"):
+        use()
+    assert any(text.startswith(f"plug-in {reason}") for text in reports(caplog))
+
+
+def test_a_broken_importer_does_not_hinder_the_others(parts, caplog, capsys):
+    (parts / "a.txt").write_text("hello")
+    for _ in range(2):
+        with pytest.raises(RecordingError, match=r"is of no supported format.*plug-ins: broken, h"):
+            import_recordings(parts / "a.txt")
+    broken, half = reports(caplog)
+    assert broken == "plug-in broken (importers of acme 1.2) is skipped: RuntimeError: no device"
+    assert half.startswith("plug-in half (importers of acme 1.2) is skipped: TypeError: a module ")
+    with pytest.raises(ValueError, match="the plug-in of half cannot be used; holdfast doctor"):
+        import_recordings(parts / "a.txt", "half")
+
+
+def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
+    for package in ("zeta", "alpha"):
+        files = {f"{package}.py": f"value = '{package}'"}
+        install(tmp_path, package, files, {"holdfast.things": {"thing": f"{package}:value"}})
+    group = PluginGroup("things", (), lambda name, loaded: loaded)
+    with on_the_path(tmp_path, monkeypatch):
+        assert (group.load("thing"), group.load("thing")) == ("alpha", "alpha")
+        states = [(plugin.package, plugin.error) for plugin in group.states()]
+    refusal = "alpha 1.2 has thing as well; another name expected"
+    assert sorted(states) == [("alpha 1.2", ""), ("zeta 1.2", refusal)]
+    assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
+
+
+def test_doctor_lists_them(parts, capsys):
+    assert main(["doctor", "--json"]) == 0
+    plugins = json.loads(capsys.readouterr().out)["plugins"]
+    works = {plugin["name"] for plugin in plugins if not plugin["error"]}
+    assert works == {"pad", "same", "twice", "grab"}
+    assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "plug-in" in out
+    assert "SKIPPED: RuntimeError: no device" in " ".join(out.split())
+
+
+def test_help_does_not_look_for_plug_ins():
+    code = (
+        "import sys; from holdfast.cli import main; main(['--help']); "
+        "print({'importlib.metadata', 'holdfast.plugins'} & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "set()\n"
+
+
+@pytest.fixture(scope="module")
+def run_with_template(tmp_path_factory):
+    """A function that runs a verb with the template package of `examples/plugin` installed."""
+    site, folder = tmp_path_factory.mktemp("site"), tmp_path_factory.mktemp("work")
+    install_project(site, TEMPLATE)
+
+    def run(*words, code=0):
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM, *words], capture_output=True, text=True, check=False,
+            cwd=folder, env={**os.environ, "PYTHONPATH": str(site)}, timeout=120,
+        )  # fmt: skip
+        assert done.returncode == code, done.stderr
+        return done.stdout if code == 0 else done.stderr
+
+    return run, folder
+
+
+def test_the_template_is_listed_by_doctor(run_with_template):
+    run, _ = run_with_template
+    plugins = json.loads(run("doctor", "--json"))["plugins"]
+    assert [(plugin["kind"], plugin["name"], plugin["error"]) for plugin in plugins] == [
+        ("sensors", "pin-skin", ""), ("sources", "pins", ""), ("importers", "pins-log", ""),
+    ]  # fmt: skip
+
+
+def test_the_sensor_of_the_template(run_with_template):
+    run, _ = run_with_template
+    listed = json.loads(run("sensors", "--json"))["sensors"]
+    assert listed[-1]["name"] == "pin-skin"
+    assert json.loads(run("sensors", "pin-skin", "--json"))["n_taxels"] == 6
+
+
+def test_the_source_of_the_template(run_with_template):
+    run, folder = run_with_template
+    run("record", "pins:?seconds=2", "press.mcap")
+    recording = holdfast.load_recording(folder / "press.mcap")
+    assert recording.modules["finger1"].n_samples == 200
+    lines = run("detect", "builtin:any", "pins:?seconds=2", "--json").splitlines()
+    states = [json.loads(line)["state"] for line in lines]
+    assert states[90] == "NO_CONTACT"
+    assert states[-1] == "STABLE"
+    refused = run("record", "pins:?secs=2", "a.mcap", code=2)
+    assert refused == "holdfast: pins:?secs=2: unknown parameter secs; there are seconds\n"
+
+
+def test_the_format_of_the_template(run_with_template):
+    run, folder = run_with_template
+    times = np.arange(200) / 100
+    rows = np.column_stack([times, np.random.default_rng(0).normal(size=(200, 18)).round(6)])
+    np.savetxt(folder / "press.pins", rows, "%.6f")
+    imported = json.loads(run("import", "press.pins", "out", "--json"))
+    assert imported["n_samples"] == 200
+    assert imported["hint"].endswith("give --in-contact")
+    loaded = holdfast.load_recording(folder / imported["recordings"][0]["path"])
+    np.testing.assert_allclose(loaded.modules["finger1"].readings.reshape(200, 18), rows[:, 1:])
+    (folder / "bad.pins").write_text("0.0 1 2\n")
+    text = run("import", "bad.pins", "bad", "--format", "pins-log", code=2)
+    assert text == "holdfast: bad.pins, line 1: 3 values, 19 expected\n"
+
+
+def test_every_kind_is_described():
+    page = (TEMPLATE.parents[1] / "docs" / "plugins.md").read_text("utf-8")
+    for kind in ("sensors", "sources", "importers", "classifiers", "laws", "hands"):
+        assert f"`holdfast.{kind}`" in page
