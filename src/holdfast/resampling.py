@@ -20,6 +20,9 @@ MIN_ROWS_PER_UPDATE = 1.5
 """Least number of rows from one change of the readings to the next of a sample-and-hold sensor."""
 EVEN_SHARE = 0.95
 """Minimum share of the changes of such a sensor that follow after even numbers of rows."""
+MIN_UPDATE_RATE = 30.0
+"""Least rate of the updates that are used in place of the rows [Hz]: that of `builtin:any`. A
+slower sensor keeps its rows."""
 MIN_HELD_UPDATES = 4
 """Minimum number of steps between changes that show how a sensor updates."""
 LATE_UPDATE = 1.6
@@ -87,15 +90,17 @@ class UpdateFilter:
 def true_updates(recording: Recording) -> Recording:
     """Return the recording with the true updates of its sensors, if all of them hold samples.
 
-    A sensor that updates at 10 Hz in rows of 40 Hz repeats each reading four times. The rows
+    A sensor that updates at 50 Hz in rows of 200 Hz repeats each reading four times. The rows
     between are no samples: features of them would be those of a slower motion with pauses.
 
     Returns:
-        The same object if a sensor does not hold its samples.
+        The same object if a sensor does not hold its samples, or updates too slowly.
     """
     modules = {name: module for name, module in recording.modules.items() if module.n_samples}
     held = {name: rows_per_update(_changed_rows(module)) for name, module in modules.items()}
     if not held or min(held.values()) == 1.0:
+        return recording
+    if min(module.rate / held[name] for name, module in modules.items()) < MIN_UPDATE_RATE:
         return recording
     updates = {name: _update_rows(module, held[name]) for name, module in modules.items()}
     return replace(recording, modules={**recording.modules, **updates})

@@ -237,7 +237,9 @@ class Finger:
             masked = invalid | self.mask.taxels | self.wrong_taxels
             enough = not self.mask.too_many
             if masked != self.mask.taxels:
-                enough = self.mask.weigh(readings, masked)[1]
+                known, enough = self.mask.weigh(readings, masked)
+                if not (known or enough):
+                    self.mask.unweighed |= masked
             if not enough:
                 return self.refuse(faults, invalid)
         self.n_refused = self.n_refused * (self.baseline is not None)

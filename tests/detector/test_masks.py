@@ -55,7 +55,7 @@ def break_taxels(recording, taxels, kind, start, end=None):
 
 def moments(module):
     first, end = longest_hold(module)
-    return {"empty": 100, "hold": (first + end) // 2, "push": end}
+    return {"empty": 100, "hold": (first + end) // 2, "release": end}
 
 
 def trace_of(hand_model, recording):
@@ -64,7 +64,7 @@ def trace_of(hand_model, recording):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["frozen", "nan", "rail"])
-@pytest.mark.parametrize("moment", ["empty", "hold", "push"])
+@pytest.mark.parametrize("moment", ["empty", "hold", "release"])
 @pytest.mark.parametrize("n_broken", [1, 4])
 class TestAFewTaxels:
     """Of small and of large loads."""
@@ -81,9 +81,14 @@ class TestAFewTaxels:
         self, grasp, shipped, kind, moment, n_broken
     ):
         healthy = trace_of(shipped, grasp)
+        share, _ = loads(grasp.modules[FINGER])
         for start, taxels, recording in self.broken(grasp, kind, moment, n_broken):
             trace = trace_of(shipped, recording)
             after = slice(start + 400, None)
+            if (kind, moment) == ("frozen", "release") and share[taxels].sum() > 0.05:
+                # It is found after the release, when it carries most of what is left.
+                assert set(trace.state[after]) <= {UNKNOWN, NO_CONTACT}
+                continue
             assert np.mean((trace.state == healthy.state)[after]) > 0.9, taxels
             assert not (trace.state[after] == UNKNOWN).any()
             bits = sum(1 << int(taxel) for taxel in taxels)
@@ -106,8 +111,6 @@ class TestTooManyTaxels:
         assert set(trace.reason[held]) == {tuple(Reason).index(Reason.FAULT)}
 
     def test_more_than_half_of_the_taxels_of_an_empty_finger(self, grasp, shipped, kind):
-        if kind == "nan":
-            pytest.xfail("refused samples leave no memory of taxels whose load is not known")
         trace = trace_of(shipped, break_taxels(grasp, np.arange(16), kind, 100))
         assert (trace.state[500:] == UNKNOWN).all()
 
@@ -128,21 +131,24 @@ class TestForce:
         first, end = longest_hold(module)
         start, back = first + (end - first) // 3, first + 2 * (end - first) // 3
         whole = self.forces(grasp, "nan", [], start)
+        taxels = order[-4:-1]
+        assert 0.1 < share[taxels].sum() < 0.5
         for kind in ("nan", "rail", "frozen"):
-            force = self.forces(grasp, kind, order[-2:], start, back)
+            force = self.forces(grasp, kind, taxels, start, back)
             usual = np.linalg.norm(np.diff(whole[first:end], axis=0), axis=1).max()
             steps = np.linalg.norm(np.diff(force[first:end], axis=0), axis=1)
-            carried = share[order[-2:]].sum() * np.linalg.norm(whole[start])
+            carried = share[taxels].sum() * np.linalg.norm(whole[start])
             assert carried > 5 * usual  # a step would show
             assert steps.max() < 1.5 * usual, kind
             assert np.linalg.norm(force[-1] - whole[-1]) < 0.05 * np.linalg.norm(whole[start])
 
     def test_what_is_filled_in_goes_with_the_load(self, grasp):
         module = grasp.modules[FINGER]
-        _, order = loads(module)
+        share, order = loads(module)
+        assert 0.1 < share[order[-4:-1]].sum() < 0.5
         start = sum(longest_hold(module)) // 2
         whole = self.forces(grasp, "nan", [], start)
-        force = self.forces(grasp, "frozen", order[-2:], start)
+        force = self.forces(grasp, "frozen", order[-4:-1], start)
         size = np.linalg.norm(whole, axis=1)
         held = slice(start, int(np.flatnonzero(size > 0.5 * size[start])[-1]))
         error = np.linalg.norm(force - whole, axis=1)
@@ -215,10 +221,10 @@ class TestEstimates:
         values[300:500, 3] += np.rint(np.random.default_rng(9).normal(scale=2000.0, size=(200, 3)))
         found = self.estimates(values)
         first = next(k for k, e in enumerate(found) if e.faults)
-        assert runs(found[first:500], lambda e: str(e.reason)) == [
-            ("warm_up", 5), ("", 500 - first - 5)
-        ]  # fmt: skip
-        assert max(e.instability for e in found[first + 5 : 500]) < 20.0
+        (reason, wait), (after, _) = runs(found[first:500], lambda e: str(e.reason))
+        assert (reason, after) == ("warm_up", "")
+        assert 5 <= wait <= 10  # the window, and until the mask is complete
+        assert max(e.instability for e in found[first + wait : 500]) < 20.0
 
     def test_one_by_one_equals_all_at_once(self):
         values = noise()

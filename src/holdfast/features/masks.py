@@ -113,7 +113,12 @@ def replace_invalid(layout: Layout, memory: Memory, readings: Array, f: int, bit
     bits |= counts[f, at.MASKED] | counts[f, at.FAULTY_TAXELS] | counts[f, at.LOST]
     if bits == counts[f, at.MASKED]:
         return bool(counts[f, at.TOO_MANY] == 0)
-    return _weigh(layout, memory, readings, f, bits)[1]
+    known, enough, _ = _weigh(layout, memory, readings, f, bits)
+    if not (known or enough):  # what they would carry stays unknown under a load as well
+        for i in range(first, last):
+            if bits & bit_of(i - first):
+                memory.masks[i, at.UNWEIGHED] = 1.0
+    return bool(enough)
 
 
 @compiled_step

@@ -27,7 +27,7 @@ from holdfast.features.loaded_start import begins_in_contact, declared_baselines
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
 from holdfast.recordings import BASELINES, GAP_PERIODS, STARTS_LOADED
-from holdfast.resampling import Resampler, UpdateFilter, rows_per_update
+from holdfast.resampling import MIN_UPDATE_RATE, Resampler, UpdateFilter, rows_per_update
 from holdfast.sensors import Sensor
 
 MAX_RATE_CHANGE = 0.2
@@ -370,7 +370,7 @@ class ArrivalDetector:
     def _start(self, rate: float) -> list[StreamEstimate]:
         """Create the detector for a rate, and process the buffer."""
         n_rows = measure_hold(list(self._buffer), self.fingers)
-        if n_rows > 1.0:
+        if n_rows > 1.0 and rate / n_rows >= MIN_UPDATE_RATE:
             self.notices.append(
                 f"readings repeat in rows of {rate:.4g} Hz; the true updates are used, "
                 f"{rate / n_rows:.4g} Hz"
