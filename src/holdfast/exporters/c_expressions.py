@@ -201,11 +201,12 @@ class Expressions:
             is_known = value.known is not None
             return known(not value.known) if is_known else CNumber(BOOL, f"!{value.text}")
         value = self.number(node.operand)
-        if not isinstance(node.op, ast.USub):
+        is_bits = isinstance(node.op, ast.Invert) and value.kind == INTEGER
+        if not (is_bits or isinstance(node.op, ast.USub)):
             self.refuse(node, "this operator")
         if value.known is not None:
-            return known(-value.known)
-        return CNumber(value.kind, f"(-{value.text})")
+            return known(~int(value.known) if is_bits else -value.known)
+        return CNumber(value.kind, f"({'~' if is_bits else '-'}{value.text})")
 
     def _binop(self, node: ast.BinOp) -> CNumber:
         return self.combine(node, self.number(node.left), node.op, self.number(node.right))
