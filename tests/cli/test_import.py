@@ -195,7 +195,9 @@ class TestOutputs:
 
 def test_refusals(capsys, table, tmp_path):
     out = tmp_path / "out"
-    formats = "uskin-pick-move, eflesh, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv"
+    formats = (
+        "uskin-pick-move, eflesh, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, lerobot, csv"
+    )
     missing, empty, text = tmp_path / "none", tmp_path / "empty", tmp_path / "notes.txt"
     empty.mkdir()
     text.write_text("hello")

@@ -67,7 +67,7 @@ def contact_by_load(
         # fall = -zero . n: the load of the start, once it has gone.
         fall = 0.0
         for axis in range(3):
-            fall -= motion[at.ZERO + axis] * normal[axis]
+            fall -= motion[at.CONTACT_ZERO + axis] * normal[axis]
         if fall < NOISE_WEIGHT * motion[at.NOISE_NOW]:
             return IN_CONTACT
         peak = max(peak, fall)

@@ -461,7 +461,8 @@ def _decide(
         )
         if contact == LEAVING:
             state = UNSTABLE  # the force decides; the probability stays that of the features
-        if state == UNSTABLE and rule.causes.shape[1] > 0:
+        begins = codes[rule_at.CANDIDATE] == NO_CONTACT  # closes, and is held as unstable below
+        if (state == UNSTABLE or begins) and rule.causes.shape[1] > 0:
             # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
             codes[rule_at.CAUSE] = add_scores(
                 output.features[f], rule.causes[f], decision.scores[f]

@@ -73,7 +73,7 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     N_STEPS,  # their number
     NOISE,  # standard deviation of a force component by noise alone; NaN while unknown
     MAX_AMPLITUDE,  # largest F_a so far, of samples without a serious fault
-    SHAPE_SQUARES,  # sum of the squares of Memory.masks SHAPE, of the healthy taxels
+    FILL_SQUARES,  # sum of the squares of Memory.masks LAST_HEALTHY, of the healthy taxels
     FILL_RATIO,  # load of the healthy taxels, beside that when the mask last changed
     LEVELS_WIDTH,
 ) = range(9)
@@ -91,7 +91,7 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
 
 # Memory.masks.
 (
-    SHAPE, _, _,  # reading beyond rest when the mask last changed
+    LAST_HEALTHY, _, _,  # reading beyond rest when the mask last changed
     FADE, _, _,  # is added to the reading of a taxel that came back
     MASKED_AT,  # time from which it is left out [s]
     UNWEIGHED,  # 1 while it is left out and its share of the load is not known
@@ -163,8 +163,8 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     PRESSURE_SQUARES,  # sum of their squares
     NORMAL_FLOOR,  # |normal force| beyond the reference and ten times its noise
     TANGENT, _, _,  # direction of the tangential force, in three components
-    ZERO, _, _,  # F_tip without contact: of the tare, or of a release since, in three components
-    CONTACT_LOAD,  # force beyond ZERO
+    CONTACT_ZERO, _, _,  # F_tip without contact: of the tare, or of a release since
+    CONTACT_LOAD,  # force beyond CONTACT_ZERO
     PEAK_CONTACT_LOAD,  # the largest CONTACT_LOAD so far, slowly forgotten
     MOTION_WIDTH,
 ) = range(29)  # fmt: skip

@@ -172,9 +172,9 @@ def _load_of(
     if memory.counts[f, at.MASKED] & bit and memory.counts[f, at.TOO_MANY] == 0:
         ratio = memory.levels[f, at.FILL_RATIO]
         return (
-            ratio * masks[i, at.SHAPE],
-            ratio * masks[i, at.SHAPE + 1],
-            ratio * masks[i, at.SHAPE + 2],
+            ratio * masks[i, at.LAST_HEALTHY],
+            ratio * masks[i, at.LAST_HEALTHY + 1],
+            ratio * masks[i, at.LAST_HEALTHY + 2],
         )
     x, y, z = _beyond_rest(layout.rotations, memory.reference, memory.baseline, readings, i)
     return x + masks[i, at.FADE], y + masks[i, at.FADE + 1], z + masks[i, at.FADE + 2]
@@ -264,7 +264,11 @@ def _change_mask(
             x, y, z = (
                 x + masks[i, at.FADE], y + masks[i, at.FADE + 1], z + masks[i, at.FADE + 2]
             )  # fmt: skip
-        masks[i, at.SHAPE], masks[i, at.SHAPE + 1], masks[i, at.SHAPE + 2] = x, y, z
+        masks[i, at.LAST_HEALTHY], masks[i, at.LAST_HEALTHY + 1], masks[i, at.LAST_HEALTHY + 2] = (
+            x,
+            y,
+            z,
+        )
     # No window holds the samples of a taxel that became noisy, nor both ways to sum a finger.
     noisy = counts[f, at.NOISY_TAXELS] & ~counts[f, at.MASKED]
     if noisy or (not enough and before):
@@ -272,7 +276,7 @@ def _change_mask(
     counts[f, at.MASKED], counts[f, at.TOO_MANY] = bits, 0 if enough else 1
     counts[f, at.LOAD_KNOWN] = 1 if known and squares > 0.0 else 0
     counts[f, at.UNLOADED] = 0
-    levels[f, at.SHAPE_SQUARES], levels[f, at.FILL_RATIO] = squares, 1.0
+    levels[f, at.FILL_SQUARES], levels[f, at.FILL_RATIO] = squares, 1.0
 
 
 @compiled_step
@@ -286,9 +290,9 @@ def _return_taxel(
     # fade_i = ratio shape_i - h_i.
     ratio = memory.levels[f, at.FILL_RATIO]
     x, y, z = _beyond_rest(layout.rotations, memory.reference, memory.baseline, readings, i)
-    masks[i, at.FADE] = ratio * masks[i, at.SHAPE] - x
-    masks[i, at.FADE + 1] = ratio * masks[i, at.SHAPE + 1] - y
-    masks[i, at.FADE + 2] = ratio * masks[i, at.SHAPE + 2] - z
+    masks[i, at.FADE] = ratio * masks[i, at.LAST_HEALTHY] - x
+    masks[i, at.FADE + 1] = ratio * masks[i, at.LAST_HEALTHY + 1] - y
+    masks[i, at.FADE + 2] = ratio * masks[i, at.LAST_HEALTHY + 2] - z
     memory.counts[f, at.FADING] = 1
 
 
@@ -309,20 +313,20 @@ def _fill_taxels(layout: Layout, memory: Memory, readings: Array, f: int) -> Non
             if bits & bit_of(i - first) or layout.ignored[i]:
                 continue
             x, y, z = _beyond_rest(layout.rotations, memory.reference, memory.baseline, readings, i)
-            ratio += x * masks[i, at.SHAPE]
-            ratio += y * masks[i, at.SHAPE + 1]
-            ratio += z * masks[i, at.SHAPE + 2]
+            ratio += x * masks[i, at.LAST_HEALTHY]
+            ratio += y * masks[i, at.LAST_HEALTHY + 1]
+            ratio += z * masks[i, at.LAST_HEALTHY + 2]
             squares += x * x + y * y + z * z
-        ratio /= levels[f, at.SHAPE_SQUARES]
+        ratio /= levels[f, at.FILL_SQUARES]
         counts[f, at.UNLOADED] = 1 if squares < _known_squares(layout, memory, f) else 0
     levels[f, at.FILL_RATIO] = ratio
     # f_i = f_i(rest) + ratio shape_i.
     for i in range(first, last):
         if bits & bit_of(i - first):
             x, y, z = _beyond_rest(layout.rotations, memory.reference, memory.baseline, readings, i)
-            readings[i, 0] += ratio * masks[i, at.SHAPE] - x
-            readings[i, 1] += ratio * masks[i, at.SHAPE + 1] - y
-            readings[i, 2] += ratio * masks[i, at.SHAPE + 2] - z
+            readings[i, 0] += ratio * masks[i, at.LAST_HEALTHY] - x
+            readings[i, 1] += ratio * masks[i, at.LAST_HEALTHY + 1] - y
+            readings[i, 2] += ratio * masks[i, at.LAST_HEALTHY + 2] - z
 
 
 @compiled_step

@@ -287,10 +287,20 @@ def _update_contact_load(layout: Layout, memory: Memory, f: int, now: int, step:
     x, y, z = track[f, 0, now], track[f, 1, now], track[f, 2, now]
     normal = x * nx + y * ny + z * nz
     # zero: F at the least F . n so far of a release.
-    least = motion[f, at.ZERO] * nx + motion[f, at.ZERO + 1] * ny + motion[f, at.ZERO + 2] * nz
+    least = (
+        motion[f, at.CONTACT_ZERO] * nx
+        + motion[f, at.CONTACT_ZERO + 1] * ny
+        + motion[f, at.CONTACT_ZERO + 2] * nz
+    )
     if normal < least and _is_release(layout, memory, f, now, normal, x * x + y * y + z * z):
-        motion[f, at.ZERO], motion[f, at.ZERO + 1], motion[f, at.ZERO + 2] = x, y, z
-    x, y, z = x - motion[f, at.ZERO], y - motion[f, at.ZERO + 1], z - motion[f, at.ZERO + 2]
+        motion[f, at.CONTACT_ZERO] = x
+        motion[f, at.CONTACT_ZERO + 1] = y
+        motion[f, at.CONTACT_ZERO + 2] = z
+    x, y, z = (
+        x - motion[f, at.CONTACT_ZERO],
+        y - motion[f, at.CONTACT_ZERO + 1],
+        z - motion[f, at.CONTACT_ZERO + 2],
+    )
     # load = |F - zero|, peak as above.
     load = math.sqrt(x * x + y * y + z * z)
     motion[f, at.CONTACT_LOAD] = load

@@ -187,7 +187,7 @@ def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> It
 def import_hint(name: str) -> str | None:
     """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
     if name in FORMATS:
-        return HINTS[name]
+        return HINTS.get(name)
     hint: str | None = getattr(_importer(name), "HINT", None)
     return hint
 

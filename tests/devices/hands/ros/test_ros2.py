@@ -1,5 +1,6 @@
 """Hands of ROS 2 beyond the contract: what they need to begin, and how they notice silence."""
 
+import gc
 import re
 import time
 from collections import deque
@@ -39,6 +40,7 @@ def domain(monkeypatch):
 @pytest.fixture
 def driver(domain):
     """A function that starts a driver."""
+    gc.collect()  # participants that tests before left in cycles are still in the domain
     made = []
 
     def start(described, **changes):

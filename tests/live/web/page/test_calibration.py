@@ -146,6 +146,7 @@ def test_nothing_overlaps_or_overflows(visit, service, size, scheme, tmp_path):
     page = visit(service.url, size, scheme)
     wait_for_samples(page)
     page.locator("#calibrate").click()
+    shows(page, "#calibration-held", r"Held 0\ss of 60\ss")  # has begun
     progress(service, 23.4)
     shows(page, "#calibration-finish", "^Use 23")
     page.screenshot(path=tmp_path / "handling.png", full_page=True)
