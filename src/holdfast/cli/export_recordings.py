@@ -78,7 +78,11 @@ def export_recordings(
     if as_json:
         print_json({"out": out, "format": options.format, **document})
         return
-    counts = [f"{n} {name}" for name, n in document.items() if isinstance(n, int)]
+    counts = [
+        f"{n} {name.removesuffix('s') if n == 1 and name != 'fps' else name}"
+        for name, n in document.items()
+        if isinstance(n, int)
+    ]
     print_line(f"{out}: {', '.join(counts)}")
 
 
