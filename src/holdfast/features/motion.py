@@ -508,8 +508,8 @@ def _fill_seconds(
         shared += pressed * square
         along += pressed * (pushed * pushed)
         px, py, pz = px + pressed * x, py + pressed * y, pz + pressed * z
-        if pressed > mean_pressure and square > top:
-            top = square
+        rival = float(pressed > mean_pressure) * square  # no branch, which would be mispredicted
+        top = rival if rival > top else top
     # With w_i = p_i / sum p and D = sum d_i:
     # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.
     x = newest * track[f, 0, now] - 2.0 * track[f, 0, before] + oldest * track[f, 0, first]
