@@ -227,6 +227,7 @@ class Memory(NamedTuple):
     counts: Integers2  # (n_fingers, COUNTS_WIDTH)
     levels: Floats2  # (n_fingers, LEVELS_WIDTH)
     own: Floats2  # (n_fingers, n_features) values of each finger, before the maximum of the hand
+    hand: Floats1  # (n_features,) this maximum, if all fingers have the same features
     taxel_forces: Floats3  # (length, n_taxels, 3) in the fingertip frame, a ring
     reference: Floats2  # (n_taxels, 3) taxel forces at the least normal force since the start
     track: Floats3  # (n_fingers, TRACK_WIDTH, length), a ring

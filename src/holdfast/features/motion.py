@@ -89,6 +89,11 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
     gain = layout.average_gain
     if abs(step - period) > EVEN_STEPS * period:
         gain = -math.expm1(-min(step, GAP_LIMIT_PERIODS * period) / AVERAGE_SECONDS)
+    load_to_noise = math.nan
+    if layout.has_centres:
+        # log(L / noise): the same for all lags.
+        noise = memory.motion[f, at.NOISE_NOW]
+        load_to_noise = math.log(_load_floor(memory.motion, f) / noise)
     for lag in range(len(layout.lags)):
         families, seconds = layout.families[lag], layout.lag_seconds[lag]
         back = _samples_back(times, now, n_before, time - seconds, layout.lags[lag])
@@ -96,6 +101,7 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
             then = _place(now, back, length)
             if families[at.LAGS]:
                 _fill_lag(layout, memory, f, now, then, lag)
+                memory.relative[f, LOAD_TO_NOISE, lag] = load_to_noise
             if families[at.RATIOS]:
                 _fill_ratios(layout, memory, f, now, then, lag)
         if families[at.SECONDS]:
@@ -331,7 +337,7 @@ def _is_release(
     for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
         forces = memory.taxel_forces
         pressed = forces[now, i, 0] * nx + forces[now, i, 1] * ny + forces[now, i, 2] * nz
-        risen += max(pressed, 0.0)
+        risen += 0.5 * (pressed + abs(pressed))  # max(p, 0), without a branch
     return risen <= RELEASED_SHARE * (risen - normal)
 
 
@@ -409,8 +415,7 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     noise, taxel_noise = motion[f, at.NOISE_NOW], motion[f, at.TAXEL_NOISE_NOW]
-    # L = peak + 100 noise.
-    load = motion[f, at.PEAK_LOAD] + NOISE_WEIGHT * noise
+    load = _load_floor(motion, f)
     taxel_load = motion[f, at.PEAK_TAXEL_LOAD] + NOISE_WEIGHT * taxel_noise
     # v = |dF| and |dF - (dF . n) n|, over L.
     x = track[f, 0, now] - track[f, 0, then]
@@ -436,8 +441,13 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     # v = |d moment|, over L.
     turned = track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then]
     out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
-    # log(L / noise).
-    out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
+
+
+@compiled_step
+def _load_floor(motion: Array, f: int) -> float:
+    """Return what changes of the force of a finger are divided by."""
+    # L = peak + 100 noise.
+    return float(motion[f, at.PEAK_LOAD] + NOISE_WEIGHT * motion[f, at.NOISE_NOW])
 
 
 @inlined
@@ -508,7 +518,9 @@ def _fill_seconds(
         shared += pressed * square
         along += pressed * (pushed * pushed)
         px, py, pz = px + pressed * x, py + pressed * y, pz + pressed * z
-        rival = float(pressed > mean_pressure) * square  # no branch, which would be mispredicted
+        # |d_i|^2 if p_i > sum p / n, else not above 0: without a branch, which half of the
+        # taxels would mispredict.
+        rival = -math.copysign(square, mean_pressure - pressed)
         top = rival if rival > top else top
     # With w_i = p_i / sum p and D = sum d_i:
     # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.

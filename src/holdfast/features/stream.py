@@ -398,6 +398,7 @@ def _memory(layout: Layout) -> Memory:
         counts=np.zeros((n_fingers, at.COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
+        hand=np.full(layout.specs.shape[1], np.nan),
         taxel_forces=np.zeros((length, n_taxels, 3)),
         reference=np.zeros((n_taxels, 3)),
         track=np.zeros((n_fingers, at.TRACK_WIDTH, length)),
