@@ -35,7 +35,8 @@ RESERVED = frozenset(
     """auto bool break case char class const continue default delete do double else enum extern
     false float for goto if inline int long new not operator or and private public register
     restrict return short signed sizeof static struct switch template this true typedef union
-    unsigned using virtual void volatile while xor d fabs sqrt log exp expm1 tanh""".split()  # noqa: SIM905
+    unsigned using virtual void volatile while xor d fabs sqrt log exp expm1 tanh
+    copysign""".split()  # noqa: SIM905
 )
 """Names that a variable of the header must not have."""
 
