@@ -213,6 +213,7 @@ class Layout(NamedTuple):
     families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0
     places: Floats2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Floats2  # (n_fingers, 3)
+    normal_axes: Integers1  # (n_fingers,) axis that the normal is; 3 if it is none
     n_levels: int  # sizes of blocks of pairs, see holdfast.features.haar
 
 

@@ -289,12 +289,8 @@ def _second_square(
     """Note the change (x, y, z) of taxel i. Return the square of its second difference."""
     taxels, n_changes = memory.taxels, memory.counts[f, at.N_CHANGES]
     still = n_changes - taxels[i, at.CHANGED_AT] - 1.0
-    if (still + 1.0) * min(1.0, period / NOISE_SMOOTHING) > 1.0:  # jumps follow faster
-        _reset_change(taxels, i)
-    if taxels[i, at.N_CHANGED] == 0.0:
-        taxels[i, at.LONGEST_STILL] = memory.counts[f, at.N_SEEN] - 1.0
-    elif still > taxels[i, at.LONGEST_STILL]:
-        _update_longest(taxels, i, still, STUCK_SECONDS / period)
+    if still != 0.0 or taxels[i, at.N_CHANGED] == 0.0:
+        _note_still(period, memory, f, i, still)
     # |D2|^2, with D2 = D1 - D1 of the last change.
     dx = x - taxels[i, at.LAST_CHANGE]
     dy = y - taxels[i, at.LAST_CHANGE + 1]
@@ -305,6 +301,18 @@ def _second_square(
     taxels[i, at.N_CHANGED] += 1.0
     taxels[i, at.CHANGED_AT] = n_changes
     return float(dx * dx + dy * dy + dz * dz)
+
+
+@compiled_step
+def _note_still(period: float, memory: Memory, f: int, i: int, still: float) -> None:
+    """Note that a taxel which changes now did not before, or never did."""
+    taxels = memory.taxels
+    if (still + 1.0) * min(1.0, period / NOISE_SMOOTHING) > 1.0:  # jumps follow faster
+        _reset_change(taxels, i)
+    if taxels[i, at.N_CHANGED] == 0.0:
+        taxels[i, at.LONGEST_STILL] = memory.counts[f, at.N_SEEN] - 1.0
+    elif still > taxels[i, at.LONGEST_STILL]:
+        _update_longest(taxels, i, still, STUCK_SECONDS / period)
 
 
 @compiled_step

@@ -151,6 +151,16 @@ def _forget_features(memory: Memory, f: int) -> None:
 
 
 @compiled_step
+def _along(axis: int, x: float, y: float, z: float, nx: float, ny: float, nz: float) -> float:
+    """Return the part of a vector along the normal, which mostly is an axis."""
+    if axis == 0:
+        return x
+    if axis == 2:
+        return z
+    return x * nx + y * ny + z * nz
+
+
+@compiled_step
 def _next_place(layout: Layout, memory: Memory, f: int, time: float) -> tuple[int, int, bool, bool]:
     """Note the time of a sample in the history, which begins anew after a gap not bridged.
 
@@ -182,6 +192,7 @@ def append_taxels(
     first, last = layout.offsets[f], layout.offsets[f + 1]
     forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    axis = layout.normal_axes[f]
     now, before, has_previous, shows_noise = _next_place(layout, memory, f, time)
     # g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|:
     # centre c = sum p_i r_i / sum p_i, moment = n . sum r_i x g_i, taxel load = sqrt(sum |h_i|^2),
@@ -204,7 +215,7 @@ def append_taxels(
         forces[now, i, 0], forces[now, i, 1], forces[now, i, 2] = gx, gy, gz
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         hx, hy, hz = gx - reference[i, 0], gy - reference[i, 1], gz - reference[i, 2]
-        pressed = abs(hx * nx + hy * ny + hz * nz)
+        pressed = abs(_along(axis, hx, hy, hz, nx, ny, nz))
         memory.pressed[i] = pressed
         weight += pressed
         pressure_squares += pressed * pressed
@@ -212,7 +223,14 @@ def append_taxels(
         if layout.has_centres:
             px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
             cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
-            moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
+            if axis == 0:
+                moment += py * gz - pz * gy
+            elif axis == 2:
+                moment += px * gy - py * gx
+            else:
+                moment += (
+                    nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
+                )
     weight = max(weight, 1e-300)
     # step = |F(k) - F(k-1)|^2.
     step = 0.0
@@ -464,7 +482,7 @@ def _residual(
             x = forces[now, i, 0] - forces[then, i, 0] - mx
             y = forces[now, i, 1] - forces[then, i, 1] - my
             z = forces[now, i, 2] - forces[then, i, 2] - mz
-            along = x * nx + y * ny + z * nz
+            along = _along(layout.normal_axes[f], x, y, z, nx, ny, nz)
             moved += x * x + y * y + z * z
             pressed += along * along
     return moved, pressed
@@ -513,7 +531,7 @@ def _fill_seconds(
         y = newest * forces[now, i, 1] - 2.0 * forces[before, i, 1] + oldest * forces[first, i, 1]
         z = newest * forces[now, i, 2] - 2.0 * forces[before, i, 2] + oldest * forces[first, i, 2]
         square, pressed = x * x + y * y + z * z, memory.pressed[i]
-        pushed = x * nx + y * ny + z * nz
+        pushed = _along(layout.normal_axes[f], x, y, z, nx, ny, nz)
         squares += square
         shared += pressed * square
         along += pressed * (pushed * pushed)
