@@ -223,14 +223,8 @@ def append_taxels(
         if layout.has_centres:
             px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
             cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
-            if axis == 0:
-                moment += py * gz - pz * gy
-            elif axis == 2:
-                moment += px * gy - py * gx
-            else:
-                moment += (
-                    nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
-                )
+            tx, ty, tz = py * gz - pz * gy, pz * gx - px * gz, px * gy - py * gx
+            moment += _along(axis, tx, ty, tz, nx, ny, nz)
     weight = max(weight, 1e-300)
     # step = |F(k) - F(k-1)|^2.
     step = 0.0
