@@ -15,6 +15,7 @@ from holdfast.features.stream import extract
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording
+from holdfast.resampling import true_updates
 from holdfast.training.calibration import location_and_scale
 from holdfast.training.own_handling import held_samples
 
@@ -63,6 +64,7 @@ class HandGrasp(NamedTuple):
 
 def read_grasp(model: Model, recording: Recording) -> HandGrasp:
     """Return the samples of a recording: features and contact by a model of any finger."""
+    recording = true_updates(recording)
     sensors = {n: m.sensor for n, m in recording.modules.items() if m.n_samples > 30}
     rows = extract(model.plan(sensors, recording.rate), recording) if sensors else {}
     traces = detect(model, recording).fingers if sensors else {}
