@@ -9,9 +9,9 @@ recordings alone, so that they can be made anew with each model that ships.
 
 `publish` copies `study.json` and all tables as CSV from the folder of a finished study to
 docs/study/, in place of the old ones. The pages docs/study.md, docs/study-changes.md and
-docs/study/real-data.md are written from templates in docs/study/ (`*.md.j2`). Change the templates, not
-the pages: every figure in them is taken from `study.json`, and lab/tests/test_docs_study.py renders
-them again.
+docs/study/real-data.md are written from templates in docs/study/ (`*.md.j2`). Change the templates,
+not the pages: every figure in them is taken from `study.json`, and lab/tests/test_docs_study.py
+renders them again.
 """
 
 import argparse
