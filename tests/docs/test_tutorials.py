@@ -30,20 +30,17 @@ def save_grasps(folder, fingers=("thumb", "index")):
 
 def test_your_hand(folder, hand):
     save_grasps(folder / "grasps", ("thumb",))
-    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
     host = hand.removeprefix("xela://").partition("?")[0]
-    live = 'open_source("xela://auto?fingers=1:thumb,2:index")'
     n_run = blocks.run_page(
         DOCS / "tutorials" / "your-hand.md",
         {
-            live: 'open_source("live.parquet", speed=0)',
             'host = "auto"': f'host = "{host}"',
             "holdfast serve": "holdfast serve --port 0",
             "holdfast play": "holdfast play --port 0",
             "holdfast label grasps": "holdfast label --port 0 grasps",
         },
     )
-    assert n_run == 10
+    assert n_run == 9
     assert (folder / "my-hand.json").exists()
     assert (folder / "grasps" / "grasp0.labels.json").exists()
 
