@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from holdfast.exporters.lerobot_columns import ColumnSpec, SharedColumns, nested, arrow_schema
+from holdfast.exporters.lerobot_columns import ColumnSpec, SharedColumns, arrow_schema, nested
 from holdfast.exporters.lerobot_frames import ColumnStatistics, EpisodeFrames
 from holdfast.exporters.output import whole_folder
 from holdfast.io.header import Header, encode_header, header_of
