@@ -43,7 +43,7 @@ class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
     digests: dict[str, str] = {}
 
 
-class Protocol(msgspec.Struct, frozen=True):
+class BenchmarkProtocol(msgspec.Struct, frozen=True):
     """A version of the benchmark.
 
     Attributes:
@@ -56,10 +56,10 @@ class Protocol(msgspec.Struct, frozen=True):
 
 
 @cache
-def protocol() -> Protocol:
+def protocol() -> BenchmarkProtocol:
     """Return the protocol of this version of holdfast."""
     data = files("holdfast_lab.study.benchmark").joinpath(PROTOCOL_FILE).read_bytes()
-    return msgspec.json.decode(data, type=Protocol)
+    return msgspec.json.decode(data, type=BenchmarkProtocol)
 
 
 def load_split(folder: Path, split: str) -> Dataset:

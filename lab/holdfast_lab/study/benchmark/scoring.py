@@ -21,13 +21,18 @@ from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.benchmark.protocol import (
     TUNING,
-    Protocol,
+    BenchmarkProtocol,
     differing,
     digest_of,
     load_split,
 )
 from holdfast_lab.study.benchmark.submission import FingerScores, Submission
-from holdfast_lab.study.comparison.event_tables import EVENT_DIGITS, event_rows
+from holdfast_lab.study.comparison.event_tables import (
+    EVENT_DIGITS,
+    FALSE_ALARMS_OF_GLITCH,
+    OTHER_FALSE_ALARMS,
+    event_rows,
+)
 from holdfast_lab.study.comparison.rows import DIGITS, sample_rows
 from holdfast_lab.study.comparison.slip_table import SLIP_DIGITS, slip_rows
 from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics, alarm_statistics
@@ -41,6 +46,8 @@ EVENT_BUDGETS = (1.0, 5.0)
 """Rates of false alarms of a finger under a stable label that events are scored at [1/min]."""
 DECISION_SCORE = 0.5
 """Score from which on a sample is called stable, for the accuracy."""
+GLITCH_FIGURES = (FALSE_ALARMS_OF_GLITCH, OTHER_FALSE_ALARMS)
+"""Figures of events that are left out: a glitch of the controller is an event here."""
 LARGEST_LOG_ODDS = 40.0
 BOOTSTRAP_SEED = 0
 
@@ -103,7 +110,9 @@ class BenchmarkResult:
     left_out: list[str] = field(default_factory=list)
 
 
-def score_submission(submission: Submission, folder: Path, protocol: Protocol) -> BenchmarkResult:
+def score_submission(
+    submission: Submission, folder: Path, protocol: BenchmarkProtocol
+) -> BenchmarkResult:
     """Return the scores of a submission.
 
     Args:
@@ -134,7 +143,7 @@ def score_submission(submission: Submission, folder: Path, protocol: Protocol) -
     return BenchmarkResult(tables, differ, left_out)
 
 
-def _splits(submission: Submission, protocol: Protocol) -> list[str]:
+def _splits(submission: Submission, protocol: BenchmarkProtocol) -> list[str]:
     """Return the splits to read, in the order of the protocol.
 
     Raises:
@@ -217,7 +226,8 @@ def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
             shift = threshold_shift(ranges, budget)
             alarms = [_alarms(fingers.values(), shift) for fingers in recordings.values()]
             keys: dict[str, Key] = {"on": split, "threshold": f"for {budget:g}/min"}
-            rows += event_rows(keys, alarms, BOOTSTRAP_SEED)
+            scored_rows = event_rows(keys, alarms, BOOTSTRAP_SEED)
+            rows += [row for row in scored_rows if row.keys["figure"] not in GLITCH_FIGURES]
     return ResultTable(
         "events", "Events", EVENTS_NOTE, rows, ("on", "threshold"), digits_of=EVENT_DIGITS,
         has_paper=False,

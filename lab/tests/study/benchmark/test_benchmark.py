@@ -3,16 +3,24 @@
 import csv
 import json
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from holdfast.cli import main
+from holdfast.cli import main, simulate
 from holdfast.contact import STABLE
 from holdfast.io import load_dataset, save_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
 from holdfast_lab.study.benchmark import protocol as protocol_module
-from holdfast_lab.study.benchmark.protocol import BenchmarkSplit, Protocol, digest_of, protocol
+from holdfast_lab.study.benchmark.protocol import (
+    BenchmarkSplit,
+    BenchmarkProtocol,
+    digest_of,
+    protocol,
+)
 from holdfast_lab.study.benchmark.scoring import log_odds
 from study.example_recordings import SLIPS, recording_with_truth
 
@@ -34,7 +42,7 @@ def made(tmp_path_factory):
         splits[name] = BenchmarkSplit(
             holds=name, seed=0, repeats=1, scored=name != "tuning", digests=digests
         )
-    return folder, Protocol(7, splits)
+    return folder, BenchmarkProtocol(7, splits)
 
 
 @pytest.fixture
@@ -173,7 +181,7 @@ def test_other_recordings_are_named(capsys, folder, made, tmp_path, monkeypatch)
     split = splits["new-objects"]
     digests = {**split.digests, "grasp4": "00"}
     splits["new-objects"] = BenchmarkSplit(holds="", seed=0, repeats=1, digests=digests)
-    monkeypatch.setattr(protocol_module, "protocol", lambda: Protocol(7, splits))
+    monkeypatch.setattr(protocol_module, "protocol", lambda: BenchmarkProtocol(7, splits))
     path = write_csv(tmp_path / "s.csv", rows_of(folder, the_truth))
     document, err = scored(capsys, folder, path)
     assert document["differ"] == ["new-objects/grasp4"]
@@ -250,6 +258,36 @@ def test_bad_words(capsys, tmp_path, monkeypatch, words, message):
 
 def test_log_odds_are_finite():
     assert np.isfinite(log_odds(np.array([0.0, 1e-300, 0.5, 1 - 1e-17, 1.0]))).all()
+
+
+@pytest.mark.slow
+def test_the_recordings_are_simulated_and_compared(capsys, monkeypatch, tmp_path):
+    splits = {
+        "tuning": BenchmarkSplit(holds="one can", seed=3, repeats=1, scored=False),
+        "new-hand-and-objects": BenchmarkSplit(holds="a hand", seed=4, repeats=1, randomized=True),
+    }
+    monkeypatch.setattr(protocol_module, "protocol", lambda: BenchmarkProtocol(7, splits))
+    brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
+    monkeypatch.setattr(simulation, "profile", lambda name: brief)
+    known = simulate.plan_grasps
+    monkeypatch.setattr(
+        simulate, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
+    )
+    words = ["study", "data", str(tmp_path / "b"), "--jobs", "1", "--json"]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    document = json.loads(out)
+    names = {"can-case1-1", "can-case2-1"}
+    assert names <= set(document["tuning"]["differ"])
+    assert list(document["new-hand-and-objects"]["recordings"]) == ["hand0000"]
+    assert "new-hand-and-objects: 1 of 1 recordings differ from the protocol" in err
+    for name in splits:
+        digests = document[name]["recordings"]
+        splits[name] = msgspec.structs.replace(splits[name], digests=digests)
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["tuning"] == {"recordings": splits["tuning"].digests, "differ": []}
+    assert "differ" not in err
 
 
 def test_the_protocol_has_digests_of_all_splits():

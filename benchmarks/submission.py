@@ -1,7 +1,7 @@
 """Write a submission to the benchmark: what a model of holdfast says at every sample.
 
     holdfast study data benchmark/
-    python examples/benchmark_submission.py benchmark/ builtin:any any.parquet
+    python benchmarks/submission.py benchmark/ builtin:any any.parquet
     holdfast study score any.parquet --benchmark benchmark/
 
 Another program writes the same columns, as .csv or .parquet (docs/benchmark.md). A split whose
@@ -52,6 +52,7 @@ def scores_of(model: Model, split: str, recording: Recording) -> Iterator[pa.Tab
 
 
 def main(folder: Path, name: str, out: Path) -> None:
+    """Write the scores of a model for all splits that it fits."""
     model = Model.load(name)
     with pq.ParquetWriter(out, SCHEMA, compression="zstd") as writer:
         for split in SPLITS:
