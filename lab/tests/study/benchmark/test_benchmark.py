@@ -16,8 +16,8 @@ from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 from holdfast_lab.study.benchmark import protocol as protocol_module
 from holdfast_lab.study.benchmark.protocol import (
-    BenchmarkSplit,
     BenchmarkProtocol,
+    BenchmarkSplit,
     digest_of,
     protocol,
 )
