@@ -68,8 +68,10 @@ def _events(rows: list[Row]) -> Iterator[str]:
         for false in _select(rows, EVENTS | {"method": method, "figure": "false alarms per minute"})
     ]
     if parts:
-        yield f"Events on unseen objects that are missed within 0.1 s: {', '.join(parts)}, at "
+        yield (
+            f"Events on unseen objects that are missed within 0.1 s: {', '.join(parts)}, at "
             "thresholds for 1 in training."
+        )
 
 
 def _select(rows: list[Row], keys: dict[str, str]) -> list[Row]:
