@@ -94,7 +94,9 @@ def evaluate(
     )
     metrics = evaluation.metrics
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
-        raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
+        raise TrainingError(
+            f"{data}: none of its recordings ({len(recordings)}) has labels; labels expected"
+        )
     warn_about_training(evaluation.trained_on, len(recordings))
     figure.save(lambda: _draw(evaluation))
     if as_json:
