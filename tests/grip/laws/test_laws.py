@@ -1,9 +1,7 @@
-import math
 from typing import NamedTuple
 
 import pytest
 
-from holdfast.contact import Cause
 from holdfast.grip import LAWS, GripReason
 from holdfast.grip.laws import Touch, law_named
 from holdfast.grip.laws.friction_margin import FORCE_MARGIN

@@ -92,15 +92,15 @@ class Stability(Law):
         *,
         levels: tuple[float, float, float] = (0.12, 0.25, 0.85),
         reaction: float = 0.005,
-        step: tuple[float, float] = (0.7, 0.5),
+        step: tuple[float, float] = (0.7, 0.4),
         missing_gain: float = 5.0,
         refractory: float = 0.2,
         episode: float = 0.6,
         growth: float = 1.1,
         calm: float = 0.15,
         settle_time: float = 0.15,
-        fall: float = 0.4,
-        margin: float = 1.15,
+        fall: float = 0.7,
+        margin: float = 1.25,
         memory: float = 20.0,
     ) -> None:
         self.hold_level, self.fall_level, self.again_level = levels
