@@ -4,7 +4,7 @@ A user normalises the features by handling of the same hand, of other objects an
 So does the training: `holdfast simulate --randomize --grasps 3` gives three grasps of each hand.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,8 @@ from holdfast.detector import detect
 from holdfast.features.stream import extract
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.model import Model
-from holdfast.recordings import Recording
+from holdfast.recordings import Recording, Tactile
+from holdfast.resampling import true_updates
 from holdfast.training.calibration import location_and_scale
 from holdfast.training.own_handling import held_samples
 
@@ -61,8 +62,19 @@ class HandGrasp(NamedTuple):
         return self._replace(features=(self.features - location) / scale)
 
 
-def read_grasp(model: Model, recording: Recording) -> HandGrasp:
-    """Return the samples of a recording: features and contact by a model of any finger."""
+def read_grasp(
+    model: Model,
+    recording: Recording,
+    changed: Callable[[np.ndarray, Tactile], np.ndarray] | None = None,
+) -> HandGrasp:
+    """Return the samples of a recording: features and contact by a model of any finger.
+
+    Args:
+        model: of any finger.
+        recording: of a randomized hand.
+        changed: returns other features for those of a finger; by default they stay.
+    """
+    recording = true_updates(recording)
     sensors = {n: m.sensor for n, m in recording.modules.items() if m.n_samples > 30}
     rows = extract(model.plan(sensors, recording.rate), recording) if sensors else {}
     traces = detect(model, recording).fingers if sensors else {}
@@ -77,7 +89,8 @@ def read_grasp(model: Model, recording: Recording) -> HandGrasp:
         kept &= np.arange(len(kept)) % step == 1 % step
         stable = module.label_states == STABLE
         held = held_samples(module.times, traces[name].state)
-        parts = finger.features, held, stable, truth.codes == SLIDING, truth.codes == STILL
+        features = changed(finger.features, module) if changed else finger.features
+        parts = features, held, stable, truth.codes == SLIDING, truth.codes == STILL
         columns.append(tuple(part[kept] for part in parts))
     empty = (np.empty((0, len(model.finger("*").all_features))), *(np.empty(0, bool),) * 4)
     metadata = recording.metadata

@@ -9,9 +9,9 @@ recordings alone, so that they can be made anew with each model that ships.
 
 `publish` copies `study.json` and all tables as CSV from the folder of a finished study to
 docs/study/, in place of the old ones. The pages docs/study.md, docs/study-changes.md and
-docs/real-data.md are written from templates in docs/study/ (`*.md.j2`). Change the templates, not
-the pages: every figure in them is taken from `study.json`, and lab/tests/test_docs_study.py renders
-them again.
+docs/study/real-data.md are written from templates in docs/study/ (`*.md.j2`). Change the templates,
+not the pages: every figure in them is taken from `study.json`, and lab/tests/test_docs_study.py
+renders them again.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = ("study.md", "study-changes.md", "real-data.md")
+PAGES = ("study.md", "study-changes.md", "study/real-data.md")
 MISSING = "–"
 OWN_FIELDS = ("ours", "paper", "difference", "n", "interval", "infinite")
 MAY_BE_MISSING = ("paper", "difference", "interval", "infinite")
@@ -191,7 +191,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
     figures = Figures(summary)
     names = {name: getattr(figures, name) for name in ("cell", "any_cell", "grid", "has", "ratio")}
     return {
-        page: environment.get_template(f"{page}.j2").render(study=summary, **names)
+        page: environment.get_template(f"{Path(page).name}.j2").render(study=summary, **names)
         for page in PAGES
     }
 

@@ -16,7 +16,9 @@ may have begun:
 
 Changes, alarms (STABLE to UNSTABLE or NO_CONTACT) by minute of a finger; shares of its samples.
 Delays are those of the events of the hand, of the decisions as they are and `raw`: without hold,
-filter, hysteresis and minimum duration. A missed event counts as infinite.
+filter, hysteresis and minimum duration. A missed event counts as infinite. Last, the share called
+STABLE, by the truth, of samples of fingers that close in contact, that are being released, and that
+have no contact, over the first 0.3 s.
 """
 
 import argparse
@@ -29,7 +31,7 @@ import numpy as np
 from chatter import alarms, delays, hand_of, raw
 from real_sets import QUIET_FROM
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import HoldfastError
 from holdfast.io import load_dataset
@@ -59,6 +61,10 @@ DELAY_HEADS = (
     "missed at 0.05, 0.1, 0.2 s %", "false alarms/min",
 )  # fmt: skip
 
+NOT_HELD_HEADS = ("model", "recordings", "closing %", "released %", "first 0.3 s of no contact %")
+AFTER_CONTACT = 0.3
+"""Time after the end of a contact [s]."""
+
 Quiet = Callable[[Recording, str, np.ndarray], np.ndarray]
 """Returns (n,) where a finger of a recording quietly holds, at times."""
 
@@ -86,6 +92,12 @@ def main(options: argparse.Namespace) -> None:
                 hands = (hand_of(used, recording) for recording in load_dataset(folder))
                 events = pool_events([alarms(hand) for hand in hands])
                 print_row(name, folder.name, kind, *delays(events))
+    print()
+    print_heads(NOT_HELD_HEADS)
+    for name in options.models:
+        for stream, recordings, quiet in streams(options):
+            if quiet is quiet_by_truth:
+                print_row(name, stream, *not_held_figures(Model.load(name), recordings))
 
 
 def print_heads(heads: Iterable[str]) -> None:
@@ -143,6 +155,38 @@ def count(trace: FingerTrace, quiet: np.ndarray) -> Counts:
         states += np.bincount(part, minlength=4)
         seconds += float(trace.times[end - 1] - trace.times[first])
     return Counts(changes, n_alarms, states, seconds)
+
+
+def not_held_figures(model: Model, recordings: Iterable[Recording]) -> tuple[str, ...]:
+    """Return the shares called STABLE of samples that are not held, in percent."""
+    counts = np.zeros((3, 2), dtype=np.int64)
+    for recording in recordings:
+        try:
+            traces = detect(model, recording).fingers
+        except HoldfastError:
+            continue
+        for name, trace in traces.items():
+            masks = not_held(recording, name, trace.times)
+            counts += [((trace.state[mask] == STABLE).sum(), mask.sum()) for mask in masks]
+    return tuple(f"{100 * stable / n:.2f}" if n else "-" for stable, n in counts.tolist())
+
+
+def not_held(recording: Recording, finger: str, times: np.ndarray) -> list[np.ndarray]:
+    """Return (n,) where a finger closes in contact, is being released, and has just let go."""
+    if recording.truth is None:
+        raise SystemExit(f"{recording.name}: a recording with truth expected")
+    labels = labels_from_truth(recording.truth, finger, LabelRule(margin=0.0))
+    masks = [
+        label_states(tuple(x for x in labels if x.cause is cause), times) != UNKNOWN
+        for cause in (Cause.CLOSING, Cause.RELEASED)
+    ]
+    states = label_states(labels, times)
+    let_go = np.zeros(len(times), dtype=bool)
+    for first, end in runs(states == NO_CONTACT):
+        if first > 0:
+            last = np.searchsorted(times, times[first] + AFTER_CONTACT)
+            let_go[first : min(end, int(last))] = True
+    return [*masks, let_go]
 
 
 def quiet_by_truth(recording: Recording, finger: str, times: np.ndarray) -> np.ndarray:

@@ -26,6 +26,7 @@ from holdfast.io import load_dataset
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording
+from holdfast.resampling import true_updates
 from holdfast.sensors.types import Array, Integers
 
 MAX_RATE = 20.0
@@ -60,6 +61,7 @@ def main(name: str, folder: Path, out: Path | None) -> None:
 
 def samples_of(model: Model, recording: Recording) -> UnstableSamples:
     """Return the unstable samples of a recording, of all fingers."""
+    recording = true_updates(recording)
     sensors = model.fingers_of({name: item.sensor for name, item in recording.modules.items()})
     extracted = extract(model.plan(sensors, recording.rate), recording)
     n_features = len(model.finger("*").features)  # the slip rule may have more

@@ -38,7 +38,7 @@ class TestPublished:
 
     def test_there_is_a_csv_of_each_table_and_no_other_data(self, summary):
         assert {path.stem for path in PUBLISHED.glob("*.csv")} == set(summary["tables"])
-        templates = {f"{page}.j2" for page in script.PAGES}
+        templates = {f"{Path(page).name}.j2" for page in script.PAGES}
         others = {p.name for p in PUBLISHED.iterdir() if p.suffix not in (".csv", ".md")}
         assert others == {"study.json", *templates}
 
@@ -57,16 +57,17 @@ class TestPublished:
                 )
 
     def test_the_links_of_the_pages_exist(self, summary):
-        for text in script.render(summary, PUBLISHED).values():
+        for page, text in script.render(summary, PUBLISHED).items():
+            folder = (ROOT / "docs" / page).parent
             for target in text.split("](")[1:]:
-                path = target.split(")")[0].split("#")[0]
-                if path.startswith("https://"):
+                link = target.split(")")[0].split("#")[0]
+                if link.startswith("https://"):
                     continue
-                known = path.removeprefix("study/").removesuffix(".csv")
-                if path.startswith("study/") and path.endswith(".csv"):
-                    assert known in summary["tables"] or summary["quick"], path
+                path = (folder / link).resolve()
+                if path.parent == PUBLISHED and path.suffix == ".csv":
+                    assert path.stem in summary["tables"] or summary["quick"], link
                 else:
-                    assert (ROOT / "docs" / path).exists(), path
+                    assert path.exists(), link
 
 
 ROWS = [

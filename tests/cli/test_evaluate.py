@@ -190,7 +190,10 @@ def test_refusals(capsys, folder, tmp_path):
     bare = tmp_path / "bare"
     bare.mkdir()
     save_recording(load_dataset(new)[0].with_labels({}), bare / "a.parquet")
-    assert refusal(capsys, model, bare) == f"{bare}: 1 recordings without labels; labels expected"
+    assert (
+        refusal(capsys, model, bare)
+        == f"{bare}: none of its recordings (1) has labels; labels expected"
+    )
     other = tmp_path / "other"
     other.mkdir()
     save_recording(synthetic_recording("ring", 9, ("ring",)), other / "a.parquet")

@@ -134,3 +134,24 @@ def test_a_replay_of_the_threshold_has_the_states_of_the_detector(threshold):
     trace = detect(with_threshold(model, threshold), recording).fingers["a"]
     assert {NO_CONTACT, UNSTABLE} <= set(trace.state.tolist())
     np.testing.assert_array_equal(replay.states(replay.raw.fingers["a"], threshold), trace.state)
+
+
+@pytest.mark.parametrize(("share", "noise"), [(0.4, 1e-3), (1.8, 1e-3), (0.3, 8e-3)])
+def test_a_force_of_which_a_large_share_comes_or_goes_at_once_is_unstable(share, noise):
+    """The classifier of stability alone may call it stable, as it learns from slips."""
+    states = states_of(steps((1, 0), (0.3, 1), (4, 1), (0.1, share), (2, share)), noise)
+    assert (states[250:525] == STABLE).all()
+    assert (states[538:545] == UNSTABLE).all()
+    assert (states[600:] == STABLE).all()
+
+
+def test_a_force_that_swings_slowly_is_not_unsteady():
+    sway = 1 + 0.3 * np.sin(2 * np.pi * 0.4 * np.arange(400) / RATE)
+    raw = msgspec.structs.replace(
+        with_threshold(Model.load("builtin:any"), 0.0), debounce=Debounce()
+    )
+    recording = recording_of(
+        np.concatenate([steps((1, 0), (0.3, 1), (2, 1)), sway[:, None] * LOADED])
+    )
+    states = detect(raw, recording).fingers["a"].state
+    assert (states[200:] == STABLE).all()

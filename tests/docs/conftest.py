@@ -1,4 +1,5 @@
 import json
+import shutil
 import subprocess
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
+from loopback import serving
 
 from .blocks import BIN
 
@@ -33,6 +35,17 @@ def hand(tmp_path_factory):
     finally:
         server.kill()
         server.communicate()
+
+
+@pytest.fixture
+def public_box(folder, data_folder, monkeypatch):
+    """The command that downloads `uskin-pick-move`, from a server on this machine."""
+    pytest.importorskip("pooch", reason="pooch is not installed")
+    monkeypatch.setenv("HOLDFAST_DATASETS", str(folder / "cache"))
+    shutil.copytree(data_folder / "uskin_pick_move", folder / "remote" / "uskin-pick-move")
+    with serving(folder / "remote") as server:
+        command = "holdfast datasets get uskin-pick-move"
+        yield {command: f"{command} --with-checksum --mirror {server.url}"}
 
 
 @pytest.fixture

@@ -1,5 +1,8 @@
 """What counts as own handling, and its location and scale."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -110,6 +113,13 @@ def test_the_change_of_the_load_shows_how_the_arm_moves():
     still, moving = (handling_of(handling_recording(0, sway=sway)) for sway in (0.0, 0.2))
     assert still.load_change(PAD_KEY) < 0.01
     assert moving.load_change(PAD_KEY) > 0.2
+
+
+def test_the_change_of_a_load_that_is_not_known_is_not_known():
+    recording = handling_recording(0, sway=0.2)
+    loaded = replace(recording, metadata=recording.metadata | {"starts_loaded": True})
+    assert math.isnan(handling_of(loaded).load_change(PAD_KEY))
+    assert handling_of(loaded, handling_recording(1, sway=0.2)).load_change(PAD_KEY) > 0.2
 
 
 def test_clips_of_half_a_second_count():

@@ -99,7 +99,7 @@ def test_a_rate_below_0(model, others, wanted):
 def test_recordings_without_labels(model):
     with pytest.raises(TrainingError) as refusal:
         tune(model, [tiny_recording(50, states=[None] * 4)], 1.0)
-    assert str(refusal.value) == "1 recordings without labels; labels expected"
+    assert str(refusal.value) == "none of the recordings (1) has labels; labels expected"
 
 
 def test_recordings_without_a_stable_hold(model):

@@ -11,6 +11,12 @@ from holdfast_lab.report.folder import ReportKind, check_output_folder, write_re
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, to_json
 from holdfast_lab.study import environment
+from holdfast_lab.study.citation import (
+    METHODS_FILE,
+    REFERENCES_FILE,
+    bibliography,
+    methods_text,
+)
 from holdfast_lab.study.comparison import all_methods, real_recordings, sensitivity, slip_table
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper import (
@@ -25,7 +31,7 @@ from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.study.sections import PartOutput, report_sections
 from holdfast_lab.tasks import Notify, ShowProgress, Task, TaskRunner
 
-STUDY = ReportKind("study", "study.json")
+STUDY = ReportKind("study", "study.json", (METHODS_FILE, REFERENCES_FILE))
 TITLE = "Slip and disturbance at the fingertips: the study"
 
 
@@ -109,7 +115,11 @@ def run_study(
     tables = [table for section in sections for table in section.tables]
     document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
     facts = environment.report_facts(summary)
-    write_report(out, STUDY, TITLE, facts, sections, document, force=force)
+    others = {
+        METHODS_FILE: methods_text(plan, summary, tables).encode(),
+        REFERENCES_FILE: bibliography(summary).encode(),
+    }
+    write_report(out, STUDY, TITLE, facts, sections, document, others=others, force=force)
     return tables
 
 

@@ -15,11 +15,13 @@ from holdfast.cli.options import (
     JsonOption,
     SeedOption,
     TareOption,
+    start_engine,
 )
 from holdfast.cli.simulate import plan_grasps, simulate_grasps
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 from holdfast_lab.verbs import OutOption, QuickOption
+from holdfast_lab.verbs.benchmark import make_data, print_scores
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
@@ -35,6 +37,8 @@ PRINTED_COLUMNS: dict[str, tuple[str, ...]] = {
 """Tables that are printed at the end, with their columns; an empty tuple means all columns."""
 PRINTED_SPLITS = ("by object", "by recording")
 """Splits that can be printed; the first of those with the most methods is printed."""
+ACTIONS = {"data": "a folder", "score": "a .csv or .parquet file"}
+"""Actions of the benchmark, and what follows them."""
 REAL_DATA = "uskin_pick_move"
 """Folder of the real recordings, within `HOLDFAST_DATA`."""
 REAL_DATA_URL = "https://github.com/imanlab/proactive-slip-control"
@@ -84,7 +88,12 @@ QUICK_REPEATS = {"main": 2, "others": 1}
 
 def study(
     data: Annotated[
-        Path | None, typer.Argument(help="A folder of labelled recordings; or give --twin.")
+        list[Path] | None,
+        typer.Argument(
+            metavar="[DATA | data FOLDER | score FILE]",
+            help="A folder of labelled recordings; or give --twin. data: simulate the recordings "
+            "of the benchmark. score: score a submission to it.",
+        ),
     ] = None,
     out: OutOption = Path("study"),
     twin: Annotated[
@@ -95,6 +104,9 @@ def study(
     jobs: JobsOption = -1,
     seed: SeedOption = 0,
     tare: TareOption = "0.5",
+    benchmark: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Recordings of the benchmark, for score.")
+    ] = Path("benchmark"),
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -107,12 +119,58 @@ def study(
     method trained on the other recordings. With recordings of the twin, the real ones are read
     from HOLDFAST_DATA, or from ../shared/data, if they exist.
 
+    data FOLDER simulates the recordings of the frozen benchmark, and score FILE scores what
+    another program says of them, see docs/benchmark.md.
+
     Example:
       holdfast study --twin --quick --out quick/
       holdfast study --twin --out study/
       holdfast study real/ --tare first --quick --out real-study/
       holdfast study recordings/ --out mine/ --engine dask:tcp://10.0.0.1:8786
+      holdfast study data benchmark/
+      holdfast study score scores.csv --benchmark benchmark/
     """
+    action, path = _action(data or [])
+    if action == "score" and path is not None:
+        print_scores(path, benchmark, as_json=as_json)
+    elif action == "data" and path is not None:
+        make_data(path, start_engine(engine, jobs), as_json=as_json)
+    else:
+        _run(path, out, engine, jobs, seed, tare, twin=twin, quick=quick, force=force,
+             as_json=as_json)  # fmt: skip
+
+
+def _action(words: list[Path]) -> tuple[str, Path | None]:
+    """Return what is done, and its path.
+
+    Raises:
+        ValueError: the words are neither a folder nor an action of the benchmark with a path.
+    """
+    if len(words) < 2:
+        if words and str(words[0]) in ACTIONS and not words[0].is_dir():
+            raise ValueError(f"{words[0]}: {ACTIONS[str(words[0])]} expected after it")
+        return "study", words[0] if words else None
+    action = str(words[0])
+    if len(words) > 2 or action not in ACTIONS:
+        given = " ".join(map(str, words))
+        raise ValueError(f"a folder, data FOLDER or score FILE expected, {given!r} given")
+    return action, words[1]
+
+
+def _run(
+    data: Path | None,
+    out: Path,
+    engine: str,
+    jobs: int,
+    seed: int,
+    tare: str,
+    *,
+    twin: bool,
+    quick: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Run the study and print its main tables."""
     from holdfast_lab.study.run import run_study
 
     engine_used = _check_arguments(data, out, engine, jobs, seed, tare, twin=twin, force=force)

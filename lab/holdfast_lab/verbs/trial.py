@@ -45,7 +45,7 @@ def trial(
     follow from the seed. Write OUT/report.html with a film of one trial, trial.json, trials.csv,
     and each table and figure. Finished trials are kept in OUT/work, also with --force, so the same
     command continues a comparison that was stopped, and one more law runs only its own trials.
-    There are 240 trials, or 60 with --quick. docs/grip.md describes the trials and the numbers.
+    There are 240 trials, or 60 with --quick. docs/study/grip.md describes them.
 
     Example:
       holdfast trial --out trials --quick

@@ -38,8 +38,8 @@ def test_the_strongest_baseline():
         Row({**keys, "figure": "baseline [%]"}, 4.0, n=14),
     ]
     assert summary_text([table("strongest", rows)]) == (
-        "- On unseen objects our own method has 2.0 % errors by sample, the strongest baseline of "
-        "the paper's family (trees) 4.0 %; 14 recordings."
+        "- On unseen objects our own method has 2.0 % errors by samples of hands, the strongest "
+        "rival (trees) 4.0 %; 14 recordings."
     )
 
 
@@ -51,7 +51,7 @@ def test_events():
     ]
     assert summary_text([table("events", rows)]) == (
         "- Events on unseen objects that are missed within 0.1 s: holdfast 3.0 % "
-        "(with 1.5 false alarms per minute)."
+        "(with 1.5 false alarms per minute), at thresholds for 1 in training."
     )
 
 

@@ -61,7 +61,7 @@ def test_own_recordings(capsys, data, tmp_path):
     assert printed.endswith(f"{out / 'report.html'}: all 7 tables and the figures\n")
     assert "making tables and figures\n" in err
     assert {path.name for path in out.iterdir()} == {
-        "report.html", "study.json", "tables", "figures", "work",
+        "report.html", "study.json", "tables", "figures", "work", "methods.md", "references.bib",
     }  # fmt: skip
     summary = json.loads((out / "study.json").read_text())
     assert summary["left_out"] == []

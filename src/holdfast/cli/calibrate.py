@@ -1,5 +1,6 @@
 """`holdfast calibrate`: a model with the own handling of a hand, without labels."""
 
+import math
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -154,13 +155,19 @@ def _print(calibrated: "CalibratedModel", out: Path) -> None:
     print_line(f"{out}: {calibrated.model.name or 'the model'}")
 
 
+def _motion(summary: "HandlingSummary") -> str:
+    if math.isnan(summary.load_change):
+        return "how much the force changed is not known, as the hand was never seen open"
+    share = 100 * summary.load_change
+    return f"while it was held, the force changed by {share:.0f} % in half a second (median)"
+
+
 def _seen(summary: "HandlingSummary") -> str:
     """Return what was seen of a sensor, as a text."""
     held = [f"{name} {seconds:.0f} s" for name, seconds in summary.fingers.items()]
     more = ", ..." if len(held) > MAX_FINGERS_SHOWN else ""
     return (
         f"{summary.sensor}: held {summary.seconds:.0f} s ({', '.join(held[:MAX_FINGERS_SHOWN])}"
-        f"{more}); while it was held, the force changed by {100 * summary.load_change:.0f} % in "
-        f"half a second (median). {summary.n_changed} of {summary.n_features} features differ from "
-        "those of the default."
+        f"{more}); {_motion(summary)}. {summary.n_changed} of {summary.n_features} features differ "
+        "from those of the default."
     )

@@ -1,10 +1,13 @@
 """`holdfast evaluate`: metrics of a model on labelled recordings."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
     EngineOption,
     InContactOption,
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
+    from holdfast.recordings import Recording
     from holdfast.training.evaluation import Evaluation
 
 PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
@@ -44,8 +48,11 @@ AUC_NOTE = (
 
 def evaluate(
     model: ModelArgument,
-    data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
+    data: Annotated[
+        Path, typer.Argument(help="A labelled recording or CSV file, or a folder of them.")
+    ],
     *,
+    csv: CsvOptions,
     seed: SeedOption = 0,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
@@ -60,18 +67,19 @@ def evaluate(
     in time, false alarms), if the model has a slip rule; with bootstrap intervals over the
     recordings. Sentences before them say what the model is good for, from the recordings that it
     was not trained on. The others are named, because their metrics are optimistic. The figure
-    shows errors, delays and slips.
+    shows errors, delays and slips. CSV files, with labels in a column, are read directly; a folder
+    of them needs --sensor.
 
     Example:
       holdfast evaluate model.json recordings/
       holdfast evaluate builtin:twin recordings/ --json
+      holdfast evaluate builtin:any press.csv --sensor sensor.json
       holdfast evaluate model.json recordings/ --engine dask:tcp://hub:8786
     """
     require_extras("train")
     import msgspec
 
     from holdfast.errors import TrainingError
-    from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.training.verdict import no_verdict
@@ -79,14 +87,16 @@ def evaluate(
     figure.check()
     loaded = Model.load(model)
     started = start_engine(engine, jobs)
-    recordings = load_dataset(started.path(data), in_contact=in_contact)
+    recordings = _recordings(started.path(data), csv, in_contact=in_contact)
     report_handling(loaded, recordings)
     evaluation = evaluate_recordings(
         loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
     )
     metrics = evaluation.metrics
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
-        raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
+        raise TrainingError(
+            f"{data}: none of its recordings ({len(recordings)}) has labels; labels expected"
+        )
     warn_about_training(evaluation.trained_on, len(recordings))
     figure.save(lambda: _draw(evaluation))
     if as_json:
@@ -98,6 +108,20 @@ def evaluate(
     print_slips(metrics.slips, has_rule=loaded.has_slip_rule)
     print_line()
     print_line(f"{model} on {len(recordings)} recordings")
+
+
+def _recordings(data: Path, csv: CsvOptions, *, in_contact: bool) -> "Sequence[Recording]":
+    """Return the recordings of a path; those of CSV files are in memory."""
+    from holdfast.io import load_dataset
+    from holdfast.recordings import STARTS_LOADED
+
+    if not csv.fits(str(data)):
+        return load_dataset(data, in_contact=in_contact)
+    declared = {STARTS_LOADED: True} if in_contact else {}
+    return [
+        replace(recording, metadata={**recording.metadata, **declared})
+        for recording in csv.read(data)
+    ]
 
 
 def _draw(evaluation: "Evaluation") -> "Figure":

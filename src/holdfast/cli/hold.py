@@ -62,7 +62,7 @@ def hold(
     Hands on topics of ROS 2 (no ROS needed): ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop and
     ros2:gripper. Of ROS 1 (with rospy): ros1:positions, ros1:efforts, ros1:envelop and
     ros1:gripper. Another program closes the hand; the loop takes over when the grip begins.
-    docs/grip.md has their topics and parameters. With --json, each new command is a line of JSON.
+    docs/hands.md has their topics and parameters. With --json, each new command is a line of JSON.
 
     No command was ever tried on a real hand: read docs/grip.md first.
 

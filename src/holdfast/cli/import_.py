@@ -1,7 +1,7 @@
 """`holdfast import`: recordings from other formats, and from files that were cut off."""
 
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -10,6 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from holdfast.cli.csv_options import (
+    ColumnsOption,
+    SensorsOption,
+    parse_sensors,
+    report_findings,
+)
 from holdfast.cli.options import (
     EngineOption,
     ForceOption,
@@ -18,7 +24,6 @@ from holdfast.cli.options import (
     check_shared,
     start_engine,
 )
-from holdfast.cli.sensors import find_sensor
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import is_installed
@@ -45,23 +50,8 @@ class FormatOptions:
         str | None,
         typer.Option("--format", help="Format of the input; detected from the content by default."),
     ] = None
-    sensor: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sensor",
-            metavar="NAME|FILE.json",
-            help="Sensor of a CSV file: a name of `holdfast sensors` or a file; MODULE=NAME for "
-            "one module. May be repeated.",
-        ),
-    ] = None
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            help="Columns of a CSV file: time=COLUMN[:ms],taxels=PATTERN[,label=COLUMN], where "
-            "PATTERN is like F{axis}{taxel}.",
-            show_default="guessed from the header",
-        ),
-    ] = None
+    sensor: SensorsOption = None
+    columns: ColumnsOption = None
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False
@@ -82,7 +72,7 @@ class FormatOptions:
         suffix = self.suffix
         if suffix is None:
             suffix = RecordingFormat.PARQUET if is_installed("pyarrow") else RecordingFormat.MCAP
-        sensors = _sensors(self.sensor or ())
+        sensors = parse_sensors(self.sensor or ())
         labels = not self.no_labels
         return _ImportTask(self.data_format, sensors, self.columns, labels, suffix, force, out)
 
@@ -204,7 +194,7 @@ class ImportResult(NamedTuple):
 
     def print_messages(self) -> None:
         """Print the findings and the hint on stderr."""
-        _report_findings(self.imported)
+        report_findings((document["name"], findings) for document, findings in self.imported)
         if self.hint:
             print_message(f"hint: {self.hint}")
 
@@ -303,21 +293,6 @@ def _recordings(
     )
 
 
-def _sensors(texts: Sequence[str]) -> "dict[str, Sensor]":
-    """Return the sensors of `--sensor` by module; `"*"` is that of all others.
-
-    Raises:
-        ValueError: a module has two sensors, or a sensor is unknown or not valid.
-    """
-    sensors: dict[str, Sensor] = {}
-    for text in texts:
-        module, equals, name = text.rpartition("=")
-        if (key := module if equals else "*") in sensors:
-            raise ValueError(f"--sensor: two sensors given for {module or 'all modules'}")
-        sensors[key] = find_sensor(name)
-    return sensors
-
-
 def _own_files(path: Path) -> list[Path]:
     """Return the recordings of holdfast at this path: the file, or the files in the folder."""
     from holdfast.errors import RecordingError
@@ -381,19 +356,6 @@ def _write(recording: "Recording", folder: Path, task: _ImportTask) -> _Imported
         "complete": recording.complete,
     }
     return _Imported(document, tuple(findings_of(recording)))
-
-
-def _report_findings(imported: Sequence[_Imported]) -> None:
-    """Print each kind of finding once, for the first recording that has it."""
-    by_kind: dict[str, list[tuple[str, Finding]]] = {}
-    for document, findings in imported:
-        for kind, finding in {finding.kind: finding for finding in findings}.items():
-            by_kind.setdefault(kind, []).append((document["name"], finding))
-    for recordings in by_kind.values():
-        name, finding = recordings[0]
-        module = f"{finding.module}: " if finding.module else ""
-        more = f" (and {len(recordings) - 1} more)" if len(recordings) > 1 else ""
-        print_message(f"{name}{more}: {module}{finding.text}")
 
 
 def _hint(task: _ImportTask) -> str | None:

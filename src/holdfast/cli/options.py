@@ -174,7 +174,7 @@ class DetectorOptions:
         from holdfast.model import Debounce, Model
 
         is_source = is_uri(name) and not name.startswith("builtin:")
-        if is_source or name.endswith((".parquet", ".mcap")):
+        if is_source or name.endswith((".parquet", ".mcap", ".csv")):
             raise ValueError(
                 f"{name} is a source; MODEL SOURCE expected, such as builtin:any {name}"
             )

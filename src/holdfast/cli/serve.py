@@ -67,7 +67,7 @@ def serve(
 
     The page shows the state, force, sigma, probability, taxels and faults of every finger. It
     can also take the tare and record. Other programs read the WebSocket /api/v1/estimates (every
-    sample) or /api/v1/live (twenty times per second), see docs/live.md. Without --host, only
+    sample) or /api/v1/live (twenty times per second), see docs/live-page.md. Without --host, only
     this machine can connect. With --json, the address is printed as JSON. Stop it with Ctrl-C.
 
     With --hand, it also controls the grip force of a hand, as holdfast hold does, and the page

@@ -23,9 +23,12 @@ TOUCH_SHARE = 1.5 * RELEASED_SHARE
 """Share of the largest load so far that a touch exceeds."""
 REST_SECONDS = 0.2
 """A force is at rest if it has not moved, or not been shaken, for this time [s]."""
-IN_CONTACT, LEAVING, WITHOUT_CONTACT = range(3)
-"""What a force shows. LEAVING: what is left of it is as small as without contact, but it moves
-still. Such a finger may touch or leave something; it holds nothing."""
+IN_CONTACT, UNSTEADY, WITHOUT_CONTACT = range(3)
+"""What a force shows. UNSTEADY: what is left of it is as small as without contact, but it moves
+still; or a large share of it comes or goes at once. Such a finger closes, opens or is pushed."""
+UNSTEADY_SHARE, UNSTEADY_TO_NOISE = 0.25, 16.0
+"""Share of the largest load so far, and multiple of the noise, by which an unsteady force changes
+within MOVE_SECONDS."""
 CALM_RATIO = 3.0
 """A finger is calm while sigma is at most this many times the sigma of noise alone."""
 
@@ -49,7 +52,7 @@ def contact_by_load(
     time: float,
     zero_unknown: bool,
 ) -> int:
-    """Return IN_CONTACT, LEAVING or WITHOUT_CONTACT: by the load, and whether the force rests.
+    """Return IN_CONTACT, UNSTEADY or WITHOUT_CONTACT: by the load, and whether the force rests.
 
     Args:
         motion: of the finger, as in `Memory`.
@@ -73,19 +76,21 @@ def contact_by_load(
         peak = max(peak, fall)
     if not _is_unloaded(motion[at.CONTACT_LOAD], peak, threshold, latest):
         decided[rule_at.LOADED_AT] = time
-        return IN_CONTACT
+        # Unsteady: |F(k) - F(k - MOVE_SECONDS / T)| > max(peak / 4, 16 noise).
+        least = max(UNSTEADY_SHARE * peak, UNSTEADY_TO_NOISE * motion[at.NOISE_NOW])
+        return UNSTEADY if motion[at.MOVED_BY] > least else IN_CONTACT
     rest = time - max(motion[at.MOVED_AT], decided[rule_at.LOADED_AT])
     if latest == NO_CONTACT or rest > REST_SECONDS:
         return WITHOUT_CONTACT
-    # Leaving: a grip was seen, peak >= 100 noise. A stream may begin in contact undeclared.
-    return LEAVING if peak >= NOISE_WEIGHT * motion[at.NOISE_NOW] else IN_CONTACT
+    # A grip was seen: peak >= 100 noise. A stream may begin in contact undeclared.
+    return UNSTEADY if peak >= NOISE_WEIGHT * motion[at.NOISE_NOW] else IN_CONTACT
 
 
 @compiled_step
 def contact_by_force(
     load: float, decided: Array, threshold: float, latest: int, time: float, zero_unknown: bool
 ) -> int:
-    """Return IN_CONTACT, LEAVING or WITHOUT_CONTACT: by F_a, and whether a share of it rests.
+    """Return IN_CONTACT, UNSTEADY or WITHOUT_CONTACT: by F_a, and whether a share of it rests.
 
     A released skin relaxes slowly: its load is a small share of the largest one, and at rest.
 
@@ -104,7 +109,7 @@ def contact_by_force(
     at_rest = time - decided[rule_at.SHAKEN_AT] > REST_SECONDS
     if at_rest or (not zero_unknown and _is_unloaded(load, 0.0, threshold, latest)):
         return WITHOUT_CONTACT
-    return LEAVING
+    return UNSTEADY
 
 
 @compiled_step

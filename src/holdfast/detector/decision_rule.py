@@ -31,7 +31,7 @@ from holdfast.detector import arrays as rule_at
 from holdfast.detector.arrays import DecisionMemory, DecisionRule
 from holdfast.detector.contact_rule import (
     IN_CONTACT,
-    LEAVING,
+    UNSTEADY,
     WITHOUT_CONTACT,
     contact_by_force,
     contact_by_load,
@@ -459,7 +459,7 @@ def _decide(
             rule.hysteresis,
             codes[rule_at.STATE],
         )
-        if contact == LEAVING:
+        if contact == UNSTEADY:
             state = UNSTABLE  # the force decides; the probability stays that of the features
         begins = codes[rule_at.CANDIDATE] == NO_CONTACT  # closes, and is held as unstable below
         if (state == UNSTABLE or begins) and rule.causes.shape[1] > 0:

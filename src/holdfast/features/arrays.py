@@ -159,6 +159,7 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     BLOCK_START,  # time [s]; NaN before the first sample
     REFERENCE, _, _,  # F_tip at the least normal force, in three components
     MOVED_AT,  # when the force last moved by much more than its noise [s]
+    MOVED_BY,  # change of the force over MOVE_SECONDS of holdfast.features.motion
     PRESSURE,  # sum over the taxels of |h . n|, beyond the reference
     PRESSURE_SQUARES,  # sum of their squares
     NORMAL_FLOOR,  # |normal force| beyond the reference and ten times its noise
@@ -167,7 +168,7 @@ N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
     CONTACT_LOAD,  # force beyond CONTACT_ZERO
     PEAK_CONTACT_LOAD,  # the largest CONTACT_LOAD so far, slowly forgotten
     MOTION_WIDTH,
-) = range(29)  # fmt: skip
+) = range(30)  # fmt: skip
 
 # Layout.families: which relative kinds a lag needs, of those lists of holdfast.features.specs.
 (

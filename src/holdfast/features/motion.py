@@ -358,9 +358,9 @@ def _update_ratio(layout: Layout, memory: Memory, f: int, now: int) -> None:
 
 @inlined
 def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: float) -> None:
-    """Note the time if the force moves: by much more than its noise, and more than an echo."""
+    """Note how far the force moved, and when: by much more than its noise, and than an echo."""
     track, motion, length = memory.track, memory.motion, memory.track.shape[2]
-    # |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
+    # moved = |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
     n_before = min(memory.counts[f, at.N_MOTION], length) - 1
     back = min(round(MOVE_SECONDS / layout.period), n_before)
     if back > 0:
@@ -371,7 +371,8 @@ def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: flo
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
     least = max(MOVED_TO_NOISE * motion[f, at.NOISE_NOW], RELEASED_SHARE * motion[f, at.PEAK_LOAD])
-    if x * x + y * y + z * z > least * least:
+    motion[f, at.MOVED_BY] = math.sqrt(x * x + y * y + z * z)
+    if motion[f, at.MOVED_BY] > least:
         motion[f, at.MOVED_AT] = time
 
 

@@ -51,7 +51,8 @@ class HandlingSummary(msgspec.Struct, frozen=True):
         sensor: its name; with the finger, of a model that has a classifier for each.
         fingers: held time of each finger [s].
         seconds: held time of the finger that holds longest [s].
-        load_change: median change of the force within half a second, as a share of it.
+        load_change: median change of the force within half a second, as a share of it; NaN if the
+            recordings begin in contact, so that the load is not known.
         n_features: number of features.
         n_changed: number of them whose location or scale differs from the default.
         activity: how far the features of change are above their default location, in default
@@ -211,7 +212,7 @@ class _Calibration:
         after = self._decide(_with_handling(self.model, handling))
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
-            moves = self.seen.load_change(key) >= STILL_CHANGE
+            moves = not self.seen.load_change(key) < STILL_CHANGE
             chosen = choose_operating_point(after[key], part, false_alarms, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, **chosen._asdict())
         model = _with_handling(self.model, handling)

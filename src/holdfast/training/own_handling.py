@@ -13,6 +13,7 @@ import numpy as np
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import TrainingError
+from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import extract
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs
@@ -74,7 +75,8 @@ class HeldSamples:
         finger: its name.
         sensor: its sensor.
         features: (n, n_features) finite.
-        load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it.
+        load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it; NaN if the
+            recording begins in contact, so that the load is not known.
         seconds: held time, with closing and opening [s].
     """
 
@@ -127,9 +129,10 @@ class OwnHandling:
         traces = detect(raw, recording).fingers
         sensors = {name: recording.modules[name].sensor for name in traces}
         rows = extract(self.model.plan(sensors, recording.rate), recording)
+        loaded = begins_in_contact(recording.metadata)
         for name, trace in traces.items():
             self._count_faults(name, trace)
-            self._add_finger(name, sensors[name], trace, rows[name].features)
+            self._add_finger(name, sensors[name], trace, rows[name].features, loaded=loaded)
 
     def fingers(self, key: HandlingKey) -> dict[str, float]:
         """Return the held time of each finger of a key [s]."""
@@ -147,9 +150,15 @@ class OwnHandling:
         return np.concatenate([part.features for part in self.samples[key]])
 
     def load_change(self, key: HandlingKey) -> float:
-        """Return the median change of the force of a key, as a share of it."""
+        """Return the median change of the force of a key, as a share of it.
+
+        It is 0 if no hold is long enough, and NaN if no load is known.
+        """
         changes = np.concatenate([part.load_changes for part in self.samples[key]])
-        return float(np.median(changes)) if len(changes) else 0.0
+        known = changes[np.isfinite(changes)]
+        if len(known):
+            return float(np.median(known))
+        return math.nan if len(changes) else 0.0
 
     def check(self) -> None:
         """Check that the fingers have few faults, and that one holds something long enough.
@@ -178,7 +187,9 @@ class OwnHandling:
                 f"({ENOUGH_HANDLING:g} s or more are better)"
             )
 
-    def _add_finger(self, name: str, sensor: Sensor, trace: FingerTrace, features: Array) -> None:
+    def _add_finger(
+        self, name: str, sensor: Sensor, trace: FingerTrace, features: Array, *, loaded: bool
+    ) -> None:
         key = HandlingKey.of(self.model, name, sensor)
         known = self.samples.setdefault(key, [])
         if known and (known[0].sensor.n_taxels, known[0].sensor.unit) != (
@@ -193,6 +204,8 @@ class OwnHandling:
         touching = held_samples(trace.times, trace.state, edge_seconds=0.0)
         seconds = float(held_durations(trace.times)[touching].sum())
         changes = _load_changes(trace, held)
+        if loaded:
+            changes = np.full_like(changes, np.nan)
         known.append(HeldSamples(name, sensor, features[held], changes, seconds))
 
     def _count_faults(self, finger: str, trace: FingerTrace) -> None:

@@ -235,7 +235,7 @@ def _measure(hands: Sequence[FingerDecisions], threshold: float) -> ThresholdMet
     counts = [stable_counts(hand) for hand in hands]
     labelled = sum(count["labelled"] for count in counts)
     if not any(hand.labels.any() for hand in hands):
-        raise TrainingError(f"{len(hands)} recordings without labels; labels expected")
+        raise TrainingError(f"none of the recordings ({len(hands)}) has labels; labels expected")
     events = pool_events(matches)
     if not events.stable_minutes or not labelled:
         raise TrainingError(

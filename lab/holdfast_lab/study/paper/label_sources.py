@@ -15,12 +15,13 @@ from holdfast.metrics.masks import Mask
 from holdfast.metrics.truth_labels import LabelRule, fingers_with_truth, relabel
 from holdfast.recordings import Recording, Tactile, Truth, label_states, labels_from_samples
 
-LabelSource = Literal["recording", "exact", "drawn", "sliding"]
+LabelSource = Literal["recording", "exact", "drawn", "sliding", "no_glitches"]
 """Where labels come from.
 
 `recording`: those of the recording. `exact`: from the truth without margin. `drawn`: by the rule
 `signal` from the force alone. `sliding`: from the truth, but in a held contact only sliding is
-unstable; disturbances without sliding and glitches are stable.
+unstable; disturbances without sliding and glitches are stable. `no_glitches`: from the truth, but
+a glitch of the hand's controller is stable.
 """
 
 
@@ -32,7 +33,7 @@ def has_truth(recording: Recording) -> bool:
 def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recording:
     """Return the recording with labels from another source.
 
-    Without a truth, `exact` and `sliding` keep the labels of the recording.
+    Without a truth, all but `drawn` keep the labels of the recording.
 
     Args:
         recording: to label.
@@ -44,6 +45,8 @@ def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recordin
     truth = recording.truth
     if source == "recording" or truth is None or not has_truth(recording):
         return recording
+    if source == "no_glitches":
+        return relabel(recording, LabelRule(margin=0.0, glitch=None))
     exact = relabel(recording, LabelRule(margin=0.0))
     if source == "exact":
         return exact

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
     DetectorOptions,
     JsonOption,
@@ -49,6 +50,7 @@ def detect(
     ] = False,
     *,
     options: DetectorOptions,
+    csv: CsvOptions,
     seconds: SecondsOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -65,12 +67,14 @@ def detect(
     SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C or
     for --seconds:
     xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic, ros1:///xServTopic
-    or serial:///dev/ttyACM0?sensor=anyskin.
+    or serial:///dev/ttyACM0?sensor=anyskin. A CSV file is read directly, as holdfast import does,
+    into memory.
 
     Example:
       holdfast detect model.json grasp.parquet > states.jsonl
       holdfast detect builtin:any xela://auto
       holdfast detect builtin:noise-floor grasp.mcap --summary
+      holdfast detect builtin:any press.csv --sensor sensor.json
       holdfast detect model.json grasp.parquet --debounce 0.05 --hysteresis 0.1
     """
     from holdfast.devices.uri import is_uri
@@ -79,11 +83,13 @@ def detect(
     if seconds is not None and not live:
         raise ValueError(f"--seconds is for live sources; {source} is a recording")
     check_seconds(seconds)
+    is_csv = csv.fits(source)
     loaded = options.load_model(model)
     if live:
         chunks = _detect_live(loaded, source, options, seconds)
     else:
-        chunks = _detect_recording(loaded, Path(source), options)
+        recording = _single(csv.read(Path(source)), source) if is_csv else None
+        chunks = _detect_recording(loaded, Path(source), options, recording)
         if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
             chunks = progress(chunks, "detecting")
     if summary:
@@ -137,16 +143,28 @@ def _print_summary(chunks: Iterator["EstimateChunk"], model: str, *, as_json: bo
         summary.print()
 
 
+def _single(recordings: "list[Recording]", source: str) -> "Recording":
+    """Return the only recording of a source.
+
+    Raises:
+        ValueError: there are several.
+    """
+    if len(recordings) > 1:
+        raise ValueError(f"one recording expected, {len(recordings)} given: {source}")
+    return recordings[0]
+
+
 def _detect_recording(
-    model: "Model", path: Path, options: DetectorOptions
+    model: "Model", path: Path, options: DetectorOptions, recording: "Recording | None"
 ) -> Iterator["EstimateChunk"]:
+    """Yield the estimates of the recording at a path; None if it is read from there."""
     from holdfast.cli.detect.output import chunk_from_detection
     from holdfast.detector import Detector
     from holdfast.features.loaded_start import begins_in_contact
     from holdfast.live.readings_monitor import ReadingsMonitor
 
     detector = None
-    for part in _read_parts(model, path, options.rate):
+    for part in _read_parts(model, path, options.rate, recording):
         if detector is None:
             sensors = {name: module.sensor for name, module in part.modules.items()}
             taxels = parse_taxels(options.ignore, sensors)
@@ -165,8 +183,10 @@ def _detect_recording(
         yield chunk_from_detection(detector.run(part))
 
 
-def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recording"]:
-    """Yield the recording at the model's rate.
+def _read_parts(
+    model: "Model", path: Path, rate: RatePolicy, recording: "Recording | None"
+) -> Iterator["Recording"]:
+    """Yield the recording, that of the path if it is None, at the model's rate.
 
     It comes in parts, or as a whole if it is resampled or its tare is an interval.
     """
@@ -175,7 +195,10 @@ def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recor
     from holdfast.io import load_recording, read_chunks
     from holdfast.resampling import resample, true_updates
 
-    parts = read_chunks(path, CHUNK_SIZE, labels=False)
+    def whole() -> "Recording":
+        return true_updates(recording or load_recording(path, labels=False))
+
+    parts = iter([recording]) if recording else read_chunks(path, CHUNK_SIZE, labels=False)
     first = next(parts, None)
     if first is None:
         raise RecordingError(f"{path} has no samples; at least one expected")
@@ -188,16 +211,16 @@ def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recor
             f"{path}: readings repeat in rows of {first.rate:.4g} Hz; "
             f"the true updates are used, {updates.rate:.4g} Hz"
         )
-        first, parts = true_updates(load_recording(path, labels=False)), iter(())
+        first, parts = whole(), iter(())
     if model.rate is None or model.rate_fits(first.rate):
         if Tare.parse(model.tare).kind == "interval":
-            return iter([true_updates(load_recording(path, labels=False))])
+            return iter([whole()])
         return chain([first], parts)
     given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
     if rate is RatePolicy.STRICT:
         raise ModelError(f"{given} within 20 % (--rate resample accepts it)")
     print_message(f"{given}: resampled")
-    return iter([resample(true_updates(load_recording(path, labels=False)), model.rate)])
+    return iter([resample(whole(), model.rate)])
 
 
 def _detect_live(

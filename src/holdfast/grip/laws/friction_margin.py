@@ -2,7 +2,7 @@
 
 The target is a margin times the tangential force over the friction coefficient; the force rises
 at once and falls by 5 % a step. Margin 1.15: protocol of the PapillArray group (UCD), whose first
-coefficient is 0.3; 0.5 was tuned on trials of another seed (docs/grip.md). Rise, fall and the
+coefficient is 0.3; 0.5 was tuned on trials of another seed (docs/study/grip.md). Rise, fall and the
 coefficient found online: G. Waltersson and Y. Karayiannidis,
 arXiv 2410.19660, whose release has margins and a lowest force of its own. The rule by which the
 coefficient is found is an own choice: the largest ratio of tangential to normal force that held.

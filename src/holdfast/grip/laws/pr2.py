@@ -3,8 +3,8 @@
 J. M. Romano, K. Hsiao, G. Niemeyer, S. Chitta, K. J. Kuchenbecker: Human-inspired robotic grasp
 control with tactile sensing. IEEE Transactions on Robotics 27 (2011) 1067-1079. Filters and
 thresholds are those of the released code. The gain of a reaction was tuned on trials of another
-seed (docs/grip.md): the paper's, 1.08 as we remember it, drops more. The original has one force
-for both fingertips; here every finger reacts with the others.
+seed (docs/study/grip.md): the paper's, 1.08 as we remember it, drops more. The original has one
+force for both fingertips; here every finger reacts with the others.
 """
 
 import math

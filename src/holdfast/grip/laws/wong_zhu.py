@@ -3,7 +3,7 @@
 Wong and Zhu, Frontiers in Robotics and AI (2026), 10.3389/frobt.2026.1735467, detect slip where
 |T_k - T_(k-1)| / max(T_(k-1), eps) exceeds a threshold, T being the tangential resultant of a
 finger. Only the abstract was available: eps is an own choice; threshold and gain were tuned on
-trials of another seed (docs/grip.md).
+trials of another seed (docs/study/grip.md).
 """
 
 from collections.abc import Sequence

@@ -47,7 +47,7 @@ HINTS = {
     "arq-crisp": _IF_IN_CONTACT,
     "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
     "lerobot": f"metadata say how the recordings begin; {_IF_IN_CONTACT}",
-    "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, import with --columns signs=+--",
+    "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
 }
 """Option that helps with the recordings of a format, for the person who imports them."""
 

@@ -1,0 +1,1 @@
+"""The frozen benchmark: its data, submissions of other programs, and their scores."""

@@ -1,0 +1,96 @@
+"""The protocol of the benchmark: its splits, and the digests of their recordings."""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import msgspec
+
+from holdfast.errors import RecordingError
+from holdfast.io import Dataset, load_dataset
+from holdfast.recordings import Recording
+from holdfast_lab.study.plan import content_digest
+
+PROTOCOL_FILE = "protocol.json"
+TUNING = "tuning"
+"""Split from which the scorer chooses the thresholds."""
+DIGEST_LENGTH = 32
+"""Number of hexadecimal digits of a digest."""
+MEASURED_ALL = "all"
+"""Mechanisms of real skins that randomized hands have."""
+
+
+class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
+    """Recordings of one split: how the twin makes them, and their digests.
+
+    Attributes:
+        holds: what is new in it, in words.
+        seed: of the twin.
+        repeats: grasps of each object and case, or number of randomized hands.
+        other_objects: use the objects that no other split has.
+        randomized: every recording has another hand, sensor and object.
+        scored: whether results are reported for it.
+        digests: of the content of each recording, by name.
+    """
+
+    holds: str
+    seed: int
+    repeats: int
+    other_objects: bool = False
+    randomized: bool = False
+    scored: bool = True
+    digests: dict[str, str] = {}
+
+
+class BenchmarkProtocol(msgspec.Struct, frozen=True):
+    """A version of the benchmark.
+
+    Attributes:
+        version: a new one for every change of data or rules.
+        splits: by name.
+    """
+
+    version: int
+    splits: dict[str, BenchmarkSplit]
+
+
+@cache
+def protocol() -> BenchmarkProtocol:
+    """Return the protocol of this version of holdfast."""
+    data = files("holdfast_lab.study.benchmark").joinpath(PROTOCOL_FILE).read_bytes()
+    return msgspec.json.decode(data, type=BenchmarkProtocol)
+
+
+def load_split(folder: Path, split: str) -> Dataset:
+    """Return the recordings of a split.
+
+    Args:
+        folder: with a folder for each split.
+        split: its name.
+
+    Raises:
+        RecordingError: the folder of the split does not exist.
+    """
+    path = folder / split
+    if not path.is_dir():
+        raise RecordingError(
+            f"{path}: no such folder; `holdfast study data {folder}` simulates the recordings"
+        )
+    return load_dataset(path)
+
+
+def digest_of(recording: Recording) -> str:
+    """Return the digest of samples, labels, metadata and truth of a recording."""
+    return content_digest(recording).hex()[:DIGEST_LENGTH]
+
+
+def differing(split: BenchmarkSplit, digests: Mapping[str, str]) -> list[str]:
+    """Return the names of the recordings that are not those of the protocol.
+
+    Args:
+        split: of the protocol.
+        digests: of the recordings, by name.
+    """
+    names = {*split.digests, *digests}
+    return sorted(name for name in names if split.digests.get(name) != digests.get(name))

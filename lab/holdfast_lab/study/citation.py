@@ -1,0 +1,135 @@
+"""What a publication takes from a study: a text of its methods, and its references as BibTeX."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
+from holdfast_lab.report.result_tables import ResultTable
+from holdfast_lab.study.comparison.jobs import method_effort, method_titles
+from holdfast_lab.study.environment import ROLES
+from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME
+from holdfast_lab.study.evaluation.evaluate_slips import SLIP_RATE
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.plan import StudyPlan
+
+METHODS_FILE, REFERENCES_FILE = "methods.md", "references.bib"
+"""Files beside the tables of a study."""
+COMPARING_TABLES = ("strongest", "methods", "hands", "events", "slips", "sigma_energy", "real")
+"""Tables that compare methods."""
+
+REFERENCES = """\
+@inproceedings{kitouni,
+  author = {Kitouni, Dounia and Khoramshahi, Mahdi and Perdereau, Veronique},
+  title = {A model-free approach to fingertip slip and disturbance detection for grasp
+           stability inference},
+}
+@article{zhang2016,
+  author = {Zhang and others},
+  journal = {IEEE Sensors Journal},
+  volume = {16},
+  pages = {7073},
+  year = {2016},
+}
+@misc{james2020,
+  author = {James, Jasper W. and Lepora, Nathan F.},
+  eprint = {2010.01928},
+  archiveprefix = {arXiv},
+  year = {2020},
+}
+@article{wong2026,
+  author = {Wong and Zhu},
+  journal = {Frontiers in Robotics and AI},
+  doi = {10.3389/frobt.2026.1735467},
+  year = {2026},
+}
+"""
+"""Entries of publications. What is not known for certain is left out."""
+
+
+def methods_text(plan: StudyPlan, summary: Mapping[str, Any], tables: Sequence[ResultTable]) -> str:
+    """Return the protocol of a study as text for a publication.
+
+    Args:
+        plan: of the study.
+        summary: contents of `study.json`, without the tables.
+        tables: of the study.
+    """
+    paragraphs = [
+        "# Methods",
+        _data_text(plan, summary),
+        _protocol_text(plan),
+        _methods_text(plan),
+        _comparisons_text(tables),
+        _software_text(summary),
+    ]
+    return "\n\n".join(paragraphs) + "\n"
+
+
+def bibliography(summary: Mapping[str, Any]) -> str:
+    """Return the references of the methods text as BibTeX.
+
+    Args:
+        summary: contents of `study.json`, with the version of holdfast.
+    """
+    return (
+        "@software{holdfast,\n  author = {{The authors of holdfast}},\n  title = {holdfast},\n"
+        f"  version = {{{summary['versions']['holdfast']}}},\n}}\n{REFERENCES}"
+    )
+
+
+def _data_text(plan: StudyPlan, summary: Mapping[str, Any]) -> str:
+    source = (
+        "simulated by the physical twin of holdfast [@holdfast]"
+        if plan.main.is_simulated
+        else "the recordings of the study"
+    )
+    lines = [
+        f"- {role}: {corpus['recordings']} recordings ({ROLES.get(role, 'others')}), "
+        f"{corpus['samples']} samples of single fingers at {corpus['rate']:.0f} Hz, digest "
+        f"{corpus['digest']}"
+        for role, corpus in summary["data"].items()
+    ]
+    return "\n".join([f"**Data**: {source}.", "", *lines])
+
+
+def _protocol_text(plan: StudyPlan) -> str:
+    effort = method_effort(plan, next(iter(METHODS)))
+    return (
+        f"**Protocol**: The features of Kitouni et al. [@kitouni] ({', '.join(DEPLOYED_FEATURES)}) "
+        f"use windows of N_w = {DEFAULT_WINDOW} samples. Folds hold out whole recordings "
+        f"({effort.folds} folds) or all recordings of an object; corpora other than main are "
+        "scored with a fit to all of main. Scalers, classifiers, contact thresholds and alarm "
+        "thresholds come from training recordings alone. All methods are scored on the samples "
+        "at which all of them have an estimate. Alarm thresholds are chosen for "
+        f"{COMPARED_RATE:g} false alarm per minute of stable label, with states held for "
+        f"{HOLD_TIME:g} s; those of slips for {SLIP_RATE:g} false alarm per minute of held time. "
+        "Intervals are 95 %, by bootstrap over recordings; differences are paired by recording. "
+        f"All random numbers come from seed {plan.seed}."
+    )
+
+
+def _methods_text(plan: StudyPlan) -> str:
+    lines = [f"- {title}: {METHODS[name].source}." for name, title in method_titles(plan).items()]
+    return "\n".join(["**Methods**:", "", *lines])
+
+
+def _comparisons_text(tables: Sequence[ResultTable]) -> str:
+    counts = {
+        table.name: sum(row.interval is not None for row in table.rows)
+        for table in tables
+        if table.name in COMPARING_TABLES
+    }
+    n_all = sum(row.interval is not None for table in tables for row in table.rows)
+    named = ", ".join(f"{name} {n}" for name, n in counts.items())
+    beside = f" Tables that compare methods have {sum(counts.values())} of them ({named})."
+    return (
+        f"**Number of comparisons**: the tables have {n_all} values with an interval."
+        f"{beside if counts else ''} No interval is corrected for their number: of a hundred "
+        "true values, about five lie outside their interval."
+    )
+
+
+def _software_text(summary: Mapping[str, Any]) -> str:
+    versions = [f"{name} {number}" for name, number in summary["versions"].items() if number]
+    quick = " This was a quick study; quote a full one." if summary["quick"] else ""
+    return f"**Software**: {', '.join(versions)}.{quick}"

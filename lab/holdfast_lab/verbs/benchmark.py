@@ -1,0 +1,117 @@
+"""`holdfast study data` and `holdfast study score`: the benchmark."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
+from holdfast.cli.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from holdfast.parallel import Engine
+    from holdfast_lab.report.result_tables import ResultTable, Row
+    from holdfast_lab.study.benchmark.protocol import BenchmarkSplit
+
+
+def make_data(folder: Path, engine: "Engine", *, as_json: bool) -> None:
+    """Simulate the missing recordings of the benchmark, and compare them with its digests.
+
+    Raises:
+        OutputError: existing recordings have another seed.
+    """
+    from holdfast_lab.study.benchmark.protocol import differing, digest_of, load_split, protocol
+
+    document: dict[str, object] = {"version": protocol().version}
+    for name, split in protocol().splits.items():
+        print_message(f"{name}: {split.holds}")
+        _simulate(folder / name, split, engine)
+        recordings = load_split(folder, name)
+        digests = {r.name: digest_of(r) for r in progress(recordings, "comparing")}
+        differ = differing(split, digests)
+        document[name] = {"recordings": digests, "differ": differ}
+        if differ:
+            print_message(
+                f"{name}: {len(differ)} of {len(digests)} recordings differ from the protocol, "
+                f"such as {differ[0]}: other versions of libraries, or another kind of processor"
+            )
+    if as_json:
+        print_json(document)
+    else:
+        print_line(f"{folder}: the benchmark, version {protocol().version}")
+
+
+def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
+    """Score a submission and print the tables.
+
+    Raises:
+        ValueError: the submission is wrong or incomplete.
+        RecordingError: the recordings of the benchmark do not exist.
+    """
+    from holdfast_lab.report.result_tables import to_json
+    from holdfast_lab.study.benchmark.protocol import protocol
+    from holdfast_lab.study.benchmark.scoring import score_submission
+    from holdfast_lab.study.benchmark.submission import read_submission
+
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; a submission as .csv or .parquet expected")
+    result = score_submission(read_submission(path), folder, protocol())
+    if result.differ:
+        print_message(
+            f"{len(result.differ)} recordings are not those of the protocol, such as "
+            f"{result.differ[0]}: the figures are not comparable"
+        )
+    if result.left_out:
+        print_message(f"no scores, and not scored: {', '.join(result.left_out)}")
+    if as_json:
+        tables = {table.name: to_json(table) for table in result.tables}
+        print_json({
+            "submission": path.name, "version": protocol().version, "differ": result.differ,
+            "left_out": result.left_out, "tables": tables,
+        })  # fmt: skip
+        return
+    for table in result.tables:
+        _print_table(table)
+
+
+def _print_table(table: "ResultTable") -> None:
+    """Print a table, with a line for each of its figures."""
+    from holdfast_lab.report.result_tables import digits_of, pivot
+
+    grid = pivot(table)
+    print_line(table.title)
+    lines = []
+    for column, name in enumerate(grid.columns):
+        cells = [line.cells[column] for line in grid.lines]
+        digits = digits_of(table, name)
+        lines.append([name, *(_text(cell, digits) for cell in cells)])
+    print_table(("", *(", ".join(line.heads) for line in grid.lines)), lines)
+    print_line()
+
+
+def _text(row: "Row | None", digits: int) -> str:
+    """Return a value with its interval."""
+    from holdfast_lab.report.result_tables import MISSING, number_text
+
+    if row is None:
+        return MISSING
+    value = number_text(row.ours, digits)
+    if row.interval is None:
+        return value
+    low, high = (number_text(end, digits) for end in row.interval)
+    return f"{value} ({low} to {high})"
+
+
+def _simulate(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
+    from holdfast.cli.simulate import GraspOptions, plan_grasps, simulate_grasps, simulate_hands
+    from holdfast.twin.objects import OTHER_OBJECTS
+    from holdfast_lab.study.benchmark.protocol import MEASURED_ALL
+
+    folder.mkdir(parents=True, exist_ok=True)
+    if split.randomized:
+        options = GraspOptions(
+            repeats=split.repeats, seed=split.seed, randomize=True, measured=MEASURED_ALL
+        )
+        simulate_hands(folder, options, engine=engine, force=False)
+        return
+    table = OTHER_OBJECTS if split.other_objects else None
+    grasps = plan_grasps("", "1,2", split.repeats, "reference", split.seed, table=table)
+    simulate_grasps(grasps, folder, engine=engine, force=False)

@@ -1,0 +1,135 @@
+"""CSV files that `detect` and `evaluate` read without an import."""
+
+import json
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.io.importers import HINTS
+from holdfast.sensors import flat_sensor
+
+N, PUSH = 1200, slice(500, 560)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def sensor(folder):
+    """The file of a 3 x 3 sensor."""
+    fields = flat_sensor("press", 3, 3, 0.005).to_dict()
+    (folder / "sensor.json").write_text(json.dumps(fields))
+    return "sensor.json"
+
+
+def write_press(path, columns="F{axis}{taxel}", labelled=False):
+    """A grasp from 2 s to 9 s with a push, as another logger writes it."""
+    times = np.arange(N) / 100
+    grip = np.interp(times, [1.5, 2.0, 9.0, 9.4], [0, 1, 1, 0])
+    push = np.zeros(N)
+    push[PUSH] = np.sin(2 * np.pi * times[PUSH] / 0.3) / 2
+    force = np.stack([push, 0.1 * grip, grip + push / 2], axis=1)
+    noise = np.random.default_rng(0).normal(0, 2, (N, 9, 3))
+    readings = (1000 + 400 * force[:, None, :] + noise).reshape(N, 27).round(1).astype(str)
+    names = [columns.format(axis=axis, taxel=taxel) for taxel in range(9) for axis in "xyz"]
+    rows = np.column_stack([(1000 * times).astype(str), readings])
+    if labelled:
+        names, states = [*names, "label"], np.full(N, "no_contact", dtype="<U10")
+        states[200:900], states[PUSH] = "stable", "unstable"
+        rows = np.column_stack([rows, states])
+    lines = [",".join(["timestamp", *names]), *(",".join(row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def run(capsys, *words, code=0):
+    capsys.readouterr()
+    assert main([*map(str, words)]) == code
+    return capsys.readouterr()
+
+
+def refusal(capsys, *words):
+    out, err = run(capsys, *words, code=2)
+    assert (out, err.count("\n")) == ("", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def test_detect_gives_what_it_gives_after_an_import(folder, sensor, capsys):
+    write_press(folder / "press.csv")
+    out, err = run(capsys, "detect", "builtin:any", "press.csv", "--sensor", sensor)
+    assert {path.name for path in folder.iterdir()} == {"press.csv", "sensor.json"}
+    guess, option, hint, *_ = err.splitlines()
+    assert guess.startswith("press.csv: the columns are a guess: 100 Hz, finger1 9 taxels")
+    assert "--columns 'time=timestamp:ms,taxels=F{axis}{taxel}'" in option
+    assert hint == f"hint: {HINTS['csv']}"
+    run(capsys, "import", "press.csv", "out", "--sensor", sensor)
+    assert run(capsys, "detect", "builtin:any", "out/press.parquet").out == out
+
+
+def test_columns_are_named_and_any_suffix_is_read(folder, sensor, capsys):
+    write_press(folder / "press.log", "m{taxel}{axis}")
+    columns = "time=timestamp:ms,taxels=m{taxel}{axis}"
+    words = ("press.log", "--sensor", sensor, "--columns", columns, "--summary", "--json")
+    out, err = run(capsys, "detect", "builtin:any", *words)
+    assert json.loads(out)["fingers"]["finger1"]["n_samples"] == N
+    assert "guess" not in err
+
+
+def test_evaluate_takes_the_labels_of_a_column(folder, sensor, capsys):
+    (folder / "in").mkdir()
+    for name in ("a", "b"):
+        write_press(folder / "in" / f"{name}.csv", labelled=True)
+    out, err = run(capsys, "evaluate", "builtin:any", "in", "--sensor", sensor, "--json")
+    report = json.loads(out)
+    assert [recording["name"] for recording in report["recordings"]] == ["a", "b"]
+    assert report["events"]["hand"]["n_events"] == 4  # pushes and releases
+    assert report["pooled"]["accuracy"] > 90
+    assert err.count("the columns are a guess") == 1
+    one = run(capsys, "evaluate", "builtin:any", "in/a.csv", "--sensor", sensor, "--json").out
+    assert json.loads(one)["pooled"]["n"] == report["pooled"]["n"] / 2
+
+
+def test_evaluate_in_contact_has_no_tare(folder, sensor, capsys):
+    write_press(folder / "press.csv", labelled=True)
+    words = ("evaluate", "builtin:any", "press.csv", "--sensor", sensor, "--json")
+    plain, held = (run(capsys, *words, *more).out for more in ((), ("--in-contact",)))
+    assert json.loads(plain)["pooled"] != json.loads(held)["pooled"]
+
+
+@pytest.mark.parametrize("verb", ["detect", "evaluate"])
+def test_bad_input_is_one_line(folder, sensor, capsys, verb):
+    write_press(folder / "press.csv")
+    words = (verb, "builtin:any", "press.csv")
+    text = refusal(capsys, *words)
+    assert text.startswith(
+        "press.csv: the sensor of finger1 (9 taxels) is missing: --sensor NAME or --sensor "
+        "FILE.json expected, or a line '# sensor: finger1=NAME' above the header; built in are "
+    )
+    assert refusal(capsys, *words, "--sensor", "skin").startswith("unknown sensor 'skin'; built in")
+    twice = ("--sensor", sensor, "--sensor", "anyskin")
+    assert refusal(capsys, *words, *twice) == "--sensor: two sensors given for all modules"
+    (folder / "empty.csv").write_text("")
+    assert "empty.csv" in refusal(capsys, verb, "builtin:any", "empty.csv", "--sensor", sensor)
+    text = refusal(capsys, verb, "builtin:any", "none.csv")
+    assert text == "none.csv does not exist; a file or folder to import expected"
+    text = refusal(capsys, verb, "builtin:any", "a.parquet", "--sensor", sensor)
+    assert text == "--sensor and --columns are for CSV files; a.parquet given"
+    assert {path.name for path in folder.iterdir()} == {"press.csv", "sensor.json", "empty.csv"}
+
+
+def test_a_live_source_and_two_recordings_are_refused(folder, sensor, capsys):
+    live = refusal(capsys, "detect", "builtin:any", "xela://auto", "--columns", "time=t")
+    assert live == "--sensor and --columns are for CSV files; xela://auto given"
+    (folder / "in").mkdir()
+    for name in ("a", "b"):
+        write_press(folder / "in" / f"{name}.csv")
+    _, err = run(capsys, "detect", "builtin:any", "in", "--sensor", sensor, code=2)
+    assert err.splitlines()[-1] == "holdfast: one recording expected, 2 given: in"
+
+
+def test_a_csv_file_in_place_of_the_model_is_named(folder, capsys):
+    text = refusal(capsys, "detect", "press.csv", "builtin:any")
+    assert text == ("press.csv is a source; MODEL SOURCE expected, such as builtin:any press.csv")
