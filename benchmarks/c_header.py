@@ -3,7 +3,8 @@
     python benchmarks/c_header.py [--samples 1000000] [--updates 200000]
 
 Speed: the median over blocks of 100 updates of a hand of 4 x 30 taxels, whose readings are random,
-at -O2, the models in turns; and `Detector.update` in the same run. Parity: random samples with
+at -O2, the models in turns; and `Detector.update` in the same run. Symbols: what `nm` lists of a
+compiled header, functions from outside and data that can change. Parity: random samples with
 gaps, NaN, faults, clock jumps and lost fingers, by C and by Python; states must be equal, and
 probabilities to 1e-9.
 """
@@ -70,6 +71,19 @@ def models() -> dict[str, Model]:
     return {"paper": paper_model(), **{name: Model.load(name) for name in list(BARS)[1:]}}
 
 
+def symbols(text: str) -> str:
+    """Return what a compiled header calls from outside, and the data in it that can change."""
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "model.h").write_text(text)
+        words = ["-std=c99", "-O2", "-DHOLDFAST_API=extern", "-x", "c", "-c", "model.h"]
+        subprocess.run(["cc", *words, "-o", "model.o"], check=True, cwd=folder)
+        done = subprocess.run(["nm", "model.o"], check=True, capture_output=True, cwd=folder)
+    listed = [line.split()[-2:] for line in done.stdout.decode().splitlines()]
+    outside = [name for kind, name in listed if kind == "U" and not name.startswith("_")]
+    changing = [name for kind, name in listed if kind in "BbDdC"]
+    return f"calls {', '.join(outside)}; data that can change: {', '.join(changing) or 'none'}"
+
+
 def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
     """Compile the loop for each model and compiler, and print the sizes."""
     made = {}
@@ -78,7 +92,7 @@ def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
             header = header_of(model, hand, RATE, single=single)
             kind = "float" if single else "double"
             print(f"{name}, {kind}: state {header.state_size}, constants {header.constants_size}, "
-                  f"code {code_size(header)} bytes")  # fmt: skip
+                  f"code {code_size(header)} bytes; {symbols(header.text)}")  # fmt: skip
             for compiler in filter(shutil.which, ("gcc", "clang")):
                 place = folder / f"{name.split(':')[-1]}-{kind}-{compiler}"
                 place.mkdir()

@@ -4,11 +4,14 @@ A packet of 368 taxels is decoded as from XELA's server, detected, recorded to M
 the page to two WebSocket clients, one of which never reads. Packets follow each other as fast as
 they are processed; their stamps are 1/150 s apart. A recording ends after `--recording` seconds of
 stamps, and its file is removed: the index of an MCAP file stays in memory until it ends. The
-report has, for each tenth of the run, memory, file descriptors, threads, and the time from packet
-to estimate.
+report has, for each tenth of the run, memory, file descriptors, threads, the time from packet to
+estimate, changes of state a minute, and how far clock and tare have moved since the start: the
+time of an estimate against the number of its packet, and a packet of the grasp less its tare
+against the same packet of the first grasp.
 
     uv run python benchmarks/soak.py                      # the whole day
     nice -n 15 uv run python benchmarks/soak.py --minutes 10
+    nice -n 15 uv run python benchmarks/soak.py --minutes 10 --from 3.5   # the part after 3.5 hours
 """
 
 import argparse
@@ -57,12 +60,13 @@ class Day(DeviceSource):
 
     paced = False
 
-    def __init__(self, n_packets: int) -> None:
+    def __init__(self, first: int, n_packets: int) -> None:
         super().__init__()
-        self.n, self.begun, self.n_packets = 0, 0.0, n_packets
+        self.n, self.begun, self.n_packets = first, 0.0, n_packets
         self.recorder: Recorder | None = None
-        self.n_before = 0
+        self.n_before = first
         self._templates = templates()
+        self.n_templates = len(self._templates)
         self._decoder = XelaDecoder()
         self._decoder.identify(self._packet(0))
         self.sensors = self._decoder.sensors
@@ -121,12 +125,17 @@ def templates() -> list[tuple[bytes, bytes]]:
 class Soak:
     """Run of a day, with the figures of each of its windows."""
 
-    def __init__(self, folder: Path, seconds: float, minutes: float, recording: float) -> None:
-        self._folder, self._minutes = folder, minutes
-        self._recording_length = round(recording * RATE)
-        self._source = Day(round(seconds * RATE))
-        model = Model.load("builtin:twin")
-        self._session = Session(StreamDetector(model, self._source))
+    def __init__(self, folder: Path, options: argparse.Namespace) -> None:
+        self._folder, self._minutes = folder, options.minutes
+        self._recording_length = round(options.recording * RATE)
+        self._first = round(options.start * HOUR * RATE)
+        self._source = Day(self._first, round(options.hours * HOUR * RATE))
+        self._stream = StreamDetector(Model.load("builtin:twin"), self._source)
+        self._session = Session(self._stream)
+        self._zero: float | None = None
+        self._tared: dict[str, np.ndarray] = {}
+        self._n_changes = self._n_counted = 0
+        self._clock_drift = self._tare_drift = 0.0
         self._service = LiveService(self._session, Guard("127.0.0.1"), None)
         self._times = np.full(20_000, np.nan)
         self._dropped = self._n_recordings = self._n_read = 0
@@ -155,7 +164,7 @@ class Soak:
     def _wait(self, begin: float, share: float) -> None:
         """Wait for a share of the day, or of the minutes."""
         while (
-            self._source.n < share * self._source.n_packets
+            self._source.n < self._first + share * (self._source.n_packets - self._first)
             and time.monotonic() - begin < share * 60 * self._minutes
             and not self._session.ended
         ):
@@ -164,10 +173,27 @@ class Soak:
     def _put(self, update: StreamUpdate) -> None:
         """Record an arrival, and take the time from packet to estimate."""
         self._times[self._source.n % len(self._times)] = time.perf_counter() - self._source.begun
-        if self._source.recorder is not None and update.arrival is not None:
-            self._source.recorder.put(update.arrival)
+        if update.arrival is not None:
+            if self._source.recorder is not None:
+                self._source.recorder.put(update.arrival)
+            self._compare(update)
         if self._source.n % self._recording_length == 0:
             self._next_recording()
+
+    def _compare(self, update: StreamUpdate) -> None:
+        """Count the changes of state, and compare clock and tare with those of the first grasp."""
+        self._n_changes += len(update.events)
+        n, period = self._source.n, self._source.n_templates
+        if len(update.estimates) == 1:  # and not those of the start, which wait for the rate
+            zero = update.estimates[0].estimate.time - n / RATE
+            self._zero = zero if self._zero is None else self._zero
+            self._clock_drift = max(self._clock_drift, abs(zero - self._zero))
+        if n % period == 0 and update.arrival is not None:
+            tared = self._stream.subtract_tare(update.arrival.samples)
+            for finger, values in tared.items():
+                first = self._tared.setdefault(finger, values)
+                moved = float(np.abs(values - first).max())
+                self._tare_drift = max(self._tare_drift, moved)
 
     def _next_recording(self) -> None:
         self._stop_recording()
@@ -201,6 +227,8 @@ class Soak:
             raise self._session.failure
         known = self._times[np.isfinite(self._times)]
         p50, p99 = np.percentile(known, (50, 99)).tolist()
+        minutes = (self._source.n - max(self._n_counted, self._first)) / RATE / 60.0
+        n_changes, self._n_changes, self._n_counted = self._n_changes, 0, self._source.n
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         return {
             "seconds": round(seconds, 1),
@@ -210,13 +238,17 @@ class Soak:
             "threads": threading.active_count(),
             "p50": round(p50, 6),
             "p99": round(p99, 6),
+            "changes_a_minute": round(n_changes / max(minutes, 1e-9), 2),
+            "clock_drift": round(self._clock_drift, 6),
+            "tare_drift": round(self._tare_drift, 6),
         }
 
     def _report(self, windows: list[dict[str, float]], seconds: float) -> dict[str, object]:
-        stamps = self._source.n / RATE
+        stamps = (self._source.n - self._first) / RATE
         return {
             "taxels": sum(sensor.n_taxels for sensor in self._source.sensors.values()),
-            "packets": self._source.n,
+            "packets": self._source.n - self._first,
+            "from_hours": self._first / RATE / HOUR,
             "share_of_the_day": round(stamps / DAY, 4),
             "speed": round(stamps / seconds, 1),
             "refused": self._session.n_refused,
@@ -235,10 +267,11 @@ def main() -> None:
     )
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--hours", type=float, default=24.0, help="length of the day")
+    parser.add_argument("--from", dest="start", type=float, default=0.0, help="hour of the start")
     parser.add_argument("--recording", type=float, default=HOUR, help="length of recordings [s]")
     options = parser.parse_args()
     with TemporaryDirectory() as folder:
-        report = Soak(Path(folder), options.hours * HOUR, options.minutes, options.recording).run()
+        report = Soak(Path(folder), options).run()
     print(json.dumps(report, indent=1))
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import copy
+import ctypes
 import re
 import shutil
 import subprocess
@@ -26,6 +27,7 @@ from holdfast.detector import Detector
 from holdfast.errors import ModelError
 from holdfast.exporters import c_functions, header_of
 from holdfast.exporters.c_functions import Program, Statements
+from holdfast.exporters.c_values import CNumber
 from holdfast.io.importers import import_recordings
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import calibrate
@@ -203,7 +205,7 @@ def test_nothing_allocates_and_nothing_is_kept(tmp_path):
     listed = subprocess.run(["nm", library], check=True, capture_output=True, text=True).stdout
     symbols = [line.split()[-2:] for line in listed.splitlines()]
     outside = {name for kind, name in symbols if kind == "U"}
-    maths = {"exp", "expm1", "log", "tanh", "sqrt", "nextafter", "fabs"}
+    maths = {"exp", "expm1", "log", "tanh", "sqrt", "nextafter", "fabs", "copysign"}
     assert outside <= maths | {"memset", "memcpy", "memmove", "_GLOBAL_OFFSET_TABLE_"}
     assert not [name for kind, name in symbols if kind in "BbDdC"]  # data that can change
 
@@ -384,11 +386,80 @@ def test_what_has_no_translation_is_named_with_file_and_line(text, expected, tmp
     source.write_text(f"import math\n\ndef step(value):\n    {text}\n")
     names = {}
     exec(compile(source.read_text(), str(source), "exec"), names)
-    from holdfast.exporters.c_values import CNumber
-
     with pytest.raises(NotImplementedError, match=expected) as caught:
         Program().call(names["step"], [CNumber("r", "x")])
     assert str(caught.value).startswith(f"{source}:4: ")
+
+
+LOOPS = {
+    "a table": (
+        "for place in range(12):\n"
+        "        kind = 5 * place & 3\n"
+        "        if kind == 2:\n            total += 3.0 * value\n"
+        "        elif kind == 1:\n            total -= value * value",
+        0,
+    ),
+    "powers of two": ("while n < 100:\n        if 37 & n:\n            total += value * n\n"
+                      "        n = 2 * n", 0),
+    "a test that is not known": ("while n < 40:\n        if value > n:\n            n += 7\n"
+                                 "        else:\n            n += 3\n        total += n", 1),
+    "a break": ("for place in range(5):\n        if place > value:\n            break\n"
+                "        total += place", 1),
+    "many": ("for place in range(100):\n        if place == 3:\n            total += value", 1),
+    "one in the other": ("for row in range(3):\n        for column in range(row, 4):\n"
+                         "            total += value * (row + 2 * column)", 0),
+    "carried on": ("last = 1.0\n    for place in range(4):\n        if value > place:\n"
+                   "            total += last\n            last = 2.0\n        last += 1.0", 1),
+}  # fmt: skip
+"""Statements, and the number of loops that are left of them in C."""
+PRELUDE = """#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+typedef double holdfast_real;
+#define HF_MATH(name) name
+"""
+
+
+def in_c(text, folder):
+    """Return a function of one number in Python and in C, and its source in C."""
+    source = folder / "kernel_of_test.py"
+    source.write_text(f"def step(value):\n    total, n = 0.5, 1\n    {text}\n    return total\n")
+    names = {}
+    exec(compile(source.read_text(), str(source), "exec"), names)
+    program = Program()
+    program.call(names["step"], [CNumber("r", "x")])
+    body = program.definitions[0]
+    (folder / "step.c").write_text(
+        f"{PRELUDE}{body}\ndouble run(double x) {{ return hf_step(x); }}\n"
+    )
+    command = ["cc", "-std=c99", "-O2", *WARNINGS, "-shared", "-fPIC", "step.c", "-o", "step.so"]
+    subprocess.run(command, check=True, cwd=folder)
+    run = ctypes.CDLL(str(folder / "step.so")).run
+    run.argtypes, run.restype = [ctypes.c_double], ctypes.c_double
+    return names["step"], run, body
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_loop_that_is_written_out_computes_the_same(name, tmp_path):
+    text, n_loops = LOOPS[name]
+    python, c, body = in_c(text, tmp_path)
+    assert body.count("for (") + body.count("while (") == n_loops
+    for value in (-1.0, 0.0, 0.5, 2.0, 3.7, 11.0, 60.0, 1e300):
+        assert c(value) == python(value), value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "if value > 1.0:\n        total = 2.0\n    total += 1.0",
+        "if value > 1.0:\n        total = 2.0\n    else:\n        n = 3\n    total += n",
+        "for k in range(n + int(value)):\n        total += n\n        n = 4\n    total -= n",
+    ],
+)
+def test_a_variable_is_known_only_where_no_branch_has_stored_it(text, tmp_path):
+    python, c, _ = in_c(text, tmp_path)
+    for value in (0.0, 1.0, 2.0, 5.0):
+        assert c(value) == python(value), value
 
 
 def test_the_header_says_what_it_was_made_of():

@@ -1,6 +1,7 @@
 """The relative features against a slow implementation, and their laws."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -273,6 +274,26 @@ def test_a_stream_computes_only_the_kinds_that_it_needs():
     assert layout.families.tolist() == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     plan = StreamPlan({"a": given}, {"a": ANY_FEATURES}, 14, Tare.parse("first"), 150.0)
     assert FeatureStream(plan).layout.families.tolist() == [[1, 0, 0, 0]] * 5
+
+
+@pytest.mark.parametrize(("name", "axis"), [("uskin-curved", 0), ("uskin-4x4", 2)])
+def test_a_normal_that_is_an_axis_gives_the_bits_of_any_other_normal(name, axis, monkeypatch):
+    given = sensor(name)
+    readings = walk(given, 150)
+    plan = StreamPlan({"a": given}, {"a": EVERY}, 14, Tare.parse("first"), RATE)
+    assert FeatureStream(plan).layout.normal_axes.tolist() == [axis]
+    short = features_of(readings, given)
+    monkeypatch.setattr("holdfast.features.stream._axis_of", lambda normal: 3)
+    np.testing.assert_array_equal(features_of(readings, given), short)
+
+
+@pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
+def test_other_normals_take_the_general_way(normal):
+    given = replace(sensor("uskin-4x4"), normal=np.array(normal))
+    plan = StreamPlan({"a": given}, {"a": EVERY}, 14, Tare.parse("first"), RATE)
+    assert FeatureStream(plan).layout.normal_axes.tolist() in ([3], [1])
+    readings = walk(given, 60)
+    np.testing.assert_allclose(features_of(readings, given), naive(readings, given), atol=1e-6)
 
 
 def test_a_gap_begins_anew_but_the_load_stays():

@@ -56,7 +56,7 @@ SYMBOLS: dict[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
 }
 """Operators: of C, and of Python."""
 MATHS = {math.sqrt: "sqrt", math.log: "log", math.exp: "exp", math.expm1: "expm1",
-         math.tanh: "tanh", np.nextafter: "nextafter"}  # fmt: skip
+         math.tanh: "tanh", math.copysign: "copysign", np.nextafter: "nextafter"}  # fmt: skip
 """Functions of C's math library. Only the square root of what is known is computed here: it is
 the one whose last bit no library chooses."""
 TESTS = {math.isnan: "isnan", math.isinf: "isinf", math.isfinite: "isfinite"}

@@ -35,9 +35,16 @@ RESERVED = frozenset(
     """auto bool break case char class const continue default delete do double else enum extern
     false float for goto if inline int long new not operator or and private public register
     restrict return short signed sizeof static struct switch template this true typedef union
-    unsigned using virtual void volatile while xor d fabs sqrt log exp expm1 tanh""".split()  # noqa: SIM905
+    unsigned using virtual void volatile while xor d fabs sqrt log exp expm1 tanh
+    copysign""".split()  # noqa: SIM905
 )
 """Names that a variable of the header must not have."""
+
+
+MAX_UNROLLED = 64
+"""Iterations up to which a loop is written out, if something of it is known then."""
+MAX_SMALL_LOOP = 8
+"""Iterations up to which a loop without branches is written out."""
 
 
 class CFunction(NamedTuple):
@@ -150,6 +157,7 @@ class Statements:
         self.expressions = Expressions(program, function, first)
         self.result: CNumber | CTuple | None = None
         self._kinds: dict[str, str] = {}  # of the variables
+        self._parameter_kinds: dict[str, str] = {}  # of the numbers that C receives
         self._n_stores = Counter(
             node.id
             for node in ast.walk(self.tree)
@@ -212,6 +220,7 @@ class Statements:
             self.expressions.names[name] = self._received(name, value)
             if isinstance(value, CNumber) and value.known is None:
                 words.append(f"{C_TYPES[value.kind]} {_c_name(name)}")
+                self._parameter_kinds[name] = value.kind
             elif isinstance(value, CNumber) and self._n_stores[name] > 1:
                 self._assign_name(name, value)
             elif isinstance(value, CArray) and not value.is_whole:
@@ -319,22 +328,62 @@ class Statements:
         test = self.expressions.condition(node.test)
         if test.known is not None:
             return self._block(node.body if test.known else node.orelse)
+        before = dict(self.expressions.names)
         self._write(f"if ({_bare(test.text)}) {{")
         ends = self._inner(node.body)
         if node.orelse:
+            after, self.expressions.names = self.expressions.names, before
             self._write("} else {")
             ends = self._inner(node.orelse) and ends
+            self.expressions.names = after | self.expressions.names
         self._write("}")
+        self._forget_values(node)
         return ends and bool(node.orelse)
+
+    def _forget_values(self, node: ast.stmt) -> None:
+        """Note that the variables which a statement stores may have any value."""
+        kinds = self._kinds | self._parameter_kinds
+        for name in _stored_names(node) & kinds.keys():
+            self.expressions.names[name] = CNumber(kinds[name], _c_name(name))
 
     def _while(self, node: ast.While) -> bool:
         if node.orelse:
             self.expressions.refuse(node, "an else of a loop")
+        if self._is_written_out(node):
+            return False
+        self._forget_values(node)
         test = self.expressions.text(self.expressions.condition(node.test))
         self._write(f"while ({_bare(test)}) {{")
         self._inner(node.body)
         self._write("}")
+        self._forget_values(node)
         return False
+
+    def _is_written_out(self, node: ast.While) -> bool:
+        """Write a loop out whose test is known at each iteration. Return whether it is."""
+        state, n = self._state(), 0
+        while (test := self.expressions.condition(node.test).known) and n < MAX_UNROLLED:
+            self._copy_of_body(node)
+            n += 1
+        if test is False and not _leaves(node):
+            return True
+        self._set_state(state)
+        return False
+
+    def _copy_of_body(self, node: ast.While | ast.For) -> None:
+        self._write("{")
+        self._inner(node.body)
+        self._write("}")
+
+    def _state(self) -> tuple[dict[str, CValue], dict[str, str], list[str], int]:
+        """Return what a translation of statements changes."""
+        return (
+            dict(self.expressions.names), dict(self._kinds), list(self._lines), self._n_helpers
+        )  # fmt: skip
+
+    def _set_state(self, state: tuple[dict[str, CValue], dict[str, str], list[str], int]) -> None:
+        names, kinds, lines, self._n_helpers = state
+        self.expressions.names, self._kinds, self._lines = dict(names), dict(kinds), list(lines)
 
     def _continue(self, _: ast.Continue) -> bool:
         self._write("continue;")
@@ -364,6 +413,9 @@ class Statements:
             self.expressions.refuse(node, "a step that is not known to be above 0")
         if begin.known is not None and end.known is not None and begin.known >= end.known:
             return
+        if self._is_unrolled(node, begin, end, step):
+            return
+        self._forget_values(node)
         last = f"{name}_end" if end.known is None else self.expressions.text(end)
         set_last = f", {last} = {end.text}" if end.known is None else ""
         more = f"++{name}" if step.known == 1 else f"{name} += {step.known}"
@@ -372,6 +424,33 @@ class Statements:
         self.expressions.names[node.target.id] = CNumber(INTEGER, name)  # type: ignore[attr-defined]
         self._inner(node.body)
         self._write("}")
+        self._forget_values(node)
+
+    def _is_unrolled(self, node: ast.For, begin: CNumber, end: CNumber, step: CNumber) -> bool:
+        """Write a loop out if it is small, or if branches of it are known then."""
+        if begin.known is None or end.known is None or step.known is None or _leaves(node):
+            return False
+        places = range(int(begin.known), int(end.known), int(step.known))
+        if len(places) > MAX_UNROLLED:
+            return False
+        state, name = self._state(), node.target.id  # type: ignore[attr-defined]
+        self._forget_values(node)
+        n_branches = self._n_branches(node, CNumber(INTEGER, _c_name(name)))
+        is_small = n_branches == 0 and len(places) <= MAX_SMALL_LOOP
+        if not is_small and self._n_branches(node, known(places[0])) == n_branches:
+            self._set_state(state)
+            return False
+        self._set_state(state)
+        for place in places:
+            self.expressions.names[name] = known(place)
+            self._copy_of_body(node)
+        return True
+
+    def _n_branches(self, node: ast.For, place: CNumber) -> int:
+        """Return the number of branches of the body of a loop, at one place."""
+        self._lines, self.expressions.names[node.target.id] = [], place  # type: ignore[attr-defined]
+        self._inner(node.body)
+        return sum(line.lstrip().startswith(("if (", "for (", "while (")) for line in self._lines)
 
     def _loop_over(self, node: ast.For, array: CArray) -> None:
         """Translate a loop over the elements of an array."""
@@ -382,12 +461,14 @@ class Statements:
         self._write(f"for (int64_t {place} = 0; {place} < {end}; ++{place}) {{")
         stride = f"{array.strides[0]} * " if array.strides[0] > 1 else ""
         element = array._replace(shape=(), offsets=(*array.offsets, f"{stride}{place}"))
+        self._forget_values(node)
         self._depth += 1
         self._write(f"const {C_TYPES[array.kind]} {_c_name(name)} = {element_of(element).text};")
         self._depth -= 1
         self.expressions.names[name] = CNumber(array.kind, _c_name(name))
         self._inner(node.body)
         self._write("}")
+        self._forget_values(node)
 
     def _augassign(self, node: ast.AugAssign) -> bool:
         target = node.target
@@ -475,15 +556,14 @@ class Statements:
             names[name] = self._named_tuple(name, value)
 
     def _store_variable(self, name: str, value: CNumber) -> None:
-        old = self.expressions.names.get(name)
-        is_parameter = isinstance(old, CNumber) and old.text and name not in self._kinds
-        if not is_parameter:
-            self._kinds[name] = widest(value.kind, self._kinds.get(name, BOOL))
-        kind = old.kind if is_parameter and isinstance(old, CNumber) else self._kinds[name]
+        kind = self._parameter_kinds.get(name)
+        if kind is None:
+            kind = self._kinds[name] = widest(value.kind, self._kinds.get(name, BOOL))
         if widest(kind, value.kind) != kind:
             self.expressions.refuse(self.tree, f"a parameter ({name}) that changes its type")
-        self.expressions.names[name] = CNumber(kind, _c_name(name))
         self._write(f"{_c_name(name)} = {self.expressions.text(value)};")
+        is_same = value.known is not None and kind == value.kind
+        self.expressions.names[name] = value if is_same else CNumber(kind, _c_name(name))
 
     def _named_part(self, name: str, value: CArray) -> CArray:
         """Return a part of an array under a name; a whole array keeps its own."""
@@ -503,6 +583,20 @@ class Statements:
         n = len(value.members)
         self._write(f"const {C_TYPES[kind]} {_c_name(name)}[{n}] = {{{text}}};")
         return CArray(kind, _c_name(name), (known(n),), (1,), _c_name(name))
+
+
+def _stored_names(node: ast.AST) -> set[str]:
+    """Return the names of the variables that a statement stores."""
+    return {
+        part.id
+        for part in ast.walk(node)
+        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
+    }
+
+
+def _leaves(loop: ast.For | ast.While) -> bool:
+    """Return whether the body of a loop leaves an iteration, of itself or of a loop inside."""
+    return any(isinstance(part, ast.Break | ast.Continue) for part in ast.walk(loop))
 
 
 def _c_name(name: str) -> str:

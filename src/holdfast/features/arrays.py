@@ -214,6 +214,7 @@ class Layout(NamedTuple):
     families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0
     places: Floats2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Floats2  # (n_fingers, 3)
+    normal_axes: Integers1  # (n_fingers,) axis that the normal is; 3 if it is none
     n_levels: int  # sizes of blocks of pairs, see holdfast.features.haar
 
 
@@ -228,6 +229,7 @@ class Memory(NamedTuple):
     counts: Integers2  # (n_fingers, COUNTS_WIDTH)
     levels: Floats2  # (n_fingers, LEVELS_WIDTH)
     own: Floats2  # (n_fingers, n_features) values of each finger, before the maximum of the hand
+    hand: Floats1  # (n_features,) this maximum, if all fingers have the same features
     taxel_forces: Floats3  # (length, n_taxels, 3) in the fingertip frame, a ring
     reference: Floats2  # (n_taxels, 3) taxel forces at the least normal force since the start
     track: Floats3  # (n_fingers, TRACK_WIDTH, length), a ring

@@ -72,8 +72,10 @@ def scan_readings(
         sum_x += x
         sum_y += y
         sum_z += z
-        # min and max over i and the axes of f_i.
-        low, high = (x, y) if x < y else (y, x)  # takes half as long as min and max
+        # min and max over i and the axes of f_i: each a comparison of its own, so that no
+        # compiler makes a branch of two, which half of the samples would mispredict.
+        low = x if x < y else y
+        high = x if x > y else y
         low = z if z < low else low
         high = z if z > high else high
         least = low if low < least else least
@@ -206,7 +208,7 @@ def _find_taxel_faults(
     """Find the faulty taxels of a finger at a sample that changed a reading."""
     taxels, constants, counts = memory.taxels, layout.constants, memory.counts
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    any_still, alone, loudest = _update_taxels(layout, memory, readings, f)
+    any_still, alone, largest = _update_taxels(layout, memory, readings, f)
     if after_gap:
         _reset_noise(taxels, first, last)
     counts[f, at.TAXEL_FAULTS] = counts[f, at.FAULTY_TAXELS] = counts[f, at.NOISY_TAXELS] = 0
@@ -221,6 +223,7 @@ def _find_taxel_faults(
         # Noise of a reading: noise of F / sqrt(n_used), where the step is not known.
         if math.isnan(quiet):  # its share in the noise of the finger
             quiet = memory.levels[f, at.NOISE] / math.sqrt(constants[f, at.N_USED])
+        loudest = _loudest(taxels, first, last, largest)
         if _is_noisy(taxels, loudest, quiet):
             counts[f, at.TAXEL_FAULTS] |= NOISY
             counts[f, at.NOISY_TAXELS] = bit_of(loudest - first)
@@ -230,12 +233,12 @@ def _find_taxel_faults(
 @inlined
 def _update_taxels(
     layout: Layout, memory: Memory, readings: Array, f: int
-) -> tuple[bool, bool, int]:
+) -> tuple[bool, bool, float]:
     """Update the memory of each taxel of a finger with a sample that changed a reading.
 
     Returns:
         Whether any taxel did not change for so long, whether one taxel has most of the second
-        differences, and that taxel.
+        differences, and its `SECOND_POWER`.
     """
     taxels, previous, n_changes = memory.taxels, memory.previous, memory.counts[f, at.N_CHANGES]
     first, last = layout.offsets[f], layout.offsets[f + 1]
@@ -243,7 +246,6 @@ def _update_taxels(
     long, share = STUCK_SECONDS / layout.period, min(1.0, layout.period / NOISE_SMOOTHING)
     any_still = False
     total = largest = 0.0
-    loudest = first
     for i in range(np.uint64(first), np.uint64(last)):
         # D1 = f_i(k) - f_i(k-1), D2 = D1 - D1 of the last change:
         # P1 = (1 - s) P1 + s |D1|^2, P2 = (1 - s) P2 + s |D2|^2. Without a change D1 = D2 = 0.
@@ -267,9 +269,17 @@ def _update_taxels(
             any_still = True
         taxels[i, at.FIRST_POWER], taxels[i, at.SECOND_POWER] = power, power_2
         total += power_2
-        if power_2 > largest:
-            largest, loudest = power_2, int(np.int64(i))
-    return any_still, largest >= LONE_SHARE * total, loudest
+        largest = power_2 if power_2 > largest else largest
+    return any_still, largest >= LONE_SHARE * total, largest
+
+
+@compiled_step
+def _loudest(taxels: Array, first: int, last: int, largest: float) -> int:
+    """Return the first taxel of a finger that has the largest `SECOND_POWER`."""
+    for i in range(first, last):
+        if taxels[i, at.SECOND_POWER] == largest:
+            return i
+    return first
 
 
 @inlined
@@ -279,12 +289,8 @@ def _second_square(
     """Note the change (x, y, z) of taxel i. Return the square of its second difference."""
     taxels, n_changes = memory.taxels, memory.counts[f, at.N_CHANGES]
     still = n_changes - taxels[i, at.CHANGED_AT] - 1.0
-    if (still + 1.0) * min(1.0, period / NOISE_SMOOTHING) > 1.0:  # jumps follow faster
-        _reset_change(taxels, i)
-    if taxels[i, at.N_CHANGED] == 0.0:
-        taxels[i, at.LONGEST_STILL] = memory.counts[f, at.N_SEEN] - 1.0
-    elif still > taxels[i, at.LONGEST_STILL]:
-        _update_longest(taxels, i, still, STUCK_SECONDS / period)
+    if still != 0.0 or taxels[i, at.N_CHANGED] == 0.0:
+        _note_still(period, memory, f, i, still)
     # |D2|^2, with D2 = D1 - D1 of the last change.
     dx = x - taxels[i, at.LAST_CHANGE]
     dy = y - taxels[i, at.LAST_CHANGE + 1]
@@ -295,6 +301,18 @@ def _second_square(
     taxels[i, at.N_CHANGED] += 1.0
     taxels[i, at.CHANGED_AT] = n_changes
     return float(dx * dx + dy * dy + dz * dz)
+
+
+@compiled_step
+def _note_still(period: float, memory: Memory, f: int, i: int, still: float) -> None:
+    """Note that a taxel which changes now did not before, or never did."""
+    taxels = memory.taxels
+    if (still + 1.0) * min(1.0, period / NOISE_SMOOTHING) > 1.0:  # jumps follow faster
+        _reset_change(taxels, i)
+    if taxels[i, at.N_CHANGED] == 0.0:
+        taxels[i, at.LONGEST_STILL] = memory.counts[f, at.N_SEEN] - 1.0
+    elif still > taxels[i, at.LONGEST_STILL]:
+        _update_longest(taxels, i, still, STUCK_SECONDS / period)
 
 
 @compiled_step

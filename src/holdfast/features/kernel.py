@@ -81,6 +81,10 @@ def advance(
     for f in range(len(present)):
         if present[f]:
             _compute_own(layout, memory, output, f)
+    if layout.alike:
+        for place in range(layout.specs.shape[1]):
+            if layout.specs[0, place, at.SCOPE] == OF_HAND:
+                memory.hand[place] = _largest(memory.own, place)
     for f in range(len(present)):
         if status[f, at.REASON] != at.READY:
             _clear(output.features, f)
@@ -314,21 +318,40 @@ def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None
 @inlined
 def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> float:
     """Fill the features of a finger, with the maximum of the hand by scope. Return their sum."""
-    own = memory.own
     total = 0.0
     for place in range(layout.specs.shape[1]):
-        value = own[f, place]
+        value = memory.own[f, place]
         if layout.specs[f, place, at.SCOPE] == OF_HAND:
-            for other in range(len(own)):
-                rival = own[other, place]
-                if not layout.alike:
-                    rival = _feature_of_other(layout, memory, f, place, other)
-                # max over the fingers, of those that have the feature.
-                if rival > value or math.isnan(value):
-                    value = rival
+            if layout.alike:
+                value = memory.hand[place]
+            else:
+                value = _largest_of_others(layout, memory, f, place)
         output.features[f, place] = value
         total += value
     return total
+
+
+@compiled_step
+def _largest(own: Array, place: int) -> float:
+    """Return the maximum over the fingers of a feature that all have."""
+    # max over the fingers, of those that have the feature.
+    value = own[0, place]
+    for f in range(1, len(own)):
+        rival = own[f, place]
+        if rival > value or math.isnan(value):
+            value = rival
+    return float(value)
+
+
+@compiled_step
+def _largest_of_others(layout: Layout, memory: Memory, f: int, place: int) -> float:
+    """Return the maximum over the fingers of a feature of finger f."""
+    value = memory.own[f, place]
+    for other in range(len(memory.own)):
+        rival = _feature_of_other(layout, memory, f, place, other)
+        if rival > value or math.isnan(value):
+            value = rival
+    return float(value)
 
 
 @compiled_step

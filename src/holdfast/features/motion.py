@@ -89,6 +89,11 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
     gain = layout.average_gain
     if abs(step - period) > EVEN_STEPS * period:
         gain = -math.expm1(-min(step, GAP_LIMIT_PERIODS * period) / AVERAGE_SECONDS)
+    load_to_noise = math.nan
+    if layout.has_centres:
+        # log(L / noise): the same for all lags.
+        noise = memory.motion[f, at.NOISE_NOW]
+        load_to_noise = math.log(_load_floor(memory.motion, f) / noise)
     for lag in range(len(layout.lags)):
         families, seconds = layout.families[lag], layout.lag_seconds[lag]
         back = _samples_back(times, now, n_before, time - seconds, layout.lags[lag])
@@ -96,6 +101,7 @@ def update_motion(layout: Layout, memory: Memory, f: int, time: float) -> None:
             then = _place(now, back, length)
             if families[at.LAGS]:
                 _fill_lag(layout, memory, f, now, then, lag)
+                memory.relative[f, LOAD_TO_NOISE, lag] = load_to_noise
             if families[at.RATIOS]:
                 _fill_ratios(layout, memory, f, now, then, lag)
         if families[at.SECONDS]:
@@ -145,6 +151,16 @@ def _forget_features(memory: Memory, f: int) -> None:
 
 
 @compiled_step
+def _along(axis: int, x: float, y: float, z: float, nx: float, ny: float, nz: float) -> float:
+    """Return the part of a vector along the normal, which mostly is an axis."""
+    if axis == 0:
+        return x
+    if axis == 2:
+        return z
+    return x * nx + y * ny + z * nz
+
+
+@compiled_step
 def _next_place(layout: Layout, memory: Memory, f: int, time: float) -> tuple[int, int, bool, bool]:
     """Note the time of a sample in the history, which begins anew after a gap not bridged.
 
@@ -176,6 +192,7 @@ def append_taxels(
     first, last = layout.offsets[f], layout.offsets[f + 1]
     forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    axis = layout.normal_axes[f]
     now, before, has_previous, shows_noise = _next_place(layout, memory, f, time)
     # g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|:
     # centre c = sum p_i r_i / sum p_i, moment = n . sum r_i x g_i, taxel load = sqrt(sum |h_i|^2),
@@ -198,7 +215,7 @@ def append_taxels(
         forces[now, i, 0], forces[now, i, 1], forces[now, i, 2] = gx, gy, gz
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         hx, hy, hz = gx - reference[i, 0], gy - reference[i, 1], gz - reference[i, 2]
-        pressed = abs(hx * nx + hy * ny + hz * nz)
+        pressed = abs(_along(axis, hx, hy, hz, nx, ny, nz))
         memory.pressed[i] = pressed
         weight += pressed
         pressure_squares += pressed * pressed
@@ -206,7 +223,8 @@ def append_taxels(
         if layout.has_centres:
             px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
             cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
-            moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
+            tx, ty, tz = py * gz - pz * gy, pz * gx - px * gz, px * gy - py * gx
+            moment += _along(axis, tx, ty, tz, nx, ny, nz)
     weight = max(weight, 1e-300)
     # step = |F(k) - F(k-1)|^2.
     step = 0.0
@@ -331,7 +349,7 @@ def _is_release(
     for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
         forces = memory.taxel_forces
         pressed = forces[now, i, 0] * nx + forces[now, i, 1] * ny + forces[now, i, 2] * nz
-        risen += max(pressed, 0.0)
+        risen += 0.5 * (pressed + abs(pressed))  # max(p, 0), without a branch
     return risen <= RELEASED_SHARE * (risen - normal)
 
 
@@ -410,8 +428,7 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     noise, taxel_noise = motion[f, at.NOISE_NOW], motion[f, at.TAXEL_NOISE_NOW]
-    # L = peak + 100 noise.
-    load = motion[f, at.PEAK_LOAD] + NOISE_WEIGHT * noise
+    load = _load_floor(motion, f)
     taxel_load = motion[f, at.PEAK_TAXEL_LOAD] + NOISE_WEIGHT * taxel_noise
     # v = |dF| and |dF - (dF . n) n|, over L.
     x = track[f, 0, now] - track[f, 0, then]
@@ -437,8 +454,13 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     # v = |d moment|, over L.
     turned = track[f, at.TRACK_MOMENT, now] - track[f, at.TRACK_MOMENT, then]
     out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
-    # log(L / noise).
-    out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
+
+
+@compiled_step
+def _load_floor(motion: Array, f: int) -> float:
+    """Return what changes of the force of a finger are divided by."""
+    # L = peak + 100 noise.
+    return float(motion[f, at.PEAK_LOAD] + NOISE_WEIGHT * motion[f, at.NOISE_NOW])
 
 
 @inlined
@@ -455,7 +477,7 @@ def _residual(
             x = forces[now, i, 0] - forces[then, i, 0] - mx
             y = forces[now, i, 1] - forces[then, i, 1] - my
             z = forces[now, i, 2] - forces[then, i, 2] - mz
-            along = x * nx + y * ny + z * nz
+            along = _along(layout.normal_axes[f], x, y, z, nx, ny, nz)
             moved += x * x + y * y + z * z
             pressed += along * along
     return moved, pressed
@@ -504,13 +526,15 @@ def _fill_seconds(
         y = newest * forces[now, i, 1] - 2.0 * forces[before, i, 1] + oldest * forces[first, i, 1]
         z = newest * forces[now, i, 2] - 2.0 * forces[before, i, 2] + oldest * forces[first, i, 2]
         square, pressed = x * x + y * y + z * z, memory.pressed[i]
-        pushed = x * nx + y * ny + z * nz
+        pushed = _along(layout.normal_axes[f], x, y, z, nx, ny, nz)
         squares += square
         shared += pressed * square
         along += pressed * (pushed * pushed)
         px, py, pz = px + pressed * x, py + pressed * y, pz + pressed * z
-        if pressed > mean_pressure and square > top:
-            top = square
+        # |d_i|^2 if p_i > sum p / n, else not above 0: without a branch, which half of the
+        # taxels would mispredict.
+        rival = -math.copysign(square, mean_pressure - pressed)
+        top = rival if rival > top else top
     # With w_i = p_i / sum p and D = sum d_i:
     # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.
     x = newest * track[f, 0, now] - 2.0 * track[f, 0, before] + oldest * track[f, 0, first]

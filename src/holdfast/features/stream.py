@@ -322,6 +322,7 @@ def _layout(plan: StreamPlan) -> Layout:
         families=families,
         places=np.concatenate([_places(s, i) for s, i in zip(sensors, ignored, strict=True)]),
         normals=np.array([sensor.normal for sensor in sensors], dtype=np.float64),
+        normal_axes=np.array([_axis_of(sensor.normal) for sensor in sensors], dtype=np.int64),
         n_levels=n_levels(max(longest)),
     )
 
@@ -345,6 +346,12 @@ def _places(sensor: Sensor, ignored: Flags) -> Array:
     places = sensor.positions - used.mean(axis=0)
     radius = float(np.sqrt((places[~ignored] ** 2).sum(axis=1).mean()))
     return places / radius if radius > 0 else np.zeros_like(places)
+
+
+def _axis_of(normal: Array) -> int:
+    """Return the axis that a normal is, or 3 if it is between axes."""
+    axes = [axis for axis in range(3) if normal.tolist() == np.eye(3)[axis].tolist()]
+    return axes[0] if axes else 3
 
 
 def _max_step(rate: float, *, bridged: bool) -> float:
@@ -398,6 +405,7 @@ def _memory(layout: Layout) -> Memory:
         counts=np.zeros((n_fingers, at.COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
+        hand=np.full(layout.specs.shape[1], np.nan),
         taxel_forces=np.zeros((length, n_taxels, 3)),
         reference=np.zeros((n_taxels, 3)),
         track=np.zeros((n_fingers, at.TRACK_WIDTH, length)),

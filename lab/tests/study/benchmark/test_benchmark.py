@@ -2,6 +2,9 @@
 
 import csv
 import json
+import runpy
+import sys
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -24,6 +27,7 @@ from holdfast_lab.study.benchmark.protocol import (
 from holdfast_lab.study.benchmark.scoring import log_odds
 from study.example_recordings import SLIPS, recording_with_truth
 
+SCRIPT = Path(__file__).parents[4] / "benchmarks" / "submission.py"
 SEEDS = {"tuning": (0, 1, 2), "new-objects": (3, 4, 5), "new-hand-and-objects": (6, 7)}
 
 
@@ -144,6 +148,16 @@ def test_the_scores_of_another_program(capsys, folder, tmp_path):
     assert "Stability by sample\n" in out
     assert "new-hand-and-objects" in out
     assert "Slips of fingers\n" in out
+
+
+def test_the_script_writes_the_scores_of_a_model(capsys, folder, tmp_path, monkeypatch):
+    out = tmp_path / "any.parquet"
+    monkeypatch.setattr(sys, "argv", ["submission.py", str(folder), "builtin:any", str(out)])
+    runpy.run_path(str(SCRIPT), run_name="__main__")
+    document, err = scored(capsys, folder, out)
+    assert (document["left_out"], err) == ([], "")
+    assert figure(document, "stability", "AUC", on="new-objects") > 0.9
+    assert figure(document, "slips", "n slips", on="new-hand-and-objects") == 4
 
 
 def test_only_the_order_of_scores_counts_for_events_and_slips(capsys, folder, tmp_path):
