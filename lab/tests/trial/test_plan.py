@@ -76,7 +76,7 @@ class TestVersion:
     def test_it_depends_on_the_constants_of_the_law(self, fresh, monkeypatch):
         before = {law: version(law) for law in ("pr2", "holdfast")}
         trial_plan._version.cache_clear()
-        monkeypatch.setitem(laws.LAWS, "holdfast", lambda: laws.Stability(threshold=0.6))
+        monkeypatch.setitem(laws.LAWS, "holdfast", lambda: laws.Stability(fall=0.6))
         assert version("holdfast") != before["holdfast"]
         assert version("pr2") == before["pr2"]
 

@@ -33,7 +33,6 @@ class GripReason(StrEnum):
     SLIP = "slip"
     LOAD = "load"
     MARGIN = "margin"
-    BALANCE = "balance"
     RELAX = "relax"
     STALE = "stale"
     FROZEN = "frozen"

@@ -1,9 +1,7 @@
-import math
 from typing import NamedTuple
 
 import pytest
 
-from holdfast.contact import Cause
 from holdfast.grip import LAWS, GripReason
 from holdfast.grip.laws import Touch, law_named
 from holdfast.grip.laws.friction_margin import FORCE_MARGIN
@@ -106,20 +104,23 @@ class TestFrictionMargin:
 
 
 class TestStability:
-    def calm(self, *touches, seconds=0.5):
-        """A law after a time in which the grip was calm, and the time of the last update."""
-        law = started("holdfast", touches)
-        for k in range(round(seconds / DT)):
-            wanted(law, touches, k * DT, DT)
-        return law, seconds
+    def scale_after(self, law, touches, seconds, start=0.0):
+        """Return the scale after a time in which the hand follows each wish at once."""
+        for k in range(1, round(seconds / DT) + 1):
+            (wish, *others) = wanted(law, touches, start + k * DT, DT)
+            assert all(other == wish for other in others), "one scale for the hand"
+            for one in touches:
+                one.normal *= wish.scale / one.scale
+                one.scale = wish.scale
+        return touches[0].scale
 
     def test_a_load_that_grows_is_followed_before_anything_slips(self):
         one = touch()
-        law, time = self.calm(one)
-        one.tangential, one.probability = 0.9, 0.5
-        for k in range(1, 60):
-            (wish,) = wanted(law, [one], time + k * DT, DT)
-        assert wish.scale == pytest.approx(1.5, rel=0.01)
+        law = started("holdfast", [one])
+        self.scale_after(law, [one], 0.5)
+        one.tangential, one.probability = 0.9, 0.87
+        (wish,) = [wanted(law, [one], 0.5 + k * DT, DT)[0] for k in range(1, 9)][-1:]
+        assert wish.scale > 1.2
         assert wish.reason is GripReason.LOAD
 
     def test_a_load_that_someone_else_carries_at_first_is_no_reaction(self):
@@ -129,125 +130,113 @@ class TestStability:
         for k in range(300):
             one.tangential = min(0.05 + 0.01 * k, 0.6)
             (wish,) = wanted(law, [one], k * DT, DT)
-            assert wish.scale <= 1.001
+            assert wish.scale == 1.0
 
-    def test_the_step_grows_with_lack_of_probability_and_with_sigma(self):
-        def step(probability, instability):
-            touches = [touch(probability=probability, instability=instability)]
+    def test_the_step_grows_with_the_doubt(self):
+        def step(probability):
+            touches = [touch(probability=probability)]
             return wanted(started("holdfast", touches), touches, DT, DT)[0].scale
 
-        assert 1.0 < step(0.25, 0.0) < step(0.1, 0.0) < step(0.1, 0.1)
-        assert step(0.1, math.nan) == step(0.1, 0.0)
+        assert 1.0 < step(0.1) < step(0.05) < step(0.0)
 
-    def test_no_second_step_while_the_first_one_shakes_the_contact(self):
+    def test_no_second_step_in_the_refractory_time(self):
         one = touch(probability=0.0)
         law = started("holdfast", [one])
         (first,) = wanted(law, [one], 0.0, DT)
         one.scale = first.scale
-        one.probability = 0.19  # as a step without slip leaves it
-        assert wanted(law, [one], 0.1, DT)[0].scale <= first.scale
-        one.probability = 0.01
-        assert wanted(law, [one], 0.15, DT)[0].scale <= first.scale
-        assert wanted(law, [one], 0.3, DT)[0].scale > first.scale
+        times = [k * DT for k in range(1, 60)]
+        second = next(time for time in times if wanted(law, [one], time, DT)[0].scale > one.scale)
+        assert second > law.refractory
 
-    def test_an_episode_multiplies_the_force_by_its_factor_at_most(self):
-        one = touch(probability=0.1)
+    def test_after_a_step_a_doubt_as_it_leaves_starts_no_second_one(self):
+        one = touch(probability=0.0)
         law = started("holdfast", [one])
-        for k in range(150):
-            (wish,) = wanted(law, [one], k * DT, DT)
-            one.scale = max(one.scale, wish.scale)
-        assert one.scale == pytest.approx(law.most)
+        (first,) = wanted(law, [one], 0.0, DT)
+        one.scale, one.probability = first.scale, 0.2
+        times = [k * DT for k in range(1, round(law.episode / DT))]
+        assert {wanted(law, [one], time, DT)[0].scale for time in times} == {first.scale}
 
-    def test_stable_fingers_support_the_one_that_slips(self):
-        one, other = touch(probability=0.0), touch(name="middle", probability=0.6)
-        first, second = wanted(started("holdfast", [one, other]), [one, other], DT, DT)
-        assert first.scale - 1.0 > second.scale - 1.0 > 0.8 * (first.scale - 1.0)
-        assert first.reason is second.reason is GripReason.UNSTABLE
-
-    def test_a_finger_that_is_unstable_alone_must_be_so_for_some_time(self):
-        touches = [touch(probability=0.1), *(touch(name=name) for name in ("a", "b", "c"))]
+    @pytest.mark.parametrize(("fingers", "slowest"), [(1, 0.1), (4, 0.02)])
+    def test_a_reaction_comes_the_sooner_the_more_of_the_load_slides(self, fingers, slowest):
+        touches = [touch(name=name) for name in ("thumb", "index", "middle", "ring")]
         law = started("holdfast", touches)
-        scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(20)]
+        for one in touches[:fingers]:
+            one.probability = 0.4
+        scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(30)]
         first = next(k for k, scale in enumerate(scales) if scale > 1.0)
-        assert first * DT == pytest.approx(law.alone_time, abs=2 * DT)
-
-    def test_fingers_with_much_of_the_load_start_a_reaction_at_once(self):
-        thumb, other = touch(name="thumb", probability=0.1), touch()
-        law = started("holdfast", [thumb, other])
-        assert wanted(law, [thumb, other], 0.0, DT)[0].scale > 1.0
+        assert slowest / 4 < first * DT + DT <= slowest
 
     def test_a_slip_starts_a_reaction_whatever_the_stability(self):
-        one = touch(probability=0.9)
+        one = touch(probability=0.95)
         one.slides, one.slip_probability = True, 0.2
-        (wish,) = wanted(started("holdfast", [one]), [one], 0.0, DT)
+        law = started("holdfast", [one])
+        wish = [wanted(law, [one], k * DT, DT)[0] for k in range(2)][-1]
         assert wish.scale > 1.0 and wish.reason is GripReason.UNSTABLE
         one.slides = False
-        (wish,) = wanted(started("holdfast", [one]), [one], 0.0, DT)
-        assert wish.scale == 1.0
+        law = started("holdfast", [one])
+        assert wanted(law, [one], 0.0, DT)[0].scale == 1.0
 
     def test_a_more_probable_slip_gives_a_larger_step(self):
         def step(probability):
             one = touch(probability=0.9)
             one.slides, one.slip_probability = True, probability
-            return wanted(started("holdfast", [one]), [one], 0.0, DT)[0].scale
+            law = started("holdfast", [one])
+            return [wanted(law, [one], k * DT, DT)[0].scale for k in range(2)][-1]
 
         assert step(0.2) < step(0.6) < step(1.0)
 
-    def test_all_fingers_that_are_a_little_restless_start_a_reaction_together(self):
-        """Where friction falls, all contacts slide smoothly: no finger alone is unstable."""
-        names = ("thumb", "index", "middle")
+    def test_a_hand_that_carries_less_reacts_sooner_and_more(self):
+        """Where friction falls, all contacts slide smoothly, and no finger is surely unstable."""
 
-        def last_scale(tangential, probabilities):
-            touches = [touch(name=name, probability=0.9) for name in names]
+        def reaction(tangential):
+            touches = [touch(name=name) for name in ("thumb", "index", "middle")]
             law = started("holdfast", touches)
-            for one, probability in zip(touches, probabilities, strict=True):
-                one.tangential, one.probability = tangential, probability
-            return [wanted(law, touches, k * DT, DT)[0].scale for k in range(9)][-1]
+            for one in touches:
+                one.tangential, one.probability = tangential, 0.8
+            scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(30)]
+            first = next(k for k, scale in enumerate(scales) if scale > 1.0)
+            return first, scales[first]
 
-        assert last_scale(0.5, [0.6] * 3) > 1.3
-        assert last_scale(0.6, [0.6] * 3) == 1.0, "it carries what it carried before"
-        assert last_scale(0.5, [0.9, 0.6, 0.6]) == 1.0, "a third of the load is calm"
+        (late, small), (soon, large) = reaction(0.6), reaction(0.4)
+        assert soon < late and large > small
 
     def test_after_a_slip_the_floor_follows_the_load(self):
         """At the friction that the slip has shown, half of the load needs half of the force."""
-        one = touch(normal=2.0, tangential=1.0)
+        one = touch(normal=2.0, tangential=1.0, probability=0.0)
         one.slides, one.slip_probability = True, 0.9
         law = started("holdfast", [one])
-        (wish,) = wanted(law, [one], 0.0, DT)
-        one.scale, one.slides, one.slip_probability = wish.scale, False, 0.0
+        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.slides, one.slip_probability, one.probability = False, 0.0, 0.95
         one.normal = 2.0 * one.scale
-
-        def settled(seconds, start):
-            for k in range(round(seconds / DT)):
-                one.scale = min(one.scale, wanted(law, [one], start + k * DT, DT)[0].scale)
-                one.normal = 2.0 * one.scale
-            return one.scale
-
-        assert settled(2.0, DT) == pytest.approx(1.15, rel=0.15)
+        assert self.scale_after(law, [one], 4.0) == pytest.approx(law.margin, rel=0.2)
         one.tangential = 0.3
-        assert settled(2.0, 2.0 + DT) == 1.0
+        assert self.scale_after(law, [one], 4.0, 4.0) == 1.0
+
+    def test_a_floor_without_a_slip_rule_is_the_force_of_the_slip_and_the_margin(self):
+        one = touch(probability=0.0)
+        law = started("holdfast", [one])
+        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.probability = 0.95
+        assert 1.0 < self.scale_after(law, [one], 4.0) <= law.margin
+
+    def test_a_hand_that_relaxes_raises_nothing(self):
+        """Scales of single fingers needed a new balance again and again: 46 rises a minute."""
+        touches = [touch(name=name, normal=n) for name, n in (("thumb", 3.0), ("index", 2.0))]
+        law = started("holdfast", touches)
+        for one in touches:
+            one.scale = 2.0
+        before = 2.0
+        for k in range(450):
+            scale = self.scale_after(law, touches, DT, k * DT)
+            assert scale <= before
+            before = scale
+        assert before < 1.7
 
     def test_a_finger_that_carries_nothing_starts_no_reaction(self):
         one, idle = touch(), touch(name="middle", normal=0.01, probability=0.0)
         idle.start_normal = 0.01
-        for wish in wanted(started("holdfast", [one, idle]), [one, idle], DT, DT):
-            assert wish.scale == 1.0
-
-    @pytest.mark.parametrize(
-        ("cause", "floor"), [(Cause.SLIP, 1.15), (Cause.LOST, 1.15), (Cause.DISTURBANCE, 1.0)]
-    )
-    def test_after_a_slip_the_force_stays_above_that_of_the_slip(self, cause, floor):
-        one = touch(probability=0.0)
-        one.cause = cause
-        law = started("holdfast", [one])
-        (wish,) = wanted(law, [one], 0.0, DT)
-        one.scale, one.probability, one.cause = wish.scale, 0.95, None
-        lowest = one.scale
-        for k in range(1, 200):
-            one.scale = min(one.scale, wanted(law, [one], k * DT, DT)[0].scale)
-            lowest = min(lowest, one.scale)
-        assert floor * 0.7 < lowest <= floor
-        assert (lowest > 1.0) == (floor > 1.0) or lowest == 1.0
+        law = started("holdfast", [one, idle])
+        assert self.scale_after(law, [one, idle], 1.0) == 1.0
 
     def test_a_finger_without_contact_is_pressed(self):
         one = touch()
