@@ -1,7 +1,11 @@
 """Hands for the tests of the contract: each with what tells which forces it has."""
 
+import json
+import runpy
+import socket
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -14,7 +18,8 @@ from ros.domains import new_domain
 from .ros.drivers import ROS1, ROS2, Ros2Driver
 
 taken = []
-LOCAL = ["twin", "log", "call"]
+EXAMPLES = Path(__file__).parents[3] / "examples"
+LOCAL = ["twin", "log", "call", "newtons"]
 WITH_STATES = [
     f"{scheme}:{name}"
     for scheme, drivers in (("ros2", ROS2), ("ros1", ROS1))
@@ -99,6 +104,44 @@ def take(scale):
     taken.append(scale)
 
 
+class NewtonRig:
+    """The template of `examples/hands`, with a socket on the other side."""
+
+    per_finger, driver = True, None
+    fingers = ("thumb", "index", "middle", "ring")
+
+    def __init__(self, folder):
+        template = runpy.run_path(str(EXAMPLES / "hands" / "newton_hand.py"))
+        self._peer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._peer.bind(("127.0.0.1", 0))
+        self._peer.setblocking(False)
+        self._received = []
+        self.hand = template["NewtonHand"](
+            self._peer.getsockname(), start_force=2.0, max_force=6.0, rate=1e-3
+        )
+
+    def start(self):
+        self.messages()
+        self._received.clear()
+        self.hand.heartbeat = None
+
+    def messages(self):
+        with suppress(BlockingIOError):
+            while True:
+                self._received.append(json.loads(self._peer.recv(1000)))
+        return self._received
+
+    def forces(self, n):
+        messages = self.messages()
+        assert len(messages) == n, messages
+        last = messages[-1]
+        return {k: force / 2.0 for k, force in last.items()} if any(last.values()) else "open"
+
+    def close(self):
+        self.hand.close()
+        self._peer.close()
+
+
 class RosRig:
     """A hand on topics, with a driver on the other side."""
 
@@ -169,7 +212,9 @@ class Rigs:
 
             self._world = self._world or Ros1World(self._new_folder())
             return Ros1Rig(self._world, kind)
-        return {"twin": TwinRig, "log": LogRig, "call": CallRig}[name](self._new_folder())
+        return {"twin": TwinRig, "log": LogRig, "call": CallRig, "newtons": NewtonRig}[name](
+            self._new_folder()
+        )
 
     def close(self):
         for rig in self._made.values():
