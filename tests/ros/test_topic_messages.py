@@ -1,3 +1,5 @@
+import struct
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,11 @@ from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.topic_messages import (
     FLOAT_ARRAY,
+    GRIPPER_COMMAND,
     JOINT_STATE,
     MESSAGE_TYPES,
     array_message,
+    gripper_message,
     joint_message,
     topic_definition,
 )
@@ -19,7 +23,7 @@ from holdfast.ros.topic_messages import (
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 
 
-@pytest.mark.parametrize("name", MESSAGE_TYPES)
+@pytest.mark.parametrize("name", [kind for kind in MESSAGE_TYPES if kind != GRIPPER_COMMAND])
 def test_definitions_are_those_of_ros(name):
     text, _ = TYPES.generate_msgdef(name.replace("/", "/msg/"), ros_version=2)
     theirs = parse_definition(name, text)
@@ -40,6 +44,12 @@ def test_another_program_reads_the_messages():
     read = TYPES.deserialize_cdr(data, "sensor_msgs/msg/JointState")
     assert (read.header.stamp.sec, read.header.stamp.nanosec) == (12, 500_000_000)
     assert (read.name, list(read.effort), len(read.position)) == (["a", "b"], [1.0, 2.0], 0)
+
+
+def test_a_gripper_command_is_a_position_and_a_force():
+    """rosbags does not have control_msgs: its file has `float64 position`, `float64 max_effort`."""
+    data = MessageEncoder(topic_definition(GRIPPER_COMMAND))(gripper_message(0.02, 35.0))
+    assert bytes(data) == b"\x00\x01\x00\x00" + struct.pack("<dd", 0.02, 35.0)
 
 
 @pytest.mark.parametrize("time", [float("nan"), -1.0, 1e12])

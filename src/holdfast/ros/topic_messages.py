@@ -10,6 +10,7 @@ from holdfast.sensors.types import Array
 
 FLOAT32, FLOAT64, STRING = "std_msgs/Float32", "std_msgs/Float64", "std_msgs/String"
 FLOAT_ARRAY, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
+GRIPPER_COMMAND = "control_msgs/GripperCommand"
 """Message types of the topics of hands."""
 VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
@@ -20,6 +21,7 @@ _DEFINITIONS = {
     FLOAT32: "float32 data",
     FLOAT64: "float64 data",
     STRING: "string data",
+    GRIPPER_COMMAND: "float64 position\nfloat64 max_effort",
     FLOAT_ARRAY: (
         "MultiArrayLayout layout\nfloat64[] data"
         + SEPARATOR
@@ -80,6 +82,11 @@ class JointStates(NamedTuple):
 def number_message(value: float) -> dict[str, Any]:
     """Return a message of one number."""
     return {"data": float(value)}
+
+
+def gripper_message(position: float, max_effort: float) -> dict[str, Any]:
+    """Return a `control_msgs/GripperCommand`: where to close to [m], and with which force [N]."""
+    return {"position": float(position), "max_effort": float(max_effort)}
 
 
 def array_message(values: Array) -> dict[str, Any]:

@@ -13,6 +13,7 @@ EFFORTS = [0.02 + 0.001 * k for k in range(16)]
 AH_NAMES = [f"ah_joint{finger}{joint}" for finger in range(4) for joint in range(4)]
 ROS1_NAMES = [f"joint_{k}.0" for k in range(16)]
 SIXTEEN = ",".join(["0.1"] * 16)
+OPEN_WIDTH = 0.08
 PLEXUS = "/allegro_hand_position_effort_controller"
 V4 = "/allegro_hand_position_controller/commands"
 
@@ -57,6 +58,9 @@ class Driver:
         if "home" in [message.get("data") for topic, message in messages if "lib" in topic]:
             return "open"
         _, message = messages[-1]
+        if "max_effort" in message:  # opens by its position
+            is_open = message["position"] == OPEN_WIDTH
+            return "open" if is_open else message["max_effort"] / self.effort
         if self.effort is not None:
             return message["data"] / self.effort if message["data"] else "open"
         values = list(message.get("data", ())) or list(message["effort"]) or message["position"]
@@ -105,6 +109,11 @@ ROS2 = {
     "gripper": Driver(
         "ros2:gripper?topic=/gripper/force&effort=4&max_effort=10",
         {"/gripper/force": "std_msgs/Float64"}, effort=4.0,
+    ),
+    "parallel-gripper": Driver(
+        "ros2:gripper?topic=/gripper/command&type=GripperCommand&effort=4&max_effort=10"
+        f"&open={OPEN_WIDTH}",
+        {"/gripper/command": "control_msgs/GripperCommand"}, effort=4.0,
     ),
 }  # fmt: skip
 

@@ -37,6 +37,15 @@ SIXTEEN = ",".join(["0.1"] * 16)
         ("ros2:plexus?effort=1&max_effort=0", "max_effort: numbers above 0 expected, 0 given"),
         ("ros2:plexus?effort=1&max_effort=2&release=home", "home: 16 numbers, one for each joint,"),
         ("ros2:v4?effort=0.1", "effort: 16 numbers, one for each joint, expected, '0.1' given"),
+        (
+            "ros2:gripper?topic=/g&effort=4&max_effort=9&type=GripperCommand",
+            "open: a number expected, nothing given",
+        ),
+        (
+            "ros2:gripper?topic=/g&effort=4&max_effort=9&type=GripperCommand&open=0",
+            "open= another position than closed= expected, 0 given",
+        ),
+        ("ros2:gripper?topic=/g&effort=4&max_effort=9&closed=0", "closed= is a position of type=G"),
         ("ros2:v4?release=limp", "release=home expected, 'limp' given"),
         ("ros2:v4?namespace=hand", "namespace=/TOPIC expected, 'hand' given"),
         ("ros2:v4?states=/a b", "states=/TOPIC expected, '/a b' given"),
@@ -51,7 +60,7 @@ SIXTEEN = ",".join(["0.1"] * 16)
         ("ros2:v5-envelop?effort=1", "max_effort: a number expected, nothing given"),
         ("ros2:v5-envelop?effort=-1&max_effort=1", "effort: a number above 0 expected, -1 given"),
         ("ros2:gripper?effort=1&max_effort=1", "topic=/TOPIC expected, nothing given"),
-        ("ros2:gripper?topic=/a&effort=1&max_effort=1&type=Int", "type=Float64 or Float32 expecte"),
+        ("ros2:gripper?topic=/a&effort=1&max_effort=1&type=Int", "type=Float64 or Float32 or Grip"),
         ("ros2:gripper?topic=/a&effort=x&max_effort=1", "effort: a number expected, 'x' given"),
     ],
 )

@@ -19,13 +19,21 @@ from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.scalar_hand import ScalarHand, ScalarSetup
 from holdfast.devices.ros.link import Link
 from holdfast.devices.uri import Address, parse
-from holdfast.ros.topic_messages import FLOAT32, FLOAT64, FLOAT_ARRAY, JOINT_STATE
+from holdfast.ros.topic_messages import (
+    FLOAT32,
+    FLOAT64,
+    FLOAT_ARRAY,
+    GRIPPER_COMMAND,
+    JOINT_STATE,
+)
 from holdfast.sensors.types import Array
 
 COMMON = ("shared",)
 """Parameters of every kind, besides `domain` (ROS 2) or `master` (ROS 1)."""
 NETWORKS = {"ros2": "domain", "ros1": "master"}
 """Schemes, and the parameter of each that says where the topics are."""
+GRIPPER_TYPES = {"Float64": FLOAT64, "Float32": FLOAT32, "GripperCommand": GRIPPER_COMMAND}
+"""Message types of grippers, by the parameter `type`, the default first."""
 NO_ACTION = (
     "the grasp action of V4 in ROS 2 takes its envelop effort as a goal, by services, which plain "
     "DDS does not have; use ros2:v4, or call:MODULE:FUNCTION with a function on rclpy"
@@ -145,22 +153,34 @@ class EnvelopKind:
 
 
 class GripperKind:
-    """Gripper that takes one number on a topic."""
+    """Gripper that takes one number on a topic, or a position and a force (`GripperCommand`)."""
 
-    parameters = ("topic", "type", "effort", "max_effort", "open")
+    parameters = ("topic", "type", "effort", "max_effort", "open", "closed")
 
     def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> HandDevice:
-        """Return the hand of a URI."""
+        """Return the hand of a URI.
+
+        Raises:
+            ValueError: a parameter is missing or not valid.
+        """
+        kind = given.word("type", tuple(GRIPPER_TYPES))
+        if kind != "GripperCommand" and given.has("closed"):
+            raise ValueError(f"{given.text}: closed= is a position of type=GripperCommand")
+        opens_to = given.number("open", None if kind == "GripperCommand" else 0.0)
+        closes_to = given.number("closed", 0.0)
+        if kind == "GripperCommand" and opens_to == closes_to:
+            raise ValueError(
+                f"{given.text}: open= another position than closed= expected, {opens_to:g} given"
+            )
         setup = ScalarSetup(
             topic=given.topic("topic"),
-            message={"Float64": FLOAT64, "Float32": FLOAT32}[
-                given.word("type", ("Float64", "Float32"))
-            ],
+            message=GRIPPER_TYPES[kind],
             effort=given.positive("effort"),
             max_effort=given.positive("max_effort"),
-            open_value=given.number("open", 0.0),
+            open_value=opens_to,
             word_topic=None,
             fingers=None,
+            closed=closes_to,
         )
         return ScalarHand(name, link, setup, shared=_shared(given), standby=standby)
 

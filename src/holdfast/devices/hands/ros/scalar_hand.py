@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from holdfast.devices.hands.local import largest_scale
 from holdfast.devices.hands.ros.ros_hand import RosHand
@@ -9,7 +10,12 @@ from holdfast.devices.ros.link import Link
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 from holdfast.grip.limits import Limits
-from holdfast.ros.topic_messages import STRING, number_message
+from holdfast.ros.topic_messages import (
+    GRIPPER_COMMAND,
+    STRING,
+    gripper_message,
+    number_message,
+)
 
 SLACK = 1e-9
 """Rounding by which a value may exceed its ceiling, as a share of it."""
@@ -29,6 +35,8 @@ class ScalarSetup:
         open_value: value that opens the hand, if it has no topic for words.
         word_topic: topic on which the word `home` opens the hand; None if there is none.
         fingers: fingers of the hand; None for any.
+        closed: position that a `GripperCommand` closes to, beyond any object [m]. `open_value` is
+            a position too then.
     """
 
     topic: str
@@ -38,6 +46,7 @@ class ScalarSetup:
     open_value: float
     word_topic: str | None
     fingers: tuple[str, ...] | None
+    closed: float = 0.0
 
     @property
     def topics(self) -> dict[str, str]:
@@ -83,13 +92,21 @@ class ScalarHand(RosHand):
         value = self._setup.effort * largest_scale(command)
         if problem := self._excess(value):
             raise HandError(problem)
-        self._publish(self._setup.topic, number_message(value))
+        self._publish(self._setup.topic, self._message(self._setup.closed, value))
+
+    def _message(self, position: float, value: float) -> dict[str, Any]:
+        """Return the message of a value, at a position where the driver takes one [m]."""
+        if self._setup.message == GRIPPER_COMMAND:
+            return gripper_message(position, value)
+        return number_message(value)
 
     def _release(self) -> None:
         if self._setup.word_topic is not None:
             self._publish(self._setup.word_topic, {"data": HOME})
         else:
-            self._publish(self._setup.topic, number_message(self._setup.open_value))
+            setup, moves = self._setup, self._setup.message == GRIPPER_COMMAND
+            value = setup.effort if moves else setup.open_value
+            self._publish(setup.topic, self._message(setup.open_value, value))
 
     def _excess(self, value: float) -> str:
         """Return a message about a value that exceeds its ceiling; empty if it does not."""
