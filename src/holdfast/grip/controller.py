@@ -10,6 +10,7 @@ from holdfast.grip.laws import Law, Touch, law_named
 from holdfast.grip.laws.base import Three
 from holdfast.grip.limits import Limits
 from holdfast.grip.repeats import RepeatMonitor
+from holdfast.grip.waiting import GripWait
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
@@ -90,11 +91,13 @@ class GripController:
         ceiling = math.inf if limits.max_force is None else limits.max_force
         self._ceiling = OVERLOAD * ceiling
         self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
+        self._waiting = GripWait(MIN_FINGERS)
         self.reset()
 
     def reset(self) -> None:
         """Return to IDLE: forget the grip and its faults."""
         self.state = LoopState.IDLE
+        self._waiting.reset()
         self._touches: list[Touch] = []
         self._bad_since: list[float] = []
         self._highest: list[float] = []
@@ -144,6 +147,11 @@ class GripController:
     def highest_scales(self) -> dict[str, float]:
         """Highest scale that each finger of the grip may get; none while IDLE."""
         return dict(zip(self.loaded_fingers, self._highest, strict=False))
+
+    @property
+    def waits_for(self) -> str:
+        """What the hand lacks before the grip begins, in words; empty from when it has begun."""
+        return self._waiting.text if self.state is LoopState.IDLE else ""
 
     def events(self) -> list[GripEvent]:
         """Return states and rises since the last call, at most `MAX_EVENTS`, oldest first."""
@@ -204,6 +212,7 @@ class GripController:
 
     def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
+        self._waiting.update(estimate, time)
         commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
         self._commands = commands
         is_stable = estimate.state is ContactState.STABLE

@@ -192,6 +192,7 @@ class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
         failure: why the loop has ended for good; empty while it runs.
         events: newest events, oldest first.
         fault: explanation of the fault; null if there is none.
+        waiting: what the hand lacks before the grip begins; empty from when it has begun.
     """
 
     hand: str
@@ -208,3 +209,4 @@ class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
     failure: str
     events: list[GripEntry]
     fault: GripFault | None = None
+    waiting: str = ""

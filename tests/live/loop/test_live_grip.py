@@ -5,6 +5,7 @@ import msgspec
 import pytest
 
 from grip.build import FINGERS, RATE, hand, holding
+from holdfast.contact import ContactState
 from holdfast.errors import HandError
 from holdfast.grip import GripReason
 from holdfast.live.loop.grip_loop import GripLoop
@@ -65,6 +66,17 @@ def test_an_armed_loop_locks_tare_and_thresholds(rig, armed):
     with rig.grip:
         assert bool(rig.session.lock) is armed
     assert rig.session.lock == ""
+
+
+def test_the_document_says_what_the_grip_waits_for(rig):
+    assert rig.grip.document().waiting == ""  # it holds
+    controller = rig.loop.controller
+    controller.reset()
+    ring = {"state": ContactState.UNSTABLE, "normal": 9000.0}
+    for _ in range(2):
+        rig.time += 3.0
+        controller.update(hand(rig.time, ContactState.UNSTABLE, ring=ring), rig.time)
+    assert rig.grip.document().waiting == "the ring finger is not stable: 3 s"
 
 
 def test_the_document_has_the_newest_command(rig):

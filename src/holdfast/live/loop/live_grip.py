@@ -114,6 +114,7 @@ class LiveGrip:
             failure=str(self.failure or ""),
             events=list(self._log.entries),
             fault=self._fault(limits, last) if state is LoopState.FAULT else None,
+            waiting=loop.controller.waits_for if state is LoopState.IDLE else "",
         )
 
     def _fault(self, limits: Limits, last: GripCommand | None) -> GripFault:

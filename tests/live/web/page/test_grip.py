@@ -70,6 +70,16 @@ def test_the_panel_shows_state_commands_and_limits(visit, holding):
     shows(page, "#grip-armed", "^DRY RUN$")
 
 
+def test_an_idle_loop_says_what_it_waits_for(visit, holding):
+    holding.grip = gripping(state="IDLE", waiting="the ring finger is not stable: 12 s")
+    page = visit(holding.url, PHONE)
+    shows(page, "#grip-word", "^IDLE$")
+    shows(page, "#grip-reason", "^waiting: the ring finger is not stable: 12 s$")
+    assert flaws(page, PHONE) == []
+    holding.grip = gripping(state="HOLD", waiting="")
+    shows(page, "#grip-reason", "^$")
+
+
 def test_each_event_is_listed_once(visit, holding):
     page = visit(holding.url)
     shows(page, "#events", "REACT: index")

@@ -90,7 +90,7 @@ export class GripPanel {
     this.stop.enable(this.grip !== null);
     if (this.grip === null) return;
     const reason = grip.stopped ? "stopped by a person" : withSpaces(grip.reason);
-    this.showState(grip.state.toLowerCase(), grip.state, grip.failure || reason);
+    this.showState(grip.state.toLowerCase(), grip.state, grip.failure || reason || (grip.waiting ? `waiting: ${grip.waiting}` : ""));
     const word = commandWord(grip);
     setText(byId("grip-armed"), word);
     byId("grip").dataset.command = word.toLowerCase().replace(" ", "-");
