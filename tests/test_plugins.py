@@ -26,7 +26,9 @@ TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
 PROGRAM = "import sys; from holdfast.cli import main; sys.exit(main())"
 
 PARTS = '''
+from pathlib import Path
 from holdfast.classifiers import LogisticRegression
+from holdfast.devices.hands.local import LogFile
 from holdfast.grip.laws import Fixed
 from holdfast.sensors import flat_sensor
 
@@ -38,15 +40,18 @@ class Twice(Fixed):
 def pad():
     return flat_sensor("pad", 1, 2, 1e-3)
 
-class Hand:
+class Hand(LogFile):
     def __init__(self, uri):
-        self.uri = uri
+        super().__init__(uri, "commands")
+
+def not_a_hand(uri):
+    return Path(uri)
 '''
 POINTS = {
     "holdfast.sensors": {"pad": "parts:pad", "gtac": "parts:pad", "other": "parts:pad"},
     "holdfast.classifiers": {"same": "parts:same", "none": "parts:pad"},
     "holdfast.laws": {"twice": "parts:Twice", "wrong": "parts:pad"},
-    "holdfast.hands": {"grab": "parts:Hand"},
+    "holdfast.hands": {"grab": "parts:Hand", "hollow": "parts:not_a_hand"},
     "holdfast.sources": {"gone": "no_such_module:source", "number": "parts:__name__"},
     "holdfast.importers": {"broken": "broken", "half": "parts"},
 }
@@ -71,7 +76,7 @@ def test_each_kind_is_found_by_its_name(parts):
     assert sensor("pad").n_taxels == 2
     assert recipe("same").name == "same"
     assert type(law_named("twice")).__name__ == "Twice"
-    assert open_hand("grab:left").uri == "grab:left"
+    assert open_hand("grab:left").name == "grab:left"
     assert parse("gone://host")[0] == "gone"
 
 
@@ -80,7 +85,7 @@ def test_names_are_listed_after_our_own(parts, caplog):
     assert recipe_names() == ("logreg", "svm", "none", "same")
     with pytest.raises(ValueError, match=r"there are fixed.*holdfast; of plug-ins: twice, wrong$"):
         law_named("thrice")
-    with pytest.raises(ValueError, match=r"ros1:KIND; of plug-ins: grab$"):
+    with pytest.raises(ValueError, match=r"ros1:KIND; of plug-ins: grab, hollow$"):
         open_hand("grip:left")
     assert reports(caplog) == [
         "plug-in gtac (sensors of acme 1.2) is skipped: holdfast itself has gtac; another name "
@@ -118,6 +123,12 @@ def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason
     assert any(text.startswith(f"plug-in {reason}") for text in reports(caplog))
 
 
+def test_what_is_no_hand_is_named_with_the_contract(parts):
+    text = "hollow:left: the plug-in hollow must return a subclass of HandDevice, as the contract"
+    with pytest.raises(ValueError, match=text):
+        open_hand("hollow:left")
+
+
 def test_a_broken_importer_does_not_hinder_the_others(parts, caplog, capsys):
     (parts / "a.txt").write_text("hello")
     for _ in range(2):
@@ -147,7 +158,7 @@ def test_doctor_lists_them(parts, capsys):
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
-    assert works == {"pad", "same", "twice", "grab"}
+    assert works == {"pad", "same", "twice", "grab", "hollow"}
     assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out

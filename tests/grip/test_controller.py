@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from grip.build import FINGERS, NORMAL, RATE, finger, hand, holding, run, scales
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.grip import LAWS, GripController, GripReason, Limits, LoopState
-from holdfast.sensors import sensor
+from holdfast.sensors import flat_sensor, sensor
 
 SLIPPING = {name: {"probability": 0.05, "state": ContactState.UNSTABLE} for name in FINGERS}
 RISING = {GripReason.UNSTABLE, GripReason.SLIP, GripReason.LOAD, GripReason.MARGIN}
@@ -384,6 +384,12 @@ class TestResume:
 
 
 class TestUnits:
+    def test_a_calibration_of_readings_in_newtons_is_refused(self):
+        sensors = {"thumb": sensor("uskin-curved"), "pad": flat_sensor("pad", 1, 2, 1e-3, unit="N")}
+        with pytest.raises(ValueError, match=r"counts expected, those of pad are in N already"):
+            GripController(Limits(), sensors=sensors, newtons_per_unit=1e-3)
+        GripController(Limits(), sensors=sensors)
+
     @pytest.mark.parametrize("law", ["pr2", "friction-margin"])
     def test_a_law_that_needs_newtons_refuses_counts(self, law):
         with pytest.raises(ValueError, match="needs forces in N and the readings are counts"):

@@ -7,7 +7,7 @@ import pytest
 from grip.build import hand
 from holdfast.contact import ContactState
 from holdfast.grip import GripController, Limits
-from holdfast.grip.waiting import LAST, NO_CONTACT, NO_SAMPLES
+from holdfast.grip.waiting import MUST_LAST, NO_SAMPLES, NO_TOUCH
 
 UNSTABLE, UNKNOWN = ContactState.UNSTABLE, ContactState.UNKNOWN
 FREE = {"state": ContactState.NO_CONTACT}
@@ -45,13 +45,13 @@ def test_the_condition_that_lasts_longest_is_first(controller):
 def test_a_condition_that_ended_begins_anew(controller):
     ring = {"state": UNSTABLE, "normal": 9000.0}
     waits(controller, 0.0, ring=ring)
-    assert waits(controller, 8.0, ContactState.STABLE) == LAST
+    assert waits(controller, 8.0, ContactState.STABLE) == MUST_LAST
     assert waits(controller, 8.1, ring=ring) == "the ring finger is not stable"
 
 
 def test_a_hand_without_an_object_and_a_single_finger(controller):
     free = dict.fromkeys(("thumb", "index", "middle", "ring"), FREE)
-    assert waits(controller, 0.0, ContactState.NO_CONTACT, **free) == NO_CONTACT
+    assert waits(controller, 0.0, ContactState.NO_CONTACT, **free) == NO_TOUCH
     del free["index"]
     text = waits(controller, 1.0, ContactState.STABLE, **free)
     assert text == "only the index finger touches an object"

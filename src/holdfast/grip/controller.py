@@ -57,8 +57,8 @@ class GripController:
         thumb: finger opposite to all others, which balances them; None if there is none.
 
     Raises:
-        ValueError: there is no such law, or it needs newtons and the readings are counts without
-            a calibration.
+        ValueError: there is no such law, it needs newtons and the readings are counts without a
+            calibration, or there is a calibration and readings are in newtons.
 
     Example:
         >>> from holdfast.contact import ContactEstimate
@@ -400,6 +400,12 @@ def _check_unit(
         raise ValueError(
             f"the law {type(law).__name__} needs forces in N and the readings are counts: give "
             "newtons_per_unit, the calibration of the sensor"
+        )
+    measured = [name for name, sensor in sensors.items() if sensor.unit == "N"]
+    if measured and newtons_per_unit is not None:
+        raise ValueError(
+            f"newtons_per_unit: readings in counts expected, those of {', '.join(measured)} are in "
+            "N already: leave the calibration out"
         )
     given = newtons_per_unit if isinstance(newtons_per_unit, tuple) else (newtons_per_unit,)
     if any(one is not None and not (math.isfinite(one) and one > 0) for one in given):

@@ -7,8 +7,8 @@ from holdfast.contact import ContactState, HandEstimate
 HUMAN_FINGERS = ("index", "middle", "ring", "little")
 """Fingers whose names need the word finger in a sentence."""
 NO_SAMPLES = "no finger has sent a sample"
-NO_CONTACT = "no finger touches an object"
-LAST = "the hand is stable, which must last"
+NO_TOUCH = "no finger touches an object"
+MUST_LAST = "the hand is stable, which must last"
 """Conditions of the hand as a whole."""
 
 
@@ -65,8 +65,8 @@ class GripWait:
         if len(touching) == 1 < min(self._min_fingers, len(estimate.fingers)):
             conditions.append(f"only {_named(touching[0])} touches an object")
         if not touching and not conditions:
-            return [NO_CONTACT]
-        return conditions or [LAST]
+            return [NO_TOUCH]
+        return conditions or [MUST_LAST]
 
 
 _WORDS = {ContactState.UNKNOWN: "has no estimate", ContactState.UNSTABLE: "is not stable"}

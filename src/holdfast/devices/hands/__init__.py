@@ -29,7 +29,8 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
         standby: whether a watchdog opens it, beside the controller that commands the hand.
 
     Raises:
-        ValueError: the URI names no hand, or a parameter is missing or not valid.
+        ValueError: the URI names no hand, a parameter is missing or not valid, or what a plug-in
+            returns is no `HandDevice`.
         MissingExtra: the hand needs a package that is not installed.
     """
     scheme, _, rest = uri.partition(":")
@@ -51,7 +52,13 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
             f"{uri!r} is no hand; there are twin:, log:PATH, call:MODULE:FUNCTION, ros2:KIND and "
             f"ros1:KIND{HAND_PLUGINS.text()}"
         )
-    return make(uri)
+    hand: Any = make(uri)
+    if not isinstance(hand, HandDevice):
+        raise ValueError(
+            f"{uri}: the plug-in {scheme} must return a subclass of HandDevice, as the contract "
+            f"of hands says; {type(hand).__name__} returned"
+        )
+    return hand
 
 
 def _plugin_hand(name: str, loaded: Any) -> Callable[[str], HandDevice]:  # noqa: ANN401

@@ -46,6 +46,15 @@ SIXTEEN = ",".join(["0.1"] * 16)
             "open= another position than closed= expected, 0 given",
         ),
         ("ros2:gripper?topic=/g&effort=4&max_effort=9&closed=0", "closed= is a position of type=G"),
+        (
+            f"ros2:v5?max_effort=1&stiffness=2&home={SIXTEEN.replace('0.1', '45')}",
+            "home: index joint 0: -3.14159 to 3.14159 rad expected, 45 given",
+        ),
+        (
+            f"ros2:v5?max_effort=1&stiffness=2&home={SIXTEEN}&highest=0.05",
+            "home: index joint 0: -3.14159 to 0.05 rad expected, 0.1 given",
+        ),
+        ("ros1:positions?highest=0.5", "0.5 rad expected"),
         ("ros2:v4?release=limp", "release=home expected, 'limp' given"),
         ("ros2:v4?namespace=hand", "namespace=/TOPIC expected, 'hand' given"),
         ("ros2:v4?states=/a b", "states=/TOPIC expected, '/a b' given"),

@@ -100,7 +100,7 @@ class JointKind:
         is_v4 = self.max_torque is not None
         lowest, highest = _joint_limits(given, order, is_v4=is_v4)
         release = given.word("release", self.release)
-        return JointSetup(
+        setup = JointSetup(
             output=self.output,
             topic=f"{namespace}/{self.topic}",
             message=self.message,
@@ -116,6 +116,8 @@ class JointKind:
             home=given.joints("home", table(self.home), each=True) if release == "home" else None,
             home_topic=self.home_topic and f"{namespace}/{self.home_topic}",
         )
+        _check_home(given, setup)
+        return setup
 
 
 @dataclass(frozen=True)
@@ -275,6 +277,23 @@ def _joint_limits(given: Parameters, order: JointOrder, *, is_v4: bool) -> tuple
     if not (lowest < highest).all():
         raise ValueError(f"{given.text}: lowest below highest expected for each joint")
     return lowest, highest
+
+
+def _check_home(given: Parameters, setup: JointSetup) -> None:
+    """Check that the pose of the open hand is within the limits of the joints.
+
+    Raises:
+        ValueError: it is not, as in degrees, or in another order of the joints.
+    """
+    if setup.home is None:
+        return
+    beyond = np.maximum(setup.lowest - setup.home, setup.home - setup.highest)
+    worst = int(np.argmax(beyond))
+    if beyond[worst] > 0.0:
+        raise ValueError(
+            f"{given.text}: home: {setup.order.describe(worst)}: {setup.lowest[worst]:g} to "
+            f"{setup.highest[worst]:g} rad expected, {setup.home[worst]:g} given"
+        )
 
 
 def _shared(given: Parameters) -> bool:
