@@ -1,12 +1,12 @@
-"""Publish a comparison of grip laws in docs/, and write the page that quotes it.
+"""Publish a comparison of grip laws in docs/study/, and write the page that quotes it.
 
     python benchmarks/publish_trial.py publish TRIALS
     python benchmarks/publish_trial.py render
 
 `publish` copies trial.json, the tables and trials as CSV, the film and some figures from the
-folder of a finished `holdfast trial` to docs/grip/, in place of the old ones, and writes the page;
-`render` writes the page again. docs/grip-trials.md is written from docs/grip/grip-trials.md.j2.
-Change the template, not the page: every figure in it is taken from trial.json, and
+folder of a finished `holdfast trial` to docs/study/grip/, in place of the old ones, and writes the
+page; `render` writes the page again. docs/study/grip-trials.md is written from grip-trials.md.j2 in
+that folder. Change the template, not the page: every figure in it is taken from trial.json, and
 lab/tests/test_docs_trial.py renders it again.
 """
 
@@ -23,7 +23,7 @@ from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.trial.report import summary_text
 from holdfast_lab.trial.tables import all_tables
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[1] / "docs" / "study"
 PAGE = "grip-trials.md"
 FIGURES = ("film.webp", "force.png", "distributions.png", "course.png")
 """Figures that are copied; a run without a film has some of them only."""
@@ -34,11 +34,11 @@ DIGITS = 6
 
 
 def publish(run: Path, docs: Path) -> None:
-    """Copy the results of a run to docs/grip/, in place of the old ones.
+    """Copy the results of a run to docs/study/grip/, in place of the old ones.
 
     Args:
         run: folder of a finished comparison.
-        docs: folder of the documentation.
+        docs: folder of the pages of the study.
 
     Raises:
         FileNotFoundError: the folder has no finished comparison.
@@ -100,7 +100,9 @@ def _rounded(value: object) -> object:
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(description="Publish a comparison of grip laws in docs/.")
+    parser = argparse.ArgumentParser(
+        description="Publish a comparison of grip laws in docs/study/."
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("publish").add_argument("run", type=Path)
     commands.add_parser("render")

@@ -1,4 +1,4 @@
-"""The figures in docs/grip-trials.md are those of the published run of `holdfast trial`."""
+"""The figures in docs/study/grip-trials.md are those of the published run of `holdfast trial`."""
 
 import importlib.util
 import json
@@ -13,7 +13,7 @@ from holdfast_lab.trial.plan import TrialPlan
 from trial.example_results import results_of
 
 ROOT = Path(__file__).parents[2]
-PUBLISHED = ROOT / "docs" / "grip"
+PUBLISHED = ROOT / "docs" / "study" / "grip"
 
 
 def load_script():
@@ -29,8 +29,8 @@ script = load_script()
 
 
 def test_the_page_is_what_the_template_gives():
-    assert (ROOT / "docs" / script.PAGE).read_text("utf-8") == script.render(PUBLISHED), (
-        "docs/grip-trials.md differs: run python benchmarks/publish_trial.py render"
+    assert (ROOT / "docs" / "study" / script.PAGE).read_text("utf-8") == script.render(PUBLISHED), (
+        "docs/study/grip-trials.md differs: run python benchmarks/publish_trial.py render"
     )
 
 
@@ -51,7 +51,7 @@ def test_the_readme_quotes_the_published_run():
 
 def test_the_links_of_the_page_exist():
     for target in script.render(PUBLISHED).split("](")[1:]:
-        assert (ROOT / "docs" / target.split(")")[0].split("#")[0]).exists(), target
+        assert (ROOT / "docs" / "study" / target.split(")")[0].split("#")[0]).exists(), target
 
 
 @pytest.fixture

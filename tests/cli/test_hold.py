@@ -78,7 +78,7 @@ def test_the_limits_are_those_of_the_trials(verb):
 
 
 def test_the_published_trials_have_these_limits():
-    published = json.loads((DOCS / "grip" / "trial.json").read_text("utf-8"))["limits"]
+    published = json.loads((DOCS / "study" / "grip" / "trial.json").read_text("utf-8"))["limits"]
     assert published == msgspec.to_builtins(Limits())
 
 
