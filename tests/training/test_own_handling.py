@@ -116,10 +116,15 @@ def test_the_change_of_the_load_shows_how_the_arm_moves():
 
 
 def test_the_change_of_a_load_that_is_not_known_is_not_known():
-    recording = handling_recording(0, sway=0.2)
-    loaded = replace(recording, metadata=recording.metadata | {"starts_loaded": True})
-    assert math.isnan(handling_of(loaded).load_change(PAD_KEY))
-    assert handling_of(loaded, handling_recording(1, sway=0.2)).load_change(PAD_KEY) > 0.2
+    in_newtons, in_counts = (
+        replace(
+            handling_recording(0, sway=0.2, sensor=replace(PAD, unit=unit)),
+            metadata={"starts_loaded": True},
+        )
+        for unit in ("N", "count")
+    )
+    assert handling_of(in_newtons).load_change(PAD_KEY) > 0.2
+    assert math.isnan(handling_of(in_counts).load_change(PAD_KEY))
 
 
 def test_clips_of_half_a_second_count():

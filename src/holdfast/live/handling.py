@@ -17,7 +17,7 @@ from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 from holdfast.live.web.schema import CalibrationDocument, CalibrationState
 from holdfast.model import Model
 from holdfast.model.files import encode
-from holdfast.recordings import BASELINES, STARTS_LOADED, Recording, Tactile
+from holdfast.recordings import Recording, Tactile
 from holdfast.training.calibration import (
     STILL_CHANGE,
     CalibratedModel,
@@ -70,13 +70,6 @@ class HandlingBuffer:
             or self._end - self._start >= MAX_WAITING
             or self._n_bytes >= MAX_HANDLING_BYTES
         )
-
-    @property
-    def knows_zero(self) -> bool:
-        """Whether the readings without contact are known, so that the force is the load."""
-        in_counts = any(one.unit == "count" for one in self._stream.fingers.values())
-        started = self._metadata or {}
-        return not (in_counts and STARTS_LOADED in started and BASELINES not in started)
 
     def put(self, update: StreamUpdate) -> None:
         """Append an update; a listener of the session."""
@@ -279,7 +272,7 @@ class SessionCalibration:
 
     def _fit(self, buffer: HandlingBuffer) -> None:
         try:
-            self._use(_fitted(self._original, buffer), knows_zero=buffer.knows_zero)
+            self._use(_fitted(self._original, buffer))
         except HoldfastError as refusal:
             self._refuse(str(refusal))
         except Exception as failure:  # the user gets it, and the session goes on
@@ -287,12 +280,10 @@ class SessionCalibration:
         finally:
             self._fitting = False
 
-    def _use(self, calibrated: CalibratedModel, *, knows_zero: bool) -> None:
+    def _use(self, calibrated: CalibratedModel) -> None:
         self._session.set_model(calibrated.model)
         self._result, self._refused = calibrated, False
-        self.text = " ".join(
-            described(summary, knows_zero=knows_zero) for summary in calibrated.sensors
-        )
+        self.text = " ".join(described(summary) for summary in calibrated.sensors)
 
 
 def _fitted(model: Model, buffer: HandlingBuffer) -> CalibratedModel:
@@ -309,16 +300,11 @@ def _fitted(model: Model, buffer: HandlingBuffer) -> CalibratedModel:
     return calibrate_with_report(model, [buffer.recording()])
 
 
-def described(summary: HandlingSummary, *, knows_zero: bool = True) -> str:
-    """Return in two sentences what a calibration saw of a sensor, and what it changes.
-
-    Args:
-        summary: of the sensor.
-        knows_zero: whether the readings without contact are known, so that the force is the load.
-    """
+def described(summary: HandlingSummary) -> str:
+    """Return in two sentences what a calibration saw of a sensor, and what it changes."""
     moved = "the arm moved" if summary.load_change >= STILL_CHANGE else "the arm hardly moved"
     moved += f" (the force changed by {100 * summary.load_change:.0f} % within half a second)"
-    if not knows_zero:
+    if math.isnan(summary.load_change):
         moved = "how much the arm moved is not known, as the hand has not been open"
     before, after = summary.before, summary.after
     return (

@@ -52,7 +52,7 @@ class HandlingSummary(msgspec.Struct, frozen=True):
         fingers: held time of each finger [s].
         seconds: held time of the finger that holds longest [s].
         load_change: median change of the force within half a second, as a share of it; NaN if the
-            recordings begin in contact, so that the load is not known.
+            load is not known: of counts of recordings that begin in contact.
         n_features: number of features.
         n_changed: number of them whose location or scale differs from the default.
         activity: how far the features of change are above their default location, in default

@@ -19,7 +19,7 @@ from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.model import ANY_FINGER, Debounce, Model
-from holdfast.recordings import Recording
+from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import true_updates
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
@@ -75,8 +75,8 @@ class HeldSamples:
         finger: its name.
         sensor: its sensor.
         features: (n, n_features) finite.
-        load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it; NaN if the
-            recording begins in contact, so that the load is not known.
+        load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it; NaN if
+            the load is not known: of counts of a recording that begins in contact.
         seconds: held time, with closing and opening [s].
     """
 
@@ -129,7 +129,7 @@ class OwnHandling:
         traces = detect(raw, recording).fingers
         sensors = {name: recording.modules[name].sensor for name in traces}
         rows = extract(self.model.plan(sensors, recording.rate), recording)
-        loaded = begins_in_contact(recording.metadata)
+        loaded = begins_in_contact(recording.metadata) and BASELINES not in recording.metadata
         for name, trace in traces.items():
             self._count_faults(name, trace)
             self._add_finger(name, sensors[name], trace, rows[name].features, loaded=loaded)
@@ -204,7 +204,7 @@ class OwnHandling:
         touching = held_samples(trace.times, trace.state, edge_seconds=0.0)
         seconds = float(held_durations(trace.times)[touching].sum())
         changes = _load_changes(trace, held)
-        if loaded:
+        if loaded and sensor.unit == "count":  # newtons have a zero
             changes = np.full_like(changes, np.nan)
         known.append(HeldSamples(name, sensor, features[held], changes, seconds))
 

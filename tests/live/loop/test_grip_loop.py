@@ -175,7 +175,7 @@ class TestStop:
         assert loop.last.state is LoopState.HOLD
         assert scales(loop.last) == held
         assert texts[-1] == "grip HOLD"
-        stepped(loop, time, n=30, index=SLIPPING)
+        stepped(loop, time, n=120, index=SLIPPING)  # past the episode of the first step
         assert scales(loop.last)["index"] > held["index"]
 
     def test_without_contact_it_begins_from_idle(self, tape):
@@ -290,7 +290,7 @@ class TestClock:
         loop.resume()
         time = stepped(loop, time)
         assert loop.last.state in (LoopState.HOLD, LoopState.RELAX)
-        stepped(loop, time, n=60, index=SLIPPING)
+        stepped(loop, time, n=120, index=SLIPPING)  # past the episode of the first step
         assert scales(loop.last)["index"] > held["index"]
 
     @pytest.mark.parametrize("on_fault", ["hold", "open"])
