@@ -40,7 +40,7 @@ class TestPublished:
         assert {path.stem for path in PUBLISHED.glob("*.csv")} == set(summary["tables"])
         templates = {f"{Path(page).name}.j2" for page in script.PAGES}
         others = {p.name for p in PUBLISHED.iterdir() if p.suffix not in (".csv", ".md")}
-        assert others == {"study.json", *templates}
+        assert others == {"study.json", "grip", *templates}
 
     @pytest.mark.slow
     def test_csv_and_json_have_the_same_values(self, summary):
