@@ -2,6 +2,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from holdfast.metrics.slip_thresholds import ThresholdChoice
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.evaluation.evaluate_slips import (
@@ -70,13 +71,23 @@ def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, 
     seen = []
     choose = module.choose_threshold
     monkeypatch.setattr(
-        module, "choose_threshold", lambda curve, rate: seen.append(curve) or choose(curve, rate)
+        module, "choose_threshold", lambda curve, *rest: seen.append(curve) or choose(curve, *rest)
     )
     evaluated(corpora, "holdfast")
-    (curve,) = seen
-    assert curve[0].held_seconds == pytest.approx(
-        4 * (2 * 7.2 - 1.353), rel=0.01
-    )  # the thumb slips
+    assert len(seen) == 2  # for each budget
+    for curve in seen:
+        held_seconds = 4 * (2 * 7.2 - 1.353)  # the thumb slips
+        assert curve[0].held_seconds == pytest.approx(held_seconds, rel=0.01)
+
+
+def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypatch):
+    """No false alarm is allowed in held time: then nothing is found, and quiet hold still is."""
+    monkeypatch.setattr(module, "CHOICE", ThresholdChoice(-1.0))
+    for evaluation in evaluated(corpora, "holdfast").values():
+        held, quiet = evaluation.summary, evaluation.quiet_budget
+        assert held.pooled.n == quiet.pooled.n
+        assert held.pooled.incipient["0.1"] < quiet.pooled.incipient["0.1"]
+        assert quiet.intervals is not None
 
 
 def test_every_method_can_be_found_and_has_a_title_of_its_own():
