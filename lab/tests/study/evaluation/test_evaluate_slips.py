@@ -81,13 +81,16 @@ def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, 
 
 
 def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypatch):
-    """No false alarm is allowed in held time: then nothing is found, and quiet hold still is."""
-    monkeypatch.setattr(module, "CHOICE", ThresholdChoice(-1.0))
-    for evaluation in evaluated(corpora, "holdfast").values():
-        held, quiet = evaluation.summary, evaluation.quiet_budget
-        assert held.pooled.n == quiet.pooled.n
-        assert held.pooled.incipient["0.1"] < quiet.pooled.incipient["0.1"]
-        assert quiet.intervals is not None
+    """Equal budgets give equal scores; one that allows nothing finds nothing."""
+    monkeypatch.setattr(module, "QUIET_CHOICE", module.CHOICE)
+    same = evaluated(corpora, "holdfast")["main"]
+    assert same.quiet_budget == same.summary
+    monkeypatch.setattr(module, "QUIET_CHOICE", ThresholdChoice(-1.0, "quiet"))
+    strict = evaluated(corpora, "holdfast")["main"]
+    assert strict.summary == same.summary
+    assert strict.quiet_budget.pooled.incipient["0.1"] == 0.0
+    assert strict.quiet_budget.pooled.false_alarms_per_minute["quiet"] == 0.0
+    assert strict.quiet_budget.intervals != strict.summary.intervals
 
 
 def test_every_method_can_be_found_and_has_a_title_of_its_own():
