@@ -65,9 +65,9 @@ def table(plan: StudyPlan, results: Results) -> ResultTable:
         f"method's own threshold. By event: the hand, missed until {posts} after the onset, at "
         f"the threshold chosen for {COMPARED_RATE:g} false alarm per minute under a stable label "
         "in training; the false alarms that result are given. The ratio is that of the baseline "
-        "to ours; its interval is paired: a resample draws the same recordings for both. What is left out is left out "
-        "of numerator and denominator. A glitch is a jump of the hand's own controller: an "
-        "event, a false alarm, or left out."
+        "to ours; its interval is paired: a resample draws the same recordings for both. What is "
+        "left out is left out of numerator and denominator. A glitch is a jump of the hand's own "
+        "controller: an event, a false alarm, or left out."
     )
     lines = ("on", "error", "left out", "baseline of", "baseline")
     title = "Ours against the strongest baseline"
