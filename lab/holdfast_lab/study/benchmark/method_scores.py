@@ -65,7 +65,8 @@ class BothTargets(NamedTuple):
     def scores(self, recording: SlipRecording) -> dict[str, FingerScores]:
         """Return the scores of each finger of a recording, 0 where there is no estimate.
 
-        A score of 0.5 is the method's own threshold.
+        A score of 0.5 is the method's own threshold. A finger that did not slide in training has
+        no estimate of slip.
 
         Raises:
             ValueError: a finger has no estimate at all: the method does not fit the sensor.
@@ -75,7 +76,7 @@ class BothTargets(NamedTuple):
         scored = {}
         for finger in recording.truth:
             margins = _margins(stable, recording.features, finger)
-            if np.isnan(margins).all() or np.isnan(slips[finger].score).all():
+            if np.isnan(margins).all():
                 raise ValueError(f"no estimate of {finger} in {recording.features.name}")
             margins = np.where(stable.in_contact[finger], margins, -np.inf)
             scored[finger] = FingerScores(_known(margins), _known(slips[finger].score))
