@@ -110,10 +110,10 @@ def evaluate_slips(job: SlipJob) -> dict[str, SlipEvaluation]:
         return {}
     curves = [_curves(scores[place], ranks) for place in range(len(recordings))]
     groups = [next(k for k, held in enumerate(folds) if p in held) for p in range(len(recordings))]
-    held, quiet = (
+    of_budgets = [
         _out_of_fold(curves, groups, split, job.seed, choice) for choice in (CHOICE, QUIET_CHOICE)
-    )
-    results = {job.train.name: _of_both_budgets(held, quiet)}
+    ]
+    results = {job.train.name: _of_both_budgets(*of_budgets)}
     fitted = FittedMethod.fit(chosen.method, training, range(len(recordings)), job.seed)
     for corpus in job.tests:
         tested = slip_recordings(chosen.method, corpus, warm_up)
