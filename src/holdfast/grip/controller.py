@@ -337,11 +337,15 @@ class GripController:
         limits, commands, highest = self.limits, self._commands, self._highest
         clock = time + self._shift
         wishes = self.law.wishes(self._touches, clock, dt)
+        if len(wishes) != len(self._touches):
+            raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))
         may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
         rising = falling = False
         for k, touch in enumerate(self._touches):
             scale = touch.scale
             wanted, reason = wishes[k]
+            if math.isnan(wanted):
+                raise ValueError(_broken_law(self.law, len(self._touches), "a scale of nan"))
             wanted = min(max(wanted, limits.min_scale), highest[k])
             if wanted > scale and reason is not _NONE:
                 self._set(touch, min(wanted, scale + limits.rise * dt), reason, time)
@@ -383,6 +387,14 @@ def _since(since: float, time: float, *, still: bool) -> float:
     if not (still and math.isfinite(time)):
         return math.nan
     return since if since <= time else time
+
+
+def _broken_law(law: Law, n: int, given: str) -> str:
+    """Return a message about what a law returned."""
+    return (
+        f"law {type(law).__name__}: the contract of laws expects a scale and a reason for each of "
+        f"{n} fingers, {given} given"
+    )
 
 
 def _three(vector: Array) -> Three:

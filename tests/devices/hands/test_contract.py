@@ -21,12 +21,17 @@ RELEASE = msgspec.structs.replace(COMMAND, release=True, state=LoopState.FAULT)
 HOLD = msgspec.structs.replace(COMMAND, state=LoopState.FAULT)
 IDLE = msgspec.structs.replace(COMMAND, state=LoopState.IDLE)
 ON_TOPICS = [name for name in NAMES if name not in LOCAL]
-GRIPPERS = ("log", "call", "gripper", "parallel-gripper")
+GRIPPERS = ("log", "call", "gripper", "parallel-gripper", "width-gripper")
 WITH_FINGERS = [name for name in NAMES if name.split(":")[-1] not in GRIPPERS]
 
 
 def scaled(scale, finger="index"):
     return GripCommand(1.0, LoopState.HOLD, {finger: FingerCommand(scale)})
+
+
+def expected_of(rig):
+    """The scales that a hand has after `COMMAND`."""
+    return SCALES if rig.per_finger else max(SCALES.values())
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +61,7 @@ each_with_fingers = pytest.mark.parametrize("rig", WITH_FINGERS, indirect=True)
 def test_the_force_of_each_finger_is_that_of_the_command(rig):
     with rig.hand as hand:
         hand.send(COMMAND)
-        expected = SCALES if rig.per_finger else max(SCALES.values())
-        assert rig.forces(1) == pytest.approx(expected, rel=1e-5)
+        assert rig.forces(1) == pytest.approx(expected_of(rig), rel=1e-5)
 
 
 @each
@@ -162,7 +166,7 @@ def test_a_wrong_joint_reading_defines_no_command(rig, position):
     before = rig.hand.n_refused
     with rig.spoiled(position), rig.hand as hand:
         hand.send(COMMAND)
-        assert rig.forces(1) == pytest.approx(SCALES, rel=1e-5)
+        assert rig.forces(1) == pytest.approx(expected_of(rig), rel=1e-5)
         assert (hand.n_refused > before) is (position != 0.4)
 
 
