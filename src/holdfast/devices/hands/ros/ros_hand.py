@@ -93,8 +93,12 @@ class RosHand(HandDevice):
             HandError: it does not within 5 s, or another program publishes commands.
         """
         self.close()
-        with _hand_errors():
-            self._connect()
+        try:
+            with _hand_errors():
+                self._connect()
+        except BaseException:
+            self.close()  # else the next attempt finds the publishers of this one
+            raise
 
     def _connect(self) -> None:
         self._link.open()
