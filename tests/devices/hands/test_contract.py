@@ -21,7 +21,7 @@ RELEASE = msgspec.structs.replace(COMMAND, release=True, state=LoopState.FAULT)
 HOLD = msgspec.structs.replace(COMMAND, state=LoopState.FAULT)
 IDLE = msgspec.structs.replace(COMMAND, state=LoopState.IDLE)
 ON_TOPICS = [name for name in NAMES if name not in LOCAL]
-GRIPPERS = ("log", "call", "gripper", "parallel-gripper", "width-gripper")
+GRIPPERS = ("log", "call", "gripper", "parallel-gripper", "width-gripper", "width")
 WITH_FINGERS = [name for name in NAMES if name.split(":")[-1] not in GRIPPERS]
 
 
@@ -100,7 +100,9 @@ def test_it_can_be_closed_twice_and_opened_again(rig):
 
 @each
 def test_its_name_is_its_uri(rig):
-    if not rig.hand.name.startswith(("twin:", "newtons:")):  # opened with a source, by a plug-in
+    if not rig.hand.name.startswith(
+        ("twin:", "newtons:", "width:")
+    ):  # opened with a source, by a plug-in
         assert open_hand(rig.hand.name).name == rig.hand.name
 
 
