@@ -184,8 +184,8 @@ def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
     if not example.film:
         return f"{example.what} {rule}\n\n{NO_FILM.format(reason=example.reason)}", [], figures
     caption = (
-        f"The same trial with {BASELINE_LAW} (left) and {OWN} (right), in real time. "
+        f"The same trial with {BASELINE_LAW} (above) and {OWN} (below), in real time. "
         f"{example.what} "
-        "Arrows: forces of the fingertips on the object."
+        "Red arrows: forces of the fingertips on the object. Violet arrow: the load."
     )
     return f"{example.what} {rule}", [], [ReportFilm("film", caption, example.film), *figures]
