@@ -32,10 +32,10 @@ FILM_GAP = 10
 BACKGROUND, FILM_INK, ALARM, LOAD_INK = "#ffffff", "#1c1f23", "#b03a00", "#5c0d8f"
 STATE_WORDS = {
     "IDLE": "waits for a grip",
-    "HOLD": "holds",
+    "HOLD": "force stays",
     "REACT": "presses more",
-    "RELAX": "relaxes",
-    "FAULT": "fault, stays",
+    "RELAX": "presses less",
+    "FAULT": "fault, force stays",
 }
 """States of the loop in words."""
 SIDES = (("away", "near"), ("left", "right"), ("down", "up"))
@@ -44,7 +44,7 @@ TOWARDS_VIEWER = np.array([1.0, 0.0, 0.5])
 """Direction in which the arrow of a load is in front of its object."""
 CLEARANCE = 0.015
 """Distance between them [m]."""
-LOAD_LENGTH_PER_NEWTON, MAX_LOAD_LENGTH = 0.025, 0.07
+LOAD_LENGTH_PER_NEWTON, MAX_LOAD_LENGTH = 0.04, 0.08
 """Length of the arrow of a load of one newton, and of the longest one [m]."""
 MIN_LOAD = 0.1
 """Least force whose arrow is drawn [N]."""
