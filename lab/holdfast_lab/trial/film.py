@@ -180,7 +180,7 @@ def load_text(load: Load, time: float) -> str:
     if load.kind is LoadKind.PULL:
         return f"pull {float(np.linalg.norm(state.force)):.1f} N {_side(state.force)}"
     size = float(np.linalg.norm(state.acceleration))
-    return f"{load.kind.value} {size:.1f} m/s² {_side(state.acceleration)}"
+    return f"{load.kind.value} {size:.1f} m/s2"  # the font has no raised 2
 
 
 def _side(vector: Array) -> str:
