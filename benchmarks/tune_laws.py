@@ -23,10 +23,12 @@ from unittest.mock import patch
 import msgspec
 
 from holdfast.grip.laws import Law
+from holdfast.grip.laws.costanzo import Costanzo
 from holdfast.grip.laws.friction_margin import FrictionMargin
 from holdfast.grip.laws.pr2 import Pr2
 from holdfast.grip.laws.wong_zhu import WongZhu
 from holdfast_lab.trial import run
+from holdfast_lab.trial.reference_rows import V5Reflex
 from holdfast_lab.trial.run import TrialResult, run_trial
 from holdfast_lab.trial.summary import Summary, summarize
 from holdfast_lab.trial.trials import draw_trial
@@ -55,8 +57,22 @@ SETTINGS: dict[str, tuple[type[Law], list[dict[str, Any]]]] = {
         {"first_friction": 0.5, "margin": 1.3},
         {"first_friction": 0.6, "margin": 1.3},
     ]),
+    "costanzo": (Costanzo, [
+        {"first_friction": 0.5, "least_friction": 0.25, "gain": 1.0},
+        {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.3},
+        {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1},
+        {"first_friction": 0.7, "least_friction": 0.4, "gain": 0.3},
+        {"first_friction": 0.7, "least_friction": 0.4, "gain": 0.1},
+    ]),
+    "v5-reflex": (V5Reflex, [
+        {"level": 0.0},
+        {"level": 1.02},
+        {"level": 1.05},
+        {"level": 1.1},
+        {"level": 1.2},
+    ]),
 }  # fmt: skip
-"""Settings by law, the first of them that of the law before."""
+"""Settings by law; the first ones of the first three laws are those of the laws before."""
 
 
 def name_of(law: str, setting: Mapping[str, Any]) -> str:

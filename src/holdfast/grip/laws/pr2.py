@@ -25,10 +25,6 @@ SLOW_LIMIT = 0.18
 """|F_bp| above which a change of force is not a slip [N]."""
 GAIN = 1.3
 """Factor of the force at each sample that slips."""
-THRESHOLD_FACTOR = 1.0
-"""Factor of the threshold of |F_hp|."""
-FALL = 0.0
-"""Relative speed of the relaxation [1/s]."""
 
 
 class Pr2(Law):
@@ -43,10 +39,7 @@ class Pr2(Law):
     needs_newtons = True
 
     def __init__(
-        self,
-        gain: float = GAIN,
-        threshold_factor: float = THRESHOLD_FACTOR,
-        fall: float = FALL,
+        self, gain: float = GAIN, threshold_factor: float = 1.0, fall: float = 0.0
     ) -> None:
         self.gain, self.threshold_factor = gain, threshold_factor
         self.relaxation = Relaxation(fall)

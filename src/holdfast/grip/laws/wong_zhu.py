@@ -20,10 +20,6 @@ FLOOR = 0.1
 """eps, as a share of the normal force of the start."""
 GAIN = 1.3
 """Factor of the force of a finger that slips."""
-FALL = 0.0
-"""Relative speed of the relaxation [1/s]."""
-TOGETHER = False
-"""Whether all fingers react where one slips."""
 
 
 class WongZhu(Law):
@@ -40,9 +36,9 @@ class WongZhu(Law):
         self,
         threshold: float = SLIP_CHANGE,
         gain: float = GAIN,
-        fall: float = FALL,
+        fall: float = 0.0,
         *,
-        together: bool = TOGETHER,
+        together: bool = False,
     ) -> None:
         self.threshold, self.gain, self.fall, self.together = threshold, gain, fall, together
 
