@@ -51,11 +51,11 @@ SETTINGS: dict[str, tuple[type[Law], list[dict[str, Any]]]] = {
         {"threshold": 0.2, "fall": 0.2, "together": True},
     ]),
     "friction-margin": (FrictionMargin, [
-        {"first_friction": 0.5, "margin": 1.15},
-        {"first_friction": 0.4, "margin": 1.15},
-        {"first_friction": 0.3, "margin": 1.15},
-        {"first_friction": 0.5, "margin": 1.3},
-        {"first_friction": 0.6, "margin": 1.3},
+        {"first_friction": 0.5},
+        {"first_friction": 0.4, "acts_at": 1.1, "fall": 0.2},
+        {"first_friction": 0.5, "acts_at": 1.1, "fall": 0.2},
+        {"first_friction": 0.7, "acts_at": 1.1, "fall": 0.2},
+        {"first_friction": 0.5, "margin": 1.3, "acts_at": 1.1, "fall": 0.2},
     ]),
     "costanzo": (Costanzo, [
         {"first_friction": 0.5, "least_friction": 0.25, "gain": 1.0},
@@ -116,8 +116,8 @@ def print_tables(path: Path, laws: list[str]) -> None:
         common = set.intersection(*numbers)
         if not common:
             continue
-        rows = {name: summarize([one for one in results if one.law == name and one.number in common])
-                for name in names}  # fmt: skip
+        shared = [one for one in results if one.number in common]
+        rows = {name: summarize([one for one in shared if one.law == name]) for name in names}
         best = best_of(rows)
         print(f"\n| {law} | trials | dropped % | force / least | false a minute | slip p90 mm |")
         print("|---|--:|--:|--:|--:|--:|")

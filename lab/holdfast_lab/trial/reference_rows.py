@@ -4,6 +4,7 @@ They bound what a law can reach. `fixed-1.5` and `fixed-2` raise the first grip 
 is the law of holdfast with the true slip of each finger in place of the estimates. `true-load-1.5`
 and `true-load-2` press by this multiple of the least force that holds, with the true load, friction
 and contacts. `v5-reflex` is the reflex that the driver of the Allegro Hand V5 has.
+`holdfast-widest` and `pr2-widest` are laws with `WIDEST_LIMITS` in place of the limits as shipped.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from holdfast.contact import (
 from holdfast.grip.command import GripReason
 from holdfast.grip.laws import LAWS, Law, Touch, law_named
 from holdfast.grip.laws.base import Wish, stay
+from holdfast.grip.limits import Limits
 from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Simulation
@@ -33,6 +35,9 @@ TRUE_SLIPS = "true-slips"
 SLIPPING_PROBABILITY, HOLDING_PROBABILITY = 0.02, 0.98
 """Probability of stability of a finger that slides, and of one that does not, in that row."""
 
+WIDEST_LIMITS = Limits(min_scale=0.5, max_scale=5.0)
+"""Limits of the rows `*-widest`. A scale of 0.5 is the least force that holds the unloaded object;
+5 is more than the twin's motors give in most grips."""
 V5_FORCE = 2.0
 """Grasping force of the reflex of the V5, over that before."""
 
@@ -130,8 +135,15 @@ REFERENCE_ROWS: dict[str, Callable[[], Law]] = {
     "true-load-1.5": lambda: KnownLoad(1.5),
     "true-load-2": lambda: KnownLoad(2.0),
     "v5-reflex": V5Reflex,
+    "holdfast-widest": LAWS["holdfast"],
+    "pr2-widest": LAWS["pr2"],
 }
 """Rows that are no laws for a hand, by name."""
+
+
+def limits_of(row: str) -> Limits:
+    """Return the limits of a law or reference row."""
+    return WIDEST_LIMITS if row.endswith("-widest") else Limits()
 
 
 def row_named(name: str) -> Law:

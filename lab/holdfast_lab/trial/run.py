@@ -22,12 +22,18 @@ from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
 from holdfast_lab.trial.needed_force import needed_force
-from holdfast_lab.trial.reference_rows import TRUE_SLIPS, KnownLoad, row_named, true_estimate
+from holdfast_lab.trial.reference_rows import (
+    TRUE_SLIPS,
+    KnownLoad,
+    limits_of,
+    row_named,
+    true_estimate,
+)
 from holdfast_lab.trial.trials import Trial
 
 LIMITS = Limits()
-"""Limits of all laws: those that `holdfast hold` has by default. The lowest scale is 1.6 times the
-least force of an unloaded object."""
+"""Limits of all rows but `*-widest`: those that `holdfast hold` has by default. The lowest scale is
+1.6 times the least force of an unloaded object."""
 NEWTONS_PER_FINGERTIP_COUNT = (
     NEWTONS_PER_NORMAL_COUNT,
     NEWTONS_PER_SHEAR_COUNT,
@@ -117,7 +123,7 @@ def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult
             `builtin:twin` calls the light grips of the trials unstable.
     """
     running = RunningTrial(trial, law, model)
-    log = _TrialLog(trial)
+    log = _TrialLog(trial, limits_of(law))
     while not (running.is_over or running.is_lost):
         command = running.step()
         log.add(running.simulation, command, running.scales)
@@ -147,7 +153,7 @@ class RunningTrial:
         self._detector = Detector(_model(model), sensors)
         self._law, self._sees_truth = row_named(law), law == TRUE_SLIPS
         self._controller = GripController(
-            LIMITS, self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
+            limits_of(law), self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
         )
         self.scales = np.ones(len(FINGERS))
 
@@ -223,8 +229,9 @@ class _Sample(NamedTuple):
 class _TrialLog:
     """Numbers of a trial, sample by sample."""
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: Trial, limits: Limits) -> None:
         self._trial = trial
+        self._highest_scale = limits.max_scale
         self._needed = needed_force(trial)
         self._samples: list[_Sample] = []
         self._scales: list[Array] = []
@@ -251,7 +258,7 @@ class _TrialLog:
         if began and not is_loaded:
             self._add_quiet(held_for, command, slides=bool(speeds.max() > SLIP_SPEED))
         self._was_rising = command.state is LoopState.REACT
-        self._at_limit = bool((scales >= LIMIT_SHARE * LIMITS.max_scale).any())
+        self._at_limit = bool((scales >= LIMIT_SHARE * self._highest_scale).any())
         least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
         force = float(tips[:, TIP_LOAD].sum())
         self._samples.append(_Sample(held_for, force, *least, float(speeds.max())))
