@@ -58,11 +58,11 @@ SETTINGS: dict[str, tuple[type[Law], list[dict[str, Any]]]] = {
         {"first_friction": 0.5, "margin": 1.3, "acts_at": 1.1, "fall": 0.2},
     ]),
     "costanzo": (Costanzo, [
-        {"first_friction": 0.5, "least_friction": 0.25, "gain": 1.0},
-        {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.3},
-        {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1},
-        {"first_friction": 0.7, "least_friction": 0.4, "gain": 0.3},
-        {"first_friction": 0.7, "least_friction": 0.4, "gain": 0.1},
+        {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.3, "slip_level": 0.1},
+        {"first_friction": 0.5, "least_friction": 0.25, "gain": 1.0, "slip_level": 0.1},
+        {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.3, "slip_level": 0.03},
+        {"first_friction": 0.4, "least_friction": 0.25, "gain": 0.3, "slip_level": 0.1},
+        {"first_friction": 0.7, "least_friction": 0.4, "gain": 1.0, "slip_level": 0.03},
     ]),
     "v5-reflex": (V5Reflex, [
         {"level": 0.0},

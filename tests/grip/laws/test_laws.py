@@ -72,9 +72,9 @@ class TestRelaxation:
     def after_a_slip(self, law, slip, scale=2.0):
         """Return fingers of a grip that slipped at a scale, and calmed down at once."""
         touches = [touch(), touch(name="thumb")]
-        law.start(touches, -1)
         for one in touches:
             one.scale, one.normal, one.tangential = scale, 2.0 * scale, 0.6 * scale
+        law.start(touches, -1)
         before = [(one.force, one.tangential) for one in touches]
         slip(touches)
         assert any(wish.scale > scale for wish in wanted(law, touches, 0.0, DT))
@@ -210,10 +210,13 @@ class TestFrictionMargin:
         assert self.wish(later, 0.95).scale == pytest.approx(1.15 * 0.95 / 0.5 / 2.0)
 
 
+FIRST = {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1, "slip_level": 0.1}
+
+
 class TestCostanzo:
     def begun(self, n=2, **arguments):
         touches = [touch(name=name) for name in ("thumb", "index", "middle")[:n]]
-        law = Costanzo(**{"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1} | arguments)
+        law = Costanzo(**FIRST | arguments)
         law.start(touches, 0)
         return law, touches
 
@@ -233,6 +236,13 @@ class TestCostanzo:
             return self.scales(law, touches, 1)[0]
 
         assert pressed(0.3) < pressed(0.6) < pressed(1.0)
+
+    def test_a_probability_below_the_level_is_no_slip(self):
+        law, touches = self.begun(slip_level=0.3)
+        touches[0].slip_probability = 0.29
+        assert self.scales(law, touches, 30)[-1] == 1.0
+        touches[0].slip_probability = 0.5
+        assert self.scales(law, touches, 1)[0] > 1.0
 
     def test_a_longer_slip_presses_more_up_to_the_largest_dynamic_force(self):
         law, touches = self.begun(gain=0.1)
@@ -256,7 +266,7 @@ class TestCostanzo:
         slide(touches)
         wanted(law, touches, 0.0, DT)
         for one in touches:
-            one.slides, one.tangential = False, 1.2
+            one.slip_probability, one.tangential = 0.0, 1.2
         assert self.scales(law, touches, 60)[-1] == pytest.approx(
             STATIC_MARGIN * 2.4 / 0.3 / 4.0, rel=0.01
         )

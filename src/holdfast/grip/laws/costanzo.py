@@ -14,11 +14,11 @@ Different:
 - The readings have no moment about the normal. The limit surface without a moment is Coulomb
   friction: the least normal force is T / mu.
 - The source knows the friction from an exploration before the grasp. Here it begins with a setting
-  and is lowered to T / N of the fingers that the slip rule of the model finds sliding.
+  and is lowered to T / N of the fingers that slide.
 - The source estimates the slip velocity by an observer at 500 Hz or more, from friction with a
   state. The models that ship have no slip speed. In its place is the probability of the slip of
-  each finger that is decided to slide, weighted by its share of the normal force: a number from 0
-  to 1, so a gain of the PI controller had to be tuned (docs/study/grip.md).
+  each finger, as far as it is above a level, weighted by the share of the normal force: a number
+  from 0 to 1, so the gain of the PI controller and the level had to be tuned (docs/study/grip.md).
 - The integral is not emptied: the force falls slowly in calm, by the rule that the other laws have
   (`holdfast.grip.laws.relaxation`), and the integral with it. A rise of the static part by less
   than 5 % is ignored, and the tangential force is smoothed.
@@ -53,6 +53,7 @@ class Costanzo(Law):
         first_friction: friction coefficient before a slip has shown one.
         least_friction: least coefficient that a slip can show.
         gain: factor of both gains of the source.
+        slip_level: probability of a slip from which a finger slides.
         fall: relative speed with which the force falls in calm [1/s]; 0 for none.
     """
 
@@ -63,10 +64,11 @@ class Costanzo(Law):
         first_friction: float = 0.5,
         least_friction: float = 0.25,
         gain: float = 0.3,
+        slip_level: float = 0.1,
         fall: float = 0.2,
     ) -> None:
         self.first_friction, self.least_friction = first_friction, least_friction
-        self.gain = gain
+        self.gain, self.slip_level = gain, slip_level
         self.relaxation = Relaxation(fall)
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
@@ -96,14 +98,15 @@ class Costanzo(Law):
 
     def _slip(self, touches: Sequence[Touch]) -> float:
         """Return the slip of the hand, 0 to 1; learn the friction of the fingers that slide."""
-        sliding = [touch for touch in touches if touch.slides]
+        sliding = [touch for touch in touches if touch.slip_probability > self.slip_level]
         press = sum(touch.normal for touch in sliding)
         if press <= 0:
             return 0.0
         ratio = sum(touch.tangential for touch in sliding) / press
         self._friction = min(self._friction, max(ratio, self.least_friction))
         total = sum(touch.normal for touch in touches)
-        return sum(touch.normal * touch.slip_probability for touch in sliding) / total
+        above = sum(touch.normal * (touch.slip_probability - self.slip_level) for touch in sliding)
+        return above / (total * (1.0 - self.slip_level))
 
     def _pressed(self, static: float, slip: float, scale: float, time: float, dt: float) -> Wish:
         """Return the scale of the PI controller, which only raises the force."""
