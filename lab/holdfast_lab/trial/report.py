@@ -50,6 +50,8 @@ those that follow another at once. The hold is not quiet for 0.3 s after a finge
 does when the controller of the hand jerks, and for 0.3 s after the loop began.
 - fixed-1.5 and fixed-2 are constant forces. true-slips is the law of holdfast with the true slips
 of the twin; true-load-1.5 and true-load-2 press by this multiple of the least force that holds.
+v5-reflex is the reflex of the driver of the V5: the force doubles once. Rows that end in -widest
+have force scales from 0.5 to 5 in place of the limits as shipped.
 - Intervals: 95 %, by bootstrap over trials. All laws share the resamples. Where none of n trials
 was dropped the interval is 0 to 0, but a true share of up to about 3 in n is still plausible."""
 LIMITS_OF_TWIN = """These are results of a simulation. Its parameters have physical grounds and were
