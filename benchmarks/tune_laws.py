@@ -51,10 +51,10 @@ SETTINGS: dict[str, tuple[type[Law], list[dict[str, Any]]]] = {
         {"threshold": 0.2, "fall": 0.2, "together": True},
     ]),
     "friction-margin": (FrictionMargin, [
-        {"first_friction": 0.5},
-        {"first_friction": 0.4, "acts_at": 1.1, "fall": 0.2},
-        {"first_friction": 0.5, "acts_at": 1.1, "fall": 0.2},
-        {"first_friction": 0.7, "acts_at": 1.1, "fall": 0.2},
+        {"first_friction": 0.5, "margin": 1.15, "acts_at": 1.15, "fall": 7.5},
+        {"first_friction": 0.4, "margin": 1.15, "acts_at": 1.1, "fall": 0.2},
+        {"first_friction": 0.5, "margin": 1.15, "acts_at": 1.1, "fall": 0.2},
+        {"first_friction": 0.7, "margin": 1.15, "acts_at": 1.1, "fall": 0.2},
         {"first_friction": 0.5, "margin": 1.3, "acts_at": 1.1, "fall": 0.2},
     ]),
     "costanzo": (Costanzo, [
@@ -72,7 +72,8 @@ SETTINGS: dict[str, tuple[type[Law], list[dict[str, Any]]]] = {
         {"level": 1.2},
     ]),
 }  # fmt: skip
-"""Settings by law; the first ones of the first three laws are those of the laws before."""
+"""Settings by law; the first ones of the first three laws are those of the laws before. A fall of
+7.5 /s is 5 % a step."""
 
 
 def name_of(law: str, setting: Mapping[str, Any]) -> str:

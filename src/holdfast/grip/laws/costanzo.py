@@ -61,7 +61,7 @@ class Costanzo(Law):
 
     def __init__(
         self,
-        first_friction: float = 0.5,
+        first_friction: float = 0.4,
         least_friction: float = 0.25,
         gain: float = 0.3,
         slip_level: float = 0.1,

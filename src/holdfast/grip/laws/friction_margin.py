@@ -1,22 +1,25 @@
 """Friction margin: a normal force that exceeds what friction needs by a margin.
 
 The target is a margin times the tangential force over the friction coefficient; the force rises
-at once and falls slowly. Margin 1.15, and the margin of 1.1 at which the law acts: protocol of the
-PapillArray group (UCD), whose first coefficient is 0.3. Rise and the coefficient found online:
-G. Waltersson and Y. Karayiannidis, arXiv 2410.19660, whose release has margins and a lowest force
-of its own and falls by 5 % a step. The rule by which the coefficient is found is an own choice: the
-largest ratio of tangential to normal force that held. First coefficient, margins and fall were
-tuned by the rule for all laws (docs/study/grip.md).
+at once and falls slowly. A target and a lower margin at which the law acts: protocol of the
+PapillArray group (UCD), with 1.15 and 1.1 and a first coefficient of 0.3. Rise, and the coefficient
+found online: G. Waltersson and Y. Karayiannidis, arXiv 2410.19660, whose release has margins and a
+lowest force of its own and falls by 5 % a step. The rule by which the coefficient is found is an
+own choice: the largest ratio of tangential to normal force that held. First coefficient, margins
+and fall were tuned by the rule for all rivals (docs/study/grip.md).
 """
 
-import math
 from collections.abc import Sequence
 
 from holdfast.grip.command import GripReason
 from holdfast.grip.laws.base import Law, Touch, Wish
 
-FORCE_MARGIN = 1.15
+FORCE_MARGIN = 1.3
 """Factor of the least normal force."""
+ACTING_MARGIN = 1.1
+"""Factor of the least normal force below which the force rises."""
+MARGIN_FALL = 0.2
+"""Relative speed of the fall [1/s]."""
 FIRST_FRICTION = 0.5
 """Friction coefficient before anything is known."""
 LOWEST_FORCE = 0.05
@@ -36,7 +39,7 @@ class FrictionMargin(Law):
         margin: factor of the least normal force.
         first_friction: friction coefficient before anything is known.
         acts_at: margin below which the force rises to `margin`.
-        fall: relative speed of the fall [1/s]; infinite for 5 % a step.
+        fall: relative speed of the fall [1/s], 5 % a step at most.
     """
 
     needs_newtons = True
@@ -45,8 +48,8 @@ class FrictionMargin(Law):
         self,
         margin: float = FORCE_MARGIN,
         first_friction: float = FIRST_FRICTION,
-        acts_at: float = FORCE_MARGIN,
-        fall: float = math.inf,
+        acts_at: float = ACTING_MARGIN,
+        fall: float = MARGIN_FALL,
     ) -> None:
         self.margin, self.first_friction = margin, first_friction
         self.acts_at, self.fall = acts_at, fall
