@@ -49,7 +49,8 @@ def trial(
     and each table and figure. Finished trials are kept in OUT/work, also with --force, so the same
     command continues a comparison that was stopped, and one more law runs only its own trials.
     There are 240 trials, or 60 with --quick. --plant hard adds latency, backlash, friction of the
-    joints, the lag of the motors and more jerks of the hand's controller. docs/study/grip.md describes them.
+    joints, the lag of the motors and more jerks of the hand's controller.
+    docs/study/grip.md describes them.
 
     Example:
       holdfast trial --out trials --quick

@@ -6,13 +6,13 @@ import numpy as np
 
 from holdfast.sensors.types import Array
 
-SPREAD_REPORTS = 300
-"""Number of reports over which the running spread forgets: 1 to 3 s of the known drivers."""
+SPREAD_REPORTS = 75
+"""Number of reports over which the running spread forgets: 0.2 to 0.8 s of the known drivers."""
 MIN_SPREAD_REPORTS = 30
 """Number of reports after which the spread is known."""
 JERK_RATIO = 16.0
 """Ratio of a change of speed to its running spread from which it is a jerk. In the holds of tuning
-seed 100 it was 17 to 440 in jerks of the controller, and 3 to 15 when an object began to slide."""
+seed 100 it was 25 to 410 in 16 of 17 jerks of the controller, and 3 to 14 when a load came."""
 
 
 class JerkMonitor:

@@ -26,7 +26,8 @@ vendor's ROS driver (0.225 N m at the end of the thumb) it could press with at m
 COMPENSATION = (0.90, 1.05)
 """Range of the compensated share of gravity, drawn once for each joint."""
 ANGLE_MEMORY, ANGLE_PART = 0.6, 0.198
-"""Filter of the vendor's driver for the angles that it publishes: y = 0.6 y + 0.198 (x_last + x)."""
+"""Filter of the vendor's driver for the angles that it publishes:
+y = 0.6 y + 0.198 (x_last + x)."""
 GLITCH_ERROR, GLITCH_TICKS = 0.08, (2, 8)
 """Standard deviation of the set-point's error in a glitch [rad], and its duration in control steps.
 Own choices, after the spikes in the paper's figures. The profile has the rate of glitches."""
