@@ -73,35 +73,35 @@ class TrialPlan:
     def trial_task(self, number: int, law: str) -> Task:
         """Return the task of one trial with one law."""
         version = _version(law, SIMULATION)
-        arguments = (self.seed, number, self.plant, law, self.model, self.model_digest)
+        arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
         return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
 
     def course_task(self, number: int, law: str) -> Task:
         """Return the task of the course of one trial with one law."""
-        arguments = (self.seed, number, self.plant, law, self.model, self.model_digest)
+        arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
         version = _version(law, COURSE)
         return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
 
     def film_task(self, number: int, laws: tuple[str, str]) -> Task:
         """Return the task of the film of one trial with two laws."""
-        arguments = (self.seed, number, self.plant, laws, self.model, self.model_digest)
+        arguments = (self.seed, number, laws, self.model, self.model_digest, self.plant)
         versions = (_version(law, FILM) for law in laws)
         version = sha256("".join(versions).encode()).hexdigest()
         return Task(f"film/{number}", film_of, arguments, bytes, version=version)
 
 
 def run_numbered(
-    seed: int, number: int, plant: str, law: str, model: str, digest: str
+    seed: int, number: int, law: str, model: str, digest: str, plant: str = MILD
 ) -> TrialResult:
     """Run one trial of a set with a law.
 
     Args:
         seed: seed of the set.
         number: number of the trial.
-        plant: name of the plant.
         law: name of the law.
         model: name or path of the model.
         digest: digest of its content.
+        plant: name of the plant.
 
     Raises:
         ModelError: the model has another content.
@@ -111,7 +111,7 @@ def run_numbered(
 
 
 def course_of(
-    seed: int, number: int, plant: str, law: str, model: str, digest: str
+    seed: int, number: int, law: str, model: str, digest: str, plant: str = MILD
 ) -> TrialCourse:
     """Return the course of one trial of a set, with the arguments of `run_numbered`."""
     _check_digest(model, digest)
@@ -119,7 +119,7 @@ def course_of(
 
 
 def film_of(
-    seed: int, number: int, plant: str, laws: tuple[str, str], model: str, digest: str
+    seed: int, number: int, laws: tuple[str, str], model: str, digest: str, plant: str = MILD
 ) -> bytes:
     """Return the film of one trial with two laws side by side, as a WebP file.
 

@@ -128,8 +128,8 @@ def _plant(document: Mapping[str, Any]) -> str:
     rate = plant["jerk_rate"]
     jerks = "7 jerks a minute" if rate is None else f"{60 * rate:.0f} jerks a minute"
     return (
-        f"{plant['name']}: latency of sensor and bus {shortest} to {longest} samples of 6.7 ms, lag "
-        f"of the motors {1e3 * plant['motor_time']:g} ms, friction of a joint "
+        f"{plant['name']}: latency of sensor and bus {shortest} to {longest} samples of 6.7 ms, "
+        f"lag of the motors {1e3 * plant['motor_time']:g} ms, friction of a joint "
         f"{plant['joint_friction']:g} N m, backlash {plant['backlash']:g} rad, {jerks} of "
         f"{plant['jerk_size']:g} rad"
     )

@@ -144,9 +144,7 @@ class RunningTrial:
         scales: (4,) force scales of the last command.
     """
 
-    def __init__(
-        self, trial: Trial, law: str, model: str, *, reports_joints: bool = True
-    ) -> None:
+    def __init__(self, trial: Trial, law: str, model: str, *, reports_joints: bool = True) -> None:
         self.trial = trial
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}

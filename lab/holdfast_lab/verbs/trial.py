@@ -34,9 +34,7 @@ def trial(
     ] = None,
     seed: SeedOption = 0,
     jobs: JobsOption = -1,
-    plant: Annotated[
-        str, typer.Option("--plant", help="Hand of the twin: mild or hard.")
-    ] = "mild",
+    plant: Annotated[str, typer.Option("--plant", help="Hand of the twin: mild or hard.")] = "mild",
     engine: EngineOption = "loky",
     force: ForceOption = False,
     as_json: JsonOption = False,

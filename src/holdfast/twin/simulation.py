@@ -387,9 +387,7 @@ def _world(grasp: Grasp, chosen: Profile) -> World:
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     hand = HandModel.build(item, plant.joint_friction)
-    return World(
-        hand, item, _path(grasp.object, grasp.table), controller, tremors, start
-    )
+    return World(hand, item, _path(grasp.object, grasp.table), controller, tremors, start)
 
 
 def _poses(bodies: Array) -> Array:
