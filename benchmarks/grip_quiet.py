@@ -2,8 +2,9 @@
 
 The trials are those of `holdfast trial`, without their load and with a longer hold. In the profile
 of the trials the hand's own controller jerks a finger 7 times a minute. A rise counts as in the
-trials: not within 0.3 s after a fingertip slid or the loop began. "joints" says whether the law
-sees the joint angles that the hand's driver reports. `lost` counts objects that fell.
+trials: not within 0.3 s after a fingertip slid or the loop began; `all` counts the others too.
+"joints" says whether the law sees the joint angles that the hand's driver reports. `lost` counts
+objects that fell.
 
     python benchmarks/grip_quiet.py [--n 24] [--hold 30] [--seed 2] [--laws holdfast] [--jobs 1]
 """
@@ -14,19 +15,21 @@ from collections import Counter
 from dataclasses import replace
 from typing import NamedTuple
 
-from holdfast.contact import SLIP_SPEED
+from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
 from holdfast.grip import LAWS, LoopState
 from holdfast.parallel import Engine
+from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import RATE
 from holdfast_lab.trial.run import SLIP_MEMORY, START_TIME, RunningTrial
 from holdfast_lab.trial.trials import Trial, draw_trials
 
 
 class Hold(NamedTuple):
-    """Quiet time [s], rises by reason, and whether the object was lost, of one hold."""
+    """Quiet time [s], false rises by reason, all rises, and whether the object was lost."""
 
     quiet: float
     rises: dict[str, int]
+    n_rises: int
     lost: bool
 
 
@@ -40,21 +43,24 @@ def run_hold(trial: Trial, law: str, joints: bool) -> Hold:
     """Run a trial until its load."""
     running = RunningTrial(trial, law, "builtin:any", reports_joints=joints)
     began, slid, was_rising, time, rises = math.nan, -math.inf, False, 0.0, Counter[str]()
+    n_rises = 0
     while not running.is_over and not running.is_lost:
         command = running.step()
-        now, world = running.simulation.held_for, running.simulation.world
+        now, tips = running.simulation.held_for, running.simulation.world.contact.tips
         if now >= trial.load.start:
             break
         if math.isnan(began) and command.state is not LoopState.IDLE:
             began = now
-        slid = now if world.slip > SLIP_SPEED else slid
+        if tips[tips[:, TIP_LOAD] > CONTACT_FORCE, TIP_SLIP].max(initial=0.0) > SLIP_SPEED:
+            slid = now
         is_rising = command.state is LoopState.REACT
+        n_rises += is_rising and not was_rising
         if now - slid > SLIP_MEMORY and now - began > START_TIME:
             time += 1 / RATE
             if is_rising and not was_rising:
                 rises[next(str(one.reason) for one in command.fingers.values() if one.reason)] += 1
         was_rising = is_rising
-    return Hold(time, dict(rises), running.is_lost)
+    return Hold(time, dict(rises), n_rises, running.is_lost)
 
 
 def row(law: str, trials: list[Trial], joints: bool, jobs: int) -> str:
@@ -65,7 +71,8 @@ def row(law: str, trials: list[Trial], joints: bool, jobs: int) -> str:
     reasons: Counter[str] = sum((Counter(one.rises) for one in holds), Counter())
     why = ", ".join(f"{n} {reason}" for reason, n in sorted(reasons.items())) or "none"
     rate = reasons.total() / minutes
-    return f"{rate:6.2f} {minutes:8.1f} {sum(one.lost for one in holds):5}   {why}"
+    n_rises, n_lost = sum(one.n_rises for one in holds), sum(one.lost for one in holds)
+    return f"{rate:6.2f} {minutes:8.1f} {n_rises:4} {n_lost:5}   {why}"
 
 
 if __name__ == "__main__":
@@ -80,7 +87,7 @@ if __name__ == "__main__":
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=["holdfast"])
     given = parser.parse_args()
     drawn = draw_trials(given.n, given.seed, given.plant)
-    print(f"{'law':16}{'jerks':>9}{'joints':>8}  a min  minutes  lost   rises by reason")
+    print(f"{'law':16}{'jerks':>9}{'joints':>8}  a min  minutes  all  lost   false rises by reason")
     for name in given.laws:
         for jerks, rate, joints in (("none", 0.0, True), ("yes", None, False), ("yes", None, True)):
             trials = [quiet(trial, given.hold, rate) for trial in drawn]
