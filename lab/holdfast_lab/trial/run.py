@@ -1,6 +1,7 @@
 """One trial with one law: the twin, the detector and the controller in turns."""
 
 import math
+from collections import deque
 from functools import cache
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
+from holdfast.twin.uskin_readout import Counts
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.reference_rows import (
     TRUE_SLIPS,
@@ -133,12 +135,14 @@ def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult
 class RunningTrial:
     """One trial with one law, sample by sample.
 
-    The command that follows from a sample acts from the next sample on, 6.7 ms later.
+    The command that follows from a sample acts from the next sample on, 6.7 ms later. In a plant
+    with latency, samples and joint angles arrive late. Oracles know the truth at once.
 
     Args:
         trial: the trial.
         law: name of the law.
         model: name of the model of the detector.
+        reports_joints: whether the hand reports its joint angles.
 
     Attributes:
         trial: the trial.
@@ -146,7 +150,7 @@ class RunningTrial:
         scales: (4,) force scales of the last command.
     """
 
-    def __init__(self, trial: Trial, law: str, model: str) -> None:
+    def __init__(self, trial: Trial, law: str, model: str, *, reports_joints: bool = True) -> None:
         self.trial = trial
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
@@ -156,6 +160,8 @@ class RunningTrial:
             limits_of(law), self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
         )
         self.scales = np.ones(len(FINGERS))
+        self._reports_joints = reports_joints
+        self._late: deque[tuple[dict[str, Counts], Array]] = deque()
 
     @property
     def is_lost(self) -> bool:
@@ -171,11 +177,17 @@ class RunningTrial:
         """Simulate one sample and return the command that follows from it."""
         self.simulation.step(self.scales)
         time = (self.simulation.n_samples - 1) / RATE
-        estimate = self._detector.update(self.simulation.read(), time)
+        self._late.append((self.simulation.read(), self.simulation.joint_angles()))
+        if len(self._late) <= self.trial.latency:
+            return GripCommand(time, LoopState.IDLE, {})
+        samples, angles = self._late.popleft()
+        estimate = self._detector.update(samples, time)
         if self._sees_truth:
             estimate = true_estimate(estimate, self.simulation)
         if isinstance(self._law, KnownLoad):
             self._law.know(self.simulation, self.trial)
+        if self._reports_joints:
+            self._controller.observe(angles)
         command = self._controller.update(estimate, time)
         self.scales = np.array([_scale(command, finger) for finger in FINGERS])
         return command
