@@ -3,6 +3,7 @@
 import math
 
 import msgspec
+import numpy as np
 import pytest
 
 from holdfast.devices.hands import open_hand
@@ -54,6 +55,12 @@ def rig(rigs, request):
 each = pytest.mark.parametrize("rig", NAMES, indirect=True)
 each_on_topics = pytest.mark.parametrize("rig", ON_TOPICS, indirect=True)
 each_with_states = pytest.mark.parametrize("rig", WITH_STATES, indirect=True)
+IN_PROCESS = [name for name in NAMES if not name.startswith("ros1:")]
+"""Hands of ROS 1 run in a process of their own, which passes commands on and no reports."""
+each_in_process = pytest.mark.parametrize("rig", IN_PROCESS, indirect=True)
+each_in_process_with_states = pytest.mark.parametrize(
+    "rig", [name for name in WITH_STATES if name in IN_PROCESS], indirect=True
+)
 each_with_fingers = pytest.mark.parametrize("rig", WITH_FINGERS, indirect=True)
 
 
@@ -159,6 +166,25 @@ def test_who_takes_over_sends_in_any_case(rig):
     with rig.hand as hand:
         assert [hand.send(RELEASE, repeat=True) for _ in range(3)] == [True] * 3
         assert rig.forces(3) == "open"
+
+
+@each_in_process
+def test_joint_reports_are_measured_angles_or_none(rig):
+    with rig.hand as hand:
+        hand.send(COMMAND)
+        reports = list(hand.joint_reports())
+        assert all(np.isfinite(report).all() for report in reports)
+        assert len({report.shape for report in reports}) <= 1
+
+
+@each_in_process_with_states
+def test_each_joint_state_is_reported_once_in_the_order_of_the_hand(rig):
+    with rig.hand as hand:
+        hand.send(COMMAND)
+        first = hand.joint_reports()
+        assert len(first) >= 5
+        np.testing.assert_allclose(first[-1], POSITIONS)
+        assert len(hand.joint_reports()) < len(first)
 
 
 @each_with_states
