@@ -22,6 +22,7 @@ pytestmark = pytest.mark.slow
 
 DOCS = Path(__file__).parents[2] / "docs"
 TWIN = "twin:?object=ball&case=1&profile=finger-vigorous"
+WIDTH = "ros2:width-gripper?topic=/g&joint=f&open=0.08&effort=4&stiffness=2000"
 PLEXUS = "ros2:plexus?effort=0.06&max_effort=0.1"
 
 
@@ -87,6 +88,21 @@ def test_the_published_trials_have_these_limits():
     [
         ("ros2:plexus?effort=1", "max_effort: a number or 16 numbers"),
         (PLEXUS, "at most 0.1 N m expected, 0.18 N m given at max_scale 3: lower"),
+        (f"{WIDTH}&max_effort=9", "at most 9 N expected, 12 N given at max_scale 3: lower one of"),
+        (
+            f"{WIDTH.replace('2000', '2')}&max_effort=12",
+            "0.08 m expected, 4 m given at max_scale 3",
+        ),
+        (
+            f"{WIDTH.replace('0.08', '80')}&max_effort=12",
+            "a stroke of at most 1 m expected, 80 giv",
+        ),
+        (f"ros2:v4?effort={','.join(['0.3'] * 16)}", "0.9 N m given at max_scale 3: lower one of"),
+        (
+            f"ros2:v4?home={','.join(['45'] * 16)}",
+            "home: index joint 0: -0.47 to 0.47 rad expected",
+        ),
+        ("ros2:v4?order=thumb,ring,index", "order=thumb,index,middle,ring expected, in any order"),
     ],
 )
 def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, message):

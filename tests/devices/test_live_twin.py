@@ -79,3 +79,14 @@ def test_a_loop_begins_the_grasp_again_after_a_pause(monkeypatch):
         again = twin.read(0.0)
     assert again.time == pytest.approx(last + PAUSE + first.time)
     np.testing.assert_array_equal(again.samples["thumb"], first.samples["thumb"])
+
+
+def test_it_reports_the_joints_of_each_sample_once():
+    with LiveTwin(URI, speed=0) as twin:
+        assert twin.joint_reports() == []
+        for _ in range(5):
+            twin.read(0.0)
+        reports = twin.joint_reports()
+        assert [report.shape for report in reports] == [(16,)] * 5
+        np.testing.assert_array_equal(reports[-1], twin.simulation.world.controller.published)
+        assert twin.joint_reports() == []

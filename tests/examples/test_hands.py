@@ -1,13 +1,16 @@
-"""The template of a hand beyond the contract: its ceiling, deadband and rate.
+"""The templates of hands beyond the contract: ceilings, deadband and rate, width, actions.
 
-The contract runs over it in `tests/devices/hands/test_contract.py`.
+The contract runs over the first two in `tests/devices/hands/test_contract.py`.
 """
 
+import math
 import re
+import sys
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from devices.hands.rigs import NewtonRig
+from devices.hands.rigs import EXAMPLES, NewtonRig, WidthRig
 from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
 
@@ -62,3 +65,135 @@ def test_a_number_out_of_range_is_refused(rig, changes, message):
     given = {"start_force": 2.0, "max_force": 6.0} | changes
     with pytest.raises(ValueError, match=re.escape(message)):
         type(rig.hand)(("127.0.0.1", 5005), **given)
+
+
+class TestWidth:
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"stiffness": 0.0}, "stiffness: above 0 expected, 0 given"),
+            ({"start_force": math.nan}, "start_force: above 0 expected, nan given"),
+            ({"stroke": 80.0}, "stroke: at most 1 m expected, 80 given"),
+        ],
+    )
+    def test_a_number_out_of_range_is_refused(self, tmp_path, changes, message):
+        rig = WidthRig(tmp_path)
+        with pytest.raises(ValueError, match=f"width:: {message}"):
+            rig.make("width:", rig, **(rig.numbers | changes))
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"max_force": 5.0}, "at most 5 N expected, 6 N given at max_scale 3: lower it"),
+            ({"stiffness": 40.0}, "closing by at most 0.08 m expected, 0.1 m given at max_scale 3"),
+        ],
+    )
+    def test_it_is_checked_before_arming(self, tmp_path, changes, message):
+        rig = WidthRig(tmp_path)
+        with pytest.raises(ValueError, match=message):
+            rig.make("width:", rig, **(rig.numbers | changes)).check(Limits(), ["thumb"])
+
+    def test_a_width_that_leaves_no_room_is_refused(self, tmp_path):
+        rig = WidthRig(tmp_path)
+        with rig.make("width:", rig, **(rig.numbers | {"stiffness": 60.0})) as hand:
+            hand.check(Limits(), ["thumb"])
+            with pytest.raises(HandError, match=r"0.0667 to 0.08 m at the beg.*, 0.06 m given"):
+                hand.send(command(1.0))
+        assert not rig.moves
+
+
+class FakeAction:
+    """Stand-in for an action client of rclpy, which keeps the goals."""
+
+    goals, is_ready, accepts = (), True, True
+
+    def __init__(self, node, kind, name):
+        type(self).goals = []
+        assert (kind.name, name) in {
+            ("GripperCommand", "/gripper_controller/gripper_cmd"),
+            ("ParallelGripperCommand", "/gripper_controller/gripper_cmd"),
+        }
+
+    def wait_for_server(self, timeout_sec):
+        return self.is_ready
+
+    def server_is_ready(self):
+        return self.is_ready
+
+    def send_goal_async(self, goal):
+        self.goals.append(vars(goal.command))
+        answer = SimpleNamespace(result=lambda: SimpleNamespace(accepted=self.accepts))
+        return SimpleNamespace(add_done_callback=lambda check: check(answer))
+
+
+class FakeNode:
+    def __init__(self, name):
+        self.name = name
+
+
+def action_kind(kind):
+    goal = staticmethod(lambda: SimpleNamespace(command=SimpleNamespace()))
+    return type(kind, (), {"name": kind, "Goal": goal})
+
+
+@pytest.fixture
+def action_gripper(monkeypatch):
+    """The functions of the example, with stand-ins for ROS."""
+    kinds = {kind: action_kind(kind) for kind in ("GripperCommand", "ParallelGripperCommand")}
+    client = type("Client", (FakeAction,), {})
+    packages = {
+        "rclpy": {"ok": lambda: True, "spin": lambda node: None},
+        "rclpy.action": {"ActionClient": client},
+        "rclpy.node": {"Node": FakeNode},
+        "control_msgs": {},
+        "control_msgs.action": kinds,
+    }
+    for name, members in packages.items():
+        module = ModuleType(name)
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, name, module)
+    example = ModuleType("gripper_action")
+    source = EXAMPLES / "hands" / "gripper_action.py"
+    exec(compile(source.read_text("utf-8"), str(source), "exec"), vars(example))
+    example.client = client
+    return example
+
+
+class TestAction:
+    def test_each_new_force_is_a_goal(self, action_gripper):
+        for scale in (1.0, 1.01, 1.02, 1.5, 0.0):
+            action_gripper.set_force(scale)
+        assert action_gripper.client.goals == [
+            {"position": 0.0, "max_effort": 10.0},
+            {"position": 0.0, "max_effort": 10.5},
+            {"position": 0.0, "max_effort": 15.0},
+            {"position": 0.08, "max_effort": 10.0},
+        ]
+
+    def test_a_parallel_gripper(self, action_gripper):
+        action_gripper.IS_PARALLEL = True
+        action_gripper.set_force(2.0)
+        assert action_gripper.client.goals == [
+            {"name": ["finger_joint"], "position": [0.0], "effort": [20.0]}
+        ]
+
+    def test_a_force_above_the_largest_is_refused(self, action_gripper):
+        with pytest.raises(ValueError, match="at most 30 N expected, 40 N given: lower"):
+            action_gripper.set_force(4.0)
+
+    def test_no_server(self, action_gripper):
+        action_gripper.client.is_ready = False
+        with pytest.raises(RuntimeError, match="no action server /gripper_controller/gripper_cmd"):
+            action_gripper.set_force(1.0)
+
+    def test_a_goal_that_was_refused_ends_the_loop(self, action_gripper):
+        action_gripper.client.accepts = False
+        action_gripper.set_force(1.0)
+        with pytest.raises(RuntimeError, match="refused a goal: is its controller active"):
+            action_gripper.set_force(1.2)
+
+    def test_a_server_that_ends(self, action_gripper):
+        action_gripper.set_force(1.0)
+        action_gripper.client.is_ready = False
+        with pytest.raises(RuntimeError, match="has ended"):
+            action_gripper.set_force(1.2)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from grip.build import FINGERS, NORMAL, RATE, finger, hand, holding, run, scales
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.grip import LAWS, GripController, GripReason, Limits, LoopState
+from holdfast.grip.laws import Fixed
 from holdfast.sensors import flat_sensor, sensor
 
 SLIPPING = {name: {"probability": 0.05, "state": ContactState.UNSTABLE} for name in FINGERS}
@@ -390,7 +391,7 @@ class TestUnits:
             GripController(Limits(), sensors=sensors, newtons_per_unit=1e-3)
         GripController(Limits(), sensors=sensors)
 
-    @pytest.mark.parametrize("law", ["pr2", "friction-margin"])
+    @pytest.mark.parametrize("law", ["pr2", "friction-margin", "costanzo"])
     def test_a_law_that_needs_newtons_refuses_counts(self, law):
         with pytest.raises(ValueError, match="needs forces in N and the readings are counts"):
             GripController(Limits(), law, sensors={"index": sensor("uskin-curved")})
@@ -415,3 +416,30 @@ class TestUnits:
     def test_an_unknown_law_is_refused(self):
         with pytest.raises(ValueError, match="unknown law 'magic'; there are fixed, pr2"):
             GripController(Limits(), "magic")
+
+
+class BrokenLaw(Fixed):
+    """Law that returns the given wishes."""
+
+    def __init__(self, wishes):
+        self._given = wishes
+
+    def wishes(self, touches, time, dt):
+        return self._given
+
+
+@pytest.mark.parametrize(
+    ("wishes", "given_text"),
+    [
+        ([(1.0, GripReason.NONE)], "1 wishes given"),
+        ([(math.nan, GripReason.SLIP)] * len(FINGERS), "a scale of nan given"),
+    ],
+)
+def test_a_law_that_breaks_its_contract_is_named_with_it(wishes, given_text):
+    controller, time = holding(BrokenLaw(wishes))
+    with pytest.raises(ValueError) as failure:
+        run(controller, time, 0.1)
+    assert str(failure.value) == (
+        "law BrokenLaw: the contract of laws expects a scale and a reason for each of "
+        f"{len(FINGERS)} fingers, {given_text}"
+    )

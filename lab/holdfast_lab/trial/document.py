@@ -8,6 +8,7 @@ import msgspec
 
 from holdfast.csv_cells import csv_text
 from holdfast.twin.loads import LoadKind
+from holdfast.twin.plant import plant_named
 from holdfast_lab.trial.plan import TrialPlan
 from holdfast_lab.trial.run import LIMITS, TrialResult
 from holdfast_lab.trial.summary import Summary, compare, summarize
@@ -54,6 +55,7 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
         "model_digest": plan.model_digest,
         "goals": GOALS,
         "first_grip": GRIP_MULTIPLE,
+        "plant": msgspec.to_builtins(plant_named(plan.plant)),
         "limits": msgspec.to_builtins(LIMITS),
         "seed": plan.seed,
     }

@@ -107,7 +107,7 @@ def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
 
 def _describe(plan: TrialPlan, number: int, courses: Mapping[str, TrialCourse]) -> str:
     """Return a sentence on a trial."""
-    trial = draw_trial(number, plan.seed)
+    trial = draw_trial(number, plan.seed, plan.plant)
     lost_at = courses[BASELINE_LAW].lost_at
     when = "" if lost_at is None else f"; {BASELINE_LAW} loses it {lost_at:.2f} s later"
     return (
@@ -120,6 +120,7 @@ def _facts(document: Mapping[str, Any]) -> dict[str, object]:
     """Return the head of the report."""
     return {
         "trials": f"{document['n_trials']} with each of {len(document['laws'])} laws",
+        "plant": document["plant"]["name"],
         "model": f"{document['model']}, digest {document['model_digest'][:12]}",
         **fact_texts(document),
     }

@@ -13,6 +13,7 @@ from holdfast.grip.laws import LAWS
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.twin.hand import FINGERS
+from holdfast.twin.plant import MILD, plant_named
 from holdfast_lab.source_digest import source_digest
 from holdfast_lab.tasks import Task
 from holdfast_lab.trial.course import TrialCourse, follow
@@ -38,9 +39,10 @@ class TrialPlan:
         n: number of trials with each law.
         seed: seed of the trials.
         model: name or path of the detector's model.
+        plant: name of the plant.
 
     Raises:
-        ValueError: a law does not exist or is given twice, or a number is too small.
+        ValueError: a law or plant does not exist or is given twice, or a number is too small.
         ModelError: the model does not exist, or does not fit the hand of the twin.
     """
 
@@ -48,8 +50,10 @@ class TrialPlan:
     n: int = 240
     seed: int = 0
     model: str = "builtin:any"
+    plant: str = MILD
 
     def __post_init__(self) -> None:
+        plant_named(self.plant)
         for name in self.laws:
             row_named(name)
         twice = [name for name in self.laws if self.laws.count(name) > 1]
@@ -69,24 +73,26 @@ class TrialPlan:
     def trial_task(self, number: int, law: str) -> Task:
         """Return the task of one trial with one law."""
         version = _version(law, SIMULATION)
-        arguments = (self.seed, number, law, self.model, self.model_digest)
+        arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
         return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
 
     def course_task(self, number: int, law: str) -> Task:
         """Return the task of the course of one trial with one law."""
-        arguments = (self.seed, number, law, self.model, self.model_digest)
+        arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
         version = _version(law, COURSE)
         return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
 
     def film_task(self, number: int, laws: tuple[str, str]) -> Task:
         """Return the task of the film of one trial with two laws."""
-        arguments = (self.seed, number, laws, self.model, self.model_digest)
+        arguments = (self.seed, number, laws, self.model, self.model_digest, self.plant)
         versions = (_version(law, FILM) for law in laws)
         version = sha256("".join(versions).encode()).hexdigest()
         return Task(f"film/{number}", film_of, arguments, bytes, version=version)
 
 
-def run_numbered(seed: int, number: int, law: str, model: str, digest: str) -> TrialResult:
+def run_numbered(
+    seed: int, number: int, law: str, model: str, digest: str, plant: str = MILD
+) -> TrialResult:
     """Run one trial of a set with a law.
 
     Args:
@@ -95,28 +101,33 @@ def run_numbered(seed: int, number: int, law: str, model: str, digest: str) -> T
         law: name of the law.
         model: name or path of the model.
         digest: digest of its content.
+        plant: name of the plant.
 
     Raises:
         ModelError: the model has another content.
     """
     _check_digest(model, digest)
-    return run_trial(draw_trial(number, seed), law, model)
+    return run_trial(draw_trial(number, seed, plant), law, model)
 
 
-def course_of(seed: int, number: int, law: str, model: str, digest: str) -> TrialCourse:
+def course_of(
+    seed: int, number: int, law: str, model: str, digest: str, plant: str = MILD
+) -> TrialCourse:
     """Return the course of one trial of a set, with the arguments of `run_numbered`."""
     _check_digest(model, digest)
-    return TrialCourse.of(follow(draw_trial(number, seed), law, model))
+    return TrialCourse.of(follow(draw_trial(number, seed, plant), law, model))
 
 
-def film_of(seed: int, number: int, laws: tuple[str, str], model: str, digest: str) -> bytes:
+def film_of(
+    seed: int, number: int, laws: tuple[str, str], model: str, digest: str, plant: str = MILD
+) -> bytes:
     """Return the film of one trial with two laws side by side, as a WebP file.
 
     Raises:
         OutputError: no back end of MuJoCo works here.
     """
     _check_digest(model, digest)
-    return film(draw_trial(number, seed), laws, model)
+    return film(draw_trial(number, seed, plant), laws, model)
 
 
 @cache

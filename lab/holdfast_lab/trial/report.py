@@ -50,13 +50,16 @@ those that follow another at once. The hold is not quiet for 0.3 s after a finge
 does when the controller of the hand jerks, and for 0.3 s after the loop began.
 - fixed-1.5 and fixed-2 are constant forces. true-slips is the law of holdfast with the true slips
 of the twin; true-load-1.5 and true-load-2 press by this multiple of the least force that holds.
+v5-reflex is the reflex of the driver of the V5: the force doubles once. Rows that end in -widest
+have force scales from 0.5 to 5 in place of the limits as shipped.
+- Plant: {plant}.
 - Intervals: 95 %, by bootstrap over trials. All laws share the resamples. Where none of n trials
 was dropped the interval is 0 to 0, but a true share of up to about 3 in n is still plausible."""
 LIMITS_OF_TWIN = """These are results of a simulation. Its parameters have physical grounds and were
 not turned to make a law look good. It cannot show:
 
-- what the hand adds: gear backlash, friction in the joints, delays of the motor controller, torque
-limits, heat. The twin's fingers follow their set-points, and a command acts one sample later;
+- what a real hand adds: heat, wear, torque limits. Backlash, friction in the joints, latency and
+the lag of the motors are those of the plant, whose numbers are argued and not measured;
 - objects that yield, break or are damaged by a high force: a high force costs nothing here but the
 column with the force;
 - friction as of real surfaces: here it is Coulomb friction with one coefficient for an object. It
@@ -109,7 +112,7 @@ def report_sections(
             [kinds_table(document), objects_table(document), fingers_table(document)],
             [kinds_figure(document)],
         ),
-        Section("What the numbers mean", join_lines(MEANINGS)),
+        Section("What the numbers mean", join_lines(MEANINGS.format(plant=_plant(document)))),
         Section("What the twin cannot show", join_lines(LIMITS_OF_TWIN)),
     ]
 
@@ -118,6 +121,20 @@ PAIRED = (
     "The trials differ more than the laws do, so each law is compared with another on the same "
     "trials. A value below 0 means that the law of the line has less."
 )
+
+
+def _plant(document: Mapping[str, Any]) -> str:
+    """Return the plant with its numbers."""
+    plant = document["plant"]
+    shortest, longest = plant["latency"]
+    rate = plant["jerk_rate"]
+    jerks = "7 jerks a minute" if rate is None else f"{60 * rate:.0f} jerks a minute"
+    return (
+        f"{plant['name']}: latency of sensor and bus {shortest} to {longest} samples of 6.7 ms, "
+        f"lag of the motors {1e3 * plant['motor_time']:g} ms, friction of a joint "
+        f"{plant['joint_friction']:g} N m, backlash {plant['backlash']:g} rad, {jerks} of "
+        f"{plant['jerk_size']:g} rad"
+    )
 
 
 def summary_text(document: Mapping[str, Any]) -> str:
@@ -184,8 +201,8 @@ def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
     if not example.film:
         return f"{example.what} {rule}\n\n{NO_FILM.format(reason=example.reason)}", [], figures
     caption = (
-        f"The same trial with {BASELINE_LAW} (left) and {OWN} (right), in real time. "
+        f"The same trial with {BASELINE_LAW} (above) and {OWN} (below), in real time. "
         f"{example.what} "
-        "Arrows: forces of the fingertips on the object."
+        "Red arrows: forces of the fingertips on the object. Violet arrow: the load."
     )
     return f"{example.what} {rule}", [], [ReportFilm("film", caption, example.film), *figures]

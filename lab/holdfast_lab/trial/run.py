@@ -1,6 +1,7 @@
 """One trial with one law: the twin, the detector and the controller in turns."""
 
 import math
+from collections import deque
 from functools import cache
 from typing import NamedTuple
 
@@ -21,13 +22,20 @@ from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
+from holdfast.twin.uskin_readout import Counts
 from holdfast_lab.trial.needed_force import needed_force
-from holdfast_lab.trial.reference_rows import TRUE_SLIPS, KnownLoad, row_named, true_estimate
+from holdfast_lab.trial.reference_rows import (
+    TRUE_SLIPS,
+    KnownLoad,
+    limits_of,
+    row_named,
+    true_estimate,
+)
 from holdfast_lab.trial.trials import Trial
 
 LIMITS = Limits()
-"""Limits of all laws: those that `holdfast hold` has by default. The lowest scale is 1.6 times the
-least force of an unloaded object."""
+"""Limits of all rows but `*-widest`: those that `holdfast hold` has by default. The lowest scale is
+1.6 times the least force of an unloaded object."""
 NEWTONS_PER_FINGERTIP_COUNT = (
     NEWTONS_PER_NORMAL_COUNT,
     NEWTONS_PER_SHEAR_COUNT,
@@ -117,7 +125,7 @@ def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult
             `builtin:twin` calls the light grips of the trials unstable.
     """
     running = RunningTrial(trial, law, model)
-    log = _TrialLog(trial)
+    log = _TrialLog(trial, limits_of(law))
     while not (running.is_over or running.is_lost):
         command = running.step()
         log.add(running.simulation, command, running.scales)
@@ -127,12 +135,14 @@ def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult
 class RunningTrial:
     """One trial with one law, sample by sample.
 
-    The command that follows from a sample acts from the next sample on, 6.7 ms later.
+    The command that follows from a sample acts from the next sample on, 6.7 ms later. In a plant
+    with latency, samples and joint angles arrive late. Oracles know the truth at once.
 
     Args:
         trial: the trial.
         law: name of the law.
         model: name of the model of the detector.
+        reports_joints: whether the hand reports its joint angles.
 
     Attributes:
         trial: the trial.
@@ -140,16 +150,18 @@ class RunningTrial:
         scales: (4,) force scales of the last command.
     """
 
-    def __init__(self, trial: Trial, law: str, model: str) -> None:
+    def __init__(self, trial: Trial, law: str, model: str, *, reports_joints: bool = True) -> None:
         self.trial = trial
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
         self._detector = Detector(_model(model), sensors)
         self._law, self._sees_truth = row_named(law), law == TRUE_SLIPS
         self._controller = GripController(
-            LIMITS, self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
+            limits_of(law), self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
         )
         self.scales = np.ones(len(FINGERS))
+        self._reports_joints = reports_joints
+        self._late: deque[tuple[dict[str, Counts], Array]] = deque()
 
     @property
     def is_lost(self) -> bool:
@@ -165,11 +177,17 @@ class RunningTrial:
         """Simulate one sample and return the command that follows from it."""
         self.simulation.step(self.scales)
         time = (self.simulation.n_samples - 1) / RATE
-        estimate = self._detector.update(self.simulation.read(), time)
+        self._late.append((self.simulation.read(), self.simulation.joint_angles()))
+        if len(self._late) <= self.trial.latency:
+            return GripCommand(time, LoopState.IDLE, {})
+        samples, angles = self._late.popleft()
+        estimate = self._detector.update(samples, time)
         if self._sees_truth:
             estimate = true_estimate(estimate, self.simulation)
         if isinstance(self._law, KnownLoad):
             self._law.know(self.simulation, self.trial)
+        if self._reports_joints:
+            self._controller.observe(angles)
         command = self._controller.update(estimate, time)
         self.scales = np.array([_scale(command, finger) for finger in FINGERS])
         return command
@@ -223,8 +241,9 @@ class _Sample(NamedTuple):
 class _TrialLog:
     """Numbers of a trial, sample by sample."""
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: Trial, limits: Limits) -> None:
         self._trial = trial
+        self._highest_scale = limits.max_scale
         self._needed = needed_force(trial)
         self._samples: list[_Sample] = []
         self._scales: list[Array] = []
@@ -251,7 +270,7 @@ class _TrialLog:
         if began and not is_loaded:
             self._add_quiet(held_for, command, slides=bool(speeds.max() > SLIP_SPEED))
         self._was_rising = command.state is LoopState.REACT
-        self._at_limit = bool((scales >= LIMIT_SHARE * LIMITS.max_scale).any())
+        self._at_limit = bool((scales >= LIMIT_SHARE * self._highest_scale).any())
         least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
         force = float(tips[:, TIP_LOAD].sum())
         self._samples.append(_Sample(held_for, force, *least, float(speeds.max())))

@@ -27,6 +27,7 @@ import numpy as np
 from holdfast.twin.hand import FINGERS, GRAVITY
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.objects import OTHER_OBJECTS, GraspObject, load_objects
+from holdfast.twin.plant import MILD, plant_named
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import THUMB_SHARE, Plan
 from holdfast.twin.simulation import Grasp
@@ -57,6 +58,7 @@ class Trial:
         n_fingers: 4, or 3 without the ring finger.
         load: load on the object.
         speed: speed of closing [m/s].
+        latency: latency of sensor and bus [samples].
     """
 
     number: int
@@ -64,6 +66,7 @@ class Trial:
     n_fingers: int
     load: Load
     speed: float
+    latency: int = 0
 
     @property
     def unseen(self) -> bool:
@@ -93,37 +96,44 @@ def least_force(item: GraspObject) -> float:
     return item.mass * GRAVITY / item.mu_static
 
 
-def draw_trials(n: int, seed: int = 0) -> list[Trial]:
+def draw_trials(n: int, seed: int = 0, plant: str = MILD) -> list[Trial]:
     """Draw trials in which objects, kinds of loads and grips take turns.
 
     Args:
         n: number of trials; 60 have every object with every kind once.
         seed: of all random numbers.
+        plant: name of the plant; objects, grips and loads are the same in all plants.
 
     Example:
         >>> trials = draw_trials(60)
         >>> len({(trial.grasp.object, trial.load.kind) for trial in trials})
         60
     """
-    return [draw_trial(number, seed) for number in range(n)]
+    return [draw_trial(number, seed, plant) for number in range(n)]
 
 
-def draw_trial(number: int, seed: int = 0) -> Trial:
+def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     """Draw one trial of a set, which does not depend on the others.
 
     Args:
         number: number of the trial, from 0.
         seed: of all random numbers.
+        plant: name of the plant.
+
+    Raises:
+        ValueError: there is no such plant.
     """
     objects = _objects()
     name, item, table = objects[number % len(objects)]
     kind = LOAD_KINDS[(number + number // len(objects)) % len(LOAD_KINDS)]
     generator = np.random.default_rng([seed, number])
-    grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table)
+    grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table, plant=plant)
     load = _draw_load(generator, kind, item.mass)
     three = item.shape != "sphere" and number // len(objects) % 2 == 1
     speed = float(generator.uniform(*CLOSING_SPEED))
-    return Trial(number, grasp, 3 if three else 4, load, speed)
+    shortest, longest = plant_named(plant).latency
+    latency = int(grasp.generator("latency").integers(shortest, longest + 1))
+    return Trial(number, grasp, 3 if three else 4, load, speed, latency)
 
 
 @cache

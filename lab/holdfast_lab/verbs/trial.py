@@ -34,6 +34,7 @@ def trial(
     ] = None,
     seed: SeedOption = 0,
     jobs: JobsOption = -1,
+    plant: Annotated[str, typer.Option("--plant", help="Hand of the twin: mild or hard.")] = "mild",
     engine: EngineOption = "loky",
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -45,11 +46,14 @@ def trial(
     follow from the seed. Write OUT/report.html with a film of one trial, trial.json, trials.csv,
     and each table and figure. Finished trials are kept in OUT/work, also with --force, so the same
     command continues a comparison that was stopped, and one more law runs only its own trials.
-    There are 240 trials, or 60 with --quick. docs/study/grip.md describes them.
+    There are 240 trials, or 60 with --quick. --plant hard adds latency, backlash, friction of the
+    joints, the lag of the motors and more jerks of the hand's controller.
+    docs/study/grip.md describes them.
 
     Example:
       holdfast trial --out trials --quick
       holdfast trial --out trials --laws fixed,holdfast --n 12 --json
+      holdfast trial --out trials-hard --plant hard
       holdfast trial --out trials --engine dask:tcp://10.0.0.1:8786
     """
     from holdfast_lab.report.folder import check_output_folder
@@ -58,7 +62,7 @@ def trial(
 
     names = tuple(name.strip() for name in laws.split(",")) if laws else ALL_ROWS
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
-    plan = TrialPlan(names, number, seed, model)
+    plan = TrialPlan(names, number, seed, model, plant)
     check_output_folder(out, COMPARISON, force=force)
     chosen = start_engine(engine, jobs)
     try:

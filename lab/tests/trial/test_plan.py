@@ -43,6 +43,7 @@ def fresh():
         ({"laws": ("fixed", "fixed")}, r"^the law 'fixed' is given twice$"),
         ({"n": 0}, r"^at least 1 trial expected, 0 given$"),
         ({"seed": -1}, r"^a seed of at least 0 expected, -1 given$"),
+        ({"plant": "soft"}, r"^unknown plant 'soft'; there are mild, hard$"),
     ],
 )
 def test_a_plan_refuses_what_cannot_be_run(given, message):
@@ -70,6 +71,17 @@ def test_a_model_with_a_tare_of_a_recording_is_refused(tmp_path):
 def test_a_worker_with_another_model_is_refused():
     with pytest.raises(ModelError, match=r"builtin:any has another content here: copy it to every"):
         run_numbered(0, 0, "fixed", "builtin:any", "another")
+
+
+def test_a_result_is_stored_for_its_plant():
+    tasks = {}
+    for plant in ("mild", "hard"):
+        plan = TrialPlan(("fixed",), 1, plant=plant)
+        film = plan.film_task(0, ("fixed", "holdfast"))
+        tasks[plant] = [plan.trial_task(0, "fixed"), plan.course_task(0, "fixed"), film]
+    for mild, hard in zip(tasks["mild"], tasks["hard"], strict=True):
+        assert mild.arguments != hard.arguments
+        assert mild.version == hard.version
 
 
 class TestVersion:

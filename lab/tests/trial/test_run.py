@@ -3,9 +3,10 @@ from dataclasses import replace
 
 import pytest
 
+from holdfast.twin.hand import RATE
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.simulation import Grasp
-from holdfast_lab.trial.run import least_force_at, run_trial
+from holdfast_lab.trial.run import RunningTrial, least_force_at, run_trial
 from holdfast_lab.trial.trials import Trial, draw_trials, least_force
 
 pytestmark = pytest.mark.slow
@@ -59,6 +60,44 @@ def test_trials_of_any_law_begin_alike(fixed):
 def test_a_constant_force_is_no_false_reaction():
     double = run_trial(CAN, "fixed-2")
     assert double.n_false == 0 and double.static_ratio > 1.5
+
+
+def test_samples_arrive_late_by_the_latency():
+    seen = {}
+    for latency in (0, 4):
+        running = RunningTrial(replace(CAN, latency=latency), "fixed", "builtin:noise-floor")
+        monitor = running._detector
+        update, seen[latency] = monitor.update, []
+
+        def record(samples, time, update=update, log=seen[latency]):
+            log.append((time, samples["thumb"].copy()))
+            return update(samples, time)
+
+        monitor.update = record
+        for _ in range(20):
+            running.step()
+    assert len(seen[4]) == len(seen[0]) - 4
+    for (time, sample), (late, same) in zip(seen[0], seen[4], strict=False):
+        assert late - time == pytest.approx(4 / RATE)
+        assert (sample == same).all()
+
+
+def test_a_hand_that_reports_no_joints_has_no_jerks():
+    jerks = {}
+    for reports in (True, False):
+        trial = replace(CAN, grasp=replace(CAN.grasp, glitch_rate=3.0))
+        running = RunningTrial(trial, "fixed", "builtin:noise-floor", reports_joints=reports)
+        jerks[reports] = 0
+        for _ in range(300):
+            running.step()
+            jerks[reports] += running._controller._jerks.jerked
+    assert jerks[True] > 0 and jerks[False] == 0
+
+
+def test_the_hard_plant_is_deterministic_and_another_hand():
+    hard = replace(CAN, grasp=replace(CAN.grasp, plant="hard"), latency=3)
+    first = run_trial(hard, "fixed")
+    assert run_trial(hard, "fixed") == first != run_trial(CAN, "fixed")
 
 
 def test_true_slips_replace_the_estimates():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,15 @@ def test_the_same_seed_draws_the_same_trials():
     assert draw_trials(10, seed=3) == draw_trials(10, seed=3)
     assert draw_trials(10, seed=3)[:5] == draw_trials(5, seed=3)
     assert draw_trials(10, seed=3) != draw_trials(10, seed=4)
+
+
+def test_plants_share_objects_grips_and_loads():
+    mild, hard = draw_trials(60, seed=3), draw_trials(60, seed=3, plant="hard")
+    assert {trial.latency for trial in mild} == {0}
+    assert {trial.latency for trial in hard} == {2, 3, 4, 5}
+    for one, other in zip(mild, hard, strict=True):
+        assert (one.load, one.speed, one.n_fingers) == (other.load, other.speed, other.n_fingers)
+        assert replace(other.grasp, plant="mild") == one.grasp
 
 
 def test_60_trials_have_every_object_with_every_kind_and_both_grips():

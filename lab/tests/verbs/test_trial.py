@@ -38,7 +38,21 @@ def test_trial_json_has_every_law(tmp_path, capsys, quick):
 def test_json_goes_to_stdout(tmp_path, capsys, quick):
     words = ["--n", "2", "--laws", "holdfast", "--jobs", "1", "--json"]
     assert main(["trial", "--out", str(tmp_path / "out"), *words]) == 0
-    assert list(json.loads(capsys.readouterr().out)["laws"]) == ["holdfast"]
+    document = json.loads(capsys.readouterr().out)
+    assert list(document["laws"]) == ["holdfast"]
+    assert (document["plant"]["name"], document["plant"]["latency"]) == ("mild", [0, 0])
+
+
+@pytest.mark.slow
+def test_the_plant_reaches_the_trials_and_the_document(tmp_path, capsys, quick, monkeypatch):
+    ran = []
+    monkeypatch.setattr(
+        plan, "run_trial", lambda trial, *rest: ran.append(trial) or invented(trial, *rest)
+    )
+    words = ["--n", "4", "--laws", "holdfast", "--jobs", "1", "--json", "--plant", "hard"]
+    assert main(["trial", "--out", str(tmp_path / "out"), *words]) == 0
+    assert {trial.grasp.plant for trial in ran} == {"hard"}
+    assert json.loads(capsys.readouterr().out)["plant"]["backlash"] == 0.01
 
 
 @pytest.mark.parametrize(
@@ -47,6 +61,7 @@ def test_json_goes_to_stdout(tmp_path, capsys, quick):
         (["--laws", "magic"], "unknown law 'magic'; there are fixed"),
         (["--laws", "fixed,fixed"], "the law 'fixed' is given twice"),
         (["--n", "0"], "at least 1 trial expected, 0 given"),
+        (["--plant", "soft"], "unknown plant 'soft'; there are mild, hard"),
         (["--seed", "-1"], "a seed of at least 0 expected, -1 given"),
         (["--jobs", "0"], "jobs other than 0 expected, 0 given"),
         (["--engine", "moon"], "unknown engine 'moon'"),

@@ -59,9 +59,10 @@ def hold(
     nothing is sent. With it, a second process watches this one, and brings the hand into its
     safe state if it dies. With SOURCE twin:... and --hand twin:, the twin is both.
 
-    Hands on topics of ROS 2 (no ROS needed): ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop and
-    ros2:gripper. Of ROS 1 (with rospy): ros1:positions, ros1:efforts, ros1:envelop and
-    ros1:gripper. Another program closes the hand; the loop takes over when the grip begins.
+    Hands on topics of ROS 2 (no ROS needed): ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop,
+    ros2:controller, ros2:gripper and ros2:width-gripper. Of ROS 1 (with rospy): ros1:positions,
+    ros1:efforts, ros1:envelop, ros1:gripper and ros1:width-gripper. Another program closes the
+    hand; the loop takes over when the grip begins.
     docs/hands.md has their topics and parameters. With --json, each new command is a line of JSON.
 
     No command was ever tried on a real hand: read docs/grip.md first.

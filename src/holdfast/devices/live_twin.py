@@ -1,12 +1,14 @@
 """The twin as a source and a hand at once: the simulation runs, and takes commands."""
 
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from holdfast.devices.hands import HandDevice
+from holdfast.devices.hands.base import MAX_JOINT_REPORTS
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.replay import PAUSE
 from holdfast.devices.sources.twin import grasp_of
@@ -14,6 +16,7 @@ from holdfast.devices.uri import parse
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
 from holdfast.twin.hand import FINGERS, RATE
 from holdfast.twin.simulation import Simulation
 
@@ -56,6 +59,7 @@ class LiveTwin(Source, HandDevice):
         self._loops = loop
         self._shift = 0.0  # of the times of this grasp
         self._begun_at: float | None = None
+        self._reports: deque[Array] = deque(maxlen=MAX_JOINT_REPORTS)
 
     @property
     def sensors(self) -> Mapping[str, Sensor]:  # type: ignore[override]
@@ -100,7 +104,12 @@ class LiveTwin(Source, HandDevice):
                 return None
         at = self._shift + self.simulation.time
         self.simulation.step(self._scales)
+        self._reports.append(self.simulation.joint_angles())
         return Arrival(at, self.simulation.read(), time.monotonic())
+
+    def joint_reports(self) -> Sequence[Array]:
+        """Return the joint angles (16,) of each sample since the last call [rad]."""
+        return [self._reports.popleft() for _ in range(len(self._reports))]
 
     def _begin_again(self, ended_at: float) -> None:
         """Begin the grasp once more, after a pause."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from holdfast.contact import ContactState, HandEstimate, Reason
 from holdfast.grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
+from holdfast.grip.jerks import JerkMonitor
 from holdfast.grip.laws import Law, Touch, law_named
 from holdfast.grip.laws.base import Three
 from holdfast.grip.limits import Limits
@@ -92,6 +93,7 @@ class GripController:
         self._ceiling = OVERLOAD * ceiling
         self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
         self._waiting = GripWait(MIN_FINGERS)
+        self._jerks = JerkMonitor()
         self.reset()
 
     def reset(self) -> None:
@@ -99,6 +101,8 @@ class GripController:
         self.state = LoopState.IDLE
         self._waiting.reset()
         self._touches: list[Touch] = []
+        self._jerked = False
+        self._jerks.reset()
         self._bad_since: list[float] = []
         self._highest: list[float] = []
         self._commands: dict[str, FingerCommand] = {}
@@ -162,6 +166,18 @@ class GripController:
     def report(self, fault: GripReason) -> None:
         """Report a fault outside the estimates, as that of a silent hand, to the next update."""
         self._reported = fault
+
+    def observe(self, angles: Array) -> None:
+        """Process the joint angles that the hand's driver reports, before the next `update`.
+
+        A hand whose own controller jerks shakes its contacts. A law may wait with its reaction
+        then, see `Touch.jerked`. Without this call no jerk is known, and nothing else changes.
+
+        Args:
+            angles: (n_joints,) measured angle of each joint, in any order that stays [rad].
+        """
+        self._jerks.update(angles)
+        self._jerked |= self._jerks.jerked
 
     def update(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Process an estimate, or the passing of time if the estimate is the last one again.
@@ -254,7 +270,7 @@ class GripController:
         finite = all(touch.read(estimate.fingers[touch.finger]) for touch in touches)
         if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
             return
-        self._touches, self._time = touches, time
+        self._touches, self._time, self._jerked = touches, time, False
         for touch in touches:
             touch.start()
         self._highest = [self.limits.highest_scale(touch.start_normal) for touch in touches]
@@ -336,12 +352,20 @@ class GripController:
         """Apply the law within the limits."""
         limits, commands, highest = self.limits, self._commands, self._highest
         clock = time + self._shift
+        if self._jerked is not self._touches[0].jerked:
+            for touch in self._touches:
+                touch.jerked = self._jerked
+        self._jerked = False
         wishes = self.law.wishes(self._touches, clock, dt)
+        if len(wishes) != len(self._touches):
+            raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))
         may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
         rising = falling = False
         for k, touch in enumerate(self._touches):
             scale = touch.scale
             wanted, reason = wishes[k]
+            if math.isnan(wanted):
+                raise ValueError(_broken_law(self.law, len(self._touches), "a scale of nan"))
             wanted = min(max(wanted, limits.min_scale), highest[k])
             if wanted > scale and reason is not _NONE:
                 self._set(touch, min(wanted, scale + limits.rise * dt), reason, time)
@@ -383,6 +407,14 @@ def _since(since: float, time: float, *, still: bool) -> float:
     if not (still and math.isfinite(time)):
         return math.nan
     return since if since <= time else time
+
+
+def _broken_law(law: Law, n: int, given: str) -> str:
+    """Return a message about what a law returned."""
+    return (
+        f"law {type(law).__name__}: the contract of laws expects a scale and a reason for each of "
+        f"{n} fingers, {given} given"
+    )
 
 
 def _three(vector: Array) -> Three:

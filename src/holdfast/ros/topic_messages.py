@@ -1,5 +1,6 @@
 """ROS messages that holdfast publishes, of hands and of estimates: their definitions in ROS 2."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,10 +12,14 @@ from holdfast.sensors.types import Array
 FLOAT32, FLOAT64, STRING = "std_msgs/Float32", "std_msgs/Float64", "std_msgs/String"
 FLOAT_ARRAY, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
 GRIPPER_COMMAND = "control_msgs/GripperCommand"
+JOINT_TRAJECTORY = "trajectory_msgs/JointTrajectory"
 """Message types of the topics of hands."""
 VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
 """Message types of the topics of estimates, besides `STRING` and `FLOAT64`."""
+
+TRAJECTORY_TIME = 0.02
+"""Time in which a trajectory reaches its only point: two periods of a controller at 100 Hz [s]."""
 
 _VECTOR3 = SEPARATOR + "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z"
 _DEFINITIONS = {
@@ -32,6 +37,16 @@ _DEFINITIONS = {
     JOINT_STATE: (
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
         "float64[] effort" + ROS2_HEADER
+    ),
+    JOINT_TRAJECTORY: (
+        "std_msgs/Header header\nstring[] joint_names\nJointTrajectoryPoint[] points"
+        + ROS2_HEADER
+        + SEPARATOR
+        + "trajectory_msgs/JointTrajectoryPoint\nfloat64[] positions\nfloat64[] velocities\n"
+        + "float64[] accelerations\nfloat64[] effort\n"
+        + "builtin_interfaces/Duration time_from_start"
+        + SEPARATOR
+        + "builtin_interfaces/Duration\nint32 sec\nuint32 nanosec"
     ),
     VECTOR: "std_msgs/Header header\nVector3 vector" + ROS2_HEADER + _VECTOR3,
     WRENCH: (
@@ -117,6 +132,26 @@ def joint_message(
         "velocity": empty,
         "effort": empty if efforts is None else efforts,
     }
+
+
+def trajectory_message(names: Sequence[str], positions: Array) -> dict[str, Any]:
+    """Return a `trajectory_msgs/JointTrajectory` of one point, which begins at once.
+
+    A controller refuses a trajectory whose stamp is over, so none is set.
+
+    Args:
+        names: names of the joints.
+        positions: set-points [rad or m].
+    """
+    empty = np.empty(0)
+    point = {
+        "positions": positions,
+        "velocities": empty,
+        "accelerations": empty,
+        "effort": empty,
+        "time_from_start": {"sec": 0, "nanosec": round(TRAJECTORY_TIME * 1e9)},
+    }
+    return {"header": header(math.nan), "joint_names": list(names), "points": [point]}
 
 
 def header(time: float, frame: str = "") -> dict[str, Any]:

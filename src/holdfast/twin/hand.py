@@ -144,9 +144,10 @@ class HandModel:
     mounts: Array = field(default_factory=lambda: MOUNTS)
 
     @classmethod
-    def build(cls, item: GraspObject) -> "HandModel":
-        """Build the model of the hand before an object."""
+    def build(cls, item: GraspObject, joint_friction: float = FRICTION) -> "HandModel":
+        """Build the model of the hand before an object, with this dry friction [N m]."""
         model = mujoco.MjModel.from_xml_string(hand_xml(item))
+        model.dof_frictionloss[:N_JOINTS] = joint_friction
         last = [model.body(f"link_{JOINTS[f] + 3}.0").id for f in FINGERS]
         return cls(model, mujoco.MjData(model), np.array(last), model.body("object").id)
 

@@ -30,7 +30,11 @@ ARROW_LENGTH_PER_NEWTON = 0.012
 ARROW_HALF_WIDTH = 0.002
 """Half width of an arrow [m]."""
 ARROW_COLOUR = (0.80, 0.10, 0.16, 1.0)
-"""Colour of the arrows."""
+"""Colour of the arrows of contact forces."""
+LOAD_COLOUR, LOAD_HALF_WIDTH = (0.36, 0.05, 0.56, 1.0), 0.004
+"""Colour and half width of the arrow of a load [m]."""
+MIN_ARROW_FORCE = 0.02
+"""Force up to which no arrow is drawn [N]."""
 MAX_SHAPES = 1000
 """Maximum number of shapes in a picture."""
 SAMPLES_PER_PICTURE = 12
@@ -88,17 +92,24 @@ class Renderer:
         """Free the resources of the back end."""
         self._renderer.close()
 
-    def picture(self, data: mujoco.MjData, forces: Array | None = None) -> Picture:
+    def picture(
+        self, data: mujoco.MjData, forces: Array | None = None, load: Array | None = None
+    ) -> Picture:
         """Render a picture of the current state.
 
         Args:
             data: MuJoCo's state, with computed positions of the bodies.
             forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end at
                 the points.
+            load: (6,) begin and length of an arrow of another colour, for a load [m].
         """
         self._renderer.update_scene(data, self._camera)
         for row in np.zeros((0, 6)) if forces is None else forces:
-            _draw_arrow(self._renderer.scene, row[:3], row[3:])
+            length = ARROW_LENGTH_PER_NEWTON * row[3:]
+            if np.linalg.norm(row[3:]) > MIN_ARROW_FORCE:
+                _draw_arrow(self._renderer.scene, row[:3] - length, length)
+        if load is not None:
+            _draw_arrow(self._renderer.scene, load[:3], load[3:], LOAD_COLOUR, LOAD_HALF_WIDTH)
         picture: Picture = self._renderer.render()
         return picture
 
@@ -200,18 +211,20 @@ def _aimed(camera: Camera) -> mujoco.MjvCamera:
     return aimed
 
 
-def _draw_arrow(scene: mujoco.MjvScene, point: Array, force: Array) -> None:
-    if scene.ngeom >= scene.maxgeom or not np.linalg.norm(force) > 0.02:
+def _draw_arrow(
+    scene: mujoco.MjvScene,
+    begin: Array,
+    length: Array,
+    colour: tuple[float, ...] = ARROW_COLOUR,
+    half_width: float = ARROW_HALF_WIDTH,
+) -> None:
+    if scene.ngeom >= scene.maxgeom:
         return
     geom = scene.geoms[scene.ngeom]
     kind = mujoco.mjtGeom.mjGEOM_ARROW.value
-    mujoco.mjv_initGeom(
-        geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(ARROW_COLOUR, "f4")
-    )
-    tail = point - ARROW_LENGTH_PER_NEWTON * force
-    mujoco.mjv_connector(
-        geom, kind, ARROW_HALF_WIDTH, tail, tail + 2 * ARROW_LENGTH_PER_NEWTON * force
-    )  # half of the length is drawn
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, "f4"))
+    # Half of the length is drawn.
+    mujoco.mjv_connector(geom, kind, half_width, begin, begin + 2 * length)
     scene.ngeom += 1
 
 

@@ -1,5 +1,6 @@
 """Simulate a grasp from a seed: a recording with exact truth, without a clock."""
 
+import math
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +20,7 @@ from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.loads import Load, LoadState, load_state
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor, tremor_at
+from holdfast.twin.plant import MILD, plant_named
 from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import (
     MIN_TOUCH_LOAD,
@@ -65,6 +67,7 @@ class Grasp:
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
         noise: rms of a reading at rest [count]; rounding to whole counts remains. None for that
             of the sensor.
+        plant: name of the plant, see `holdfast.twin.plant`.
     """
 
     object: str
@@ -77,6 +80,7 @@ class Grasp:
     table: str | Path | None = None
     glitch_rate: float | None = None
     noise: float | None = None
+    plant: str = MILD
 
     @property
     def item(self) -> GraspObject:
@@ -125,7 +129,7 @@ class Simulation:
         command: command of the last sample.
 
     Raises:
-        ValueError: object, profile or case is unknown, or the object cannot be grasped.
+        ValueError: object, profile, plant or case is unknown, or the object cannot be grasped.
     """
 
     def __init__(
@@ -138,9 +142,10 @@ class Simulation:
     ) -> None:
         if grasp.case not in GRASP_CASES:
             raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
-        chosen = profile(grasp.profile)
-        if grasp.glitch_rate is not None:
-            chosen = msgspec.structs.replace(chosen, glitch_rate=grasp.glitch_rate)
+        chosen, plant = profile(grasp.profile), plant_named(grasp.plant)
+        rate = plant.jerk_rate if grasp.glitch_rate is None else grasp.glitch_rate
+        if rate is not None:
+            chosen = msgspec.structs.replace(chosen, glitch_rate=rate)
         self.grasp, self._profile, self._loads = grasp, chosen, loads
         self.plan = plan or _draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
@@ -152,6 +157,9 @@ class Simulation:
         self.command: Command | None = None
         self.n_samples = 0
         self._pressing: Pressing | None = None
+        lag = plant.motor_time * RATE
+        self._motor_part = -math.expm1(-1.0 / lag) if lag > 0 else 1.0
+        self._forces = np.ones(len(FINGERS))  # scales that act, behind those of the commands
         self._slip_events = SlipEvents(self.plan.slip_events, grasp.item, 1 / RATE)
         self._arm_tremor = draw_tremor(grasp.generator("arm"))
         self._truth_log = TruthLog(FINGERS)
@@ -197,7 +205,7 @@ class Simulation:
             scales = slipping.grip_scale * (np.ones(len(FINGERS)) if scales is None else scales)
         moved, released = None, protocol.is_released(self.time)
         if scales is not None and self._pressing is not None and not released:
-            moved = self._pressing.displacement(scales)
+            moved = self._pressing.displacement(self._followed(scales))
         world.advance(command, self.plan, protocol.anchor, moved)
         self._truth_log.add(
             command.phase,
@@ -213,6 +221,13 @@ class Simulation:
         self._taxel_forces.append(skin.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
+
+    def _followed(self, scales: Array) -> Array:
+        """Return the scales that act, which follow those of the commands as the motors do."""
+        if self._motor_part < 1.0:
+            self._forces = self._forces + self._motor_part * (scales - self._forces)
+            return self._forces
+        return scales
 
     @property
     def _is_loaded(self) -> bool:
@@ -245,6 +260,10 @@ class Simulation:
             "grip_scale": slipping.grip_scale,
             "friction_scale": slipping.load.friction,
         }
+
+    def joint_angles(self) -> Array:
+        """Return the joint angles (16,) that the hand's driver publishes now [rad]."""
+        return self.world.controller.published.copy()
 
     def read(self) -> dict[str, Counts]:
         """Return the counts (n_taxels, 3) of the last sample; call it after every `step`."""
@@ -360,12 +379,15 @@ def _world(grasp: Grasp, chosen: Profile) -> World:
     generator = grasp.generator("world")
     duration = max(MAX_DURATION, chosen.hold + MAX_UNHELD_DURATION)
     period = STEPS_PER_CONTROL * TIMESTEP
-    controller = draw_controller(generator, duration, period, chosen.glitch_rate)
+    plant = plant_named(grasp.plant)
+    controller = draw_controller(
+        generator, duration, period, chosen.glitch_rate,
+        glitch_error=plant.jerk_size, backlash=plant.backlash,
+    )  # fmt: skip
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
-    return World(
-        HandModel.build(item), item, _path(grasp.object, grasp.table), controller, tremors, start
-    )
+    hand = HandModel.build(item, plant.joint_friction)
+    return World(hand, item, _path(grasp.object, grasp.table), controller, tremors, start)
 
 
 def _poses(bodies: Array) -> Array:
@@ -410,6 +432,7 @@ def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
         "profile": grasp.profile,
         **({} if grasp.glitch_rate is None else {"glitch_rate": grasp.glitch_rate}),
         **({} if grasp.noise is None else {"noise": grasp.noise}),
+        **({} if grasp.plant == MILD else {"plant": grasp.plant}),
         "seed": grasp.seed,
         "server": grasp.server,
         "hand": "allegro-right",

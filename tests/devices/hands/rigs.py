@@ -19,7 +19,7 @@ from .ros.drivers import ROS1, ROS2, Ros2Driver
 
 taken = []
 EXAMPLES = Path(__file__).parents[3] / "examples"
-LOCAL = ["twin", "log", "call", "newtons"]
+LOCAL = ["twin", "log", "call", "newtons", "width"]
 WITH_STATES = [
     f"{scheme}:{name}"
     for scheme, drivers in (("ros2", ROS2), ("ros1", ROS1))
@@ -142,6 +142,36 @@ class NewtonRig:
         self._peer.close()
 
 
+class WidthRig:
+    """The template of a gripper by width: 60 mm when the grip begins, 0.1 mm for each 0.1 N."""
+
+    per_finger, fingers, driver = False, None, None
+
+    def __init__(self, folder):
+        template = runpy.run_path(str(EXAMPLES / "hands" / "width_gripper.py"))
+        self.make, self.moves = template["WidthGripper"], []
+        self.numbers = {"start_force": 2.0, "stiffness": 1e3, "stroke": 0.08, "max_force": 6.0}
+        self.hand = self.make("width:", self, **self.numbers)
+
+    def width(self):
+        return 0.06
+
+    def move(self, width):
+        self.moves.append(width)
+
+    def start(self):
+        self.moves.clear()
+        self.hand.heartbeat = None
+
+    def forces(self, n):
+        assert len(self.moves) == n
+        last = self.moves[-1]
+        return "open" if last == 0.08 else 1.0 + 1e3 * (0.06 - last) / 2.0
+
+    def close(self):
+        self.hand.close()
+
+
 class RosRig:
     """A hand on topics, with a driver on the other side."""
 
@@ -212,9 +242,8 @@ class Rigs:
 
             self._world = self._world or Ros1World(self._new_folder())
             return Ros1Rig(self._world, kind)
-        return {"twin": TwinRig, "log": LogRig, "call": CallRig, "newtons": NewtonRig}[name](
-            self._new_folder()
-        )
+        kinds = {"twin": TwinRig, "log": LogRig, "call": CallRig, "newtons": NewtonRig}
+        return {**kinds, "width": WidthRig}[name](self._new_folder())
 
     def close(self):
         for rig in self._made.values():

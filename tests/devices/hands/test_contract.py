@@ -3,6 +3,7 @@
 import math
 
 import msgspec
+import numpy as np
 import pytest
 
 from holdfast.devices.hands import open_hand
@@ -21,12 +22,17 @@ RELEASE = msgspec.structs.replace(COMMAND, release=True, state=LoopState.FAULT)
 HOLD = msgspec.structs.replace(COMMAND, state=LoopState.FAULT)
 IDLE = msgspec.structs.replace(COMMAND, state=LoopState.IDLE)
 ON_TOPICS = [name for name in NAMES if name not in LOCAL]
-GRIPPERS = ("log", "call", "gripper", "parallel-gripper")
+GRIPPERS = ("log", "call", "gripper", "parallel-gripper", "width-gripper", "width")
 WITH_FINGERS = [name for name in NAMES if name.split(":")[-1] not in GRIPPERS]
 
 
 def scaled(scale, finger="index"):
     return GripCommand(1.0, LoopState.HOLD, {finger: FingerCommand(scale)})
+
+
+def expected_of(rig):
+    """The scales that a hand has after `COMMAND`."""
+    return SCALES if rig.per_finger else max(SCALES.values())
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +55,12 @@ def rig(rigs, request):
 each = pytest.mark.parametrize("rig", NAMES, indirect=True)
 each_on_topics = pytest.mark.parametrize("rig", ON_TOPICS, indirect=True)
 each_with_states = pytest.mark.parametrize("rig", WITH_STATES, indirect=True)
+IN_PROCESS = [name for name in NAMES if not name.startswith("ros1:")]
+"""Hands of ROS 1 run in a process of their own, which passes commands on and no reports."""
+each_in_process = pytest.mark.parametrize("rig", IN_PROCESS, indirect=True)
+each_in_process_with_states = pytest.mark.parametrize(
+    "rig", [name for name in WITH_STATES if name in IN_PROCESS], indirect=True
+)
 each_with_fingers = pytest.mark.parametrize("rig", WITH_FINGERS, indirect=True)
 
 
@@ -56,8 +68,7 @@ each_with_fingers = pytest.mark.parametrize("rig", WITH_FINGERS, indirect=True)
 def test_the_force_of_each_finger_is_that_of_the_command(rig):
     with rig.hand as hand:
         hand.send(COMMAND)
-        expected = SCALES if rig.per_finger else max(SCALES.values())
-        assert rig.forces(1) == pytest.approx(expected, rel=1e-5)
+        assert rig.forces(1) == pytest.approx(expected_of(rig), rel=1e-5)
 
 
 @each
@@ -96,7 +107,9 @@ def test_it_can_be_closed_twice_and_opened_again(rig):
 
 @each
 def test_its_name_is_its_uri(rig):
-    if not rig.hand.name.startswith(("twin:", "newtons:")):  # opened with a source, by a plug-in
+    if not rig.hand.name.startswith(
+        ("twin:", "newtons:", "width:")
+    ):  # opened with a source, by a plug-in
         assert open_hand(rig.hand.name).name == rig.hand.name
 
 
@@ -155,6 +168,25 @@ def test_who_takes_over_sends_in_any_case(rig):
         assert rig.forces(3) == "open"
 
 
+@each_in_process
+def test_joint_reports_are_measured_angles_or_none(rig):
+    with rig.hand as hand:
+        hand.send(COMMAND)
+        reports = list(hand.joint_reports())
+        assert all(np.isfinite(report).all() for report in reports)
+        assert len({report.shape for report in reports}) <= 1
+
+
+@each_in_process_with_states
+def test_each_joint_state_is_reported_once_in_the_order_of_the_hand(rig):
+    with rig.hand as hand:
+        hand.send(COMMAND)
+        first = hand.joint_reports()
+        assert len(first) >= 5
+        np.testing.assert_allclose(first[-1], POSITIONS)
+        assert len(hand.joint_reports()) < len(first)
+
+
 @each_with_states
 @pytest.mark.parametrize("position", [1e6, POSITIONS[0] + 2 * math.pi, 0.4])
 def test_a_wrong_joint_reading_defines_no_command(rig, position):
@@ -162,7 +194,7 @@ def test_a_wrong_joint_reading_defines_no_command(rig, position):
     before = rig.hand.n_refused
     with rig.spoiled(position), rig.hand as hand:
         hand.send(COMMAND)
-        assert rig.forces(1) == pytest.approx(SCALES, rel=1e-5)
+        assert rig.forces(1) == pytest.approx(expected_of(rig), rel=1e-5)
         assert (hand.n_refused > before) is (position != 0.4)
 
 

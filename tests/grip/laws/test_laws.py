@@ -4,7 +4,11 @@ import pytest
 
 from holdfast.grip import LAWS, GripReason
 from holdfast.grip.laws import Touch, law_named
-from holdfast.grip.laws.friction_margin import FORCE_MARGIN
+from holdfast.grip.laws.costanzo import LARGEST_DYNAMIC_FORCE, STATIC_MARGIN, Costanzo
+from holdfast.grip.laws.friction_margin import FORCE_MARGIN, FrictionMargin
+from holdfast.grip.laws.pr2 import Pr2
+from holdfast.grip.laws.relaxation import RELAXATION_MARGIN, RELAXATION_SETTLE_TIME
+from holdfast.grip.laws.wong_zhu import WongZhu
 
 DT = 1 / 150
 
@@ -44,10 +48,83 @@ def test_a_quiet_grip_wants_no_rise(name):
         assert wish.scale <= touches[0].scale
 
 
+def shake(touches):
+    """Shake the first finger once."""
+    x, y, z = touches[0].force
+    touches[0].force, touches[0].tangential = (x, y + 1.0, z), touches[0].tangential + 1.0
+
+
+def slide(touches):
+    """Let all fingers slide."""
+    for one in touches:
+        one.slides, one.slip_probability = True, 0.9
+
+
+RELAXING = [
+    (Pr2(fall=0.2), shake),
+    (WongZhu(fall=0.2), shake),
+    (WongZhu(fall=0.2, together=True), shake),
+    (Costanzo(fall=0.2), slide),
+]
+
+
+class TestRelaxation:
+    def after_a_slip(self, law, slip, scale=2.0):
+        """Return fingers of a grip that slipped at a scale, and calmed down at once."""
+        touches = [touch(), touch(name="thumb")]
+        for one in touches:
+            one.scale, one.normal, one.tangential = scale, 2.0 * scale, 0.6 * scale
+        law.start(touches, -1)
+        before = [(one.force, one.tangential) for one in touches]
+        slip(touches)
+        assert any(wish.scale > scale for wish in wanted(law, touches, 0.0, DT))
+        for one, (force, tangential) in zip(touches, before, strict=True):
+            one.force, one.tangential = force, tangential
+            one.slides, one.slip_probability = False, 0.0
+        return touches
+
+    def calm(self, law, touches, seconds, start=0.0):
+        for k in range(1, round(seconds / DT) + 1):
+            wishes = wanted(law, touches, start + k * DT, DT)
+            for one, wish in zip(touches, wishes, strict=True):
+                one.scale = min(wish.scale, one.scale)
+        return [one.scale for one in touches]
+
+    @pytest.mark.parametrize(("law", "slip"), RELAXING)
+    def test_the_force_falls_in_calm_after_the_settle_time(self, law, slip):
+        touches = self.after_a_slip(law, slip, scale=2.0)
+        for one in touches:
+            one.scale = 3.0
+        assert self.calm(law, touches, RELAXATION_SETTLE_TIME / 2)[0] == 3.0
+        (scale, _) = self.calm(law, touches, 0.75, start=RELAXATION_SETTLE_TIME / 2)
+        assert 2.5 < scale < 3.0
+
+    @pytest.mark.parametrize(("law", "slip"), RELAXING)
+    def test_it_stays_above_the_force_of_the_last_slip(self, law, slip):
+        touches = self.after_a_slip(law, slip, scale=1.4)
+        touches[0].scale = 3.0
+        assert self.calm(law, touches, 20.0)[0] == pytest.approx(RELAXATION_MARGIN * 1.4)
+
+    @pytest.mark.parametrize("law", [Pr2(fall=0.0), WongZhu(fall=0.0)])
+    def test_without_a_fall_the_force_stays(self, law):
+        touches = self.after_a_slip(law, shake)
+        assert self.calm(law, touches, 5.0) == [2.0, 2.0]
+
+    @pytest.mark.parametrize("law", [Pr2(fall=0.2), WongZhu(fall=0.2)])
+    def test_a_new_grip_forgets_the_slip(self, law):
+        self.after_a_slip(law, shake)
+        touches = [touch(), touch(name="thumb")]
+        law.start(touches, -1)
+        for one in touches:
+            one.scale = 2.0
+        assert self.calm(law, touches, 20.0) == [1.0, 1.0]
+
+
 class TestPr2:
     def shaken(self, amplitude, slow=0.0):
         touches = [touch(), touch(name="thumb")]
-        law, wishes = started("pr2", touches), []
+        law, wishes = Pr2(gain=1.3, threshold_factor=1.0), []
+        law.start(touches, -1)
         for k in range(60):
             normal = 2.0 + slow * k * DT
             touches[0].force = (normal, 0.6 + amplitude * (-1) ** k, 0.0)
@@ -62,6 +139,16 @@ class TestPr2:
     def test_a_vibration_below_the_threshold_does_not(self):
         assert all(one.scale == 1.0 for wishes in self.shaken(0.01) for one in wishes)
 
+    def test_the_factor_raises_the_threshold(self):
+        def rises(factor):
+            touches = [touch()]
+            law = Pr2(threshold_factor=factor)
+            law.start(touches, -1)
+            touches[0].force = (2.0, 0.7, 0.0)
+            return wanted(law, touches, DT, DT)[0].scale > 1.0
+
+        assert rises(1.0) and not rises(3.0)
+
     def test_a_force_that_changes_slowly_is_no_slip(self):
         assert self.shaken(0.1, slow=5.0)[-1][0].reason is GripReason.NONE
 
@@ -69,11 +156,19 @@ class TestPr2:
 class TestWongZhu:
     def test_a_jump_of_the_tangential_force_raises_that_finger(self):
         touches = [touch(), touch(name="thumb")]
-        law = started("wong-zhu", touches)
+        law = WongZhu(threshold=0.05, gain=1.3, together=False)
+        law.start(touches, -1)
         touches[0].tangential = 0.67
         one, other = wanted(law, touches, DT, DT)
         assert one == (1.3, GripReason.SLIP)
         assert other == (1.0, GripReason.NONE)
+
+    def test_all_fingers_may_react_together(self):
+        touches = [touch(), touch(name="thumb")]
+        law = WongZhu(threshold=0.05, gain=1.3, together=True)
+        law.start(touches, -1)
+        touches[0].tangential = 0.67
+        assert wanted(law, touches, DT, DT) == [(1.3, GripReason.SLIP)] * 2
 
     def test_a_small_change_does_not(self):
         touches = [touch()]
@@ -97,10 +192,90 @@ class TestFrictionMargin:
         (wish,) = wanted(law, touches, 2 * DT, DT)
         assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
 
+    def wish(self, law, tangential):
+        touches = [touch(tangential=tangential)]
+        law.start(touches, -1)
+        return wanted(law, touches, DT, DT)[0]
+
     def test_it_falls_by_5_percent_at_most(self):
-        touches = [touch(tangential=0.01)]
-        (wish,) = wanted(started("friction-margin", touches), touches, DT, DT)
-        assert wish == (0.95, GripReason.RELAX)
+        assert self.wish(FrictionMargin(fall=100.0), 0.01) == (0.95, GripReason.RELAX)
+        assert self.wish(FrictionMargin(fall=0.2), 0.01).scale == pytest.approx(1 - 0.2 * DT)
+
+    def test_it_acts_below_a_margin_of_its_own(self):
+        """The friction is 0.5: 2 N are 1.12 times what 0.893 N need."""
+        always = FrictionMargin(first_friction=0.5, margin=1.15, acts_at=1.15)
+        assert self.wish(always, 0.893).reason is GripReason.MARGIN
+        later = FrictionMargin(first_friction=0.5, margin=1.15, acts_at=1.1)
+        assert self.wish(later, 0.893) == (1.0, GripReason.NONE)
+        assert self.wish(later, 0.95).scale == pytest.approx(1.15 * 0.95 / 0.5 / 2.0)
+
+
+FIRST = {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1, "slip_level": 0.1}
+
+
+class TestCostanzo:
+    def begun(self, n=2, **arguments):
+        touches = [touch(name=name) for name in ("thumb", "index", "middle")[:n]]
+        law = Costanzo(**FIRST | arguments)
+        law.start(touches, 0)
+        return law, touches
+
+    def scales(self, law, touches, n):
+        return [wanted(law, touches, k * DT, DT)[0].scale for k in range(n)]
+
+    def test_a_slip_of_one_finger_raises_all(self):
+        law, touches = self.begun()
+        slide(touches[:1])
+        first, second = wanted(law, touches, 0.0, DT)
+        assert first == second and first.scale > 1.0 and first.reason is GripReason.SLIP
+
+    def test_a_more_probable_slip_presses_more(self):
+        def pressed(probability):
+            law, touches = self.begun()
+            touches[0].slides, touches[0].slip_probability = True, probability
+            return self.scales(law, touches, 1)[0]
+
+        assert pressed(0.3) < pressed(0.6) < pressed(1.0)
+
+    def test_a_probability_below_the_level_is_no_slip(self):
+        law, touches = self.begun(slip_level=0.3)
+        touches[0].slip_probability = 0.29
+        assert self.scales(law, touches, 30)[-1] == 1.0
+        touches[0].slip_probability = 0.5
+        assert self.scales(law, touches, 1)[0] > 1.0
+
+    def test_a_longer_slip_presses_more_up_to_the_largest_dynamic_force(self):
+        law, touches = self.begun(gain=0.1)
+        slide(touches)
+        scales = self.scales(law, touches, 600)
+        static = STATIC_MARGIN * 1.2 / 0.3
+        assert scales[0] < scales[5] <= scales[-1]
+        assert scales[-1] == pytest.approx((static + LARGEST_DYNAMIC_FORCE) / 4.0)
+
+    def test_a_load_that_grows_is_followed_without_a_slip(self):
+        law, touches = self.begun()
+        for one in touches:
+            one.tangential = 1.2
+        scale = self.scales(law, touches, 60)[-1]
+        assert scale == pytest.approx(STATIC_MARGIN * 2.4 / 0.5 / 4.0, rel=0.01)
+        assert wanted(law, touches, 1.0, DT)[0].reason is GripReason.MARGIN
+
+    def test_a_slip_shows_the_friction(self):
+        """T/N is 0.3: as the load doubles, the force follows for 0.3 and no more for 0.5."""
+        law, touches = self.begun(gain=0.0)
+        slide(touches)
+        wanted(law, touches, 0.0, DT)
+        for one in touches:
+            one.slip_probability, one.tangential = 0.0, 1.2
+        assert self.scales(law, touches, 60)[-1] == pytest.approx(
+            STATIC_MARGIN * 2.4 / 0.3 / 4.0, rel=0.01
+        )
+
+    def test_a_finger_without_an_estimate_changes_nothing(self):
+        law, touches = self.begun()
+        slide(touches)
+        touches[1].known = False
+        assert wanted(law, touches, 0.0, DT) == [(1.0, GripReason.NONE)] * 2
 
 
 class TestStability:

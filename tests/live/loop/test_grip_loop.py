@@ -74,6 +74,18 @@ def test_a_dry_run_sends_nothing_and_logs_everything(tape):
     assert "grip REACT" in texts
 
 
+def test_the_controller_gets_the_joints_of_the_hand_before_the_estimate(tape):
+    controller, time = holding()
+    reports, seen = [[0.0, 1.0], [0.5, 1.0]], []
+    tape.joint_reports = lambda: [reports.pop(0)] if reports else []
+    controller.observe = lambda angles: seen.append((angles, controller._time))
+    with GripLoop(controller, tape) as loop:
+        end = stepped(loop, time, n=3)
+    assert [angles for angles, _ in seen] == [[0.0, 1.0], [0.5, 1.0]]
+    assert [at for _, at in seen] == pytest.approx([time, time + 1 / RATE])
+    assert end > time
+
+
 def test_armed_it_sends_what_the_controller_says(tape):
     controller, time = holding()
     beats = Beats()

@@ -10,8 +10,9 @@ from holdfast.plugins import PluginGroup
 HAND_SCHEMES = {
     "twin": "the twin, with the source twin:...",
     "ros2": "a hand on topics of ROS 2: ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop, "
-    "ros2:gripper",
-    "ros1": "a hand on topics of ROS 1: ros1:positions, ros1:efforts, ros1:envelop, ros1:gripper",
+    "ros2:gripper, ros2:width-gripper, ros2:controller",
+    "ros1": "a hand on topics of ROS 1: ros1:positions, ros1:efforts, ros1:envelop, ros1:gripper, "
+    "ros1:width-gripper",
     "log": "a file, for dry runs: log:PATH",
     "call": "a function of Python: call:MODULE:FUNCTION",
 }

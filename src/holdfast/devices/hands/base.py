@@ -3,12 +3,16 @@
 import math
 import time
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand, LoopState
 from holdfast.grip.limits import Limits
 from holdfast.openable import Openable
+from holdfast.sensors.types import Array
+
+MAX_JOINT_REPORTS = 512
+"""Number of newest joint reports that wait for `HandDevice.joint_reports`."""
 
 
 class HandDevice(Openable):
@@ -48,6 +52,14 @@ class HandDevice(Openable):
         No force changes meanwhile.
         """
         return False
+
+    def joint_reports(self) -> Sequence[Array]:
+        """Return the joint angles that the hand has reported since the last call, oldest first.
+
+        Each is (n_joints,), measured, in an order that stays [rad]. None of a hand that reports no
+        joints.
+        """
+        return ()
 
     def check(self, limits: Limits, fingers: Iterable[str]) -> None:
         """Check, before anything is sent, that the hand can do what the limits allow.

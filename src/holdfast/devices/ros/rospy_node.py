@@ -40,8 +40,8 @@ _lock = threading.Lock()
 _master: str | None = None
 QUEUE_SIZE = 10
 """Messages that rospy keeps for a slow subscriber; the oldest is dropped first."""
-STAMP = "builtin_interfaces/Time"
-"""Type of a time in ROS 2, by whose definitions messages are filled."""
+STAMP, DURATION = "builtin_interfaces/Time", "builtin_interfaces/Duration"
+"""Types of a time and of a duration in ROS 2, by whose definitions messages are filled."""
 STATE_QUEUE_SIZE = 256
 """Joint states that wait until they are read; the oldest is dropped first."""
 
@@ -332,6 +332,8 @@ class Ros1Link(Link):
             value = fields[field.name]
             if field.kind == STAMP:
                 setattr(message, field.name, self._rospy.Time(value["sec"], value["nanosec"]))
+            elif field.kind == DURATION:
+                setattr(message, field.name, self._rospy.Duration(value["sec"], value["nanosec"]))
             elif field.kind not in definition.types:
                 setattr(message, field.name, value)
             elif field.size is None:

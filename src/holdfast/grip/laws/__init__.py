@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from holdfast.grip.laws.base import Law, Touch, Wish
+from holdfast.grip.laws.costanzo import Costanzo
 from holdfast.grip.laws.fixed import Fixed
 from holdfast.grip.laws.friction_margin import FrictionMargin
 from holdfast.grip.laws.pr2 import Pr2
@@ -16,9 +17,10 @@ LAWS: dict[str, Callable[[], Law]] = {
     "pr2": Pr2,
     "wong-zhu": WongZhu,
     "friction-margin": FrictionMargin,
+    "costanzo": Costanzo,
     "holdfast": Stability,
 }
-"""Laws by name, with the constants of their sources."""
+"""Laws by name, with the best of the settings that were tried (docs/study/grip.md)."""
 
 __all__ = ["LAWS", "Law", "Touch", "Wish", "law_named"]
 

@@ -4,14 +4,16 @@ J. M. Romano, K. Hsiao, G. Niemeyer, S. Chitta, K. J. Kuchenbecker: Human-inspir
 control with tactile sensing. IEEE Transactions on Robotics 27 (2011) 1067-1079. Filters and
 thresholds are those of the released code. The gain of a reaction was tuned on trials of another
 seed (docs/study/grip.md): the paper's, 1.08 as we remember it, drops more. The original has one
-force for both fingertips; here every finger reacts with the others.
+force for both fingertips; here every finger reacts with the others. The factor of the thresholds
+and the relaxation in calm are additions, tuned as those of the other laws.
 """
 
 import math
 from collections.abc import Sequence
 
 from holdfast.grip.command import GripReason
-from holdfast.grip.laws.base import Law, Touch, Wish, stay
+from holdfast.grip.laws.base import Law, Touch, Wish
+from holdfast.grip.laws.relaxation import Relaxation
 
 HIGH_PASS = 5.0
 """Corner of the high-pass filter of F_hp [Hz]."""
@@ -30,23 +32,31 @@ class Pr2(Law):
 
     Args:
         gain: factor of the force at each sample that slips.
+        threshold_factor: factor of the threshold of |F_hp|; 1 is that of the source.
+        fall: relative speed with which the force falls in calm [1/s]; 0 is that of the source.
     """
 
     needs_newtons = True
 
-    def __init__(self, gain: float = GAIN) -> None:
-        self.gain = gain
+    def __init__(
+        self, gain: float = GAIN, threshold_factor: float = 1.0, fall: float = 0.0
+    ) -> None:
+        self.gain, self.threshold_factor = gain, threshold_factor
+        self.relaxation = Relaxation(fall)
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Start the filters at rest."""
         self._filters = [_Filters(touch) for touch in touches]
+        self.relaxation.start()
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
-        """Raise all fingers if one slips."""
+        """Raise all fingers if one slips; else relax them."""
         pairs = zip(self._filters, touches, strict=True)
-        slips = [touch.known and filters.slips(touch, dt) for filters, touch in pairs]
+        factor = self.threshold_factor
+        slips = [touch.known and filters.slips(touch, dt, factor) for filters, touch in pairs]
         if not any(slips):
-            return stay(touches)
+            return [self.relaxation.wish(touch.scale, time, dt) for touch in touches]
+        self.relaxation.slipped(max(touch.scale for touch in touches), time)
         return [(touch.scale * self.gain, GripReason.SLIP) for touch in touches]
 
 
@@ -58,7 +68,7 @@ class _Filters:
         self._high = (0.0, 0.0, 0.0)
         self._fast = self._slow = touch.normal
 
-    def slips(self, touch: Touch, dt: float) -> bool:
+    def slips(self, touch: Touch, dt: float, factor: float) -> bool:
         keep = 1.0 / (1.0 + dt * 2 * math.pi * HIGH_PASS)
         x, y, z = touch.force
         u, v, w = self._last
@@ -67,7 +77,7 @@ class _Filters:
         self._last = touch.force
         self._slow += (touch.normal - self._slow) * _share(dt, BAND[0])
         self._fast += (touch.normal - self._fast) * _share(dt, BAND[1])
-        threshold = min(max(SHARE * math.hypot(x, y, z), LOWEST), HIGHEST)
+        threshold = factor * min(max(SHARE * math.hypot(x, y, z), LOWEST), HIGHEST)
         band_pass = abs(self._fast - self._slow)
         return math.hypot(*self._high) > threshold and band_pass < SLOW_LIMIT
 

@@ -20,7 +20,10 @@ Its rules have no units, so that they carry over between counts and newtons:
    calm grip: if the load grows so that T/N is beyond a margin, the force follows before anything
    slips. People raise grip and load force in parallel (R. S. Johansson and G. Westling, Exp. Brain
    Res. 56 (1984) 550-564).
-5. Relaxation. In a calm grip the force falls slowly, to a margin above the force at which a slip
+5. Jerks. Where the hand reports its joints, a jerk of its own controller explains a doubt that
+   begins with it. For a short time such a doubt starts nothing, unless load is missing. A doubt
+   that lasts longer is a slip that the jerk began.
+6. Relaxation. In a calm grip the force falls slowly, to a margin above the force at which a slip
    began, or, where the slip rule decides that fingers slide, above what the load needs at the
    friction that these fingers show. Both are forgotten slowly.
 """
@@ -45,6 +48,14 @@ LARGEST_DOUBT = 2.0
 """Largest doubt, with the missing load, that enters a step."""
 PRESS_TIME = 0.1
 """Time for which a step is wanted after it began, so that the limit of speed lets it end [s]."""
+JERK_TIME = 0.25
+"""Time for which a jerk of the hand explains a doubt [s]: two periods of its ringing, 8 Hz."""
+JERK_LAG = 0.02
+"""Time after a doubt began within which a jerk explains it [s]: joints and taxels have clocks and
+delays of their own."""
+JERK_MISSING_LOAD = 0.1
+"""Share of the load of the calm grip that is missing from which a jerk explains nothing: half of
+what contacts lose when all begin to slide, where kinetic friction is 20 to 27 % lower."""
 NEVER = -math.inf
 
 
@@ -120,6 +131,7 @@ class Stability(Law):
         self._sum, self._floor, self._target = 0.0, 1.0, 0.0
         self._friction = math.inf
         self._stepped_at = self._followed_at = self._fell_at = self._unsettled_at = NEVER
+        self._jerked_at = self._rested_at = NEVER
         self._reason = GripReason.UNSTABLE
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
@@ -128,6 +140,10 @@ class Stability(Law):
         doubt = self._observe(touches, dt)
         if doubt > self.calm:
             self._unsettled_at = time
+        else:
+            self._rested_at = time
+        if touches[0].jerked and time - self._rested_at <= JERK_LAG:
+            self._jerked_at = time
         is_calm = time - self._unsettled_at > self.settle_time
         if is_calm:
             self._follow_calm(scale, min(dt / FOLLOW_TIME, 1.0))
@@ -177,7 +193,7 @@ class Stability(Law):
     def _react(self, doubt: float, scale: float, time: float, dt: float) -> None:
         """Begin a step if the doubt lasts; else follow a load that grows."""
         since = time - self._stepped_at
-        if since < self.refractory:
+        if since < self.refractory or self._is_explained(time):
             self._sum = 0.0
             return
         evidence = doubt
@@ -188,6 +204,11 @@ class Stability(Law):
             self._step(min(evidence, LARGEST_DOUBT), scale, time)
         elif doubt > self.hold_level:
             self._follow_load(scale, time)
+
+    def _is_explained(self, time: float) -> bool:
+        """Return whether a jerk of the hand explains a doubt at this time."""
+        is_held = self._load >= (1.0 - JERK_MISSING_LOAD) * self._calm_load
+        return is_held and time - self._jerked_at < JERK_TIME
 
     def _level(self, since: float, time: float) -> float:
         """Return the level of the doubt, at a time since the last step."""

@@ -3,13 +3,16 @@
 Wong and Zhu, Frontiers in Robotics and AI (2026), 10.3389/frobt.2026.1735467, detect slip where
 |T_k - T_(k-1)| / max(T_(k-1), eps) exceeds a threshold, T being the tangential resultant of a
 finger. Only the abstract was available: eps is an own choice; threshold and gain were tuned on
-trials of another seed (docs/study/grip.md).
+trials of another seed (docs/study/grip.md). The relaxation in calm and the choice whether all
+fingers react together, as in a gripper of one motor, are additions, tuned as those of the other
+laws.
 """
 
 from collections.abc import Sequence
 
 from holdfast.grip.command import GripReason
 from holdfast.grip.laws.base import Law, Touch, Wish
+from holdfast.grip.laws.relaxation import Relaxation
 
 SLIP_CHANGE = 0.05
 """Relative change of the tangential force in one sample that counts as a slip."""
@@ -25,26 +28,42 @@ class WongZhu(Law):
     Args:
         threshold: relative change in one sample that counts as a slip.
         gain: factor of the force of a finger that slips.
+        fall: relative speed with which the force falls in calm [1/s]; 0 for none.
+        together: whether all fingers react where one slips.
     """
 
-    def __init__(self, threshold: float = SLIP_CHANGE, gain: float = GAIN) -> None:
-        self.threshold, self.gain = threshold, gain
+    def __init__(
+        self,
+        threshold: float = SLIP_CHANGE,
+        gain: float = GAIN,
+        fall: float = 0.0,
+        *,
+        together: bool = False,
+    ) -> None:
+        self.threshold, self.gain, self.fall, self.together = threshold, gain, fall, together
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Remember the tangential forces."""
         self._last = [touch.tangential for touch in touches]
+        self._relaxations = [Relaxation(self.fall) for _ in touches]
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
-        """Raise each finger that slips."""
-        out = []
+        """Raise each finger that slips, or all; relax the others."""
+        slips = []
         for k, touch in enumerate(touches):
-            if touch.known and self._slips(touch, self._last[k]):
-                out.append((touch.scale * self.gain, GripReason.SLIP))
-            else:
-                out.append((touch.scale, GripReason.NONE))
+            slips.append(touch.known and self._slips(touch, self._last[k]))
             if touch.known:
                 self._last[k] = touch.tangential
-        return out
+        if self.together and any(slips):
+            slips = [True] * len(slips)
+        return [self._wish(k, touch, slips[k], time, dt) for k, touch in enumerate(touches)]
+
+    def _wish(self, k: int, touch: Touch, slips: bool, time: float, dt: float) -> Wish:
+        relaxation = self._relaxations[k]
+        if not slips:
+            return relaxation.wish(touch.scale, time, dt)
+        relaxation.slipped(touch.scale, time)
+        return (touch.scale * self.gain, GripReason.SLIP)
 
     def _slips(self, touch: Touch, last: float) -> bool:
         return abs(touch.tangential - last) > self.threshold * max(last, FLOOR * touch.start_normal)

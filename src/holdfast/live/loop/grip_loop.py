@@ -113,6 +113,8 @@ class GripLoop:
         """
         if self.armed and self.hand.silent:
             fault = fault or GripReason.HAND
+        for angles in self.hand.joint_reports():
+            self.controller.observe(angles)
         self.controller.report(fault)
         command = self._update(estimate, time)
         violated = self.guard.violation

@@ -30,14 +30,27 @@ def readings(position, every, n):
     return wrong(POSITIONS, position), wrong(EFFORTS, 2 * EFFORTS[0])
 
 
-def ratios(values, order, base):
-    """The ratio of the four joints of each finger, which is the same for all four."""
-    found = {}
-    for place, finger in enumerate(order):
-        four = [values[k] / base[k] for k in range(4 * place, 4 * place + 4)]
-        assert max(four) - min(four) < 1e-6, (finger, four)
-        found[finger] = four[0]
+def ratios(values, order, base, counts=(4, 4, 4, 4)):
+    """The ratio of the joints of each finger, which is the same for all of them."""
+    found, begin = {}, 0
+    for finger, n in zip(order, counts, strict=True):
+        parts = [values[k] / base[k] for k in range(begin, begin + n)]
+        assert max(parts) - min(parts) < 1e-6, (finger, parts)
+        found[finger], begin = parts[0], begin + n
+    assert len(values) == begin
     return found
+
+
+def values_of(message):
+    """The positions of a trajectory of one point that begins at once, or the numbers."""
+    if "points" not in message:
+        data = message.get("data", ())
+        return [data] if isinstance(data, float) else list(data)
+    assert message["header"]["stamp"] == {"sec": 0, "nanosec": 0}
+    (point,) = message["points"]
+    assert point["time_from_start"] == {"sec": 0, "nanosec": 20_000_000}
+    assert len(message["joint_names"]) == len(point["positions"])
+    return list(point["positions"])
 
 
 @dataclass
@@ -52,26 +65,46 @@ class Driver:
     stiffness: list | None = None
     home: list | None = None
     effort: float | None = None
+    counts: tuple = (4, 4, 4, 4)
+    strength: float | None = None
 
     def meaning(self, messages):
         """The force scales of the last message; "open" if it opens the hand."""
         if "home" in [message.get("data") for topic, message in messages if "lib" in topic]:
             return "open"
         _, message = messages[-1]
+        if self.strength is not None:
+            return width_meaning(values_of(message), self.effort, self.strength)
         if "max_effort" in message:  # opens by its position
             is_open = message["position"] == OPEN_WIDTH
             return "open" if is_open else message["max_effort"] / self.effort
         if self.effort is not None:
             return message["data"] / self.effort if message["data"] else "open"
-        values = list(message.get("data", ())) or list(message["effort"]) or message["position"]
+        values = values_of(message) or list(message["effort"]) or message["position"]
         if self.stiffness is None:
-            return "open" if not any(values) else ratios(values, self.order, EFFORTS)
+            return "open" if not any(values) else ratios(values, self.order, EFFORTS, self.counts)
         if all(math.isclose(a, b, abs_tol=1e-3) for a, b in zip(values, self.home, strict=True)):
             return "open"
-        torques = [k * (v - q) for k, v, q in zip(self.stiffness, values, POSITIONS, strict=True)]
-        return ratios(torques, self.order, EFFORTS)
+        parts = zip(self.stiffness, values, POSITIONS[: len(values)], strict=True)
+        return ratios([k * (v - q) for k, v, q in parts], self.order, EFFORTS, self.counts)
 
 
+def width_meaning(values, force, strength):
+    """The scale of a gripper that is open at 0 rad, and closed by 80 mm at 0.8 rad."""
+    (position,) = values
+    if position == 0.0:
+        return "open"
+    narrower = 0.08 * (position - POSITIONS[0]) / 0.8
+    return 1.0 + strength * narrower / force
+
+
+MIXED = ("ring", "thumb", "index", "middle")
+MIXED_COUNTS = (3, 4, 2, 1)
+MIXED_NAMES = [f"j{k}" for k in range(16)]
+MIXED_JOINTS = "ring:j0:j1:j2,thumb:j3:j4:j5:j6,index:j7:j8,middle:j9"
+FINGER_NAMES = ["finger_joint", *MIXED_NAMES[1:]]
+WIDTH = "joint=finger_joint&open=0&closed=0.8&stroke=0.08&effort=4&max_effort=10&stiffness=2000"
+TRAJECTORY = "trajectory_msgs/JointTrajectory"
 FLOATS, JOINTS = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
 V4_HOME = {
     "thumb": [1.0472, 0.4363, 0.2618, 0.7854],
@@ -115,6 +148,21 @@ ROS2 = {
         f"&open={OPEN_WIDTH}",
         {"/gripper/command": "control_msgs/GripperCommand"}, effort=4.0,
     ),
+    "width-gripper": Driver(
+        f"ros2:width-gripper?topic=/gripper/joint_trajectory&{WIDTH}",
+        {"/gripper/joint_trajectory": TRAJECTORY}, "/joint_states", FINGER_NAMES,
+        effort=4.0, strength=2000.0,
+    ),
+    "controller": Driver(
+        f"ros2:controller?topic=/hand/joint_trajectory&joints={MIXED_JOINTS}&max_effort=0.1"
+        f"&stiffness=2&home={','.join(['0.1'] * 10)}",
+        {"/hand/joint_trajectory": TRAJECTORY}, "/joint_states", MIXED_NAMES, MIXED,
+        stiffness=[2.0] * 10, home=[0.1] * 10, counts=MIXED_COUNTS,
+    ),
+    "effort-controller": Driver(
+        f"ros2:controller?topic=/hand/commands&joints={MIXED_JOINTS}&max_effort=0.1&command=efforts",
+        {"/hand/commands": FLOATS}, "/joint_states", MIXED_NAMES, MIXED, counts=MIXED_COUNTS,
+    ),
 }  # fmt: skip
 
 ROS1 = {
@@ -135,6 +183,12 @@ ROS1 = {
     "gripper": Driver(
         "ros1:gripper?topic=/gripper/force&type=Float32&effort=4&max_effort=10",
         {"/gripper/force": "std_msgs/Float32"}, effort=4.0,
+    ),
+    "width-gripper": Driver(
+        f"ros1:width-gripper?topic=/gripper/command&type=Float64&states=/gripper/joint_states"
+        f"&{WIDTH}",
+        {"/gripper/command": "std_msgs/Float64"}, "/gripper/joint_states", FINGER_NAMES,
+        effort=4.0, strength=2000.0,
     ),
 }  # fmt: skip
 

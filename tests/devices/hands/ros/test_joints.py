@@ -9,7 +9,7 @@ from holdfast.devices.hands.ros.joints import (
     THUMB_LAST,
     V4_HIGHEST,
     V4_LOWEST,
-    JointOrder,
+    allegro_order,
 )
 from holdfast.ros.topic_messages import JointStates
 
@@ -17,14 +17,14 @@ from holdfast.ros.topic_messages import JointStates
 def test_limits_are_those_of_the_twins_hand():
     text = resources.files("holdfast.twin.tables").joinpath("allegro_right.csv").read_text()
     rows = list(csv.DictReader(line for line in text.splitlines() if line[0] != "#"))
-    order = JointOrder(THUMB_LAST, "joint_")
+    order = allegro_order(THUMB_LAST, "joint_")
     assert [row["joint"] for row in rows] == list(order.names)
     np.testing.assert_allclose(order.values(V4_LOWEST), [float(row["lower"]) for row in rows])
     np.testing.assert_allclose(order.values(V4_HIGHEST), [float(row["upper"]) for row in rows])
 
 
 def test_states_are_sorted_by_name():
-    order = JointOrder(THUMB_FIRST, "ah_joint")
+    order = allegro_order(THUMB_FIRST, "ah_joint")
     names = ("arm", *reversed(order.names))
     values = np.arange(17.0)
     found = order.sort(JointStates(names, values, 10 * values))
@@ -45,10 +45,10 @@ def test_states_are_sorted_by_name():
 )
 def test_states_of_another_hand_are_refused(states, message):
     with pytest.raises(ValueError, match=message):
-        JointOrder(THUMB_FIRST, "ah_joint").sort(states)
+        allegro_order(THUMB_FIRST, "ah_joint").sort(states)
 
 
 def test_a_short_list_of_names_is_no_crash():
-    order = JointOrder(THUMB_FIRST, "ah_joint")
+    order = allegro_order(THUMB_FIRST, "ah_joint")
     with pytest.raises(ValueError, match="no joint"):
         order.sort(JointStates(order.names, np.zeros(3), np.zeros(3)))

@@ -8,6 +8,8 @@ from holdfast.devices.hands import open_hand
 from holdfast.grip import Limits
 
 SIXTEEN = ",".join(["0.1"] * 16)
+WIDTH = "ros2:width-gripper?topic=/g&joint=f&open=0.08&effort=4&max_effort=12&stiffness=2000"
+JOINTS = "ros2:controller?topic=/h&joints=thumb:a:b,index:c&max_effort=1"
 
 
 @pytest.mark.parametrize(
@@ -71,6 +73,22 @@ SIXTEEN = ",".join(["0.1"] * 16)
         ("ros2:gripper?effort=1&max_effort=1", "topic=/TOPIC expected, nothing given"),
         ("ros2:gripper?topic=/a&effort=1&max_effort=1&type=Int", "type=Float64 or Float32 or Grip"),
         ("ros2:gripper?topic=/a&effort=x&max_effort=1", "effort: a number expected, 'x' given"),
+        (f"{WIDTH}&closed=0.08", "open= another position than closed= expected, 0.08 given"),
+        (f"{WIDTH}&stroke=0", "stroke: a number above 0 expected, 0 given"),
+        (f"{WIDTH}&gain=1999", "gain: at least the stiffness of 2000 N/m expected, of which it is"),
+        (f"{WIDTH}&type=Int8", "type=JointTrajectory or Float64MultiArray or Float64 or Gripper"),
+        (WIDTH.replace("joint=f&", ""), "joint=NAME expected, nothing given"),
+        (WIDTH.replace("open=0.08", "open=80"), "a stroke of at most 1 m expected, 80 given: give"),
+        (WIDTH.replace("&stiffness=2000", ""), "stiffness: a number expected, nothing given"),
+        (f"{JOINTS}&stiffness=1", "home: 3 numbers, one for each joint, expected, nothing given"),
+        (f"{JOINTS}&stiffness=1,2&home=0,0,0", "stiffness: a number or 3 numbers, one for each"),
+        (f"{JOINTS}&stiffness=1&home=0,0,90", "home: index joint 0: -3.14159 to 3.14159 rad expe"),
+        (f"{JOINTS}&stiffness=1&home=0,0,0&lowest=4", "lowest below highest expected for each joi"),
+        (f"{JOINTS}&command=efforts&home=0,0,0", "home= is a parameter of command=positions"),
+        (f"{JOINTS}&command=efforts&type=JointTrajectory", "type=Float64MultiArray expected, 'Jo"),
+        ("ros2:controller?topic=/h", "joints=thumb:JOINT:JOINT,index:JOINT expected, each name"),
+        ("ros2:controller?topic=/h&joints=thumb,index:c", "each name once, 'thumb,index:c' given"),
+        ("ros2:controller?topic=/h&joints=thumb:a,index:a", "each name once, 'thumb:a,index:a' gi"),
     ],
 )
 def test_a_wrong_uri_is_refused(uri, message):
@@ -89,6 +107,20 @@ def test_a_wrong_uri_is_refused(uri, message):
         (
             "ros2:v5-envelop?effort=1&max_effort=1.5",
             "an effort of at most 1.5 expected, 2 given at max_scale 2: lower one of them",
+        ),
+        (
+            WIDTH.replace("=12", "=6"),
+            "at most 6 N expected, 8 N given at max_scale 2: lower one of them",
+        ),
+        (
+            WIDTH.replace("=2000", "=40"),  # in N/mm
+            "closing by at most 0.08 m expected, 0.1 m given at max_scale 2: lower it, or check "
+            "stiffness= [N/m]",
+        ),
+        (
+            f"{JOINTS}&stiffness=0.11&home=0,0,0&effort=0.1,0.1,0.4",  # in N m for each degree
+            "index joint 0: a set-point at most 6.28319 rad from the joint expected, 7.27 rad "
+            "given at max_scale 2: check stiffness= [N m/rad]",
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Allegro hands that take a command for each joint: torques, largest torques or set-points."""
+"""Hands that take a command for each joint: torques, largest torques or set-points."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -7,13 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE, N_JOINTS, JointGrip, JointOrder
+from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
 from holdfast.devices.hands.ros.ros_hand import RosHand
 from holdfast.devices.ros.link import Link
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 from holdfast.grip.limits import Limits
-from holdfast.ros.topic_messages import JOINT_STATE, JointStates, array_message, joint_message
+from holdfast.ros.topic_messages import (
+    JOINT_STATE,
+    JOINT_TRAJECTORY,
+    JointStates,
+    array_message,
+    joint_message,
+    trajectory_message,
+)
 from holdfast.sensors.types import Array
 
 SLACK = 1e-9
@@ -34,7 +41,7 @@ class JointOutput(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class JointSetup:
-    """Description of a hand that takes a command for each joint; arrays are (16,).
+    """Description of a hand that takes a command for each joint; arrays are (n_joints,).
 
     Attributes:
         output: what the driver takes.
@@ -110,9 +117,12 @@ class JointHand(RosHand):
         super().check(limits, fingers)
         self._max_scale = limits.max_scale
         torques = self.setup.torques
-        problem = "" if torques is None else self._excess(limits.max_scale * torques)
-        if problem:
+        if torques is None:
+            return
+        if problem := self._excess(limits.max_scale * torques):
             raise ValueError(f"{problem} at max_scale {limits.max_scale:g}: lower one of them")
+        if problem := self._reach(limits.max_scale * torques):
+            raise ValueError(problem)
 
     def _begin(self) -> None:
         given = self.setup.torques
@@ -127,6 +137,8 @@ class JointHand(RosHand):
             raise HandError(
                 f"{problem} at max_scale {self._max_scale:g}: lower it, or grip more gently"
             )
+        if problem := self._reach(self._max_scale * torques):
+            raise HandError(problem)
         self._grip = JointGrip(positions, torques)
 
     def _checked(self, states: JointStates) -> JointStates:
@@ -148,15 +160,16 @@ class JointHand(RosHand):
         return ordered
 
     def _measured(self) -> tuple[Array, Array]:
-        """Return the median positions and torques (16,) of the last joint states.
+        """Return the median positions and torques (n_joints,) of the last joint states.
 
         Positions are NaN without joint states, and torques 0 where a state has none.
         """
+        n = len(self.setup.order.names)
         states = [one for _, one in self._states]
         if not states:
-            return np.full(N_JOINTS, np.nan), np.zeros(N_JOINTS)
+            return np.full(n, np.nan), np.zeros(n)
         efforts = [state.efforts for state in states if len(state.efforts)]
-        torques = np.zeros(N_JOINTS)
+        torques = np.zeros(n)
         if len(efforts) == len(states):
             torques = np.median(efforts, axis=0)
         return np.median([state.positions for state in states], axis=0), torques
@@ -172,7 +185,7 @@ class JointHand(RosHand):
     def _release(self) -> None:
         setup = self.setup
         if setup.home is None:
-            message = self._values(0.0, efforts=np.zeros(N_JOINTS))
+            message = self._values(0.0, efforts=np.zeros(len(setup.order.names)))
             self._publish(setup.topic, message)
         else:
             message = self._values(0.0, positions=setup.home)
@@ -190,9 +203,11 @@ class JointHand(RosHand):
     def _values(
         self, time: float, *, positions: Array | None = None, efforts: Array | None = None
     ) -> Mapping[str, Any]:
+        names = self.setup.order.names
         if self.setup.message == JOINT_STATE:
-            names = self.setup.order.names
             return joint_message(time, names, positions=positions, efforts=efforts)
+        if self.setup.message == JOINT_TRAJECTORY and positions is not None:
+            return trajectory_message(names, positions)
         values = positions if efforts is None else efforts
         return array_message(np.empty(0) if values is None else values)
 
@@ -206,4 +221,39 @@ class JointHand(RosHand):
         return (
             f"{self.name}: {setup.order.describe(worst)}: at most {setup.max_torques[worst]:g} N m "
             f"expected, {abs(torques[worst]):g} N m given"
+        )
+
+    def _reach(self, torques: Array) -> str:
+        """Return a message about a set-point further away than its joint moves; else empty.
+
+        No joint can need it, so the stiffness has another unit, or is that of another hand.
+        """
+        setup = self.setup
+        if setup.output is not JointOutput.POSITIONS:
+            return ""
+        distance, longest = np.abs(torques) / setup.stiffness, setup.highest - setup.lowest
+        worst = int(np.argmax(distance / longest))
+        if distance[worst] <= longest[worst]:
+            return ""
+        return (
+            f"{self.name}: {setup.order.describe(worst)}: a set-point at most {longest[worst]:g} "
+            f"rad from the joint expected, {distance[worst]:.3g} rad given at max_scale "
+            f"{self._max_scale:g}: check stiffness= [N m/rad]"
+        )
+
+
+def check_home(name: str, setup: JointSetup) -> None:
+    """Check that the pose of the open hand is within the limits of the joints.
+
+    Raises:
+        ValueError: it is not, as in degrees, or in another order of the joints.
+    """
+    if setup.home is None:
+        return
+    beyond = np.maximum(setup.lowest - setup.home, setup.home - setup.highest)
+    worst = int(np.argmax(beyond))
+    if beyond[worst] > 0.0:
+        raise ValueError(
+            f"{name}: home: {setup.order.describe(worst)}: {setup.lowest[worst]:g} to "
+            f"{setup.highest[worst]:g} rad expected, {setup.home[worst]:g} given"
         )

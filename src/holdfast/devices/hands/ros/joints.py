@@ -1,4 +1,4 @@
-"""The 16 joints of an Allegro hand: their order, names, limits and torques. No I/O."""
+"""The joints of a hand: order and names; limits and torques of an Allegro hand. No I/O."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -52,53 +52,49 @@ class JointOrder:
     """Order and names of the joints in the messages of a hand.
 
     Args:
-        fingers: the four fingers in the order of the messages; four joints of each follow.
-        prefix: begin of the names of the joints. After it follow finger and joint if the thumb
-            is first (`ah_joint00`), otherwise the number and `.0` (`joint_0.0`).
+        joints: names of the joints of each finger, in the order of the messages.
+
+    Attributes:
+        fingers: names of the fingers.
+        names: names of all joints.
 
     Example:
-        >>> JointOrder(THUMB_FIRST, "ah_joint").names[4:6]
-        ('ah_joint10', 'ah_joint11')
-        >>> JointOrder(THUMB_LAST, "joint_").names[4:6]
-        ('joint_4.0', 'joint_5.0')
+        >>> JointOrder({"thumb": ["th_1", "th_2"], "index": ["if_1"]}).describe(1)
+        'thumb joint 1'
     """
 
-    def __init__(self, fingers: Sequence[str], prefix: str) -> None:
-        self.fingers = tuple(fingers)
-        places = [divmod(joint, JOINTS_PER_FINGER) for joint in range(N_JOINTS)]
-        thumb_first = self.fingers[0] == "thumb"
-        self.names = tuple(
-            f"{prefix}{finger}{joint}"
-            if thumb_first
-            else f"{prefix}{JOINTS_PER_FINGER * finger + joint}.0"
-            for finger, joint in places
-        )
+    def __init__(self, joints: Mapping[str, Sequence[str]]) -> None:
+        self.fingers = tuple(joints)
+        self.names = tuple(name for names in joints.values() for name in names)
+        self._places = [
+            (finger, joint) for finger, names in joints.items() for joint in range(len(names))
+        ]
 
     def values(self, by_finger: ByFinger) -> Array:
-        """Return the values (16,) of all joints in this order."""
+        """Return the values (n_joints,) of all joints in this order."""
         return np.array([value for name in self.fingers for value in by_finger[name]])
 
     def scales(self, command: GripCommand) -> Array:
-        """Return the force scale (16,) of each joint; 1 for fingers without a command."""
-        found = [command.fingers[f].scale if f in command.fingers else 1.0 for f in self.fingers]
-        return np.repeat(found, JOINTS_PER_FINGER)
+        """Return the force scale (n_joints,) of each joint; 1 for fingers without a command."""
+        commands = [command.fingers.get(finger) for finger, _ in self._places]
+        return np.array([1.0 if one is None else one.scale for one in commands])
 
     def describe(self, joint: int) -> str:
         """Return the finger and the number of a joint in it, from 0: "index joint 2"."""
-        finger, number = divmod(joint, JOINTS_PER_FINGER)
-        return f"{self.fingers[finger]} joint {number}"
+        finger, number = self._places[joint]
+        return f"{finger} joint {number}"
 
     def sort(self, states: JointStates) -> JointStates:
-        """Return the states of the 16 joints in this order.
+        """Return the states of the joints in this order.
 
-        States without names, of 16 joints, have this order already.
+        States without names, of as many joints, have this order already.
 
         Raises:
             ValueError: a joint of the hand is missing, or a value is not finite.
         """
         names, n = states.names, len(states.positions)
-        if not names and n == N_JOINTS:
-            places = list(range(N_JOINTS))
+        if not names and n == len(self.names):
+            places = list(range(n))
         elif missing := [name for name in self.names if name not in names[:n]]:
             have = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
             raise ValueError(f"no joint {missing[0]} (there are {have or 'no names'})")
@@ -112,12 +108,40 @@ class JointOrder:
         return sorted_states
 
 
+def allegro_order(fingers: Sequence[str], prefix: str) -> JointOrder:
+    """Return the order of the 16 joints of an Allegro hand.
+
+    Args:
+        fingers: the four fingers in the order of the messages; four joints of each follow.
+        prefix: begin of the names of the joints. After it follow finger and joint if the thumb
+            is first (`ah_joint00`), otherwise the number and `.0` (`joint_0.0`).
+
+    Example:
+        >>> allegro_order(THUMB_FIRST, "ah_joint").names[4:6]
+        ('ah_joint10', 'ah_joint11')
+        >>> allegro_order(THUMB_LAST, "joint_").names[4:6]
+        ('joint_4.0', 'joint_5.0')
+    """
+    thumb_first = fingers[0] == "thumb"
+    return JointOrder(
+        {
+            finger: [
+                f"{prefix}{place}{joint}"
+                if thumb_first
+                else f"{prefix}{JOINTS_PER_FINGER * place + joint}.0"
+                for joint in range(JOINTS_PER_FINGER)
+            ]
+            for place, finger in enumerate(fingers)
+        }
+    )
+
+
 class JointGrip(NamedTuple):
     """Pose and torques of a hand when the grip began, in the order of its messages.
 
     Attributes:
-        positions: angles (16,) [rad]; NaN if they are not measured.
-        torques: torques (16,) [N m].
+        positions: angles (n_joints,) [rad]; NaN if they are not measured.
+        torques: torques (n_joints,) [N m].
     """
 
     positions: Array

@@ -7,13 +7,15 @@ import numpy as np
 
 from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.ros import joints
-from holdfast.devices.hands.ros.joint_hand import JointHand, JointOutput, JointSetup
+from holdfast.devices.hands.ros.controller_kinds import ControllerKind, WidthKind
+from holdfast.devices.hands.ros.joint_hand import JointHand, JointOutput, JointSetup, check_home
 from holdfast.devices.hands.ros.joints import (
     N_JOINTS,
     THUMB_FIRST,
     THUMB_LAST,
     ByFinger,
     JointOrder,
+    allegro_order,
 )
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.scalar_hand import ScalarHand, ScalarSetup
@@ -75,7 +77,7 @@ class JointKind:
     def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> HandDevice:
         """Return the hand of a URI."""
         setup = self._setup(given)
-        return JointHand(name, link, setup, shared=_shared(given), standby=standby)
+        return JointHand(name, link, setup, shared=given.shared, standby=standby)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -85,7 +87,7 @@ class JointKind:
                 "lowest", "highest", "release", "home")  # fmt: skip
 
     def _setup(self, given: Parameters) -> JointSetup:
-        order = JointOrder(given.fingers(self.order), given.prefix(self.prefix))
+        order = allegro_order(given.fingers(self.order), given.prefix(self.prefix))
 
         def table(values: ByFinger | None) -> np.ndarray | None:
             return None if values is None else order.values(values)
@@ -116,7 +118,7 @@ class JointKind:
             home=given.joints("home", table(self.home), each=True) if release == "home" else None,
             home_topic=self.home_topic and f"{namespace}/{self.home_topic}",
         )
-        _check_home(given, setup)
+        check_home(given.text, setup)
         return setup
 
 
@@ -146,7 +148,7 @@ class EnvelopKind:
             word_topic=words if home else None,
             fingers=THUMB_FIRST,
         )
-        return ScalarHand(name, link, setup, shared=_shared(given), standby=standby)
+        return ScalarHand(name, link, setup, shared=given.shared, standby=standby)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -184,10 +186,10 @@ class GripperKind:
             fingers=None,
             closed=closes_to,
         )
-        return ScalarHand(name, link, setup, shared=_shared(given), standby=standby)
+        return ScalarHand(name, link, setup, shared=given.shared, standby=standby)
 
 
-HandKind = JointKind | EnvelopKind | GripperKind
+HandKind = JointKind | EnvelopKind | GripperKind | ControllerKind | WidthKind
 
 HAND_KINDS: dict[str, dict[str, HandKind]] = {
     "ros2": {
@@ -207,6 +209,8 @@ HAND_KINDS: dict[str, dict[str, HandKind]] = {
         ),
         "v5-envelop": EnvelopKind("/allegroHand", "/allegroHand_0"),
         "gripper": GripperKind(),
+        "width-gripper": WidthKind(),
+        "controller": ControllerKind(),
     },
     "ros1": {
         "positions": JointKind(
@@ -221,6 +225,7 @@ HAND_KINDS: dict[str, dict[str, HandKind]] = {
         ),
         "envelop": EnvelopKind("/allegroHand"),
         "gripper": GripperKind(),
+        "width-gripper": WidthKind(),
     },
 }  # fmt: skip
 """Hands by scheme and name."""
@@ -277,24 +282,3 @@ def _joint_limits(given: Parameters, order: JointOrder, *, is_v4: bool) -> tuple
     if not (lowest < highest).all():
         raise ValueError(f"{given.text}: lowest below highest expected for each joint")
     return lowest, highest
-
-
-def _check_home(given: Parameters, setup: JointSetup) -> None:
-    """Check that the pose of the open hand is within the limits of the joints.
-
-    Raises:
-        ValueError: it is not, as in degrees, or in another order of the joints.
-    """
-    if setup.home is None:
-        return
-    beyond = np.maximum(setup.lowest - setup.home, setup.home - setup.highest)
-    worst = int(np.argmax(beyond))
-    if beyond[worst] > 0.0:
-        raise ValueError(
-            f"{given.text}: home: {setup.order.describe(worst)}: {setup.lowest[worst]:g} to "
-            f"{setup.highest[worst]:g} rad expected, {setup.home[worst]:g} given"
-        )
-
-
-def _shared(given: Parameters) -> bool:
-    return given.word("shared", ("false", "true")) == "true"

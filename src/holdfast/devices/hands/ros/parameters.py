@@ -24,6 +24,11 @@ class Parameters:
         self.text = address.text
         self._given = address.parameters
 
+    @property
+    def shared(self) -> bool:
+        """Whether other publishers of the topics of the commands are allowed."""
+        return self.word("shared", ("false", "true")) == "true"
+
     def has(self, name: str) -> bool:
         """Return whether a parameter is given."""
         return name in self._given
@@ -38,26 +43,31 @@ class Parameters:
             return default
         return self._numbers(name, (1,), "a number")[0]
 
-    def joints(self, name: str, default: Array | None = None, *, each: bool = False) -> Array:
-        """Return a value for each joint (16,), in the order of the messages.
+    def joints(
+        self, name: str, default: Array | None = None, *, each: bool = False, n: int = N_JOINTS
+    ) -> Array:
+        """Return a value for each joint (n,), in the order of the messages.
 
         Args:
             name: name of the parameter.
             default: value of a parameter that is not given.
             each: whether one number for all joints is refused.
+            n: number of joints.
 
         Raises:
-            ValueError: there are not 16 numbers, or the parameter is missing.
+            ValueError: there are not `n` numbers, or the parameter is missing.
         """
         if name not in self._given and default is not None:
             return default
-        sizes, text = ((N_JOINTS,), "") if each else ((1, N_JOINTS), "a number or ")
-        found = self._numbers(name, sizes, f"{text}{N_JOINTS} numbers, one for each joint,")
-        return np.full(N_JOINTS, found[0]) if len(found) == 1 else np.array(found)
+        sizes, text = ((n,), "") if each else ((1, n), "a number or ")
+        found = self._numbers(name, sizes, f"{text}{n} numbers, one for each joint,")
+        return np.full(n, found[0]) if len(found) == 1 else np.array(found)
 
-    def positive_joints(self, name: str, default: Array | None = None) -> Array:
+    def positive_joints(
+        self, name: str, default: Array | None = None, *, n: int = N_JOINTS
+    ) -> Array:
         """Return a value above 0 for each joint, as `joints`."""
-        values = self.joints(name, default)
+        values = self.joints(name, default, n=n)
         if not (values > 0).all():
             raise ValueError(
                 f"{self.text}: {name}: numbers above 0 expected, {min(values):g} given"
@@ -107,6 +117,34 @@ class Parameters:
                 f"{','.join(found)!r} given"
             )
         return found
+
+    def named_joints(self, name: str) -> dict[str, list[str]]:
+        """Return the names of the joints of each finger, from `joints=thumb:th_1:th_2,index:if_1`.
+
+        Raises:
+            ValueError: it has another form, or a name occurs twice.
+        """
+        given = self._given.get(name)
+        parts = [part.split(":") for part in (given or "").split(",")]
+        fingers, joints = [part[0] for part in parts], [one for part in parts for one in part[1:]]
+        is_complete = all(len(part) > 1 and all(part) for part in parts)
+        if not is_complete or len({*fingers}) < len(fingers) or len({*joints}) < len(joints):
+            text = "nothing" if given is None else repr(given)
+            raise ValueError(
+                f"{self.text}: {name}=thumb:JOINT:JOINT,index:JOINT expected, each name once, "
+                f"{text} given"
+            )
+        return {finger: names for finger, *names in parts}
+
+    def name(self, name: str) -> str:
+        """Return a name that must be given.
+
+        Raises:
+            ValueError: it is missing or empty.
+        """
+        if not self._given.get(name):
+            raise ValueError(f"{self.text}: {name}=NAME expected, nothing given")
+        return self._given[name]
 
     def prefix(self, default: str) -> str:
         """Return the begin of the names of the joints."""

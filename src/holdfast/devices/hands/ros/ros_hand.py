@@ -3,16 +3,17 @@
 import time
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from holdfast.devices.hands.base import HandDevice
+from holdfast.devices.hands.base import MAX_JOINT_REPORTS, HandDevice
 from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.errors import HandError, SourceError
 from holdfast.grip.command import GripCommand
 from holdfast.ros.topic_messages import JointStates
+from holdfast.sensors.types import Array
 
 HAND_OPEN_TIMEOUT = 5.0
 """Longest wait until the hand listens and sends its joint states [s]."""
@@ -67,6 +68,7 @@ class RosHand(HandDevice):
         self._publishers: dict[str, Publisher] = {}
         self._take_states: TakeStates | None = None
         self._states: deque[tuple[float, JointStates]] = deque()
+        self._reports: deque[Array] = deque(maxlen=MAX_JOINT_REPORTS)
         self._refusal = ""
 
     @property
@@ -86,6 +88,13 @@ class RosHand(HandDevice):
         period = (times[-1] - times[0]) / (len(times) - 1)
         return time.monotonic() - times[-1] > max(SILENCE_TIME, SILENCE_PERIODS * period)
 
+    def joint_reports(self) -> Sequence[Array]:
+        """Return the angles of the valid joint states since the last call, oldest first [rad]."""
+        self._poll()
+        reports = list(self._reports)
+        self._reports.clear()
+        return reports
+
     def open(self) -> None:
         """Wait until the hand listens and sends valid joint states.
 
@@ -93,8 +102,12 @@ class RosHand(HandDevice):
             HandError: it does not within 5 s, or another program publishes commands.
         """
         self.close()
-        with _hand_errors():
-            self._connect()
+        try:
+            with _hand_errors():
+                self._connect()
+        except BaseException:
+            self.close()  # else the next attempt finds the publishers of this one
+            raise
 
     def _connect(self) -> None:
         self._link.open()
@@ -117,6 +130,7 @@ class RosHand(HandDevice):
         self._publishers.clear()
         self._take_states = None
         self._states.clear()
+        self._reports.clear()
         self._refusal = ""
         self._link.close()
 
@@ -160,10 +174,13 @@ class RosHand(HandDevice):
             new = () if self._take_states is None else self._take_states()
         for states in new:
             try:
-                self._states.append((now, self._checked(states)))
+                checked = self._checked(states)
             except ValueError as cause:
                 self.n_refused += 1
                 self._refusal = str(cause)
+            else:
+                self._states.append((now, checked))
+                self._reports.append(checked.positions)
         while len(self._states) > MIN_STATES and now - self._states[0][0] > STATE_MEMORY:
             self._states.popleft()
         return len(self._states) >= MIN_STATES

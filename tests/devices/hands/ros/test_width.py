@@ -1,0 +1,126 @@
+"""Grippers that take a width, and units that cannot be right."""
+
+import gc
+import math
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
+
+from holdfast.devices.hands import open_hand
+from holdfast.devices.hands.ros import ros_hand
+from holdfast.errors import HandError
+from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
+from ros.domains import new_domain
+
+from .drivers import AH_NAMES, POSITIONS, ROS2, Ros2Driver
+
+pytestmark = pytest.mark.slow
+
+COMMAND = GripCommand(1.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)})
+
+
+@pytest.fixture(autouse=True)
+def domain(monkeypatch):
+    """A ROS domain of this test alone, on this machine only."""
+    number = new_domain()
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+    monkeypatch.setattr(ros_hand, "DISCOVERY_TIME", 0.05)
+    return number
+
+
+@pytest.fixture
+def driver(domain):
+    """A function that starts a driver."""
+    gc.collect()  # participants that tests before left in cycles are still in the domain
+    made = []
+
+    def start(described, **changes):
+        made.append(Ros2Driver(described, domain, **changes))
+        return made[-1]
+
+    yield start
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.2)
+
+
+class TestWidth:
+    """A gripper that takes a width; its joint is open at 0 rad, and at 0.8 rad closed by 80 mm."""
+
+    uri = ROS2["width-gripper"].uri
+    begin = 0.08 * (0.8 - POSITIONS[0]) / 0.8
+
+    def send(self, driver, scale, uri="", **changes):
+        """The width that a scale commands [m]."""
+        peer = driver(ROS2["width-gripper"], **changes)
+        with open_hand(self.uri + uri) as hand:
+            hand.check(Limits(max_scale=2.0), ["thumb"])
+            hand.send(GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(scale)}))
+            ((_, message),) = peer.wait(1)
+        assert message["joint_names"] == ["finger_joint"]
+        return 0.08 * (0.8 - message["points"][0]["positions"][0]) / 0.8
+
+    def test_a_stiff_gripper_begins_at_the_width_that_it_has(self, driver):
+        assert self.send(driver, 1.0) == pytest.approx(self.begin)
+
+    def test_each_newton_more_is_narrower_by_the_stiffness(self, driver):
+        assert self.begin - self.send(driver, 2.0) == pytest.approx(4.0 / 2000)
+
+    def test_the_gain_keeps_the_first_force_of_a_soft_gripper(self, driver):
+        narrower = self.begin - self.send(driver, 2.0, "&gain=4000")
+        assert narrower == pytest.approx(4.0 / 4000 + 4.0 / 2000)
+
+    def test_a_width_is_within_the_stroke(self, driver):
+        peer = driver(ROS2["width-gripper"])
+        with open_hand(self.uri.replace("=2000", "=100")) as hand:
+            hand.send(GripCommand(1.0, LoopState.RELAX, {"thumb": FingerCommand(0.0)}))
+            _, message = peer.wait(1)[-1]
+        assert list(message["points"][0]["positions"]) == [0.0]
+
+    def test_a_grip_that_would_close_beyond_the_end_is_refused(self, driver):
+        driver(ROS2["width-gripper"])
+        uri = self.uri.replace("stiffness=2000", "stiffness=70")
+        with open_hand(uri) as hand:
+            hand.check(Limits(max_scale=2.0), ["thumb"])
+            text = r"a width of at least 0.0571 m at the beginning of the grip expected, 0.053 m gi"
+            with pytest.raises(HandError, match=text):
+                hand.send(COMMAND)
+
+    def test_another_joint_is_refused(self, driver, impatient):
+        driver(ROS2["width-gripper"], names=AH_NAMES)
+        with pytest.raises(HandError, match=r"no joint finger_joint \(there are arm_1, ah_joint33"):
+            open_hand(self.uri).open()
+
+    @pytest.mark.parametrize("position", [15.0, -0.05, math.nan])  # degrees, beyond its end
+    def test_a_reading_beyond_the_stroke_is_refused(self, driver, impatient, position):
+        driver(ROS2["width-gripper"]).spoil(position, every=1)
+        with pytest.raises(HandError, match=r"finger_joint at \S+, 0 to 0.8 expected"):
+            open_hand(self.uri).open()
+
+
+class TestUnits:
+    def test_angles_in_degrees_are_refused(self, driver, impatient):
+        driver(ROS2["v4"]).spoil(math.degrees(POSITIONS[0]), every=1)
+        with pytest.raises(HandError, match=r"joint 0 at 15.4699 rad, 0.263 to 1.396 expected"):
+            open_hand("ros2:v4").open()
+
+    def test_a_stiffness_in_degrees_is_refused_before_anything_is_sent(self, driver):
+        peer = driver(ROS2["v4"])
+        with open_hand("ros2:v4?stiffness=0.01") as hand:
+            hand.check(Limits(), ["thumb"])
+            text = r"ring joint 0: a set-point at most 0.94 rad .* check stiffness= \[N m/rad\]"
+            with pytest.raises(HandError, match=text):
+                hand.send(COMMAND)
+        assert not peer.messages
+
+    def test_torques_in_another_order_exceed_the_ceiling_of_a_joint(self):
+        torques = ["0.3"] * 16  # of the second joints; the fourth of a finger has 0.2375
+        with pytest.raises(ValueError, match=r"ring joint 3|thumb joint 2") as failure:
+            open_hand(f"ros2:v4?effort={','.join(torques)}").check(Limits(), ["thumb"])
+        assert "given at max_scale 3: lower one of them" in str(failure.value)
