@@ -6,10 +6,12 @@
     python benchmarks/benchmark_methods.py table OUT
 
 `score` fits each method twice: to the split `train` for the scores of `new-objects`, and to the
-drawn hands of a folder for those of `new-hand-and-objects`. Each fit scores `tuning` too, from
-which the scorer chooses the thresholds. A submission and its results are written for each; those
-that exist are kept. `table` prints the results of a folder as Markdown. The results of a model,
-`holdfast study score FILE --json > OUT/NAME.json`, may lie in the same folder.
+drawn hands of a folder for those of `new-hand-and-objects`. There the contact threshold of a
+finger comes from its own tare interval, since units and noise differ from hand to hand. Each fit
+scores `tuning` too, from which the scorer chooses the thresholds. A submission and its results
+are written for each; those that exist are kept. `table` prints the results of a folder as
+Markdown. The results of a model, `holdfast study score FILE --json > OUT/NAME.json`, may lie in
+the same folder.
 """
 
 import argparse
@@ -88,7 +90,7 @@ def _score(name: str, split: str, train: Path, benchmark: Path, path: Path) -> N
         ValueError: the method does not fit a sensor of the split.
     """
     method = METHODS[name]
-    fitted = BothTargets.fit(method, load_features(method, train))
+    fitted = BothTargets.fit(method, load_features(method, train), own_rest=split == HANDS)
     splits = {own: load_features(method, benchmark / own) for own in (TUNING, split)}
     write_submission(path, fitted, splits)
     result = score_submission(read_submission(path), benchmark, protocol())

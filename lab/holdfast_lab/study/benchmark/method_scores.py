@@ -1,6 +1,7 @@
 """Submissions of the methods of the study: fitted to a folder of recordings, scored on splits."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -11,6 +12,7 @@ import pyarrow.parquet as pq
 from holdfast.errors import TrainingError
 from holdfast.io import load_dataset
 from holdfast.sensors.types import Array
+from holdfast.training.training_samples import contact_threshold
 from holdfast_lab.study.benchmark.submission import COLUMN_TYPES, FingerScores
 from holdfast_lab.study.evaluation.fitted_method import (
     MAX_FITTED_SAMPLES,
@@ -37,14 +39,30 @@ class BothTargets(NamedTuple):
     Attributes:
         stable: fitted to the labels of stability.
         slip: fitted to true sliding.
+        own_rest: take the contact threshold of each finger from the tare interval of the
+            recording, not from training: for hands whose units and noise differ.
     """
 
     stable: FittedMethod
     slip: FittedMethod
+    own_rest: bool = False
 
     @classmethod
-    def fit(cls, method: Method, recordings: Sequence[SlipRecording], seed: int = 0) -> Self:
+    def fit(
+        cls,
+        method: Method,
+        recordings: Sequence[SlipRecording],
+        seed: int = 0,
+        *,
+        own_rest: bool = False,
+    ) -> Self:
         """Fit a method to recordings, as the study does.
+
+        Args:
+            method: to fit.
+            recordings: to fit it to.
+            seed: of the fit.
+            own_rest: see the class.
 
         Raises:
             TrainingError: no finger has samples of both classes.
@@ -60,7 +78,7 @@ class BothTargets(NamedTuple):
         )
         if not (stable.classifiers and slip.classifiers):
             raise TrainingError(f"{method.name}: no finger with samples of both classes given")
-        return cls(stable, slip)
+        return cls(stable, slip, own_rest)
 
     def scores(self, recording: SlipRecording) -> dict[str, FingerScores]:
         """Return the scores of each finger of a recording, 0 where there is no estimate.
@@ -71,8 +89,8 @@ class BothTargets(NamedTuple):
         Raises:
             ValueError: a finger has no estimate at all: the method does not fit the sensor.
         """
-        stable = self.stable.scores(recording.features)
-        slips = score_slips(self.slip, recording)
+        stable = self._for(self.stable, recording).scores(recording.features)
+        slips = score_slips(self._for(self.slip, recording), recording)
         scored = {}
         for finger in recording.truth:
             margins = _margins(stable, recording.features, finger)
@@ -81,6 +99,16 @@ class BothTargets(NamedTuple):
             margins = np.where(stable.in_contact[finger], margins, -np.inf)
             scored[finger] = FingerScores(_known(margins), _known(slips[finger].score))
         return scored
+
+    def _for(self, fitted: FittedMethod, recording: SlipRecording) -> FittedMethod:
+        """Return a fitted method with the contact thresholds that apply to a recording."""
+        if not self.own_rest:
+            return fitted
+        at_rest = recording.features.at_rest
+        thresholds = {
+            finger: contact_threshold(np.array([moments])) for finger, moments in at_rest.items()
+        }
+        return replace(fitted, contact_thresholds=thresholds)
 
 
 def load_features(method: Method, folder: Path) -> list[SlipRecording]:

@@ -199,6 +199,24 @@ def test_a_method_that_does_not_fit_a_sensor_has_no_scores(folder):
         fitted.scores(other)
 
 
+def test_a_hand_of_another_unit_has_the_contact_threshold_of_its_own_rest(folder):
+    """Readings ten thousand times smaller: nothing touches by the threshold of training."""
+    method = METHODS["tangential"]
+    recordings = load_features(method, folder / "tuning")
+    features = recordings[0].features
+    small = replace(
+        features,
+        amplitude={name: 1e-4 * rows for name, rows in features.amplitude.items()},
+        at_rest={n: (k, 1e-4 * a, 1e-8 * b) for n, (k, a, b) in features.at_rest.items()},
+    )
+    other = replace(recordings[0], features=small)
+    own, trained = (BothTargets.fit(method, recordings, own_rest=rest) for rest in (True, False))
+    assert trained.scores(other)["thumb"].stable.max() < 1e-9
+    scores = own.scores(other)["thumb"].stable
+    assert (scores == own.scores(recordings[0])["thumb"].stable).all()
+    assert scores.max() > 0.5
+
+
 def test_only_the_order_of_scores_counts_for_events_and_slips(capsys, folder, tmp_path):
     def bent(recording, finger):
         return tuple(0.9 * scores**3 for scores in noisy_truth(recording, finger))
