@@ -10,9 +10,10 @@ Its rules have no units, so that they carry over between counts and newtons:
    the model decides that it slides. The doubt in the hand is the mean over the fingers, weighted
    by their share of the normal force in the calm grip: a finger that carries little says little.
 2. Reaction. The doubt above a level, summed over time, starts a step: at once if the hand surely
-   slides, after some time if one finger does. The step grows with the doubt. Where friction falls,
-   all contacts slide smoothly and the hand carries less than in the calm grip: the missing share
-   of the load adds to a doubt that is above its level.
+   slides, after some time if one finger does. The step grows with the doubt, and is smaller the
+   harder the hand presses already. Where friction falls, all contacts slide smoothly and the hand
+   carries less than in the calm grip: the missing share of the load adds to a doubt that is above
+   its level, and the step is larger, because friction may fall further.
 3. Hysteresis. A step shakes the contacts itself. So there is a refractory time without any step,
    and then, until the episode is over, a higher level. A force that falls stirs the contacts a
    little, and has a level of its own.
@@ -23,9 +24,10 @@ Its rules have no units, so that they carry over between counts and newtons:
 5. Jerks. Where the hand reports its joints, a jerk of its own controller explains a doubt that
    begins with it. For a short time such a doubt starts nothing, unless load is missing. A doubt
    that lasts longer is a slip that the jerk began.
-6. Relaxation. In a calm grip the force falls slowly, to a margin above the force at which a slip
-   began, or, where the slip rule decides that fingers slide, above what the load needs at the
-   friction that these fingers show. Both are forgotten slowly.
+6. Relaxation. In a calm grip the force falls slowly, to a margin above what the load needs at the
+   friction that a step has shown: T/N of the fingers that slide, or of all fingers where none is
+   decided to slide. The calm grip held at its own T/N, so the friction is not much lower than
+   that. It is forgotten slowly.
 """
 
 import math
@@ -46,11 +48,15 @@ SLIDING_DOUBT = 0.7
 """Least doubt in a finger that is decided to slide."""
 LARGEST_DOUBT = 2.0
 """Largest doubt, with the missing load, that enters a step."""
+FALLING_STEP = 0.6
+"""What a step is larger by where the hand carries less than in the calm grip: friction falls."""
+HELD_SHARE = 0.9
+"""Least friction that a step can show, as a share of T/N of the calm grip, which held."""
 PRESS_TIME = 0.1
 """Time for which a step is wanted after it began, so that the limit of speed lets it end [s]."""
 JERK_TIME = 0.25
 """Time for which a jerk of the hand explains a doubt [s]: two periods of its ringing, 8 Hz."""
-JERK_LAG = 0.02
+JERK_LAG = 0.007
 """Time after a doubt began within which a jerk explains it [s]: joints and taxels have clocks and
 delays of their own."""
 JERK_MISSING_LOAD = 0.1
@@ -86,7 +92,8 @@ class Stability(Law):
     Args:
         levels: doubt from which it counts: in a hold, while the force falls, and after a step.
         reaction: sum over time of the doubt above its level at which a step begins [s].
-        step: rise of the scale in a step without doubt, and its growth with the doubt.
+        step: rise of the scale in a step from the first grip, without doubt, and its growth with
+            the doubt; from a higher scale, it is divided by that scale.
         missing_gain: growth of the doubt with the share of the load that is missing.
         refractory: time after a step in which there is no other one [s].
         episode: time after a step in which its level holds [s].
@@ -94,23 +101,23 @@ class Stability(Law):
         calm: doubt below which the grip is calm, for `settle_time` [s], before the force falls.
         settle_time: see `calm`.
         fall: relative speed of the fall [1/s].
-        margin: floor after a slip, as a multiple of the force at which it began.
-        memory: time constant with which floor and friction are forgotten [s].
+        margin: force to which a calm hand relaxes, as a multiple of what the load needs.
+        memory: time constant with which the friction is forgotten [s].
     """
 
     def __init__(
         self,
         *,
-        levels: tuple[float, float, float] = (0.12, 0.25, 0.85),
+        levels: tuple[float, float, float] = (0.12, 0.35, 0.85),
         reaction: float = 0.005,
         step: tuple[float, float] = (0.7, 0.4),
         missing_gain: float = 5.0,
         refractory: float = 0.2,
         episode: float = 0.6,
         growth: float = 1.1,
-        calm: float = 0.15,
+        calm: float = 0.22,
         settle_time: float = 0.15,
-        fall: float = 0.7,
+        fall: float = 0.5,
         margin: float = 1.25,
         memory: float = 20.0,
     ) -> None:
@@ -128,7 +135,7 @@ class Stability(Law):
         self._load, self._press = self._sums()
         self._calm_load, self._calm_scale = self._load, 1.0
         self._calm_ratio = self._load / self._press if self._press > 0 else 0.0
-        self._sum, self._floor, self._target = 0.0, 1.0, 0.0
+        self._sum = self._target = 0.0
         self._friction = math.inf
         self._stepped_at = self._followed_at = self._fell_at = self._unsettled_at = NEVER
         self._jerked_at = self._rested_at = NEVER
@@ -140,14 +147,14 @@ class Stability(Law):
         doubt = self._observe(touches, dt)
         if doubt > self.calm:
             self._unsettled_at = time
-        else:
+        if doubt <= self.hold_level:
             self._rested_at = time
         if touches[0].jerked and time - self._rested_at <= JERK_LAG:
             self._jerked_at = time
         is_calm = time - self._unsettled_at > self.settle_time
         if is_calm:
             self._follow_calm(scale, min(dt / FOLLOW_TIME, 1.0))
-        self._forget(dt / self.memory)
+        self._friction *= 1.0 + dt / self.memory
         self._react(doubt, scale, time, dt)
         pressing = time - max(self._stepped_at, self._followed_at) < PRESS_TIME
         if pressing and self._target > scale:
@@ -185,11 +192,6 @@ class Stability(Law):
         for finger in self._fingers:
             finger.share += part * (finger.press - finger.share)
 
-    def _forget(self, part: float) -> None:
-        """Forget a part of the floor and of what slips have shown of the friction."""
-        self._floor -= min(part, 1.0) * (self._floor - 1.0)
-        self._friction *= 1.0 + part
-
     def _react(self, doubt: float, scale: float, time: float, dt: float) -> None:
         """Begin a step if the doubt lasts; else follow a load that grows."""
         since = time - self._stepped_at
@@ -214,23 +216,27 @@ class Stability(Law):
         """Return the level of the doubt, at a time since the last step."""
         if since < self.episode:
             return self.again_level
-        return self.fall_level if time - self._fell_at < self.episode else self.hold_level
+        is_stirred = self._rested_at < self._stepped_at or time - self._fell_at < self.episode
+        return self.fall_level if is_stirred else self.hold_level
 
     def _step(self, evidence: float, scale: float, time: float) -> None:
-        """Begin a step; the first one of an episode shows friction and the least force."""
+        """Begin a step; the first one of an episode shows the friction."""
         if time - self._stepped_at >= self.episode:
-            self._floor = max(self._floor, self.margin * scale)
             self._learn()
-        self._target = scale + self.least_step + self.step_growth * evidence
+        step = self.least_step + self.step_growth * evidence
+        if self._load < self._calm_load:
+            step += FALLING_STEP
+        self._target = scale + step / max(scale, 1.0)
         self._stepped_at, self._reason, self._sum = time, GripReason.UNSTABLE, 0.0
 
     def _learn(self) -> None:
-        """Take T/N of the fingers that slide as the friction, if it is lower than the known one."""
-        sliding = [finger for finger in self._fingers if finger.slides]
+        """Take T/N of the fingers that slide, or of all, as the friction, if it is lower."""
+        sliding = [finger for finger in self._fingers if finger.slides] or self._fingers
         press = sum(finger.press for finger in sliding)
         if press > 0:
             ratio = sum(finger.load for finger in sliding) / press
-            self._friction = min(self._friction, max(ratio, LEAST_FRICTION))
+            least = max(LEAST_FRICTION, HELD_SHARE * self._calm_ratio)
+            self._friction = min(self._friction, max(ratio, least))
 
     def _follow_load(self, scale: float, time: float) -> None:
         """Follow a load that has grown beyond the margin; a fall of N alone is no growth."""
@@ -243,9 +249,8 @@ class Stability(Law):
             self._followed_at, self._reason = time, GripReason.LOAD
 
     def _relaxed(self, scale: float, time: float, dt: float) -> float:
-        """Return a scale that falls to what friction and floor need, 1 at least."""
-        lowest = max(1.0, self._needed()) if self._friction < math.inf else self._floor
-        relaxed = min(scale, max(scale * (1.0 - self.fall * dt), lowest))
+        """Return a scale that falls to what the load needs, 1 at least."""
+        relaxed = min(scale, max(scale * (1.0 - self.fall * dt), 1.0, self._needed()))
         if relaxed < scale:
             self._fell_at = time
         return relaxed
