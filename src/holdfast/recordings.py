@@ -160,13 +160,19 @@ class Tactile:
         )
         if not part.n_samples:
             return part
-        first, last = float(part.times[0]), float(part.times[-1]) + part.period
-        labels = tuple(
-            replace(label, start=max(label.start, first), end=min(label.end, last))
-            for label in self.labels
-            if label.start < last and label.end > first
-        )
-        return replace(part, labels=labels)
+        return replace(part, labels=cut_labels(self.labels, part))
+
+
+def cut_labels(labels: tuple[Label, ...], module: Tactile) -> tuple[Label, ...]:
+    """Return the labels that overlap the samples of a module, cut to them."""
+    if module.n_samples == 0:
+        return ()
+    first, last = float(module.times[0]), float(module.times[-1]) + module.period
+    return tuple(
+        replace(label, start=max(label.start, first), end=min(label.end, last))
+        for label in labels
+        if label.start < last and label.end > first
+    )
 
 
 @dataclass(frozen=True, eq=False)

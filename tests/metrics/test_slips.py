@@ -249,6 +249,16 @@ class TestThresholds:
         assert rates[place - 1] > 1.0
         assert all(rate <= 1.0 for rate in rates[place:])
 
+    def test_false_alarms_are_counted_in_held_time_or_in_quiet_hold_alone(self):
+        total = tuple(SlipCounts.total(column) for column in zip(*self.curves, strict=True))
+        pushed = tuple(replace(counts, false_held=counts.false_held + 99) for counts in total)
+        assert choose_threshold(pushed, 1.0) is None
+        place = choose_threshold(pushed, 1.0, "quiet")
+        rates = [60 * counts.false_quiet / counts.quiet_seconds for counts in total]
+        raised = [counts.raised_seconds / counts.quiet_seconds for counts in total]
+        assert rates[place] <= 1.0
+        assert rates[place - 1] > 1.0 or raised[place - 1] > 0.02
+
     def test_a_curve_is_the_counts_at_each_threshold(self):
         slips = [slip(), slip(8.0, 8.3, gross=8.1, reached=(8.05, math.nan))]
         made = replace(

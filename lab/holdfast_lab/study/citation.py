@@ -32,12 +32,15 @@ REFERENCES = """\
 }
 @misc{james2020,
   author = {James, Jasper W. and Lepora, Nathan F.},
+  title = {Slip detection for grasp stabilisation with a multi-fingered tactile robot hand},
   eprint = {2010.01928},
   archiveprefix = {arXiv},
   year = {2020},
 }
 @article{wong2026,
-  author = {Wong and Zhu},
+  author = {Wong, Dickson Chiu Yu and Zhu, Zheng H.},
+  title = {Calibration-free per-finger force-feedback slip control for grasping by
+           anthropomorphic hand with tri-axial tactile sensors},
   journal = {Frontiers in Robotics and AI},
   doi = {10.3389/frobt.2026.1735467},
   year = {2026},

@@ -16,11 +16,10 @@ from holdfast.io.timed_arrays import (
     TACTILE,
     TimedArray,
     TimedArrays,
-    cut_labels,
     recording_from,
     time_spans,
 )
-from holdfast.recordings import Label, Recording
+from holdfast.recordings import Label, Recording, cut_labels
 
 SUFFIXES = (".parquet", ".mcap")
 """Suffixes of the formats; the first is preferred if a recording exists in both."""

@@ -18,7 +18,7 @@ from holdfast.io.header import (
     header_sensors,
     label_of,
 )
-from holdfast.recordings import Label, Recording, Tactile, Truth
+from holdfast.recordings import Recording, Tactile, Truth, cut_labels
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
@@ -129,18 +129,6 @@ def recording_from(
         )
     except (RecordingError, ValueError) as cause:
         raise RecordingError(f"{path}: {cause}") from cause
-
-
-def cut_labels(labels: tuple[Label, ...], module: Tactile) -> tuple[Label, ...]:
-    """Return the labels that overlap the samples of a module, cut to them."""
-    if module.n_samples == 0:
-        return ()
-    first, last = float(module.times[0]), float(module.times[-1]) + module.period
-    return tuple(
-        replace(label, start=max(label.start, first), end=min(label.end, last))
-        for label in labels
-        if label.start < last and label.end > first
-    )
 
 
 def time_spans(

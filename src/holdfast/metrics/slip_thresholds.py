@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -83,20 +83,24 @@ def total_curve(curves: Sequence[Curve]) -> Curve:
     return tuple(replace(counts, scores=totals[0].scores) for counts in totals)
 
 
-def choose_threshold(curve: Curve, false_alarms: float) -> int | None:
+def choose_threshold(
+    curve: Curve, false_alarms: float, counted_in: Literal["held", "quiet"] = "held"
+) -> int | None:
     """Return the place of the lowest threshold with few enough false alarms.
 
-    It has at most so many per minute of all held time, and a slip is reported in at most 2 % of
-    quiet hold; so has every higher threshold.
+    It has at most so many per minute, and a slip is reported in at most 2 % of quiet hold; so has
+    every higher threshold.
 
     Args:
         curve: of the recordings from which the threshold is chosen.
-        false_alarms: maximum number per minute of held time, of one finger.
+        false_alarms: maximum number per minute, of one finger.
+        counted_in: all held time, or quiet hold alone.
 
     Returns:
         The place in `THRESHOLDS`; None if no threshold fits, or nothing is held.
     """
-    table, choice = [[_ratios(counts) for counts in curve]], ThresholdChoice(false_alarms)
+    table = [[_ratios(counts) for counts in curve]]
+    choice = ThresholdChoice(false_alarms, counted_in)
     place = int(_places(_limited(table, choice), choice, np.ones((1, 1)))[0])
     return place if place < len(curve) else None
 
@@ -112,10 +116,13 @@ class ThresholdChoice:
     """Choice of a threshold that an interval repeats in each resample.
 
     Attributes:
-        false_alarms: maximum number per minute of held time, of one finger.
+        false_alarms: maximum number per minute, of one finger.
+        counted_in: all held time, pushes and glitches included, or quiet hold alone. Either way
+            a slip is reported in at most 2 % of quiet hold.
     """
 
     false_alarms: float
+    counted_in: Literal["held", "quiet"] = "held"
 
 
 def held_out_places(
@@ -254,7 +261,10 @@ def _held_out(
 
 def _limits(choice: ThresholdChoice) -> dict[tuple[str, str], float]:
     """Return the limits of the metrics by which a threshold is chosen."""
-    return {("false_alarms", "held"): choice.false_alarms, ("raised_quiet", ""): MAX_RAISED_QUIET}
+    return {
+        ("false_alarms", choice.counted_in): choice.false_alarms,
+        ("raised_quiet", ""): MAX_RAISED_QUIET,
+    }
 
 
 def _limited(table: Table, choice: ThresholdChoice) -> "list[_Sums]":

@@ -23,7 +23,7 @@ from holdfast.contact import (
     Phase,
 )
 from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
-from holdfast.recordings import Label, Recording, Truth, labels_from_samples
+from holdfast.recordings import Label, Recording, Truth, cut_labels, labels_from_samples
 from holdfast.sensors.types import Array
 
 Onsets = Literal["truth", "labels", "mixed"]
@@ -109,7 +109,8 @@ def labels_from_truth(
 def relabel(recording: Recording, rule: LabelRule) -> Recording:
     """Return the recording with labels made from its truth.
 
-    Fingers without a truth keep their labels.
+    Fingers without a truth keep their labels. Labels are cut to the samples: a sensor may start
+    later than the truth.
 
     Args:
         recording: to label.
@@ -117,7 +118,7 @@ def relabel(recording: Recording, rule: LabelRule) -> Recording:
     """
     labels = labels_by_truth(recording, rule)
     modules = {
-        name: replace(module, labels=labels.get(name, module.labels))
+        name: replace(module, labels=cut_labels(labels[name], module)) if name in labels else module
         for name, module in recording.modules.items()
     }
     return replace(recording, modules=modules) if labels else recording

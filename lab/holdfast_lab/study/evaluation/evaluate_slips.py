@@ -38,8 +38,11 @@ from holdfast_lab.study.methods.slip_methods import SLIP_METHODS, SlipMethod
 from holdfast_lab.study.plan import Corpus
 
 SLIP_RATE = 1.0
-"""False alarms per minute of all held time of a finger for which thresholds are chosen [1/min]."""
+"""False alarms per minute of a finger for which thresholds are chosen [1/min]."""
 CHOICE = ThresholdChoice(SLIP_RATE)
+"""Choice by the false alarms of all held time."""
+QUIET_CHOICE = ThresholdChoice(SLIP_RATE, "quiet")
+"""Choice by the false alarms of quiet hold alone: pushes and glitches may raise a slip."""
 
 Curves = Sequence[Mapping[str, Curve]]
 """Counts of slips of each finger, at each threshold, of each recording."""
@@ -72,12 +75,15 @@ class SlipEvaluation(msgspec.Struct, frozen=True):
     Attributes:
         split: `object` or `recording`; empty for another corpus.
         n_recordings: in which slips are known.
-        summary: of the slips, by fingers and pooled.
+        summary: of the slips, by fingers and pooled, at the threshold for all held time.
+        quiet_budget: the same at the threshold for quiet hold alone; None where only the first
+            is chosen.
     """
 
     split: str
     n_recordings: int
     summary: SlipSummary
+    quiet_budget: SlipSummary | None = None
 
 
 def evaluate_slips(job: SlipJob) -> dict[str, SlipEvaluation]:
@@ -104,13 +110,19 @@ def evaluate_slips(job: SlipJob) -> dict[str, SlipEvaluation]:
         return {}
     curves = [_curves(scores[place], ranks) for place in range(len(recordings))]
     groups = [next(k for k, held in enumerate(folds) if p in held) for p in range(len(recordings))]
-    results = {job.train.name: _out_of_fold(curves, groups, split, job.seed)}
+    of_budgets = [
+        _out_of_fold(curves, groups, split, job.seed, choice) for choice in (CHOICE, QUIET_CHOICE)
+    ]
+    results = {job.train.name: _of_both_budgets(*of_budgets)}
     fitted = FittedMethod.fit(chosen.method, training, range(len(recordings)), job.seed)
     for corpus in job.tests:
         tested = slip_recordings(chosen.method, corpus, warm_up)
         fresh = [_curves(score_slips(fitted, recording), ranks) for recording in tested]
         if fresh:
-            results[corpus.name] = summarise_fresh(fresh, curves, job.seed)
+            results[corpus.name] = _of_both_budgets(
+                summarise_fresh(fresh, curves, job.seed),
+                summarise_fresh(fresh, curves, job.seed, QUIET_CHOICE),
+            )
     return {name: result for name, result in results.items() if result.summary.pooled.n}
 
 
@@ -145,26 +157,37 @@ def _pooled(curves: Curves) -> list[Curve]:
     return [total_curve(list(fingers.values())) for fingers in curves]
 
 
-def _out_of_fold(curves: Curves, groups: Sequence[int], split: str, seed: int) -> SlipEvaluation:
+def _of_both_budgets(held: SlipEvaluation, quiet: SlipEvaluation) -> SlipEvaluation:
+    """Return one evaluation with the thresholds for all held time and for quiet hold."""
+    return msgspec.structs.replace(held, quiet_budget=quiet.summary)
+
+
+def _out_of_fold(
+    curves: Curves, groups: Sequence[int], split: str, seed: int, choice: ThresholdChoice
+) -> SlipEvaluation:
     """Return the scores of recordings, each at the threshold of the other folds."""
     pooled = _pooled(curves)
-    places = held_out_places(pooled, groups, CHOICE).tolist()
-    intervals = slip_intervals(pooled, CHOICE, groups=groups, seed=seed)
+    places = held_out_places(pooled, groups, choice).tolist()
+    intervals = slip_intervals(pooled, choice, groups=groups, seed=seed)
     return _evaluation(split, curves, places, intervals)
 
 
-def summarise_fresh(curves: Curves, training: Curves, seed: int) -> SlipEvaluation:
+def summarise_fresh(
+    curves: Curves, training: Curves, seed: int, choice: ThresholdChoice = CHOICE
+) -> SlipEvaluation:
     """Return the scores of other recordings, at the threshold of the training recordings.
 
     Args:
         curves: of the tested recordings.
         training: of the recordings from which the threshold is chosen.
         seed: of the bootstrap, which draws from both.
+        choice: of the threshold.
     """
     chosen_from = _pooled(training)
-    place = choose_threshold(total_curve(chosen_from), SLIP_RATE)
+    total = total_curve(chosen_from)
+    place = choose_threshold(total, choice.false_alarms, choice.counted_in)
     places = [len(chosen_from[0]) - 1 if place is None else place] * len(curves)
-    intervals = slip_intervals(_pooled(curves), CHOICE, training=chosen_from, seed=seed)
+    intervals = slip_intervals(_pooled(curves), choice, training=chosen_from, seed=seed)
     return _evaluation("", curves, places, intervals)
 
 

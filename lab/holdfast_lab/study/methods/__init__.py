@@ -14,6 +14,7 @@ from holdfast_lab.study.methods.method import (
 from holdfast_lab.study.methods.vibration import SLIP_SERVO, SPECTRUM
 from holdfast_lab.study.methods.wavelets import (
     ENERGY,
+    LOG_HAND,
     LOG_TWO,
     LOGREG,
     LOGREG_UNWEIGHTED,
@@ -31,6 +32,7 @@ METHODS: dict[str, Method] = {
         SVM,
         SVM_UNWEIGHTED,
         LOG_TWO,
+        LOG_HAND,
         ENERGY,
         HOLDFAST,
         ZHANG,

@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.classifiers import recipe
 from holdfast.errors import TrainingError
-from holdfast.features.motion import GAP_LIMIT_PERIODS
 from holdfast.sensors.types import Array
 from holdfast_lab.classifiers.tcn import TemporalConvolution
 from holdfast_lab.study.methods.method import (
@@ -15,6 +13,7 @@ from holdfast_lab.study.methods.method import (
     FingerSignal,
     HandSignal,
     Method,
+    latest_rows,
     stretchwise,
     windowed,
 )
@@ -121,12 +120,7 @@ def hand_motion(hand: HandSignal) -> dict[str, Array]:
             f"{len(hand.fingers)} given ({', '.join(hand.fingers) or 'none'})"
         )
     times = next(iter(hand.fingers.values())).times
-    max_age = GAP_LIMIT_PERIODS / hand.rate
-    parts = [
-        _latest_rows(hand.fingers[name].times, rows, times, max_age)
-        for name, rows in taxel_motion(hand).items()
-    ]
-    return {HAND: np.hstack(parts)}
+    return {HAND: np.hstack(list(latest_rows(hand, taxel_motion(hand), times)))}
 
 
 def _motion_of_finger(finger: FingerSignal) -> Array:
@@ -162,13 +156,6 @@ def motion_features(motion: Array) -> Array:
 def _unit(vectors: Array, lengths: Array) -> Array:
     """Return vectors of length 1; 0 for a vector of length 0."""
     return vectors / np.where(lengths > 0, lengths, 1.0)[..., None]
-
-
-def _latest_rows(source: Array, rows: Array, times: Array, max_age: float) -> Array:
-    """Return the latest row at each of `times`; NaN if it is older than `max_age` [s]."""
-    last: npt.NDArray[np.intp] = np.searchsorted(source, times, side="right") - 1
-    known = (last >= 0) & (times - source[last] <= max_age)
-    return np.where(known[:, None], rows[last], np.nan)
 
 
 def last_second(hand: HandSignal) -> dict[str, Array]:

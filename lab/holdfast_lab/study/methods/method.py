@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.classifiers import Parameters, Recipe
@@ -190,6 +191,27 @@ def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> 
             features[rows] = function(stretch)
         found[name] = features
     return found
+
+
+def latest_rows(hand: HandSignal, rows: Mapping[str, Array], times: Array) -> Iterator[Array]:
+    """Yield the rows of every finger as they are known at some times.
+
+    A finger contributes its last sample that is not later. If that is more than three sample
+    periods old, its values are NaN.
+
+    Args:
+        hand: gives the times of the fingers.
+        rows: (n, n_features) of every finger.
+        times: (m,) [s].
+
+    Yields:
+        (m, n_features) of one finger after the other.
+    """
+    for name, own in rows.items():
+        sampled = hand.fingers[name].times
+        last: npt.NDArray[np.intp] = np.searchsorted(sampled, times, side="right") - 1
+        known = (last >= 0) & (times - sampled[last] <= GAP_LIMIT_PERIODS / hand.rate)
+        yield np.where(known[:, None], own[last], np.nan)
 
 
 def windowed(values: Array, window: int, function: Callable[[Array], Array]) -> Array:

@@ -16,7 +16,8 @@ Target = Literal["sliding", "stability"]
 """What a method is fitted to: true sliding of a finger, or the labels of stability."""
 
 RIVALS = (
-    "logreg", "friction", "slip_servo", "spectrum", "difference", "tangential", "anyskin",
+    "logreg", "svm", "log_two", "log_hand", "energy", "zhang", "friction",
+    "slip_servo", "spectrum", "difference", "tangential", "anyskin",
     "jl_local_logreg", "jl_local_svm", "jl_global_logreg", "jl_global_svm",
 )  # fmt: skip
 """Names of the other methods, of `METHODS`."""

@@ -3,6 +3,7 @@
 - `LOGREG`, `SVM`: the paper's method, a linear classifier of the force and of sigma, with
   balanced classes; `LOGREG_UNWEIGHTED`, `SVM_UNWEIGHTED`: without class weights.
 - `LOG_TWO`: the same idea with two features, log F_a and log sigma.
+- `LOG_HAND`: the same with a third one, the largest log sigma of all fingers of the hand.
 - `ENERGY`: a threshold on the energy of the details of F_a, without their mean taken out.
 - `TREES`: boosted trees on the paper's six features, as an upper limit of what they hold.
 - `ZHANG`: the energy of the details of the normal force.
@@ -24,6 +25,7 @@ from holdfast_lab.study.methods.method import (
     FingerSignal,
     HandSignal,
     Method,
+    latest_rows,
     stretchwise,
     windowed,
 )
@@ -35,6 +37,11 @@ UNWEIGHTED_SOURCE = (
 LOG_TWO_SOURCE = (
     "no paper: the two quantities of Kitouni et al., F_a and sigma at N_w = 14, on logarithmic "
     "scales, by logistic regression with balanced classes"
+)
+LOG_HAND_SOURCE = (
+    "no paper: log F_a and log sigma of the finger at N_w = 14, and the largest log sigma of all "
+    "fingers, so that a finger is judged by the whole hand too; logistic regression with balanced "
+    "classes"
 )
 ENERGY_SOURCE = (
     "the rival of sigma in Kitouni et al.: sum d^2 of the Haar details of F_a at N_w = 14, whose "
@@ -146,6 +153,21 @@ def _log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
     }
 
 
+def _log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
+    """Return log10 of F_a, of sigma and of the largest sigma of all fingers, (n, 3).
+
+    Fingers without a sigma at the time are left out of the largest.
+    """
+    own = _log_force_and_sigma(hand)
+    sigmas = {name: rows[:, 1:] for name, rows in own.items()}
+    return {
+        name: np.hstack([
+            rows, np.fmax.reduce(list(latest_rows(hand, sigmas, hand.fingers[name].times)))
+        ])
+        for name, rows in own.items()
+    }  # fmt: skip
+
+
 def _normal_energy(hand: HandSignal) -> Mapping[str, Array]:
     return normal_energy(hand)
 
@@ -170,6 +192,10 @@ SVM_UNWEIGHTED = Method(
 LOG_TWO = Method(
     "log_two", "LogReg of log F_a and log sigma", "paper", LOG_TWO_SOURCE,
     _log_force_and_sigma, recipe("logreg"),
+)  # fmt: skip
+LOG_HAND = Method(
+    "log_hand", "LogReg of log F_a, log sigma and the hand's largest", "paper", LOG_HAND_SOURCE,
+    _log_force_and_sigmas, recipe("logreg"),
 )  # fmt: skip
 TREES = Method(
     "trees", "Boosted trees, 6 features", "learning", TREES_SOURCE, _six_features,

@@ -4,6 +4,7 @@ import csv
 import json
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -18,6 +19,7 @@ from holdfast.io import load_dataset, save_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 from holdfast_lab.study.benchmark import protocol as protocol_module
+from holdfast_lab.study.benchmark.method_scores import BothTargets, load_features
 from holdfast_lab.study.benchmark.protocol import (
     BenchmarkProtocol,
     BenchmarkSplit,
@@ -25,9 +27,11 @@ from holdfast_lab.study.benchmark.protocol import (
     protocol,
 )
 from holdfast_lab.study.benchmark.scoring import log_odds
+from holdfast_lab.study.methods import METHODS
 from study.example_recordings import SLIPS, recording_with_truth
 
-SCRIPT = Path(__file__).parents[4] / "benchmarks" / "submission.py"
+SCRIPTS = Path(__file__).parents[4] / "benchmarks"
+WHOLE_HAND = "jl_global_logreg"
 SEEDS = {"tuning": (0, 1, 2), "new-objects": (3, 4, 5), "new-hand-and-objects": (6, 7)}
 
 
@@ -121,6 +125,11 @@ def refusal(capsys, folder, path):
     return err.removeprefix("holdfast: ").rstrip("\n")
 
 
+def run_script(monkeypatch, name, *words):
+    monkeypatch.setattr(sys, "argv", [name, *words])
+    runpy.run_path(str(SCRIPTS / name), run_name="__main__")
+
+
 def test_the_truth_makes_no_error(capsys, folder, tmp_path):
     document, err = scored(
         capsys, folder, write_csv(tmp_path / "s.csv", rows_of(folder, the_truth))
@@ -152,12 +161,60 @@ def test_the_scores_of_another_program(capsys, folder, tmp_path):
 
 def test_the_script_writes_the_scores_of_a_model(capsys, folder, tmp_path, monkeypatch):
     out = tmp_path / "any.parquet"
-    monkeypatch.setattr(sys, "argv", ["submission.py", str(folder), "builtin:any", str(out)])
-    runpy.run_path(str(SCRIPT), run_name="__main__")
+    run_script(monkeypatch, "submission.py", str(folder), "builtin:any", str(out))
     document, err = scored(capsys, folder, out)
     assert (document["left_out"], err) == ([], "")
     assert figure(document, "stability", "AUC", on="new-objects") > 0.9
     assert figure(document, "slips", "n slips", on="new-hand-and-objects") == 4
+
+
+def test_the_script_scores_the_methods_of_the_study(capsys, folder, tmp_path, monkeypatch):
+    """A fit scores its split and `tuning`; results that exist are kept."""
+    benchmark, out = tmp_path / "benchmark", tmp_path / "out"
+    benchmark.mkdir()
+    for split, recordings in {**{name: name for name in SEEDS}, "train": "tuning"}.items():
+        (benchmark / split).symlink_to(folder / recordings)
+    words = ["score", str(benchmark), str(folder / "tuning"), str(out)]
+    for n_made in (4, 0):
+        run_script(monkeypatch, "benchmark_methods.py", *words, "--methods", "logreg", WHOLE_HAND)
+        assert capsys.readouterr().out.count("done\n") == n_made
+    run_script(monkeypatch, "benchmark_methods.py", "table", str(out))
+    head, _, *lines = (line.split(" | ") for line in capsys.readouterr().out.splitlines())
+    assert [line[0] for line in lines] == ["| `new-objects`"] * 2 + ["| `new-hand-and-objects`"] * 2
+    assert {line[1] for line in lines} == {METHODS[n].title for n in ("logreg", WHOLE_HAND)}
+    assert all(float(line[head.index("AUC")]) > 0.9 for line in lines)
+    document, _ = scored(capsys, benchmark, out / "logreg.new-objects.parquet")
+    results = json.loads((out / "logreg.new-objects.json").read_text())
+    assert results["tables"] == document["tables"]
+    assert document["left_out"] == ["new-hand-and-objects"]
+
+
+def test_a_method_that_does_not_fit_a_sensor_has_no_scores(folder):
+    recordings = load_features(METHODS["logreg"], folder / "tuning")
+    fitted = BothTargets.fit(METHODS["logreg"], recordings)
+    fewer = {name: rows[:, :-1] for name, rows in recordings[0].features.features.items()}
+    other = replace(recordings[0], features=replace(recordings[0].features, features=fewer))
+    assert set(fitted.scores(recordings[0])) == {"thumb", "index"}
+    with pytest.raises(ValueError, match="no estimate of thumb in grasp0"):
+        fitted.scores(other)
+
+
+def test_a_hand_of_another_unit_has_the_contact_threshold_of_its_own_rest(folder):
+    """Readings ten thousand times smaller: nothing touches by the threshold of training."""
+    method = METHODS["tangential"]
+    recordings = load_features(method, folder / "tuning")
+    features = recordings[0].features
+    small = replace(
+        features,
+        amplitude={name: 1e-4 * rows for name, rows in features.amplitude.items()},
+        at_rest={n: (k, 1e-4 * a, 1e-8 * b) for n, (k, a, b) in features.at_rest.items()},
+    )
+    other = replace(recordings[0], features=small)
+    own, trained = (BothTargets.fit(method, recordings, own_rest=rest) for rest in (True, False))
+    assert trained.scores(other)["thumb"].stable.max() < 1e-9
+    scores = own.scores(other)["thumb"].stable
+    assert (scores == own.scores(recordings[0])["thumb"].stable).all()
+    assert scores.max() > 0.5
 
 
 def test_only_the_order_of_scores_counts_for_events_and_slips(capsys, folder, tmp_path):

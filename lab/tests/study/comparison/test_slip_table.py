@@ -1,3 +1,4 @@
+import msgspec
 import pytest
 
 from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
@@ -64,7 +65,7 @@ def test_one_recording_has_no_interval():
     assert all(row.interval is None for row in slip_rows({}, evaluation(intervals=None)))
 
 
-@pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 14)])
+@pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 19)])
 def test_each_method_has_a_task_and_lines(quick, n):
     plan = StudyPlan({"main": corpus("main"), "others": corpus("others")}, quick=quick)
     made = tasks(plan)
@@ -75,7 +76,21 @@ def test_each_method_has_a_task_and_lines(quick, n):
     assert {row.keys["on"] for row in table.rows} == {"by object", "unseen objects"}
     lines = {(row.keys["on"], row.keys["fitted to"], row.keys["method"]) for row in table.rows}
     assert len(lines) == 2 * n
-    assert "| by object | true sliding | holdfast |" in to_markdown(table)
+    assert "| by object | 1/min held | true sliding | holdfast |" in to_markdown(table)
+
+
+def test_a_line_for_each_budget():
+    plan = StudyPlan({"main": corpus("main")}, quick=True)
+    quiet = SlipSummary({}, msgspec.structs.replace(METRICS, before_1mm=88.0))
+    both = msgspec.structs.replace(evaluation(), quiet_budget=quiet)
+    (table,) = tables(plan, {task.name: {"main": both} for task in tasks(plan)})
+    found = [
+        (row.keys["budget"], row.ours)
+        for row in table.rows
+        if row.keys["method"] == "AnySkin shear features"
+        and row.keys["figure"] == "before 1 mm [%]"
+    ]
+    assert found == [("1/min held", 61.0), ("1/min quiet", 88.0)]
 
 
 def test_without_known_slips_there_is_no_table():

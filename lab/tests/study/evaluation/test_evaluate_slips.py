@@ -2,6 +2,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from holdfast.metrics.slip_thresholds import ThresholdChoice
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.evaluation.evaluate_slips import (
@@ -70,13 +71,26 @@ def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, 
     seen = []
     choose = module.choose_threshold
     monkeypatch.setattr(
-        module, "choose_threshold", lambda curve, rate: seen.append(curve) or choose(curve, rate)
+        module, "choose_threshold", lambda curve, *rest: seen.append(curve) or choose(curve, *rest)
     )
     evaluated(corpora, "holdfast")
-    (curve,) = seen
-    assert curve[0].held_seconds == pytest.approx(
-        4 * (2 * 7.2 - 1.353), rel=0.01
-    )  # the thumb slips
+    assert len(seen) == 2  # for each budget
+    for curve in seen:
+        held_seconds = 4 * (2 * 7.2 - 1.353)  # the thumb slips
+        assert curve[0].held_seconds == pytest.approx(held_seconds, rel=0.01)
+
+
+def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypatch):
+    """Equal budgets give equal scores; one that allows nothing finds nothing."""
+    monkeypatch.setattr(module, "QUIET_CHOICE", module.CHOICE)
+    same = evaluated(corpora, "holdfast")["main"]
+    assert same.quiet_budget == same.summary
+    monkeypatch.setattr(module, "QUIET_CHOICE", ThresholdChoice(-1.0, "quiet"))
+    strict = evaluated(corpora, "holdfast")["main"]
+    assert strict.summary == same.summary
+    assert strict.quiet_budget.pooled.incipient["0.1"] == 0.0
+    assert strict.quiet_budget.pooled.false_alarms_per_minute["quiet"] == 0.0
+    assert strict.quiet_budget.intervals != strict.summary.intervals
 
 
 def test_every_method_can_be_found_and_has_a_title_of_its_own():

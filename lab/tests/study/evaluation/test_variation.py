@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,3 +54,13 @@ def test_a_margin_extends_disturbances_if_the_truth_is_known():
         n[margin] = int(shaken.sum())
     assert n == pytest.approx({0.0: 180, 0.1: 210, 0.2: 240}, abs=1)
     assert relabel(RECORDING, LabelRule()) is RECORDING
+
+
+def test_labels_from_the_truth_are_cut_to_a_sensor_that_starts_late():
+    recording = recording_with_truth("grasp", 3)
+    late = recording.modules["index"].slice(300, 900)
+    modules = {**recording.modules, "index": late}
+    index = relabel(replace(recording, modules=modules), LabelRule(margin=0.0)).modules["index"]
+    whole = relabel(recording, LabelRule(margin=0.0)).modules["index"]
+    assert index.labels[0].start == late.times[0]
+    assert (index.label_states == whole.label_states[300:900]).all()

@@ -1,5 +1,7 @@
 """Methods on the details of the Haar window."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -110,6 +112,37 @@ def test_two_features_on_logarithmic_scales():
         assert rows[-len(six) :] == pytest.approx(expected)
 
 
+def test_the_largest_sigma_of_all_fingers_as_each_finger_knows_it():
+    hand = hand_signal(tiny_recording(0), Tare.parse("0.5"))
+    two, three = (METHODS[name].features(hand) for name in ("log_two", "log_hand"))
+    times = {name: finger.times for name, finger in hand.fingers.items()}
+    assert len(times) > 1
+    for name, rows in three.items():
+        assert rows[:, :2] == pytest.approx(two[name], nan_ok=True)
+        for k in range(0, len(rows), 7):
+            latest = [
+                two[other][np.searchsorted(own, times[name][k], side="right") - 1, 1]
+                for other, own in times.items()
+            ]
+            known = [value for value in latest if np.isfinite(value)]
+            assert rows[k, 2] == pytest.approx(max(known, default=np.nan), nan_ok=True)
+
+
+def test_a_silent_finger_is_left_out_of_the_largest_sigma():
+    recording = tiny_recording(0)
+    first, second = recording.modules
+    module = recording.modules[second]
+    readings = np.array(module.readings, dtype=float)
+    readings[len(readings) // 2 :] = np.nan
+    broken = replace(module, readings=readings)
+    modules = {**recording.modules, second: broken}
+    hand = hand_signal(replace(recording, modules=modules), Tare.parse("0.5"), (first, second))
+    rows = METHODS["log_hand"].features(hand)
+    half = len(readings) // 2
+    assert rows[first][half + 5 :, 2] == pytest.approx(rows[first][half + 5 :, 1])
+    assert np.isnan(rows[second][half + 5 :]).any(axis=1).all()
+
+
 def test_the_energy_keeps_the_mean_of_the_details():
     """A slope of 3 a sample: every detail is -3 / sqrt(2), so E = 7 x 9 / 2 and sigma = 0."""
     hand = pressed(along_normal(100 + 3.0 * np.arange(30)))
@@ -127,5 +160,6 @@ def test_the_classifiers_of_the_paper_with_and_without_class_weights():
         assert balanced.features is unweighted.features
         assert balanced.recipe is unweighted.recipe
     assert PAPER_FAMILY == (
-        "logreg", "logreg_unweighted", "svm", "svm_unweighted", "log_two", "energy",
+        "logreg", "logreg_unweighted", "svm", "svm_unweighted", "log_two", "log_hand",
+        "energy",
     )  # fmt: skip
