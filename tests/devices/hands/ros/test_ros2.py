@@ -1,6 +1,5 @@
 """Hands of ROS 2 beyond the contract: what they need to begin, and how they notice silence."""
 
-import gc
 import re
 import time
 from collections import deque
@@ -17,44 +16,13 @@ from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE
 from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
 from holdfast.live.loop.watchdog import Watchdog
-from ros.domains import new_domain
 
-from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, POSITIONS, ROS2, V4, Ros2Driver, home
+from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, POSITIONS, ROS2, V4, home
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("domain")]
 
 COMMAND = GripCommand(1.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)})
 RELEASE = GripCommand(1.0, LoopState.FAULT, {}, release=True)
-
-
-@pytest.fixture(autouse=True)
-def domain(monkeypatch):
-    """A ROS domain of this test alone, on this machine only."""
-    number = new_domain()
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    monkeypatch.setattr(ros_hand, "DISCOVERY_TIME", 0.05)
-    return number
-
-
-@pytest.fixture
-def driver(domain):
-    """A function that starts a driver."""
-    gc.collect()  # participants that tests before left in cycles are still in the domain
-    made = []
-
-    def start(described, **changes):
-        made.append(Ros2Driver(described, domain, **changes))
-        return made[-1]
-
-    yield start
-    for one in made:
-        one.close()
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.2)
 
 
 class TestOpening:

@@ -1,6 +1,5 @@
 """Grippers that take a width, and units that cannot be right."""
 
-import gc
 import math
 
 import pytest
@@ -8,46 +7,14 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from holdfast.devices.hands import open_hand
-from holdfast.devices.hands.ros import ros_hand
 from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
-from ros.domains import new_domain
 
-from .drivers import AH_NAMES, POSITIONS, ROS2, Ros2Driver
+from .drivers import AH_NAMES, POSITIONS, ROS2
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("domain")]
 
 COMMAND = GripCommand(1.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)})
-
-
-@pytest.fixture(autouse=True)
-def domain(monkeypatch):
-    """A ROS domain of this test alone, on this machine only."""
-    number = new_domain()
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    monkeypatch.setattr(ros_hand, "DISCOVERY_TIME", 0.05)
-    return number
-
-
-@pytest.fixture
-def driver(domain):
-    """A function that starts a driver."""
-    gc.collect()  # participants that tests before left in cycles are still in the domain
-    made = []
-
-    def start(described, **changes):
-        made.append(Ros2Driver(described, domain, **changes))
-        return made[-1]
-
-    yield start
-    for one in made:
-        one.close()
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.2)
 
 
 class TestWidth:
