@@ -8,14 +8,14 @@ from pathlib import Path
 
 from holdfast.files import lock
 
-N_BLOCKS, DOMAINS_OF_BLOCK = 7, 31
-"""The domains 1 to 217, by blocks; DDS has ports for 232. A process that is killed stays in its
+N_BLOCKS, DOMAINS_OF_BLOCK = 4, 57
+"""The domains 1 to 228, by blocks; DDS has ports for 232. A process that is killed stays in its
 domain for seconds, so a block has many."""
 _numbers = itertools.count()
 
 
 def new_domain():
-    """Return the number of a ROS domain, another than the 30 before it in this process."""
+    """Return the number of a ROS domain, another than the 56 before it in this process."""
     return 1 + DOMAINS_OF_BLOCK * _block() + next(_numbers) % DOMAINS_OF_BLOCK
 
 
