@@ -3,7 +3,7 @@ from typing import NamedTuple
 import pytest
 
 from holdfast.grip import LAWS, GripReason
-from holdfast.grip.laws import Touch, law_named
+from holdfast.grip.laws import Stability, Touch, law_named
 from holdfast.grip.laws.costanzo import LARGEST_DYNAMIC_FORCE, STATIC_MARGIN, Costanzo
 from holdfast.grip.laws.friction_margin import FORCE_MARGIN, FrictionMargin
 from holdfast.grip.laws.pr2 import Pr2
@@ -393,6 +393,44 @@ class TestStability:
         one.scale = wanted(law, [one], 0.0, DT)[0].scale
         one.probability = 0.95
         assert 1.0 < self.scale_after(law, [one], 4.0) <= law.margin
+
+    def test_a_hand_that_presses_more_takes_smaller_steps(self):
+        def step(scale):
+            one = touch(probability=0.0)
+            law = started("holdfast", [one])
+            one.scale = scale
+            return wanted(law, [one], DT, DT)[0].scale - scale
+
+        assert step(1.0) == pytest.approx(2.0 * step(2.0))
+
+    def test_after_a_shake_the_force_falls_to_that_of_the_calm_grip(self):
+        """A reaction at a high force shows no low friction: the calm grip held at its T/N."""
+        one = touch()
+        law = started("holdfast", [one])
+        self.scale_after(law, [one], 0.5)
+        one.scale, one.normal, one.probability = 2.4, 4.8, 0.0
+        one.scale = wanted(law, [one], 0.51, DT)[0].scale
+        one.probability = 0.95
+        assert self.scale_after(law, [one], 6.0, 0.51) < 1.5
+
+    def test_a_doubt_that_a_step_leaves_starts_no_other_one_after_the_episode(self):
+        one = touch(probability=0.0)
+        law = started("holdfast", [one])
+        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.probability = 0.8
+        self.scale_after(law, [one], 2.0)
+        assert one.scale < 2.5
+        one.probability = 0.95
+        self.scale_after(law, [one], 5.0, 2.0)
+        one.probability = 0.8
+        before = one.scale
+        assert max(self.scale_after(law, [one], DT, 7.0 + k * DT) for k in range(30)) > before
+
+    def test_a_calm_hand_may_hold_lighter_than_at_first(self):
+        one = touch()
+        law = Stability(lowest=0.9)
+        law.start([one], -1)
+        assert self.scale_after(law, [one], 2.0) == pytest.approx(0.9)
 
     def test_a_hand_that_relaxes_raises_nothing(self):
         """Scales of single fingers needed a new balance again and again: 46 rises a minute."""

@@ -103,6 +103,8 @@ class Stability(Law):
         fall: relative speed of the fall [1/s].
         margin: force to which a calm hand relaxes, as a multiple of what the load needs.
         memory: time constant with which the friction is forgotten [s].
+        lowest: scale to which a calm hand may relax; below 1, lighter than the first grip. The
+            controller keeps it above `Limits.min_scale`.
     """
 
     def __init__(
@@ -120,13 +122,14 @@ class Stability(Law):
         fall: float = 0.5,
         margin: float = 1.25,
         memory: float = 20.0,
+        lowest: float = 1.0,
     ) -> None:
         self.hold_level, self.fall_level, self.again_level = levels
         self.reaction, self.missing_gain = reaction, missing_gain
         self.least_step, self.step_growth = step
         self.refractory, self.episode = refractory, episode
         self.growth, self.calm, self.settle_time = growth, calm, settle_time
-        self.fall, self.margin, self.memory = fall, margin, memory
+        self.fall, self.margin, self.memory, self.lowest = fall, margin, memory, lowest
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Take the present grip as the calm one."""
@@ -249,8 +252,8 @@ class Stability(Law):
             self._followed_at, self._reason = time, GripReason.LOAD
 
     def _relaxed(self, scale: float, time: float, dt: float) -> float:
-        """Return a scale that falls to what the load needs, 1 at least."""
-        relaxed = min(scale, max(scale * (1.0 - self.fall * dt), 1.0, self._needed()))
+        """Return a scale that falls to what the load needs, `lowest` at least."""
+        relaxed = min(scale, max(scale * (1.0 - self.fall * dt), self.lowest, self._needed()))
         if relaxed < scale:
             self._fell_at = time
         return relaxed
