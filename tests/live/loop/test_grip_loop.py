@@ -187,7 +187,8 @@ class TestStop:
         assert loop.last.state is LoopState.HOLD
         assert scales(loop.last) == held
         assert texts[-1] == "grip HOLD"
-        stepped(loop, time, n=120, index=SLIPPING)  # past the episode of the first step
+        # Past the episode of the first step. The thumb carries half of all normal forces.
+        stepped(loop, time, n=120, thumb=SLIPPING)
         assert scales(loop.last)["index"] > held["index"]
 
     def test_without_contact_it_begins_from_idle(self, tape):
@@ -302,7 +303,8 @@ class TestClock:
         loop.resume()
         time = stepped(loop, time)
         assert loop.last.state in (LoopState.HOLD, LoopState.RELAX)
-        stepped(loop, time, n=120, index=SLIPPING)  # past the episode of the first step
+        # Past the episode of the first step. The thumb carries half of all normal forces.
+        stepped(loop, time, n=120, thumb=SLIPPING)
         assert scales(loop.last)["index"] > held["index"]
 
     @pytest.mark.parametrize("on_fault", ["hold", "open"])
