@@ -190,6 +190,9 @@ class GripController:
         Returns:
             The command. Its scales change only in the states REACT and RELAX, and only with a new
             estimate: otherwise it is the last command again, with the time of that one.
+
+        Raises:
+            ValueError: the law breaks its contract, as with a scale of NaN; no estimate raises it.
         """
         is_new = self._is_new(estimate)
         fault, self._reported = self._reported, _NONE
