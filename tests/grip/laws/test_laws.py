@@ -293,7 +293,7 @@ class TestStability:
         one = touch()
         law = started("holdfast", [one])
         self.scale_after(law, [one], 0.5)
-        one.tangential, one.probability = 0.9, 0.87
+        one.tangential, one.probability = 0.9, 0.83
         (wish,) = [wanted(law, [one], 0.5 + k * DT, DT)[0] for k in range(1, 9)][-1:]
         assert wish.scale > 1.2
         assert wish.reason is GripReason.LOAD
@@ -374,6 +374,17 @@ class TestStability:
 
         (late, small), (soon, large) = reaction(0.6), reaction(0.4)
         assert soon < late and large > small
+
+    @pytest.mark.parametrize(("press", "rises"), [(0.7, False), (1.0, True)])
+    def test_a_load_that_falls_with_the_force_is_not_missing(self, press, rises):
+        one = touch()
+        law = started("holdfast", [one])
+        one.scale, one.normal = 2.0, 4.0
+        self.scale_after(law, [one], 1.1)
+        assert 1.0 < one.scale < 1.5, "the force falls"
+        one.probability, one.tangential, one.normal = 0.7, 0.7 * one.tangential, press * one.normal
+        scales = [wanted(law, [one], 1.1 + k * DT, DT)[0].scale for k in range(1, 16)]
+        assert (max(scales) > one.scale) is rises
 
     def test_after_a_slip_the_floor_follows_the_load(self):
         """At the friction that the slip has shown, half of the load needs half of the force."""

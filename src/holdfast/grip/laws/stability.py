@@ -13,7 +13,8 @@ Its rules have no units, so that they carry over between counts and newtons:
    slides, after some time if one finger does. The step grows with the doubt, and is smaller the
    harder the hand presses already. Where friction falls, all contacts slide smoothly and the hand
    carries less than in the calm grip: the missing share of the load adds to a doubt that is above
-   its level, and the step is larger, because friction may fall further.
+   its level, and the step is larger, because friction may fall further. A force that falls takes a
+   part of the load with it, which is not missing.
 3. Hysteresis. A step shakes the contacts itself. So there is a refractory time without any step,
    and then, until the episode is over, a higher level. A force that falls stirs the contacts a
    little, and has a level of its own.
@@ -48,7 +49,7 @@ SLIDING_DOUBT = 0.7
 """Least doubt in a finger that is decided to slide."""
 LARGEST_DOUBT = 2.0
 """Largest doubt, with the missing load, that enters a step."""
-FALLING_STEP = 0.6
+FALLING_STEP = 0.9
 """What a step is larger by where the hand carries less than in the calm grip: friction falls."""
 HELD_SHARE = 0.9
 """Least friction that a step can show, as a share of T/N of the calm grip, which held."""
@@ -110,10 +111,10 @@ class Stability(Law):
     def __init__(
         self,
         *,
-        levels: tuple[float, float, float] = (0.12, 0.35, 0.85),
-        reaction: float = 0.005,
+        levels: tuple[float, float, float] = (0.15, 0.5, 0.85),
+        reaction: float = 0.003,
         step: tuple[float, float] = (0.7, 0.4),
-        missing_gain: float = 5.0,
+        missing_gain: float = 10.0,
         refractory: float = 0.2,
         episode: float = 0.6,
         growth: float = 1.1,
@@ -136,7 +137,7 @@ class Stability(Law):
         self._fingers = [_Finger(touch) for touch in touches]
         self._start_force = sum(touch.start_normal for touch in touches)
         self._load, self._press = self._sums()
-        self._calm_load, self._calm_scale = self._load, 1.0
+        self._calm_load, self._calm_press, self._calm_scale = self._load, self._press, 1.0
         self._calm_ratio = self._load / self._press if self._press > 0 else 0.0
         self._sum = self._target = 0.0
         self._friction = math.inf
@@ -189,6 +190,7 @@ class Stability(Law):
     def _follow_calm(self, scale: float, part: float) -> None:
         """Follow the forces of the calm grip."""
         self._calm_load += part * (self._load - self._calm_load)
+        self._calm_press += part * (self._press - self._calm_press)
         if self._press > 0:
             self._calm_ratio += part * (self._load / self._press - self._calm_ratio)
         self._calm_scale = scale
@@ -201,14 +203,22 @@ class Stability(Law):
         if since < self.refractory or self._is_explained(time):
             self._sum = 0.0
             return
+        missing = self._missing(time)
         evidence = doubt
-        if doubt > self.hold_level and self._calm_load > 0:
-            evidence += self.missing_gain * max(1.0 - self._load / self._calm_load, 0.0)
+        if doubt > self.hold_level:
+            evidence += self.missing_gain * missing
         self._sum = max(0.0, self._sum + (evidence - self._level(since, time)) * dt)
         if self._sum >= self.reaction:
-            self._step(min(evidence, LARGEST_DOUBT), scale, time)
+            self._step(min(evidence, LARGEST_DOUBT), scale, time, missing)
         elif doubt > self.hold_level:
             self._follow_load(scale, time)
+
+    def _missing(self, time: float) -> float:
+        """Return the share of the load of the calm grip that is missing, beyond a fall of N."""
+        load = self._calm_load
+        if time - self._fell_at < self.episode and self._calm_press > 0:
+            load *= min(self._press / self._calm_press, 1.0)
+        return max(1.0 - self._load / load, 0.0) if load > 0 else 0.0
 
     def _is_explained(self, time: float) -> bool:
         """Return whether a jerk of the hand explains a doubt at this time."""
@@ -222,12 +232,12 @@ class Stability(Law):
         is_stirred = self._rested_at < self._stepped_at or time - self._fell_at < self.episode
         return self.fall_level if is_stirred else self.hold_level
 
-    def _step(self, evidence: float, scale: float, time: float) -> None:
+    def _step(self, evidence: float, scale: float, time: float, missing: float) -> None:
         """Begin a step; the first one of an episode shows the friction."""
         if time - self._stepped_at >= self.episode:
             self._learn()
         step = self.least_step + self.step_growth * evidence
-        if self._load < self._calm_load:
+        if missing > 0:
             step += FALLING_STEP
         self._target = scale + step / max(scale, 1.0)
         self._stepped_at, self._reason, self._sum = time, GripReason.UNSTABLE, 0.0
