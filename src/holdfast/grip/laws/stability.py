@@ -203,10 +203,8 @@ class Stability(Law):
         if since < self.refractory or self._is_explained(time):
             self._sum = 0.0
             return
-        missing = self._missing(time)
-        evidence = doubt
-        if doubt > self.hold_level:
-            evidence += self.missing_gain * missing
+        missing = self._missing(time) if doubt > self.hold_level else 0.0
+        evidence = doubt + self.missing_gain * missing
         self._sum = max(0.0, self._sum + (evidence - self._level(since, time)) * dt)
         if self._sum >= self.reaction:
             self._step(min(evidence, LARGEST_DOUBT), scale, time, missing)
