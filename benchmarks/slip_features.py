@@ -32,13 +32,11 @@ from holdfast.features.tare import Tare, baseline_of
 from holdfast.io import load_dataset
 from holdfast.metrics.slip_thresholds import (
     THRESHOLDS,
-    Curve,
     choose_threshold,
     slip_curve,
-    total_curve,
 )
 from holdfast.metrics.slip_truth import SLIDING, STILL, SlipDecisions, SlipTruth, slip_truth
-from holdfast.metrics.slips import SlipMetrics, slip_metrics
+from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.sensors.types import Array, Flags
@@ -278,7 +276,7 @@ class Fitted:
         averaged(raw @ weights[1:] + weights[0], gain, out)
         return out
 
-    def curve(self, rows: FingerRows) -> Curve:
+    def curve(self, rows: FingerRows) -> SlipCurve:
         """Return the counts of slips at all thresholds."""
         probability = 1 / (1 + np.exp(-self.scores(rows)))
         none = np.zeros(len(probability), bool)
@@ -319,8 +317,8 @@ def simulated(
         model = fit([rows for rows in train if fold_of[rows.unit] != fold], names)
         chosen += [model.curve(rows) for rows in train if fold_of[rows.unit] == fold]
         tested += [model.curve(rows) for rows in test if fold_of.get(rows.unit) == fold]
-    place = choose_threshold(total_curve(chosen), FALSE_ALARMS)
-    curve = total_curve(tested or chosen)
+    place = choose_threshold(SlipCurve.total(chosen), FALSE_ALARMS)
+    curve = SlipCurve.total(tested or chosen)
     return slip_metrics(curve[len(THRESHOLDS) - 1 if place is None else place])
 
 

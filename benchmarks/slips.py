@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
-from holdfast.metrics.slip_thresholds import Curve, slip_intervals, slip_summary
+from holdfast.metrics.slip_thresholds import slip_intervals, slip_summary
 from holdfast.metrics.slip_truth import DISTANCES
-from holdfast.metrics.slips import SlipCounts
+from holdfast.metrics.slips import SlipCounts, SlipCurve
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Integers
@@ -61,7 +61,7 @@ class ModelCounts(NamedTuple):
     """Counts of a model on the recordings of a folder, one entry for each with known slips."""
 
     shipped: list[dict[str, SlipCounts]]
-    curves: list[dict[str, Curve]]
+    curves: list[dict[str, SlipCurve]]
 
 
 def method_rows(
@@ -93,7 +93,9 @@ def model_rows(name: str, train: Path, test: Path, seed: int) -> Iterator[Row]:
     tested = count_model(model, test)
     if not tested.shipped:
         raise SystemExit(f"{name} has no slip rule, or no slips are known in {test}")
-    by_recording = [(SlipCounts.total(fingers.values()),) for fingers in tested.shipped]
+    by_recording = [
+        SlipCurve.of_one(SlipCounts.total(fingers.values())) for fingers in tested.shipped
+    ]
     summary = slip_summary(tested.shipped, slip_intervals(by_recording, seed=seed))
     if summary is not None:
         shipped = SlipEvaluation("", len(by_recording), summary)

@@ -35,8 +35,7 @@ from holdfast.features import FeatureSpec, Tare
 from holdfast.features.specs import SLIP_FEATURES
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
-from holdfast.metrics.slip_thresholds import Curve, total_curve
-from holdfast.metrics.slips import SlipMetrics, slip_metrics
+from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
@@ -181,20 +180,20 @@ def replaced(model: Model, rule: SlipRule | None) -> Model:
 def print_folder(
     folder: str,
     recordings: Sequence[Recording],
-    curves: Sequence[Mapping[str, Curve]],
+    curves: Sequence[Mapping[str, SlipCurve]],
     place: int,
 ) -> None:
     """Print the metrics out of fold of the recordings of one folder, at the chosen threshold."""
     own = [
-        total_curve(list(fingers.values()))
+        SlipCurve.total(list(fingers.values()))
         for item, fingers in zip(recordings, curves, strict=True)
         if fingers and item.name.startswith(f"{folder}/")
     ]
     print(folder)
-    print_metrics(slip_metrics(total_curve(own)[place]))
+    print_metrics(slip_metrics(SlipCurve.total(own)[place]))
 
 
-def curves_of(model: Model, recording: Recording) -> Mapping[str, Curve]:
+def curves_of(model: Model, recording: Recording) -> Mapping[str, SlipCurve]:
     return score_recording(compute_decisions(model, recording), slip_curves=True).slip_curves
 
 

@@ -27,7 +27,7 @@ from holdfast.metrics.slip_truth import (
     SlipDecisions,
     SlipTruth,
 )
-from holdfast.metrics.slips import SlipCounts, count_slips, slip_metrics
+from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
 
 RATE = 100.0
 
@@ -242,7 +242,7 @@ class TestThresholds:
     curves = tuple(slip_curve(random_recording(seed, seed % 4)) for seed in range(8))
 
     def test_the_lowest_that_fits_is_chosen(self):
-        total = tuple(SlipCounts.total(column) for column in zip(*self.curves, strict=True))
+        total = SlipCurve.total(self.curves)
         place = choose_threshold(total, 1.0)
         rates = [60 * counts.false_held / counts.held_seconds for counts in total]
         assert rates[place] <= 1.0
@@ -250,8 +250,8 @@ class TestThresholds:
         assert all(rate <= 1.0 for rate in rates[place:])
 
     def test_false_alarms_are_counted_in_held_time_or_in_quiet_hold_alone(self):
-        total = tuple(SlipCounts.total(column) for column in zip(*self.curves, strict=True))
-        pushed = tuple(replace(counts, false_held=counts.false_held + 99) for counts in total)
+        total = SlipCurve.total(self.curves)
+        pushed = replace(total, false_held=total.false_held + 99)
         assert choose_threshold(pushed, 1.0) is None
         place = choose_threshold(pushed, 1.0, "quiet")
         rates = [60 * counts.false_quiet / counts.quiet_seconds for counts in total]
@@ -286,7 +286,7 @@ class TestThresholds:
         places = held_out_places(self.curves, list(range(8)), ThresholdChoice(1.0))
         for own, place in enumerate(places):
             others = [curve for k, curve in enumerate(self.curves) if k != own]
-            total = tuple(SlipCounts.total(column) for column in zip(*others, strict=True))
+            total = SlipCurve.total(others)
             assert place == choose_threshold(total, 1.0)
 
     @pytest.mark.parametrize("groups", [range(8), (0, 0, 1, 1, 2, 2, 3, 3)])
@@ -311,7 +311,7 @@ class TestThresholds:
         assert choose_threshold(slip_curve(decisions([], codes=codes)), 1.0) is None
 
     def test_intervals_without_a_choice_are_those_of_the_threshold(self):
-        single = [(curve[60],) for curve in self.curves]
+        single = [SlipCurve.of_one(curve[60]) for curve in self.curves]
         found = slip_intervals(single, n=200)
         summary = slip_summary([{"thumb": curve[0]} for curve in single], found)
         low, high = found.incipient["0.1"]
@@ -323,7 +323,7 @@ class TestThresholds:
         choice, tested = ThresholdChoice(1.0), self.curves[:4]
         place = choose_threshold(self.curves[5], 1.0)
         found = slip_intervals(tested, choice, training=[self.curves[5]] * 3, n=200)
-        assert found == slip_intervals([(curve[place],) for curve in tested], n=200)
+        assert found == slip_intervals([SlipCurve.of_one(curve[place]) for curve in tested], n=200)
         varied = slip_intervals(tested, choice, training=self.curves[4:], n=200)
         assert varied != found
 

@@ -1,7 +1,6 @@
 """Rule that decides whether a finger slides, from a smoothed probability, and how fast."""
 
 import math
-from collections.abc import Iterable, Iterator
 
 import msgspec
 import numpy as np
@@ -222,20 +221,16 @@ def raised_at(times: Array, probability: Array, threshold: float, hold: float) -
     Returns:
         (n,) True where the finger is reported to slide.
     """
-    return next(raised_at_each(times, probability, (threshold,), hold))
+    return np.asarray(raised_at_each(times, probability, np.array([threshold]), hold)[0])
 
 
-def raised_at_each(
-    times: Array, probability: Array, thresholds: Iterable[float], hold: float
-) -> Iterator[Flags]:
-    """Yield where a slip is reported at each threshold, as `raised_at`."""
+def raised_at_each(times: Array, probability: Array, thresholds: Array, hold: float) -> Flags:
+    """Return where a slip is reported at each threshold, (n_thresholds, n), as `raised_at`."""
     with np.errstate(invalid="ignore"):
         ended = ~(probability > 0)
+        over = probability >= thresholds[:, None]
     end = np.maximum.accumulate(np.where(ended, times, -np.inf))
+    last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    for threshold in thresholds:
-        with np.errstate(invalid="ignore"):
-            over = probability >= threshold
-        last = np.maximum.accumulate(np.where(over, times, -np.inf))
-        held = (times - last + 0.5 * period < hold) & (last > end)
-        yield np.asarray((over | held) & ~ended)
+    held = (times - last + 0.5 * period < hold) & (last > end)
+    return np.asarray((over | held) & ~ended)

@@ -1,7 +1,7 @@
 """Counts of slips at many thresholds: choice of a threshold, and intervals that include it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple, Self
 
 import msgspec
@@ -14,6 +14,7 @@ from holdfast.metrics.slips import (
     FOUND_WITHIN,
     SlipCounter,
     SlipCounts,
+    SlipCurve,
     SlipMetrics,
     slip_metrics,
 )
@@ -32,8 +33,8 @@ THRESHOLDS = 1.0 / (1.0 + np.exp(-THRESHOLD_LOG_ODDS))
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
 
-Curve = tuple[SlipCounts, ...]
-"""Counts at each of `THRESHOLDS`."""
+BLOCK_SIZE = 1 << 22
+"""Number of samples times thresholds that are counted at a time: bounds the memory."""
 
 
 class SlipIntervals(msgspec.Struct, frozen=True):
@@ -64,7 +65,7 @@ class SlipSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     threshold_chosen: bool = False
 
 
-def slip_curve(decisions: SlipDecisions) -> Curve:
+def slip_curve(decisions: SlipDecisions) -> SlipCurve:
     """Return the counts of decisions about one finger at each of `THRESHOLDS`.
 
     Args:
@@ -72,19 +73,15 @@ def slip_curve(decisions: SlipDecisions) -> Curve:
     """
     times, probability, hold = decisions.times, decisions.probability, decisions.hold
     counter = SlipCounter.of(decisions)
-    masks = raised_at_each(times, probability, THRESHOLDS.tolist(), hold)
-    return tuple(counter.count(raised) for raised in masks)
-
-
-def total_curve(curves: Sequence[Curve]) -> Curve:
-    """Return the counts of all curves together, at each of `THRESHOLDS`."""
-    totals = [SlipCounts.total(column) for column in zip(*curves, strict=True)]
-    # The probabilities are the same at every threshold: one array for all.
-    return tuple(replace(counts, scores=totals[0].scores) for counts in totals)
+    n = max(1, BLOCK_SIZE // max(len(times), 1))
+    blocks = [THRESHOLDS[first : first + n] for first in range(0, len(THRESHOLDS), n)]
+    return SlipCurve.joined(
+        [counter.count(raised_at_each(times, probability, block, hold)) for block in blocks]
+    )
 
 
 def choose_threshold(
-    curve: Curve, false_alarms: float, counted_in: Literal["held", "quiet"] = "held"
+    curve: SlipCurve, false_alarms: float, counted_in: Literal["held", "quiet"] = "held"
 ) -> int | None:
     """Return the place of the lowest threshold with few enough false alarms.
 
@@ -99,9 +96,8 @@ def choose_threshold(
     Returns:
         The place in `THRESHOLDS`; None if no threshold fits, or nothing is held.
     """
-    table = [[_ratios(counts) for counts in curve]]
     choice = ThresholdChoice(false_alarms, counted_in)
-    place = int(_places(_limited(table, choice), choice, np.ones((1, 1)))[0])
+    place = int(_places(_limited([_ratios(curve)], choice), choice, np.ones((1, 1)))[0])
     return place if place < len(curve) else None
 
 
@@ -126,7 +122,7 @@ class ThresholdChoice:
 
 
 def held_out_places(
-    curves: Sequence[Curve], groups: Sequence[int], choice: ThresholdChoice
+    curves: Sequence[SlipCurve], groups: Sequence[int], choice: ThresholdChoice
 ) -> Integers:
     """Return the place of the threshold for each recording, chosen without its group.
 
@@ -135,50 +131,50 @@ def held_out_places(
         groups: of each recording.
         choice: of the threshold; if no threshold fits, the highest is taken.
     """
-    table = [[_ratios(counts) for counts in curve] for curve in curves]
+    table = [_ratios(curve) for curve in curves]
     places = _held_out(table, choice, groups, np.ones((1, len(curves))))
     return places.reshape(-1)
 
 
 class _Ratio(NamedTuple):
-    """A metric of one recording at one threshold, as part / whole times a factor."""
+    """A metric of one recording at each threshold, as parts (n_thresholds,) / whole."""
 
-    part: float
+    parts: Array
     whole: float
-    factor: float = 100
 
 
-def _ratios(counts: SlipCounts) -> dict[tuple[str, str], _Ratio]:
+def _ratios(curve: SlipCurve) -> dict[tuple[str, str], _Ratio]:
     """Return the metrics of slips as ratios, by name and, of those that have one, time limit."""
-    quiet, held = counts.quiet_seconds, counts.held_seconds
+    silent = curve.silent
+    quiet, held = silent.quiet_seconds, silent.held_seconds
     ratios = {
-        ("raised_quiet", ""): _Ratio(counts.raised_seconds, quiet),
-        ("false_alarms", "quiet"): _Ratio(counts.false_quiet, quiet, 60),
-        ("false_alarms", "held"): _Ratio(counts.false_held, held, 60),
+        ("raised_quiet", ""): _Ratio(100 * curve.raised_seconds, quiet),
+        ("false_alarms", "quiet"): _Ratio(60 * curve.false_quiet.astype(np.float64), quiet),
+        ("false_alarms", "held"): _Ratio(60 * curve.false_held.astype(np.float64), held),
     }
     for name, n_found, n in zip(
-        ("before_1mm", "before_3mm"), counts.found_before, counts.n_reached, strict=True
+        ("before_1mm", "before_3mm"), curve.found_before.T, silent.n_reached, strict=True
     ):
-        ratios[name, ""] = _Ratio(float(n_found), float(n))
+        ratios[name, ""] = _Ratio(100.0 * n_found, float(n))
     delays = {
-        "incipient": counts.delays,
-        "gross": counts.gross_delays,
-        "over_1mm": counts.delays[counts.is_over_1mm],
+        "incipient": curve.delays,
+        "gross": curve.gross_delays,
+        "over_1mm": curve.delays[:, silent.is_over_1mm],
     }
     for name, values in delays.items():
-        ratios[name, "before"] = _Ratio(float((values < -TIME_TOLERANCE).sum()), len(values))
-        for limit in FOUND_WITHIN:
-            n_within = float((values <= limit + TIME_TOLERANCE).sum())
-            ratios[name, str(limit)] = _Ratio(n_within, len(values))
+        limits = {"before": values < -TIME_TOLERANCE}
+        limits |= {str(limit): values <= limit + TIME_TOLERANCE for limit in FOUND_WITHIN}
+        for limit, found in limits.items():
+            ratios[name, limit] = _Ratio(100.0 * found.sum(axis=1), values.shape[1])
     return ratios
 
 
 def slip_intervals(
-    curves: Sequence[Curve],
+    curves: Sequence[SlipCurve],
     choice: ThresholdChoice | None = None,
     *,
     groups: Sequence[int] = (),
-    training: Sequence[Curve] = (),
+    training: Sequence[SlipCurve] = (),
     n: int = 1000,
     seed: int = 0,
     level: float = 0.95,
@@ -200,7 +196,7 @@ def slip_intervals(
     """
     if len(curves) < 2:
         return None
-    table = [[_ratios(counts) for counts in curve] for curve in curves]
+    table = [_ratios(curve) for curve in curves]
     draws = draw_recordings(len(curves), n, seed)
     if choice is None:
         places = np.zeros((n, 1), dtype=np.int64)
@@ -209,7 +205,7 @@ def slip_intervals(
     else:
         places = _held_out(table, choice, groups or range(len(curves)), draws)
     intervals: dict[str, dict[str, Interval | None]] = {}
-    for name, limit in table[0][0]:
+    for name, limit in table[0]:
         intervals.setdefault(name, {})[limit] = bootstrap_interval(
             _statistic(table, (name, limit), places), len(curves), n=n, seed=seed, level=level
         )
@@ -224,16 +220,18 @@ def slip_intervals(
     )
 
 
-Table = Sequence[Sequence[Mapping[tuple[str, str], _Ratio]]]
-"""Metrics of each recording at each threshold."""
+Table = Sequence[Mapping[tuple[str, str], _Ratio]]
+"""Metrics of each recording."""
 
 
-def _resampled(training: Sequence[Curve], choice: ThresholdChoice, n: int, seed: int) -> Integers:
+def _resampled(
+    training: Sequence[SlipCurve], choice: ThresholdChoice, n: int, seed: int
+) -> Integers:
     """Return the place of the threshold in n resamples of the training recordings, (n,)."""
-    table = [[_ratios(counts) for counts in curve] for curve in training]
+    table = [_ratios(curve) for curve in training]
     draws = draw_recordings(len(training), n, seed + 1)
     places = _places(_limited(table, choice), choice, draws)
-    return np.minimum(places, len(table[0]) - 1)
+    return np.minimum(places, len(training[0]) - 1)
 
 
 def _held_out(
@@ -256,7 +254,7 @@ def _held_out(
     for group in np.unique(own):
         others = np.where(own == group, 0.0, draws)
         places[:, own == group] = _places(limited, choice, others)[:, None]
-    return np.minimum(places, len(table[0]) - 1)
+    return np.asarray(np.minimum(places, limited[0].n_thresholds - 1))
 
 
 def _limits(choice: ThresholdChoice) -> dict[tuple[str, str], float]:
@@ -305,9 +303,14 @@ class _Sums:
     @classmethod
     def of(cls, table: Table, name: tuple[str, str]) -> Self:
         """Return those of one metric of a table."""
-        ratios = [[row[name] for row in curve] for curve in table]
-        parts = np.array([[ratio.factor * ratio.part for ratio in row] for row in ratios])
-        return cls(parts, np.array([row[0].whole for row in ratios], dtype=np.float64))
+        ratios = [recording[name] for recording in table]
+        wholes = np.array([ratio.whole for ratio in ratios], dtype=np.float64)
+        return cls(np.array([ratio.parts for ratio in ratios]), wholes)
+
+    @property
+    def n_thresholds(self) -> int:
+        """Number of thresholds."""
+        return int(self.parts.shape[1])
 
     def drawn(self, draws: Array) -> tuple[Array, Array]:
         """Return the sums of resamples: parts (n, n_thresholds) and wholes (n, 1)."""

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import msgspec
 import numpy as np
 
 from holdfast.contact import TIME_TOLERANCE
-from holdfast.metrics.masks import Mask, runs
+from holdfast.metrics.masks import Mask
 from holdfast.metrics.samples import N_BINS, bins_of
 from holdfast.metrics.slip_truth import (
     DISTANCES,
@@ -95,6 +95,74 @@ class SlipCounts:
         return np.asarray(self.distances > DISTANCES[0])
 
 
+@dataclass(frozen=True, eq=False)
+class SlipCurve:
+    """Counts of the slips and alarms at several thresholds, lowest first.
+
+    Attributes:
+        silent: counts without an alarm, with what does not depend on the threshold.
+        delays: (n_thresholds, n_slips) as in `SlipCounts`, like all the following [s].
+        gross_delays: (n_thresholds, n_gross) [s].
+        found_before: (n_thresholds, n_distances).
+        false_quiet: (n_thresholds,).
+        false_held: (n_thresholds,).
+        raised_seconds: (n_thresholds,) [s].
+    """
+
+    silent: SlipCounts
+    delays: Array
+    gross_delays: Array
+    found_before: Integers
+    false_quiet: Integers
+    false_held: Integers
+    raised_seconds: Array
+
+    @classmethod
+    def of_one(cls, counts: SlipCounts) -> Self:
+        """Return the counts of one threshold."""
+        return cls(counts, *(np.array(getattr(counts, name))[None] for name in _BY_THRESHOLD))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the counts at the thresholds of all parts, one after the other."""
+        arrays = ([getattr(part, name) for part in parts] for name in _BY_THRESHOLD)
+        return cls(parts[0].silent, *map(np.concatenate, arrays))
+
+    @classmethod
+    def total(cls, curves: Sequence[Self]) -> Self:
+        """Return the counts of all curves together, at each threshold; without curves, at none."""
+        if not curves:
+            none = cls.of_one(SlipCounts.total([]))
+            return cls(none.silent, *(getattr(none, name)[:0] for name in _BY_THRESHOLD))
+        return cls(
+            SlipCounts.total(curve.silent for curve in curves),
+            np.hstack([curve.delays for curve in curves]),
+            np.hstack([curve.gross_delays for curve in curves]),
+            np.sum([curve.found_before for curve in curves], axis=0),
+            np.sum([curve.false_quiet for curve in curves], axis=0),
+            np.sum([curve.false_held for curve in curves], axis=0),
+            np.sum([curve.raised_seconds for curve in curves], axis=0),
+        )
+
+    def __len__(self) -> int:
+        return len(self.delays)
+
+    def __getitem__(self, place: int) -> SlipCounts:
+        """Return the counts at one threshold."""
+        return replace(
+            self.silent,
+            delays=self.delays[place],
+            gross_delays=self.gross_delays[place],
+            found_before=self.found_before[place],
+            false_quiet=int(self.false_quiet[place]),
+            false_held=int(self.false_held[place]),
+            raised_seconds=float(self.raised_seconds[place]),
+        )
+
+
+_BY_THRESHOLD = tuple(each.name for each in fields(SlipCurve) if each.name != "silent")
+
+
 def count_slips(decisions: SlipDecisions) -> SlipCounts:
     """Return the counts of the decisions about one finger in one recording.
 
@@ -114,7 +182,7 @@ def count_slips(decisions: SlipDecisions) -> SlipCounts:
     Raises:
         ValueError: the truth is not known.
     """
-    return SlipCounter.of(decisions).count(decisions.raised)
+    return SlipCounter.of(decisions).count(decisions.raised[None])[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,25 +238,47 @@ class SlipCounter:
             ),
         )
 
-    def count(self, raised: Mask) -> SlipCounts:
-        """Return the counts of decisions that are raised at some samples (n,)."""
-        spans = runs(raised)
-        alarms = np.append(self.times[spans[:, 0]], np.inf)
-        earliest, latest, onset, gross = self.slips.T
-        first = alarms[np.searchsorted(alarms, earliest)]
-        first = np.where(first <= latest, first, np.inf)
-        reached = (first[:, None] <= self.reached + TIME_TOLERANCE).sum(axis=0)
-        wrong = runs(raised & self.away)
-        quiet, outside = (_lengths(elapsed, wrong) for elapsed in (self.quiet, self.outside))
-        return replace(
+    def count(self, raised: Mask) -> SlipCurve:
+        """Return the counts at several thresholds.
+
+        Args:
+            raised: (n_thresholds, n) True where the decision is raised.
+        """
+        first = self._first_alarms(raised)
+        _, _, onset, gross = self.slips.T
+        rows, starts, ends = _runs_of_rows(raised & self.away)
+        quiet, outside = (spent[ends] - spent[starts] for spent in (self.quiet, self.outside))
+
+        def by_row(values: Array) -> Array:
+            return np.asarray(np.bincount(rows, weights=values, minlength=len(raised)), np.float64)
+
+        return SlipCurve(
             self.silent,
             delays=first - onset,
-            gross_delays=(first - gross)[~np.isnan(gross)],
-            found_before=reached,
-            false_quiet=_count_false(quiet),
-            false_held=_count_false(outside),
-            raised_seconds=float(quiet.sum()),
+            gross_delays=(first - gross)[:, ~np.isnan(gross)],
+            found_before=(first[:, :, None] <= self.reached + TIME_TOLERANCE).sum(axis=1),
+            false_quiet=by_row(_n_false(quiet)).astype(np.int64),
+            false_held=by_row(_n_false(outside)).astype(np.int64),
+            raised_seconds=by_row(quiet),
         )
+
+    def _first_alarms(self, raised: Mask) -> Array:
+        """Return the time of the first alarm of each slip, (n_thresholds, n_slips) [s]."""
+        n, row = len(self.times), np.arange(len(raised))[:, None]
+        rows, starts, _ = _runs_of_rows(raised)
+        earliest, latest = self.slips.T[:2]
+        # Alarms of all rows in one sorted array: the place of each is its row and its sample.
+        place = np.searchsorted(rows * n + starts, row * n + np.searchsorted(self.times, earliest))
+        times, rows = np.append(self.times[starts], np.inf), np.append(rows, -1)
+        is_in_time = (rows[place] == row) & (times[place] <= latest)
+        return np.where(is_in_time, times[place], np.inf)
+
+
+def _runs_of_rows(masks: Mask) -> tuple[Integers, Integers, Integers]:
+    """Return row, first sample and first sample after each run of True in masks (m, n)."""
+    padded = np.pad(masks, ((0, 0), (1, 1))).view(np.int8)
+    rows, samples = np.divmod(np.flatnonzero(np.diff(padded)), padded.shape[1] - 1)
+    return rows[::2], samples[::2], samples[1::2]
 
 
 def _without_alarms(
@@ -244,14 +334,9 @@ def _elapsed(steps: Array, counted: Mask) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.where(counted, steps, 0.0))])
 
 
-def _lengths(elapsed: Array, spans: Integers) -> Array:
-    """Return the counted time in each span of samples, (n_spans,) [s]."""
-    return np.asarray(elapsed[spans[:, 1]] - elapsed[spans[:, 0]])
-
-
-def _count_false(lengths: Array) -> int:
+def _n_false(lengths: Array) -> Array:
     """Return the false alarms of raised runs: of each, its counted time in begun parts of 0.5 s."""
-    return int(np.ceil(lengths / FALSE_ALARM_DURATION - TIME_TOLERANCE).clip(min=0).sum())
+    return np.ceil(lengths / FALSE_ALARM_DURATION - TIME_TOLERANCE).clip(min=0)
 
 
 class SlipMetrics(msgspec.Struct, frozen=True):

@@ -25,14 +25,13 @@ from holdfast.metrics.samples import (
     score_samples,
 )
 from holdfast.metrics.slip_thresholds import (
-    Curve,
     SlipIntervals,
     SlipSummary,
     slip_curve,
     slip_intervals,
     slip_summary,
 )
-from holdfast.metrics.slips import SlipCounts, count_slips
+from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips
 from holdfast.metrics.statistics import (
     Interval,
     Statistic,
@@ -157,7 +156,7 @@ class RecordingResults:
     events: Mapping[str, EventCounts]
     hand: EventCounts | None
     slips: Mapping[str, SlipCounts] = field(default_factory=dict)
-    slip_curves: Mapping[str, Curve] = field(default_factory=dict)
+    slip_curves: Mapping[str, SlipCurve] = field(default_factory=dict)
 
 
 def summarise(decisions: Iterable[Decisions], *, n_resamples: int = 1000, seed: int = 0) -> Metrics:
@@ -299,7 +298,7 @@ class ResultTotal:
         )
 
     def _slip_intervals(self, n: int, seed: int) -> SlipIntervals | None:
-        curves = [(group.slips,) for group in self.groups] if self.slips else []
+        curves = [SlipCurve.of_one(group.slips) for group in self.groups] if self.slips else []
         return slip_intervals(curves, n=n, seed=seed, level=LEVEL)
 
     def _finger(self, name: str) -> SampleTotal:

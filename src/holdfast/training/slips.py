@@ -18,17 +18,15 @@ from holdfast.metrics import RecordingResults, score_recording
 from holdfast.metrics.slip_thresholds import (
     MAX_RAISED_QUIET,
     THRESHOLDS,
-    Curve,
     SlipSummary,
     ThresholdChoice,
     choose_threshold,
     held_out_places,
     slip_intervals,
     slip_summary,
-    total_curve,
 )
 from holdfast.metrics.slip_truth import SLIDING, STILL, SlipTruth, slip_truth
-from holdfast.metrics.slips import SlipCounts, SlipMetrics, found_shares, slip_metrics
+from holdfast.metrics.slips import SlipCounts, SlipCurve, SlipMetrics, found_shares, slip_metrics
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
@@ -299,7 +297,7 @@ class ChosenThreshold:
 
 
 def choose_slip_threshold(
-    curves: Sequence[Mapping[str, Curve]], groups: Sequence[int], seed: int
+    curves: Sequence[Mapping[str, SlipCurve]], groups: Sequence[int], seed: int
 ) -> ChosenThreshold | None:
     """Choose the threshold of slips from decisions out of fold.
 
@@ -314,9 +312,9 @@ def choose_slip_threshold(
     used = [(curve, group) for curve, group in zip(curves, groups, strict=True) if curve]
     if not used:
         return None
-    by_recording = [total_curve(list(fingers.values())) for fingers, _ in used]
+    by_recording = [SlipCurve.total(list(fingers.values())) for fingers, _ in used]
     own = [group for _, group in used]
-    pooled, highest = total_curve(by_recording), len(THRESHOLDS) - 1
+    pooled, highest = SlipCurve.total(by_recording), len(THRESHOLDS) - 1
     place = choose_threshold(pooled, SLIP_FALSE_ALARMS)
     places, intervals = [highest if place is None else place] * len(used), None
     if has_others := len(set(own)) > 1:
@@ -434,7 +432,7 @@ def tune_slips(
     for recording in progress(recordings):
         digests[recording.name] = recording.digest
         results.append(score_recording(compute_decisions(model, recording), slip_curves=True))
-    curve = total_curve([curve for result in results for curve in result.slip_curves.values()])
+    curve = SlipCurve.total([curve for result in results for curve in result.slip_curves.values()])
     if not curve:
         raise TrainingError(f"{len(results)} recordings without slips that are known")
     place = _supported(curve, false_alarms)
@@ -452,7 +450,7 @@ def tune_slips(
     )
 
 
-def _supported(curve: Curve, false_alarms: float) -> int:
+def _supported(curve: SlipCurve, false_alarms: float) -> int:
     """Return the place of the threshold.
 
     Raises:
@@ -466,7 +464,7 @@ def _supported(curve: Curve, false_alarms: float) -> int:
         )
     place = choose_threshold(curve, false_alarms)
     if place is None:
-        least = min(60 * counts.false_held / counts.held_seconds for counts in curve)
+        least = float(curve.false_held.min()) / minutes
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute of held time "
             f"with a slip reported in at most {MAX_RAISED_QUIET:g} % of quiet hold; the least is "

@@ -16,7 +16,7 @@ from holdfast.metrics import (
     score_recording,
     summarise_results,
 )
-from holdfast.metrics.slip_thresholds import Curve
+from holdfast.metrics.slips import SlipCurve
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
@@ -185,7 +185,7 @@ class _Trainer:
         if slip_features and not slips:
             warn("no slips are known in the recordings: the model gets no slip rule")
         self.data = TrainingData(self.scan, self.data_split, self.fingers, slips, slip_features)
-        self.slip_curves: list[tuple[Mapping[str, Curve], int]] = []
+        self.slip_curves: list[tuple[Mapping[str, SlipCurve], int]] = []
 
     def _with_handling(self, setting: Setting) -> Setting:
         """Return the setting; own handling of the sensors is in the classifiers to adapt."""

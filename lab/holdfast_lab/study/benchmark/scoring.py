@@ -14,8 +14,8 @@ from holdfast.contact import STABLE, UNSTABLE
 from holdfast.io import Dataset
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.slip_thresholds import Curve
 from holdfast.metrics.slip_truth import slip_truth
+from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
@@ -273,7 +273,7 @@ def _slip_scores(recordings: Scored) -> list[dict[str, SlipScores]]:
     return [fingers for fingers in made if fingers]
 
 
-def _curves(recordings: Scored, ranks: Array) -> Sequence[Mapping[str, Curve]]:
+def _curves(recordings: Scored, ranks: Array) -> Sequence[Mapping[str, SlipCurve]]:
     return [
         {finger: scores.curve(ranks) for finger, scores in fingers.items()}
         for fingers in _slip_scores(recordings)

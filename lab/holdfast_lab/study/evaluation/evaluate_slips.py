@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import msgspec
 
 from holdfast.metrics.slip_thresholds import (
-    Curve,
     SlipIntervals,
     SlipSummary,
     ThresholdChoice,
@@ -16,8 +15,8 @@ from holdfast.metrics.slip_thresholds import (
     held_out_places,
     slip_intervals,
     slip_summary,
-    total_curve,
 )
+from holdfast.metrics.slips import SlipCurve
 from holdfast.sensors.types import Array
 from holdfast_lab.study.evaluation.common_samples import longest_warm_up
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, held_out_folds
@@ -44,7 +43,7 @@ CHOICE = ThresholdChoice(SLIP_RATE)
 QUIET_CHOICE = ThresholdChoice(SLIP_RATE, "quiet")
 """Choice by the false alarms of quiet hold alone: pushes and glitches may raise a slip."""
 
-Curves = Sequence[Mapping[str, Curve]]
+Curves = Sequence[Mapping[str, SlipCurve]]
 """Counts of slips of each finger, at each threshold, of each recording."""
 
 
@@ -149,12 +148,12 @@ def _folds(training: TrainingSamples, job: SlipJob) -> tuple[str, list[frozenset
     return "recording", list(held_out_folds(objects, "recording", job.effort.folds, job.seed))
 
 
-def _curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, Curve]:
+def _curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, SlipCurve]:
     return {finger: own.curve(ranks) for finger, own in scores.items()}
 
 
-def _pooled(curves: Curves) -> list[Curve]:
-    return [total_curve(list(fingers.values())) for fingers in curves]
+def _pooled(curves: Curves) -> list[SlipCurve]:
+    return [SlipCurve.total(list(fingers.values())) for fingers in curves]
 
 
 def _of_both_budgets(held: SlipEvaluation, quiet: SlipEvaluation) -> SlipEvaluation:
@@ -184,7 +183,7 @@ def summarise_fresh(
         choice: of the threshold.
     """
     chosen_from = _pooled(training)
-    total = total_curve(chosen_from)
+    total = SlipCurve.total(chosen_from)
     place = choose_threshold(total, choice.false_alarms, choice.counted_in)
     places = [len(chosen_from[0]) - 1 if place is None else place] * len(curves)
     intervals = slip_intervals(_pooled(curves), choice, training=chosen_from, seed=seed)

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask, runs
-from holdfast.metrics.slip_thresholds import THRESHOLD_LOG_ODDS, Curve, slip_curve
+from holdfast.metrics.slip_thresholds import THRESHOLD_LOG_ODDS, slip_curve
 from holdfast.metrics.slip_truth import (
     NOT_HELD,
     SLIDING,
@@ -23,6 +23,7 @@ from holdfast.metrics.slip_truth import (
     SlipTruth,
     slip_truth,
 )
+from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
 from holdfast.training.slips import SLIP_RULE_HOLD, SLIP_SMOOTHING
@@ -168,7 +169,7 @@ class SlipScores:
         """Scores of the samples that are known to be still, in contact."""
         return np.asarray(self.score[np.isfinite(self.score) & (self.truth.codes == STILL)])
 
-    def curve(self, ranks: Array) -> Curve:
+    def curve(self, ranks: Array) -> SlipCurve:
         """Return the counts of slips at each threshold.
 
         Args:
