@@ -33,7 +33,7 @@ THRESHOLDS = 1.0 / (1.0 + np.exp(-THRESHOLD_LOG_ODDS))
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
 
-BLOCK_SIZE = 1 << 22
+MAX_FLAGS = 1 << 22
 """Number of samples times thresholds that are counted at a time: bounds the memory."""
 
 
@@ -73,7 +73,7 @@ def slip_curve(decisions: SlipDecisions) -> SlipCurve:
     """
     times, probability, hold = decisions.times, decisions.probability, decisions.hold
     counter = SlipCounter.of(decisions)
-    n = max(1, BLOCK_SIZE // max(len(times), 1))
+    n = max(1, MAX_FLAGS // max(len(times), 1))
     blocks = [THRESHOLDS[first : first + n] for first in range(0, len(THRESHOLDS), n)]
     return SlipCurve.joined(
         [counter.count(raised_at_each(times, probability, block, hold)) for block in blocks]
