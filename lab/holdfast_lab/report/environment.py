@@ -24,10 +24,11 @@ def versions() -> dict[str, str | None]:
 
 def machine() -> dict[str, Any]:
     """Return what the time depends on: processor, usable cores, memory [GiB], system."""
+    memory = physical_memory()
     return {
         "processor": _processor(),
         "cores": _cores(),
-        "memory": _memory(),
+        "memory": None if memory is None else round(memory / GIB, 1),
         "system": f"{platform.system()} {platform.machine()}",
     }
 
@@ -82,7 +83,8 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _memory() -> float | None:
+def physical_memory() -> int | None:
+    """Return the memory of this machine [byte]; None if it does not say."""
     if "SC_PHYS_PAGES" not in getattr(os, "sysconf_names", {}):
         return None
-    return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / GIB, 1)
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

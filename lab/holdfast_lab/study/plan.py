@@ -2,8 +2,10 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import overload
 
 import msgspec
 import numpy as np
@@ -14,6 +16,7 @@ from holdfast.features import Tare
 from holdfast.io import Dataset, load_dataset
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset
+from holdfast_lab.study.kept import KEPT, recording_bytes
 
 
 class Corpus(msgspec.Struct, frozen=True):
@@ -39,8 +42,8 @@ class Corpus(msgspec.Struct, frozen=True):
     tare: str = "0.5"
     n_samples: int = 0
 
-    def load(self) -> Dataset:
-        """Return the recordings; each is read when it is used.
+    def load(self) -> "CorpusRecordings":
+        """Return the recordings; each is read when it is first used by this process.
 
         Raises:
             RecordingError: the folder, or a recording of the corpus, does not exist.
@@ -56,12 +59,43 @@ class Corpus(msgspec.Struct, frozen=True):
                 f"{len(gone)} of the {len(self.recordings)} recordings of {self.name!r} are no "
                 f"longer in {self.folder}: {gone[0]}"
             )
-        return Dataset([paths[name] for name in self.recordings])
+        return CorpusRecordings(self, Dataset([paths[name] for name in self.recordings]))
+
+    @property
+    def identity(self) -> tuple[str, str]:
+        """What tells its recordings from those of other corpora, and of earlier versions."""
+        return self.folder, self.digest
 
     @property
     def is_simulated(self) -> bool:
         """Whether the twin made the recordings."""
         return self.load()[0].metadata.get("source") == "twin"
+
+
+@dataclass(frozen=True)
+class CorpusRecordings(Sequence[Recording]):
+    """The recordings of a corpus, in order; see `kept`."""
+
+    corpus: Corpus
+    files: Dataset
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the recordings, in order."""
+        return self.files.names
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    @overload
+    def __getitem__(self, index: int) -> Recording: ...
+    @overload
+    def __getitem__(self, index: slice) -> "CorpusRecordings": ...
+    def __getitem__(self, index: int | slice) -> "Recording | CorpusRecordings":
+        if isinstance(index, slice):
+            return CorpusRecordings(self.corpus, self.files[index])
+        key = (*self.corpus.identity, self.files.paths[index])
+        return KEPT.get(key, lambda: self.files[index], recording_bytes)
 
 
 class StudyPlan(msgspec.Struct, frozen=True):

@@ -1,7 +1,9 @@
 """The features that a method computes from the recordings of a corpus, with their labels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,10 +15,11 @@ from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.truth_labels import LabelRule, relabel
-from holdfast.recordings import Recording, Truth, label_states
+from holdfast.recordings import Recording, Tactile, Truth, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.kept import KEPT
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
 
@@ -87,6 +90,55 @@ class RecordingFeatures:
         return hand.labels[np.searchsorted(hand.times, next(iter(self.times.values())))]
 
 
+@dataclass(frozen=True, eq=False)
+class PreparedRecording:
+    """What every method uses of one recording: its signals, and its labels at each sample.
+
+    Attributes:
+        hand: signals of the fingers.
+        labels: label codes of each finger.
+        exact_labels: the same without margin, if the truth is known.
+        glitches: (n,) samples of each finger whose exact label has the cause glitch.
+        at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
+    """
+
+    hand: HandSignal
+    labels: Mapping[str, Codes]
+    exact_labels: Mapping[str, Codes]
+    glitches: Mapping[str, Mask]
+    at_rest: Mapping[str, tuple[int, float, float]]
+
+    @classmethod
+    def of(cls, recording: Recording, tare: Tare, fingers: Sequence[str]) -> "PreparedRecording":
+        """Prepare some fingers of a recording."""
+        hand = hand_signal(recording, tare, tuple(fingers))
+        modules = {name: recording.modules[name] for name in fingers}
+        without_contact = modules if tare.without_contact else {}
+        exact = relabel(recording, LabelRule(margin=0.0)).modules
+        return cls(
+            hand=hand,
+            labels={name: module.label_states for name, module in modules.items()},
+            exact_labels={name: exact[name].label_states for name in fingers},
+            glitches={name: _glitch_samples(exact[name]) for name in fingers},
+            at_rest={
+                name: rest_moments(module, tare, hand.rate)
+                for name, module in without_contact.items()
+            },
+        )
+
+    @property
+    def recording(self) -> Recording:
+        """The recording."""
+        return self.hand.recording
+
+    @property
+    def n_bytes(self) -> int:
+        """Size of the arrays that it adds to those of the recording [byte]."""
+        codes = (self.labels, self.exact_labels, self.glitches)
+        n_bytes = sum(array.nbytes for arrays in codes for array in arrays.values())
+        return n_bytes + sum(finger.force.nbytes for finger in self.hand.fingers.values())
+
+
 def corpus_features(
     method: Method, corpus: Corpus, variation: Variation, stride: int = 1, warm_up: float = 0.0
 ) -> list[RecordingFeatures]:
@@ -99,27 +151,33 @@ def corpus_features(
         stride: keep the features of every n-th sample. They are computed from all samples.
         warm_up: time at the start of every unbroken stretch that is not scored [s].
     """
-    varied = (variation.apply(recording) for recording in corpus.load())
-    rows = (recording_features(method, corpus, each, stride, warm_up) for each in varied)
-    return [row for row in rows if row is not None]
+    prepared = prepared_recordings(corpus, variation)
+    return [recording_features(method, each, stride, warm_up) for each in prepared]
 
 
-def recording_features(
-    method: Method, corpus: Corpus, recording: Recording, stride: int = 1, warm_up: float = 0.0
-) -> RecordingFeatures | None:
-    """Return the features of a recording; None without any of the fingers of its corpus.
+def prepared_recordings(
+    corpus: Corpus,
+    variation: Variation = Variation(),  # noqa: B008 (frozen)
+) -> Iterator[PreparedRecording]:
+    """Yield the recordings of a corpus that have one of its fingers, in order.
+
+    A process prepares a recording once, as long as it has memory; see `kept`. A recording that
+    is varied is not kept.
 
     Args:
-        method: computes the features.
-        corpus: gives the fingers and the tare.
-        recording: of the corpus.
-        stride: keep the features of every n-th sample. They are computed from all samples.
-        warm_up: time at the start of every unbroken stretch that is not scored [s].
+        corpus: gives the recordings, the fingers and the tare.
+        variation: applied to each recording first.
     """
-    if not (fingers := _fingers(corpus, recording)):
-        return None
-    hand = hand_signal(recording, Tare.parse(corpus.tare), fingers)
-    return _recording_features(method, hand, fingers, stride, warm_up)
+    tare = Tare.parse(corpus.tare)
+    for recording in corpus.load():
+        if not (fingers := _fingers(corpus, recording)):
+            continue
+        if variation != Variation():
+            yield PreparedRecording.of(variation.apply(recording), tare, fingers)
+            continue
+        prepare = partial(PreparedRecording.of, recording, tare, fingers)
+        key = (*corpus.identity, recording.name, fingers, corpus.tare)
+        yield KEPT.get(key, prepare, attrgetter("n_bytes"))
 
 
 def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
@@ -127,36 +185,49 @@ def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
     return tuple(f for f in corpus.fingers if f in modules and modules[f].n_samples)
 
 
-def _recording_features(
-    method: Method, hand: HandSignal, fingers: Sequence[str], stride: int, warm_up: float
+def _glitch_samples(module: Tactile) -> Mask:
+    """Return the samples of a finger whose label has the cause glitch."""
+    of_glitch = [label for label in module.labels if label.cause is Cause.GLITCH]
+    return np.asarray(label_states(of_glitch, module.times) != UNKNOWN)
+
+
+def recording_features(
+    method: Method, prepared: PreparedRecording, stride: int = 1, warm_up: float = 0.0
 ) -> RecordingFeatures:
-    recording = hand.recording
-    modules = {name: recording.modules[name] for name in fingers}
-    without_contact = modules if hand.tare.without_contact else {}
+    """Return the features of a recording.
+
+    Args:
+        method: computes the features.
+        prepared: the recording.
+        stride: keep the features of every n-th sample. They are computed from all samples.
+        warm_up: time at the start of every unbroken stretch that is not scored [s].
+    """
+    hand, recording = prepared.hand, prepared.recording
     held = recording.metadata.get("object")
-    exact = relabel(recording, LabelRule(margin=0.0))
-    compared = {name: _after(warm_up, hand, name)[::stride] for name in fingers}
-    labels = _label_codes(recording, fingers, stride)
+    kept = slice(None, None, stride)
+    compared = {name: _after(warm_up, hand, name)[kept] for name in hand.fingers}
+    labels = _every(prepared.labels, kept)
     return RecordingFeatures(
         name=recording.name,
         object=None if held is None else str(held),
         truth=recording.truth,
-        times={name: finger.times[::stride] for name, finger in hand.fingers.items()},
-        amplitude={name: finger.amplitude[::stride] for name, finger in hand.fingers.items()},
+        times={name: finger.times[kept] for name, finger in hand.fingers.items()},
+        amplitude={name: finger.amplitude[kept] for name, finger in hand.fingers.items()},
         labels=labels,
         compared=compared,
         scored_labels=_masked(labels, compared),
-        exact_labels=_masked(_label_codes(exact, fingers, stride), compared),
-        glitches={name: _glitch_samples(exact, name)[::stride] for name in fingers},
-        at_rest={
-            name: rest_moments(module, hand.tare, hand.rate)
-            for name, module in without_contact.items()
-        },
+        exact_labels=_masked(_every(prepared.exact_labels, kept), compared),
+        glitches=_every(prepared.glitches, kept),
+        at_rest=prepared.at_rest,
         features={
-            unit: np.asarray(rows[::stride], dtype=np.float32)
+            unit: np.asarray(rows[kept], dtype=np.float32)
             for unit, rows in method.features(hand).items()
         },
     )
+
+
+def _every(arrays: Mapping[str, npt.NDArray[Any]], kept: slice) -> dict[str, npt.NDArray[Any]]:
+    return {name: array[kept] for name, array in arrays.items()}
 
 
 def _after(warm_up: float, hand: HandSignal, name: str) -> Mask:
@@ -175,15 +246,3 @@ def _masked(labels: Mapping[str, Codes], compared: Mapping[str, Mask]) -> dict[s
         name: np.where(compared[name], codes, UNKNOWN).astype(np.int8)
         for name, codes in labels.items()
     }
-
-
-def _glitch_samples(recording: Recording, name: str) -> Mask:
-    """Return the samples of a finger whose label has the cause glitch."""
-    module = recording.modules[name]
-    of_glitch = [label for label in module.labels if label.cause is Cause.GLITCH]
-    return np.asarray(label_states(of_glitch, module.times) != UNKNOWN)
-
-
-def _label_codes(recording: Recording, fingers: Sequence[str], stride: int) -> dict[str, Codes]:
-    modules = {name: recording.modules[name] for name in fingers}
-    return {n: label_states(module.labels, module.times)[::stride] for n, module in modules.items()}

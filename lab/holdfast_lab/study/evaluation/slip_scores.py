@@ -37,7 +37,11 @@ from holdfast_lab.study.evaluation.fitted_method import (
     TrainingSamples,
     gather_rows,
 )
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, recording_features
+from holdfast_lab.study.evaluation.recording_features import (
+    RecordingFeatures,
+    prepared_recordings,
+    recording_features,
+)
 from holdfast_lab.study.evaluation.scores import RecordingScores, probability_of
 from holdfast_lab.study.methods import HAND, Method
 from holdfast_lab.study.plan import Corpus
@@ -78,10 +82,9 @@ def slip_recordings(method: Method, corpus: Corpus, warm_up: float = 0.0) -> lis
         warm_up: time at the start of every unbroken stretch that is not scored [s].
     """
     made = []
-    for recording in corpus.load():
-        features = recording_features(method, corpus, recording, warm_up=warm_up)
-        truth = {} if features is None else _truth(recording, features)
-        if features is not None and truth:
+    for prepared in prepared_recordings(corpus):
+        features = recording_features(method, prepared, warm_up=warm_up)
+        if truth := _truth(prepared.recording, features):
             made.append(SlipRecording(features, truth))
     return made
 

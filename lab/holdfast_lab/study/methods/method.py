@@ -5,10 +5,10 @@ recording.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +36,8 @@ class FingerSignal:
     Attributes:
         sensor: of the finger.
         times: (n,) [s].
-        readings: (n, n_taxels, 3) in taxel frames, less the tare [unit of the readings].
+        with_baseline: (n, n_taxels, 3) readings in taxel frames, as they are recorded.
+        baseline: (n_taxels, 3) the tare [unit of the readings].
         force: (n, 3) F_tip [unit of the readings]; NaN until the tare is complete, and at
             samples with a reading that is not finite.
         rate: samples per second [Hz].
@@ -44,9 +45,15 @@ class FingerSignal:
 
     sensor: Sensor
     times: Array
-    readings: Array
+    with_baseline: npt.NDArray[Any]
+    baseline: Array
     force: Array
     rate: float
+
+    @property
+    def readings(self) -> Array:
+        """(n, n_taxels, 3) readings less the tare [unit]; computed at each call: they are large."""
+        return np.asarray(self.with_baseline, dtype=np.float64) - self.baseline
 
     @property
     def amplitude(self) -> Array:
@@ -90,8 +97,11 @@ class FingerSignal:
 
     def part(self, rows: slice) -> "FingerSignal":
         """Return the signal of some samples."""
-        return FingerSignal(
-            self.sensor, self.times[rows], self.readings[rows], self.force[rows], self.rate
+        return replace(
+            self,
+            times=self.times[rows],
+            with_baseline=self.with_baseline[rows],
+            force=self.force[rows],
         )
 
 
@@ -171,8 +181,9 @@ def hand_signal(
 
 def _finger_signal(module: Tactile, tare: Tare, rate: float) -> FingerSignal:
     tared = tared_force(module, tare, rate)
-    readings = np.asarray(module.readings, dtype=np.float64) - tared.baseline
-    return FingerSignal(module.sensor, module.times, readings, tared.force, rate)
+    return FingerSignal(
+        module.sensor, module.times, module.readings, tared.baseline, tared.force, rate
+    )
 
 
 def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> dict[str, Array]:

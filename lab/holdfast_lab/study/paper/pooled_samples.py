@@ -5,7 +5,7 @@ The part does not depend on finger, window and features.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -138,8 +138,8 @@ def _read_forces(corpus: Corpus, rate: float, treatment: Treatment) -> Iterator[
 
 
 def _without_readings(signal: FingerSignal) -> FingerSignal:
-    empty = np.empty((len(signal.times), 0, 3))
-    return FingerSignal(signal.sensor, signal.times, empty, signal.force, signal.rate)
+    no_taxels = np.empty((len(signal.times), 0, 3))
+    return replace(signal, with_baseline=no_taxels, baseline=np.empty((0, 3)))
 
 
 def _columns(signal: FingerSignal, window: int) -> Array:

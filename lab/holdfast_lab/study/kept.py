@@ -1,0 +1,68 @@
+"""Values that a worker keeps in memory, because many tasks of a study use them."""
+
+import os
+from collections.abc import Callable, Hashable, Mapping
+from threading import Lock
+from typing import Any, TypeVar
+
+from holdfast.recordings import Recording
+from holdfast_lab.report.environment import physical_memory
+
+T = TypeVar("T")
+
+MEMORY_SHARE = 0.25
+"""Share of the memory of the machine that the kept values of all its workers may use."""
+DEFAULT_MEMORY = 4 << 30
+"""Memory of a machine that does not say how much it has [byte]."""
+
+
+class KeptValues:
+    """Values by key, in the memory of this process. What no longer fits is not kept.
+
+    The first values stay, because the tasks of a study use their recordings in the same order:
+    if the oldest values were dropped, each would be gone before it is used again.
+
+    Args:
+        max_bytes: of all values together.
+    """
+
+    def __init__(self, max_bytes: float) -> None:
+        self._left = max_bytes
+        self._kept: dict[Hashable, Any] = {}
+        self._lock = Lock()
+
+    def get(self, key: Hashable, make: Callable[[], T], n_bytes: Callable[[T], int]) -> T:
+        """Return the value of a key; make it, and keep it if it fits, if there is none.
+
+        Args:
+            key: of the value.
+            make: function that returns the value.
+            n_bytes: function from the value to its size [byte].
+        """
+        if key in self._kept:
+            value: T = self._kept[key]
+            return value
+        value = make()
+        size = n_bytes(value)
+        with self._lock:
+            if key not in self._kept and size <= self._left:
+                self._kept[key] = value
+                self._left -= size
+        return value
+
+
+def recording_bytes(recording: Recording) -> int:
+    """Return the size of the arrays of a recording [byte]."""
+    n_bytes = sum(m.times.nbytes + m.readings.nbytes for m in recording.modules.values())
+    if (truth := recording.truth) is not None:
+        n_bytes += truth.times.nbytes + _total(truth.hand)
+        n_bytes += sum(_total(arrays) for arrays in truth.fingers.values())
+    return n_bytes
+
+
+def _total(arrays: Mapping[str, Any]) -> int:
+    return sum(array.nbytes for array in arrays.values())
+
+
+KEPT = KeptValues(MEMORY_SHARE * (physical_memory() or DEFAULT_MEMORY) / (os.cpu_count() or 1))
+"""The values that this process keeps."""

@@ -1,0 +1,77 @@
+"""Values that a worker keeps: the same ones again, up to a number of bytes."""
+
+import numpy as np
+import pytest
+
+from holdfast_lab.study.evaluation.recording_features import prepared_recordings
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.kept import KeptValues, recording_bytes
+from holdfast_lab.study.plan import scan_corpus
+
+from .example_recordings import recording_with_truth, save_synthetic
+
+
+def one_byte(_):
+    return 1
+
+
+def test_a_value_is_made_once():
+    kept, made = KeptValues(10), []
+    for _ in range(3):
+        assert kept.get("a", lambda: made.append("a") or [5], one_byte) == [5]
+    assert made == ["a"]
+
+
+def test_what_does_not_fit_is_made_again_and_what_fits_stays():
+    kept, made = KeptValues(2), []
+    for key in "abcabc":
+        kept.get(key, lambda key=key: made.append(key), one_byte)
+    assert made == ["a", "b", "c", "c"]
+
+
+def test_a_value_that_cannot_be_made_is_not_kept():
+    kept = KeptValues(10)
+    with pytest.raises(ZeroDivisionError):
+        kept.get("a", lambda: 1 / 0, one_byte)
+    assert kept.get("a", lambda: 7, one_byte) == 7
+
+
+def test_the_bytes_of_a_recording_are_those_of_its_arrays():
+    recording = recording_with_truth("made", seed=0)
+    without = sum(m.readings.nbytes + m.times.nbytes for m in recording.modules.values())
+    truth = recording.truth
+    arrays = [
+        truth.times,
+        *truth.hand.values(),
+        *(a for f in truth.fingers.values() for a in f.values()),
+    ]
+    assert recording_bytes(recording) == without + sum(array.nbytes for array in arrays)
+
+
+@pytest.fixture
+def corpus(tmp_path):
+    save_synthetic(tmp_path, [1, 2])
+    return scan_corpus("main", tmp_path)
+
+
+def test_a_recording_is_prepared_once(corpus):
+    first, again = (list(prepared_recordings(corpus)) for _ in range(2))
+    assert len(first) == 2
+    assert all(a is b for a, b in zip(first, again, strict=True))
+    assert first[0].recording is corpus.load()[0]
+
+
+def test_a_varied_recording_is_not_taken_for_the_recording(corpus):
+    plain = next(prepared_recordings(corpus))
+    noisy = next(prepared_recordings(corpus, Variation(noise=20.0)))
+    finger = corpus.fingers[0]
+    assert not np.array_equal(plain.hand.fingers[finger].force, noisy.hand.fingers[finger].force)
+
+
+def test_a_changed_corpus_is_read_again(corpus, tmp_path):
+    before = next(prepared_recordings(corpus))
+    for path in tmp_path.glob("*.parquet"):
+        path.unlink()
+    save_synthetic(tmp_path, [3, 4])
+    after = next(prepared_recordings(scan_corpus("main", tmp_path)))
+    assert before.recording.digest != after.recording.digest
