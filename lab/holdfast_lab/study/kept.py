@@ -64,5 +64,7 @@ def _total(arrays: Mapping[str, Any]) -> int:
     return sum(array.nbytes for array in arrays.values())
 
 
-KEPT = KeptValues(MEMORY_SHARE * (physical_memory() or DEFAULT_MEMORY) / (os.cpu_count() or 1))
+WORKER_MEMORY = KeptValues(
+    MEMORY_SHARE * (physical_memory() or DEFAULT_MEMORY) / (os.cpu_count() or 1)
+)
 """The values that this process keeps."""

@@ -16,7 +16,7 @@ from holdfast.features import Tare
 from holdfast.io import Dataset, load_dataset
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset
-from holdfast_lab.study.kept import KEPT, recording_bytes
+from holdfast_lab.study.kept import WORKER_MEMORY, recording_bytes
 
 
 class Corpus(msgspec.Struct, frozen=True):
@@ -95,7 +95,7 @@ class CorpusRecordings(Sequence[Recording]):
         if isinstance(index, slice):
             return CorpusRecordings(self.corpus, self.files[index])
         key = (*self.corpus.identity, self.files.paths[index])
-        return KEPT.get(key, lambda: self.files[index], recording_bytes)
+        return WORKER_MEMORY.get(key, lambda: self.files[index], recording_bytes)
 
 
 class StudyPlan(msgspec.Struct, frozen=True):

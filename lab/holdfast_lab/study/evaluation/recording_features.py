@@ -19,7 +19,7 @@ from holdfast.recordings import Recording, Tactile, Truth, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.kept import KEPT
+from holdfast_lab.study.kept import WORKER_MEMORY
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
 
@@ -177,7 +177,7 @@ def prepared_recordings(
             continue
         prepare = partial(PreparedRecording.of, recording, tare, fingers)
         key = (*corpus.identity, recording.name, fingers, corpus.tare)
-        yield KEPT.get(key, prepare, attrgetter("n_bytes"))
+        yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
 
 
 def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
