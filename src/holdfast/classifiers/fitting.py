@@ -146,6 +146,12 @@ def class_ratio(stable: npt.NDArray[np.bool_]) -> float:
     return (len(stable) - n_stable) / n_stable
 
 
+def balanced_weights(stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the weights n / (2 n_0) and n / (2 n_1) of the classes."""
+    n, n_stable = len(stable), int(stable.sum())
+    return n / (2 * (n - n_stable)), n / (2 * n_stable)
+
+
 def undo_balancing(
     probability: npt.NDArray[np.float64], class_ratio: float
 ) -> npt.NDArray[np.float64]:

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from msgspec.structs import replace
 
 from holdfast.classifiers.fitting import (
@@ -12,6 +11,7 @@ from holdfast.classifiers.fitting import (
     ModelClassifier,
     Parameters,
     Samples,
+    balanced_weights,
     check_classes,
     class_ratio,
     standardise,
@@ -59,7 +59,7 @@ class LogisticRegression:
         solution = fit_logistic(
             features,
             samples.stable,
-            _balanced_weights(samples.stable) if balanced else (1.0, 1.0),
+            balanced_weights(samples.stable) if balanced else (1.0, 1.0),
             parameters["C"],
         )
         odds = class_ratio(samples.stable) if balanced else 1.0
@@ -71,12 +71,6 @@ class LogisticRegression:
             offset=-float(np.log(odds)),
             threshold=1.0 / (1.0 + odds),
         )
-
-
-def _balanced_weights(stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the weights n / (2 n_0) and n / (2 n_1) of the classes."""
-    n, n_stable = len(stable), int(stable.sum())
-    return n / (2 * (n - n_stable)), n / (2 * n_stable)
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,10 @@ class Solution(NamedTuple):
     weights: Array
     intercept: float
 
+    def decision(self, features: Array) -> Array:
+        """Return w x + b of (n, n_features)."""
+        return features @ self.weights + self.intercept
+
 
 class MultinomialSolution(NamedTuple):
     """Weights (n_classes, n_features) of the features, and intercepts (n_classes,)."""
