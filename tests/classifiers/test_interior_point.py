@@ -95,6 +95,16 @@ def test_classes_that_are_apart_have_the_widest_margin(c):
     )
 
 
+def test_outliers_of_classes_that_are_apart_do_not_end_the_search_early():
+    features = np.random.default_rng(0).standard_t(2, size=(5000, 2))
+    stable = features[:, 0] > 0.3
+    rows, costs = signed(features, stable), limits(stable, (1.0, 1.0), 1e3)
+    rule = rule_of(features, stable, (1.0, 1.0), 1e3)
+    general = minimize(objective, rule, (rows, costs), "Nelder-Mead", options={"maxiter": 4000})
+    assert objective(rule, rows, costs) <= 1.0001 * general.fun
+    assert least_subgradient(rule, rows, costs) < 1e-2
+
+
 @pytest.mark.parametrize("c", [1.0, 1e3])
 def test_equal_columns_share_their_weight(c):
     features, stable = samples(d=2)

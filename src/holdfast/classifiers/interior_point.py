@@ -18,7 +18,8 @@ from scipy.linalg import cho_factor, cho_solve
 from holdfast.classifiers.newton import Solution
 from holdfast.sensors.types import Array
 
-MAX_STEPS = 100
+MAX_STEPS = 500
+"""Usual are 15 to 45 steps; classes that are far apart, with a large C, need up to 150."""
 LAST_GAP = 1e-9
 """Difference of the objective from a lower bound of it, relative, at which the search ends."""
 STEP_SHARE = 0.995
