@@ -49,88 +49,101 @@ def fit_svm(
         class_weights: weight of a sample that is not stable, and of one that is.
         c: inverse strength of the L2 penalty, which the intercept has too, as in liblinear.
     """
-    rows = np.column_stack([features, np.ones(len(features))])
-    rows *= np.where(stable, 1.0, -1.0)[:, None]
+    columns = np.vstack([features.T, np.ones(len(features))])
+    columns *= np.where(stable, 1.0, -1.0)
     limits = c * np.where(stable, class_weights[1], class_weights[0])
-    point = _start(rows, limits)
+    point = _start(columns, limits)
     for _ in range(MAX_STEPS):
-        if _gap(rows, limits, point) < LAST_GAP:
+        margins, supported = point.weights @ columns, columns @ point.multipliers
+        if _gap(limits, point, margins, supported) < LAST_GAP:
             break
-        point = _next(rows, limits, point)
+        point = _next(_System(columns, limits, point, margins, supported))
     return Solution(point.weights[:-1], float(point.weights[-1]))
 
 
-def _start(rows: Array, limits: Array) -> _Point:
+def _start(columns: Array, limits: Array) -> _Point:
     """Return a point with multipliers of half their limits."""
-    multipliers = limits / 2
-    weights = np.zeros(rows.shape[1])
-    return _Point(weights, np.ones(len(rows)), np.ones(len(rows)), multipliers)
+    one = np.ones(len(limits))
+    return _Point(np.zeros(len(columns)), one, one, limits / 2)
 
 
-def _gap(rows: Array, limits: Array, point: _Point) -> float:
+def _gap(limits: Array, point: _Point, margins: Array, supported: Array) -> float:
     """Return (objective - lower bound) / objective; the bound is the dual objective."""
-    margins = rows @ point.weights
     objective = point.weights @ point.weights / 2 + limits @ np.maximum(0.0, 1.0 - margins)
-    supported = point.multipliers @ rows
     bound = point.multipliers.sum() - supported @ supported / 2
     return float((objective - bound) / objective)
 
 
-def _next(rows: Array, limits: Array, point: _Point) -> _Point:
+class _System:
+    """Newton's equations at a point, reduced to those of the weights.
+
+    Args:
+        columns: (n_features + 1, n) vectors z_i.
+        limits: (n,) largest multiplier of each sample.
+        point: of the step.
+        margins: (n,) z_i . v.
+        supported: (n_features + 1,) sum_i a_i z_i.
+    """
+
+    def __init__(
+        self, columns: Array, limits: Array, point: _Point, margins: Array, supported: Array
+    ) -> None:
+        self.point = point
+        self.upper = limits - point.multipliers
+        self._columns = columns
+        self._scale = 1.0 / (point.slacks / point.multipliers + point.residuals / self.upper)
+        scaled = columns * np.sqrt(self._scale)
+        matrix = scaled @ scaled.T
+        matrix[np.diag_indices_from(matrix)] += 1.0
+        self._factor = cho_factor(matrix)
+        self._missing = margins + point.residuals - 1.0 - point.slacks
+        self._unsupported = supported - point.weights
+
+    def step(self, lower_target: float | Array, upper_target: float | Array) -> _Point:
+        """Return the step to a_i s_i = `lower_target` and (C_i - a_i) r_i = `upper_target`."""
+        _, slacks, residuals, multipliers = self.point
+        ahead = lower_target / multipliers - slacks
+        beyond = upper_target / self.upper - residuals
+        wanted = ahead - self._missing - beyond
+        right = self._unsupported + self._columns @ (self._scale * wanted)
+        weights = cho_solve(self._factor, right)
+        multiplier_step = self._scale * (wanted - weights @ self._columns)
+        return _Point(
+            weights,
+            ahead - slacks / multipliers * multiplier_step,
+            beyond + residuals / self.upper * multiplier_step,
+            multiplier_step,
+        )
+
+    def product(self, step: _Point | None = None, share: float = 0.0) -> float:
+        """Return the sum of all a_i s_i and (C_i - a_i) r_i, after a share of a step."""
+        point, upper = self.point, self.upper
+        if step is not None:
+            point, upper = _moved(point, step, share), upper - share * step.multipliers
+        return float(point.multipliers @ point.slacks + upper @ point.residuals)
+
+    def longest(self, step: _Point) -> float:
+        """Return the longest share of a step, at most 1, that keeps everything at least 0."""
+        return 1.0 / max(
+            1.0,
+            float((-step.slacks / self.point.slacks).max()),
+            float((-step.residuals / self.point.residuals).max()),
+            float((-step.multipliers / self.point.multipliers).max()),
+            float((step.multipliers / self.upper).max()),
+        )
+
+
+def _next(system: _System) -> _Point:
     """Return the point after a step of predictor and corrector."""
-    upper = limits - point.multipliers
-    system = _System(rows, upper, point)
-    product = float(point.multipliers @ point.slacks + upper @ point.residuals)
+    product = system.product()
     predicted = system.step(0.0, 0.0)
-    ahead = _moved(point, predicted, _longest(upper, point, predicted))
-    left = float(ahead.multipliers @ ahead.slacks + (limits - ahead.multipliers) @ ahead.residuals)
-    target = (left / product) ** 3 * product / (2 * len(rows))
+    left = system.product(predicted, system.longest(predicted))
+    target = (left / product) ** 3 * product / (2 * len(system.upper))
     corrected = system.step(
         target - predicted.multipliers * predicted.slacks,
         target + predicted.multipliers * predicted.residuals,
     )
-    return _moved(point, corrected, STEP_SHARE * _longest(upper, point, corrected))
-
-
-class _System:
-    """Newton's equations at a point, reduced to those of the weights."""
-
-    def __init__(self, rows: Array, upper: Array, point: _Point) -> None:
-        self._rows, self._upper, self._point = rows, upper, point
-        self._scale = 1.0 / (point.slacks / point.multipliers + point.residuals / upper)
-        scaled = rows * np.sqrt(self._scale)[:, None]
-        matrix = scaled.T @ scaled
-        matrix[np.diag_indices_from(matrix)] += 1.0
-        self._factor = cho_factor(matrix)
-        self._missing = rows @ point.weights + point.residuals - 1.0 - point.slacks
-        self._unsupported = point.multipliers @ rows - point.weights
-
-    def step(self, lower_target: float | Array, upper_target: float | Array) -> _Point:
-        """Return the step to a_i s_i = `lower_target` and (C_i - a_i) r_i = `upper_target`."""
-        _, slacks, residuals, multipliers = self._point
-        ahead = lower_target / multipliers - slacks
-        beyond = upper_target / self._upper - residuals
-        wanted = ahead - self._missing - beyond
-        right = self._unsupported + (self._scale * wanted) @ self._rows
-        weights = cho_solve(self._factor, right)
-        multiplier_step = self._scale * (wanted - self._rows @ weights)
-        return _Point(
-            weights,
-            ahead - slacks / multipliers * multiplier_step,
-            beyond + residuals / self._upper * multiplier_step,
-            multiplier_step,
-        )
-
-
-def _longest(upper: Array, point: _Point, step: _Point) -> float:
-    """Return the longest part of a step, at most 1, that keeps everything at least 0."""
-    pairs = (
-        (point.slacks, step.slacks),
-        (point.residuals, step.residuals),
-        (point.multipliers, step.multipliers),
-        (upper, -step.multipliers),
-    )
-    return min(1.0, *(float((-now[d < 0] / d[d < 0]).min(initial=np.inf)) for now, d in pairs))
+    return _moved(system.point, corrected, STEP_SHARE * system.longest(corrected))
 
 
 def _moved(point: _Point, step: _Point, share: float) -> _Point:
