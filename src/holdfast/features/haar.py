@@ -26,7 +26,7 @@ DEFAULT_WINDOW = 14
 FEATURE_NAMES = ("F_a", "F_x", "F_y", "F_z", "m", "sigma")
 """The paper's features, in the order of the columns of `haar_features`."""
 
-_BLOCK_SAMPLES = 512
+_BLOCK_SAMPLES = 1024
 """Samples that one thread computes at a time: they fit into the cache."""
 
 
@@ -128,7 +128,10 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
         step = 2 * size
         length -= step
         # Two equal halves: P = P_a + P_b, D = D_a + D_b, S = S_a + S_b + (D_a - D_b)^2 / (2 n).
-        _join_equal(d, d[step:], s, s[step:], size, next_s[:length])
+        if size == 1:
+            _join_pairs(d, d[step:], next_s[:length])
+        else:
+            _join_equal(d, d[step:], s, s[step:], size, next_s[:length])
         _add(d, d[step:], next_d[:length])
         _add(p, p[step:], next_p[:length])
         p, d, s, next_p, next_d, next_s = next_p, next_d, next_s, p, d, s
@@ -182,6 +185,14 @@ def _join_equal(
     for k in range(len(joined)):
         apart = older_d[k] - newer_d[k]
         joined[k] = older_s[k] + newer_s[k] + apart * apart * factor
+
+
+@compiled_step
+def _join_pairs(older_d: Array, newer_d: Array, joined: Array) -> None:
+    """Compute S of blocks of two pairs, whose own S are 0."""
+    for k in range(len(joined)):
+        apart = older_d[k] - newer_d[k]
+        joined[k] = apart * apart * 0.5
 
 
 @compiled_step
@@ -280,27 +291,41 @@ def fill_features(force: Array, window: int, out: Array) -> None:
         amplitude = np.empty(stop - start + window - 1)
         m, sigma = np.empty(stop - start), np.empty(stop - start)
         scratch = np.empty((_SCRATCH_ROWS, len(amplitude)))
-        # F_a of the block and of the window before it; then equations 1 and 2.
-        _fill_amplitude(force[start - window + 1 : stop], amplitude)
+        # F_a of the window before the block, and of the block; then equations 1 and 2.
+        _fill_amplitude(force, start - window + 1, window - 1, amplitude)
+        _fill_force(force[start:stop], amplitude[window - 1 :], out[start:stop])
         haar_windows(amplitude, window, m, sigma, scratch)
-        _fill_rows(force[start:stop], amplitude[window - 1 :], m, sigma, out[start:stop])
+        _fill_moments(m, sigma, out[start:stop])
 
 
 @compiled_step
-def _fill_amplitude(force: Array, amplitude: Array) -> None:
-    for k in range(len(amplitude)):
+def _fill_amplitude(force: Array, first: int, n: int, amplitude: Array) -> None:
+    """Fill F_a of n samples from `first` on."""
+    for k in range(n):
         # F_a = |F_tip|.
-        x, y, z = force[k, 0], force[k, 1], force[k, 2]
+        x, y, z = force[first + k, 0], force[first + k, 1], force[first + k, 2]
         amplitude[k] = math.sqrt(x * x + y * y + z * z)
 
 
 @compiled_step
-def _fill_rows(force: Array, amplitude: Array, m: Array, sigma: Array, out: Array) -> None:
-    """Fill the rows of a block; NaN where a window is not finite."""
+def _fill_force(force: Array, amplitude: Array, out: Array) -> None:
+    """Fill F_a and the force of the rows of a block.
+
+    The rows are written while the square roots are computed: the processor waits for both.
+    """
+    for k in range(len(out)):
+        # F_a = |F_tip|.
+        x, y, z = force[k, 0], force[k, 1], force[k, 2]
+        amplitude[k] = math.sqrt(x * x + y * y + z * z)
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = amplitude[k], x, y, z
+
+
+@compiled_step
+def _fill_moments(m: Array, sigma: Array, out: Array) -> None:
+    """Fill m and sigma of the rows of a block; NaN where a window is not finite."""
     all_finite = True
     for k in range(len(out)):
-        out[k, 0], out[k, 4], out[k, 5] = amplitude[k], m[k], sigma[k]
-        out[k, 1], out[k, 2], out[k, 3] = force[k, 0], force[k, 1], force[k, 2]
+        out[k, 4], out[k, 5] = m[k], sigma[k]
         all_finite &= math.isfinite(m[k] + sigma[k])
     if not all_finite:
         for k in range(len(out)):
