@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve
 
 from holdfast.classifiers.newton import Solution
 from holdfast.sensors.types import Array
@@ -88,6 +87,8 @@ class _System:
     def __init__(
         self, columns: Array, limits: Array, point: _Point, margins: Array, supported: Array
     ) -> None:
+        from scipy.linalg import cho_factor
+
         self.point = point
         self.upper = limits - point.multipliers
         self._columns = columns
@@ -101,6 +102,8 @@ class _System:
 
     def step(self, lower_target: float | Array, upper_target: float | Array) -> _Point:
         """Return the step to a_i s_i = `lower_target` and (C_i - a_i) r_i = `upper_target`."""
+        from scipy.linalg import cho_solve
+
         _, slacks, residuals, multipliers = self.point
         ahead = lower_target / multipliers - slacks
         beyond = upper_target / self.upper - residuals
