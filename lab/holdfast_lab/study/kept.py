@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Hashable, Mapping
+from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
 
@@ -14,6 +15,8 @@ MEMORY_SHARE = 0.25
 """Share of the memory of the machine that the kept values of all its workers may use."""
 DEFAULT_MEMORY = 4 << 30
 """Memory of a machine that does not say how much it has [byte]."""
+CONTAINER_LIMIT = Path("/sys/fs/cgroup/memory.max")
+"""File with the memory that a container may use, or `max`; not there outside of Linux."""
 
 
 class KeptValues:
@@ -64,7 +67,19 @@ def _total(arrays: Mapping[str, Any]) -> int:
     return sum(array.nbytes for array in arrays.values())
 
 
-WORKER_MEMORY = KeptValues(
-    MEMORY_SHARE * (physical_memory() or DEFAULT_MEMORY) / (os.cpu_count() or 1)
-)
+def usable_memory(limit: Path = CONTAINER_LIMIT) -> int:
+    """Return the memory of this machine, or of the container if it may use less [byte].
+
+    Args:
+        limit: see `CONTAINER_LIMIT`.
+    """
+    memory = physical_memory() or DEFAULT_MEMORY
+    try:
+        text = limit.read_text().strip()
+    except OSError:
+        return memory
+    return min(memory, int(text)) if text.isdecimal() else memory
+
+
+WORKER_MEMORY = KeptValues(MEMORY_SHARE * usable_memory() / (os.cpu_count() or 1))
 """The values that this process keeps."""

@@ -5,7 +5,7 @@ import pytest
 
 from holdfast_lab.study.evaluation.recording_features import prepared_recordings
 from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.kept import KeptValues, recording_bytes
+from holdfast_lab.study.kept import KeptValues, recording_bytes, usable_memory
 from holdfast_lab.study.plan import scan_corpus
 
 from .example_recordings import recording_with_truth, save_synthetic
@@ -46,6 +46,19 @@ def test_the_bytes_of_a_recording_are_those_of_its_arrays():
         *(a for f in truth.fingers.values() for a in f.values()),
     ]
     assert recording_bytes(recording) == without + sum(array.nbytes for array in arrays)
+
+
+@pytest.mark.parametrize("text", ["max\n", "", "no number", str(1 << 60)])
+def test_a_container_without_a_limit_of_its_own_has_the_memory_of_the_machine(tmp_path, text):
+    limit = tmp_path / "memory.max"
+    limit.write_text(text)
+    assert usable_memory(limit) == usable_memory(tmp_path / "none")
+
+
+def test_a_container_may_use_less(tmp_path):
+    limit = tmp_path / "memory.max"
+    limit.write_text("1048576\n")
+    assert usable_memory(limit) == 1048576
 
 
 @pytest.fixture
