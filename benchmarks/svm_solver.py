@@ -15,7 +15,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.svm import LinearSVC
 
-from holdfast.classifiers.fitting import balanced_weights, standardise
+from holdfast.classifiers.fitting import class_weights, standardise
 from holdfast.classifiers.interior_point import fit_svm
 from holdfast_lab.study.evaluation.fitted_method import gather_training_samples
 from holdfast_lab.study.evaluation.recording_features import corpus_features
@@ -43,7 +43,7 @@ def main():
 
 
 def _line(title, features, stable, c):
-    weights = balanced_weights(stable)
+    weights = class_weights(stable, "balanced")
     began = time.process_time()
     own = fit_svm(features, stable, weights, c)
     own_time, began = time.process_time() - began, time.process_time()

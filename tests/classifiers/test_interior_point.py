@@ -4,18 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
-from holdfast.classifiers.fitting import standardise
 from holdfast.classifiers.interior_point import fit_svm
 
+from .two_classes import samples
+
 WEIGHTS = (1.0, 1.0), (0.6, 3.0)
-
-
-def samples(n=400, d=5, shift=1.0, share=0.3, seed=0):
-    draw = np.random.default_rng(seed)
-    stable = draw.random(n) < share
-    features = draw.normal(size=(n, d)) @ draw.normal(size=(d, d))
-    features += shift * stable[:, None] * draw.normal(size=d)
-    return standardise(features)[2], stable
 
 
 def signed(features, stable):

@@ -17,13 +17,7 @@ from holdfast.classifiers.newton import (
     fit_multinomial,
 )
 
-
-def samples(n=600, d=5, shift=1.0, share=0.5, seed=0):
-    draw = np.random.default_rng(seed)
-    stable = draw.random(n) < share
-    features = draw.normal(size=(n, d)) @ draw.normal(size=(d, d))
-    features += shift * stable[:, None] * draw.normal(size=d)
-    return standardise(features)[2], stable
+from .two_classes import samples
 
 
 def by_sklearn(features, stable, class_weights, c):

@@ -146,8 +146,15 @@ def class_ratio(stable: npt.NDArray[np.bool_]) -> float:
     return (len(stable) - n_stable) / n_stable
 
 
-def balanced_weights(stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the weights n / (2 n_0) and n / (2 n_1) of the classes."""
+def class_weights(stable: npt.NDArray[np.bool_], class_weight: str | None) -> tuple[float, float]:
+    """Return the weight of a sample that is not stable, and of one that is.
+
+    Args:
+        stable: (n,) class.
+        class_weight: `balanced` for n / (2 n_0) and n / (2 n_1); None for 1 and 1.
+    """
+    if class_weight != "balanced":
+        return 1.0, 1.0
     n, n_stable = len(stable), int(stable.sum())
     return n / (2 * (n - n_stable)), n / (2 * n_stable)
 

@@ -11,9 +11,9 @@ from holdfast.classifiers.fitting import (
     ModelClassifier,
     Parameters,
     Samples,
-    balanced_weights,
     check_classes,
     class_ratio,
+    class_weights,
     standardise,
 )
 from holdfast.classifiers.linear import LinearClassifier
@@ -59,7 +59,7 @@ class LogisticRegression:
         solution = fit_logistic(
             features,
             samples.stable,
-            balanced_weights(samples.stable) if balanced else (1.0, 1.0),
+            class_weights(samples.stable, parameters["class_weight"]),
             parameters["C"],
         )
         odds = class_ratio(samples.stable) if balanced else 1.0

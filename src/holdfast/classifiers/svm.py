@@ -9,8 +9,8 @@ import numpy.typing as npt
 from holdfast.classifiers.fitting import (
     Parameters,
     Samples,
-    balanced_weights,
     check_classes,
+    class_weights,
     logistic,
     sigmoid,
     standardise,
@@ -74,8 +74,7 @@ class LinearSVM:
 def _fit(
     features: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_], parameters: Parameters
 ) -> Solution:
-    balanced = parameters["class_weight"] == "balanced"
-    weights = balanced_weights(stable) if balanced else (1.0, 1.0)
+    weights = class_weights(stable, parameters["class_weight"])
     return fit_svm(features, stable, weights, parameters["C"])
 
 
