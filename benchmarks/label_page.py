@@ -11,7 +11,6 @@ without a browser; `first` is the first response of a new process.
 
 import argparse
 import json
-import resource
 import shutil
 import statistics
 import subprocess
@@ -65,13 +64,11 @@ def main() -> None:
         path = Path(folder) / "long.parquet"
         save_recording(_recording(options.samples), path)
         report = {"samples": options.samples, "fingers": len(FINGERS)}
-        with _served(path) as url:
+        with _served(path) as (url, process):
             report["service"] = _service(url)
+            report["memory of the service, largest [MB]"] = _largest_memory(process)
         if not options.no_browser:
             report["page"] = _page(path, options)
-    report["memory of the service, largest [MB]"] = round(
-        resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    )
     print(json.dumps(report, indent=1))
 
 
@@ -98,15 +95,22 @@ def _recording(n: int) -> Recording:
 
 @contextmanager
 def _served(path: Path):
-    """Run the labelling page in another process, and yield its URL."""
+    """Run the labelling page in another process, and yield its URL and its process id."""
     holdfast = Path(sys.executable).with_name("holdfast")
     words = ("label", str(path), "--port", "0", "--no-browser", "--json")
     process = subprocess.Popen([holdfast, *words], stdout=subprocess.PIPE, text=True)
     try:
-        yield json.loads(process.stdout.readline())["url"]
+        yield json.loads(process.stdout.readline())["url"], process.pid
     finally:
         process.terminate()
         process.wait()
+
+
+def _largest_memory(process: int) -> int:
+    """Return the largest resident memory of a process so far [MB]."""
+    status = Path(f"/proc/{process}/status").read_text("utf-8")
+    (line,) = (line for line in status.splitlines() if line.startswith("VmHWM:"))
+    return round(int(line.split()[1]) * 1024 / 1e6)
 
 
 def _service(url: str) -> dict[str, float]:
@@ -144,7 +148,7 @@ def _page(path: Path, options: argparse.Namespace) -> dict[str, float]:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1600, "height": 1000})
         page.add_init_script(DRAWING_TIMES_SCRIPT)
-        with _served(path) as url:
+        with _served(path) as (url, _):
             page.goto(url)
             report = _visit(page, options.wheels)
         browser.close()

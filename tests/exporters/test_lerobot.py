@@ -10,6 +10,7 @@ import pytest
 
 from holdfast.errors import OutputError, RecordingError
 from holdfast.exporters.lerobot import export
+from holdfast.exporters.lerobot_frames import ColumnStatistics
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording
@@ -164,6 +165,12 @@ def test_statistics_are_those_of_the_frames_without_nan(data_set, info, table):
             got, want = np.array(stats[name][key]), function(values, axis=0)
             assert np.allclose(got.reshape(want.shape), want, rtol=1e-9), (name, key)
         assert stats[name]["count"] == [692]
+
+
+def test_a_signalling_nan_is_no_number():
+    statistics = ColumnStatistics((1,))
+    statistics.add(np.array([[0x3F800000], [0x7FA00000]], dtype=np.uint32).view(np.float32))
+    assert statistics.result()["mean"] == [1.0]
 
 
 def test_the_library_datasets_reads_it(data_set, info, recordings, tmp_path):

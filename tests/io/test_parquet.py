@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io import load_recording, save_recording
+from holdfast.io import load_recording, parquet, save_recording
 from holdfast.io.parquet import CHECKSUM_KEY
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
@@ -74,15 +74,26 @@ def test_it_opens_as_a_wide_table(make_recording, tmp_path):
     assert "truth.thumb.slip_speed" in table.column_names
 
 
-def test_row_groups_are_a_minute_at_most(tmp_path):
-    times = np.arange(20_000) / 100
-    module = Tactile(sensor("anyskin"), times, np.zeros((20_000, 5, 3), np.int16))
-    save_recording(Recording("a", {"thumb": module}), tmp_path / "a.parquet")
-    file = pq.ParquetFile(tmp_path / "a.parquet")
-    assert [file.metadata.row_group(k).num_rows for k in range(4)] == [6000, 6000, 6000, 2000]
+def rows_of_groups(path, n):
+    times = np.arange(n) / 100
+    module = Tactile(sensor("anyskin"), times, np.zeros((n, 5, 3), np.int16))
+    save_recording(Recording("a", {"thumb": module}), path)
+    file = pq.ParquetFile(path)
     column = file.metadata.row_group(0).column(1)
     assert column.compression == "ZSTD"
     assert "BYTE_STREAM_SPLIT" in column.encodings
+    return [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
+
+
+def test_row_groups_have_a_limited_number_of_rows(tmp_path):
+    assert rows_of_groups(tmp_path / "a.parquet", 70_000) == [65_536, 4_464]
+
+
+def test_row_groups_have_a_limited_size(tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "GROUP_SIZE", 6000 * (8 + 5 * 3 * 2))
+    assert rows_of_groups(tmp_path / "a.parquet", 20_000) == [6000, 6000, 6000, 2000]
+    monkeypatch.setattr(parquet, "GROUP_SIZE", 1)
+    assert rows_of_groups(tmp_path / "b.parquet", 3) == [1, 1, 1]
 
 
 @pytest.mark.slow

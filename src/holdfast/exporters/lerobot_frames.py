@@ -87,7 +87,8 @@ class ColumnStatistics:
 
     def add(self, values: npt.NDArray[Any]) -> None:
         """Add the values of consecutive frames."""
-        numbers = values.reshape(len(values), *self._n.shape).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
+            numbers = values.reshape(len(values), *self._n.shape).astype(np.float64)
         finite = np.isfinite(numbers)
         kept = np.where(finite, numbers, 0.0)
         if self._shift is None:  # variances of large numbers need it

@@ -1,7 +1,7 @@
 """Parquet files of recordings: one wide table that opens in pandas.
 
-A row group is a span of time of at most a minute. Row i of a row group has the i-th sample of
-every module in that span. A module with fewer samples has nulls in the rows after its last
+A row group is a span of time, of at most 16 MB in memory. Row i of a row group has the i-th sample
+of every module in that span. A module with fewer samples has nulls in the rows after its last
 sample. `docs/formats.md` is the full description.
 
 A checksum over all bytes is stored in the footer of the file, so that any flipped bit is found.
@@ -9,10 +9,9 @@ A checksum over all bytes is stored in the footer of the file, so that any flipp
 
 import hashlib
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,6 +22,7 @@ import pyarrow.parquet as pq
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
+from holdfast.io.arrow_arrays import arrow_column, arrow_type, component_rows
 from holdfast.io.header import Header, decode_header, encode_header, header_of
 from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget, check_size, one_line
 from holdfast.io.timed_arrays import (
@@ -49,8 +49,8 @@ FOOTER_END_SIZE = 8
 """A Parquet file ends with the length of its footer (4 bytes) and the magic (4 bytes)."""
 MAX_FOOTER_SIZE = 1 << 30
 """Number of bytes that are searched for the checksum; a day of a whole hand has 0.3 GB."""
-GROUP_SECONDS = 60.0
-"""Maximum duration of a row group [s]."""
+GROUP_SIZE = 1 << 24
+"""Maximum size of a row group in memory [bytes], if a row is not larger."""
 GROUP_ROWS = 1 << 16
 """Maximum number of rows in a row group."""
 BLOCK_SIZE = 1 << 20
@@ -79,7 +79,7 @@ def save(recording: Recording, path: Path, *, force: bool = False) -> None:
             write_page_checksum=True,
         ) as writer:
             times = {_track_key(spec): arrays[spec.topic][0] for spec in specs}
-            for span in time_spans(times, GROUP_SECONDS, GROUP_ROWS):
+            for span in time_spans(times, np.inf, _group_rows(specs)):
                 writer.write_batch(_batch(specs, arrays, span, schema), row_group_size=1 << 30)
             writer.add_key_value_metadata({HEADER_KEY: text, CHECKSUM_KEY: BLANK_CHECKSUM})
         write_checksum(part)
@@ -124,7 +124,7 @@ def read_columns(path: Path) -> tuple[Header, Iterator[TimedArrays]]:
         RecordingError: as in `load`.
     """
     header, file = _open(path)
-    return header, _groups_ahead(header, file, path)
+    return header, _modules_ahead(header, file, path)
 
 
 def is_foreign(path: Path) -> bool:
@@ -236,15 +236,11 @@ def _schema(specs: list[ArraySpec]) -> pa.Schema:
     for spec in specs:
         if spec.track != "truth":
             fields.append((f"{spec.column}.time", pa.float64()))
-        fields += [(name, _arrow_type(spec.number)) for name in _column_names(spec)]
+        fields += [(name, arrow_type(spec.number)) for name in _column_names(spec)]
     counts = Counter(name for name, _ in fields)
     if repeated := sorted(name for name, n in counts.items() if n > 1):
         raise RecordingError(f"two arrays of the recording would share the column {repeated[0]!r}")
     return pa.schema(fields)
-
-
-def _arrow_type(number: str | None) -> pa.DataType:
-    return pa.string() if number == "str" else pa.from_numpy_dtype(np.dtype(number))
 
 
 def _encodings(schema: pa.Schema) -> dict[str, str]:
@@ -261,6 +257,12 @@ def _column_names(spec: ArraySpec) -> list[str]:
         return [f"{spec.column}.{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
     places = product(*(range(size) for size in spec.shape))
     return [".".join([spec.column, *map(str, place)]) for place in places]
+
+
+def _group_rows(specs: list[ArraySpec]) -> int:
+    """Return the maximum number of rows in a row group of these arrays."""
+    row_size = sum(_value_size(spec) for spec in specs)
+    return max(1, min(GROUP_ROWS, GROUP_SIZE // row_size))
 
 
 def _track_key(spec: ArraySpec) -> str:
@@ -283,28 +285,31 @@ def _batch(
 
 
 def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
-    array = pa.array(values, type=pa.string() if values.dtype.kind == "U" else None)
+    array = arrow_column(values)
     missing = n_rows - len(array)
     return pa.concat_arrays([array, pa.nulls(missing, array.type)]) if missing else array
 
 
 def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
-    read = _GroupReader(file, path, partial(_arrays, _specs(header, file, path)))
-    return (read(group) for group in range(file.num_row_groups))
+    specs = _specs(header, file, path)
+    read = _GroupReader(file, path, specs, "F")
+    return (_by_sample(specs, read(group, specs)) for group in range(file.num_row_groups))
 
 
-def _groups_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
-    """Yield the columns of each row group; a thread reads the next while the caller uses it.
+def _modules_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
+    """Yield each module of each row group; a thread reads the next while the caller uses it.
 
     Where memory is short, a new thread can end the process; so `load` has none.
     """
-    read = _GroupReader(file, path, partial(_columns, _specs(header, file, path)))
-    groups = range(file.num_row_groups)
+    specs = _specs(header, file, path)
+    read = _GroupReader(file, path, specs, "C")
+    modules = [[spec] for spec in specs if spec.track != "truth"]
+    parts = product(range(file.num_row_groups), modules)
     with ThreadPoolExecutor(1) as reader:
-        waiting = deque(reader.submit(read, k) for k in groups[:1])
-        for group in groups:
-            if group + 1 < len(groups):
-                waiting.append(reader.submit(read, group + 1))
+        ahead = (reader.submit(read, group, module) for group, module in parts)
+        waiting = deque(islice(ahead, 1))
+        while waiting:
+            waiting.extend(islice(ahead, 1))
             yield waiting.popleft().result()
 
 
@@ -321,94 +326,92 @@ class _GroupReader:
     Args:
         file: the file.
         path: its path.
-        convert: makes arrays of the table of a row group.
+        specs: of all arrays in the file.
+        order: of the components of a sample in memory: "F" side by side, "C" apart.
+
+    Raises:
+        RecordingError: a row group is larger than recordings have.
     """
 
     def __init__(
-        self, file: pq.ParquetFile, path: Path, convert: Callable[[pa.Table], TimedArrays]
+        self, file: pq.ParquetFile, path: Path, specs: list[ArraySpec], order: Literal["C", "F"]
     ) -> None:
         self._file = file
         self._path = path
-        self._convert = convert
-        self._budget = ReadBudget(path)
+        self._order = order
+        self._specs = specs
+        budget = ReadBudget(path)
+        for number in range(file.num_row_groups):
+            group = file.metadata.row_group(number)
+            if group.num_rows > GROUP_ROWS:
+                raise RecordingError(
+                    f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
+                    f"{group.num_rows} given"
+                )
+            budget.unpack(max(group.num_rows * group.num_columns * 8, group.total_byte_size))
 
-    def __call__(self, group: int) -> TimedArrays:
-        """Return the arrays of a row group.
+    def __call__(self, group: int, specs: list[ArraySpec]) -> TimedArrays:
+        """Return some arrays of a row group, with values (n_components, n).
 
         Raises:
-            RecordingError: it is damaged or too large.
+            RecordingError: it is damaged.
         """
-        self._check(self._file.metadata.row_group(group))
+        names = None if specs is self._specs else _schema(specs).names
         try:
-            return self._convert(self._file.read_row_group(group))
+            return _columns(specs, self._file.read_row_group(group, columns=names), self._order)
         except (pa.ArrowException, OSError, ValueError) as cause:
             raise RecordingError(
                 f"{self._path} is damaged in row group {group}: {one_line(cause)}"
             ) from cause
 
-    def _check(self, group: pq.RowGroupMetaData) -> None:
-        """Check that a row group is not larger than recordings have."""
-        if group.num_rows > GROUP_ROWS:
-            raise RecordingError(
-                f"{self._path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
-                f"{group.num_rows} given"
-            )
-        self._budget.unpack(max(group.num_rows * group.num_columns * 8, group.total_byte_size))
-
 
 def _size(spec: ArraySpec) -> int:
     """Return the size of an array and its times in memory [bytes]."""
+    return (spec.n or 0) * _value_size(spec)
+
+
+def _value_size(spec: ArraySpec) -> int:
+    """Return the size of a value and its time in memory [bytes]."""
     n_bytes: int = 8 + spec.n_components * np.dtype(_memory_type(spec)).itemsize
-    return (spec.n or 0) * n_bytes
+    return n_bytes
 
 
-def _arrays(specs: list[ArraySpec], table: pa.Table) -> TimedArrays:
+def _by_sample(specs: list[ArraySpec], arrays: TimedArrays) -> TimedArrays:
+    """Return arrays with values (n_components, n) as they are in a recording, (n, ...)."""
     shapes = {spec.topic: spec.shape for spec in specs}
     return {
         topic: (times, values.T.reshape(len(times), *shapes[topic]))
         if topic != TRUTH_TIME
         else (times, times)
-        for topic, (times, values) in _columns(specs, table, "F").items()
+        for topic, (times, values) in arrays.items()
     }
 
 
-def _columns(
-    specs: list[ArraySpec], table: pa.Table, order: Literal["C", "F"] = "C"
-) -> TimedArrays:
+def _columns(specs: list[ArraySpec], table: pa.Table, order: Literal["C", "F"]) -> TimedArrays:
     """Return times and values of each array, a row for each component, in this order in memory."""
-    columns = iter(table.columns)
+    columns = (column.combine_chunks() for column in table.columns)
     arrays: dict[str, TimedArray] = {}
     times: Array = np.empty(0)
     for spec in specs:
-        if spec.track != "truth":
-            times = _values(next(columns), None)
-        elif spec.topic == TRUTH_TIME:
-            times = _values(next(columns), None)
+        if spec.track != "truth" or spec.topic == TRUTH_TIME:
+            column = next(columns)
+            times = _rows([column], len(column) - column.null_count)[0]
+        if spec.topic == TRUTH_TIME:
             arrays[spec.topic] = (times, times)
             continue
-        values = np.empty((spec.n_components, len(times)), _memory_type(spec), order=order)
-        for row in values:
-            row[:] = _values(next(columns), len(times))
-        arrays[spec.topic] = (times, values)
+        components = list(islice(columns, spec.n_components))
+        arrays[spec.topic] = (times, _rows(components, len(times), order))
     return arrays
 
 
-def _values(column: pa.ChunkedArray, n: int | None) -> npt.NDArray[Any]:
-    """Return the `n` values of a column before the nulls at its end.
-
-    Args:
-        column: column of a row group.
-        n: expected number of values; None if any number is right.
+def _rows(columns: list[pa.Array], n: int, order: Literal["C", "F"] = "C") -> npt.NDArray[Any]:
+    """Return the first `n` values of each column, before the nulls at its end.
 
     Raises:
-        ValueError: there are nulls between values, or another number of values.
+        ValueError: there are nulls among them.
     """
-    n = len(column) - column.null_count if n is None else n
-    values = column if len(column) == n else column.slice(0, n)
-    if values.null_count or len(values) != n:
-        raise ValueError("a column has another number of values than its times")
-    array: npt.NDArray[Any] = values.to_numpy()
-    return array
+    batch = pa.RecordBatch.from_arrays(columns, names=[""] * len(columns))
+    return component_rows(batch.slice(0, n), order)
 
 
 def _memory_type(spec: ArraySpec) -> Any:  # noqa: ANN401 (a dtype)

@@ -10,7 +10,7 @@ from holdfast.errors import RecordingError
 from holdfast.features.force import tared_force
 from holdfast.io import load_recording, parquet, save_recording
 from holdfast.labelling.server import long_recordings, workspace
-from holdfast.labelling.server.long_recordings import load_for_labelling, without_forces
+from holdfast.labelling.server.long_recordings import load_for_labelling, without_force
 from holdfast.labelling.server.signals import SERIES
 from holdfast.recordings import Label, Recording
 from holdfast.synthetic import synthetic_recording
@@ -27,8 +27,8 @@ def path(tmp_path, monkeypatch):
     return path
 
 
-def opened(path):
-    return workspace.Workspace([path], author="me", clock=lambda: "2026-01-01T00:00:00Z")
+def opened(path, tare=None):
+    return workspace.Workspace([path], author="me", clock=lambda: "2026-01-01T00:00:00Z", tare=tare)
 
 
 def test_it_has_the_forces_and_all_else_of_the_recording(path):
@@ -92,9 +92,22 @@ def test_labels_are_saved_for_the_recording_of_the_file(path):
     assert space.stored(0).origin == "file"
 
 
-def test_without_forces_it_needs_no_memory_for_them(path):
+def test_a_finger_that_cannot_be_plotted_is_an_error_each_time(path):
+    whole = load_recording(path)
+    last = list(whole.modules)[-1]
+    readings = whole.modules[last].readings.astype(float)
+    readings[100:200] = np.nan
+    modules = {**whole.modules, last: replace(whole.modules[last], readings=readings)}
+    save_recording(Recording("grasp", modules), path, force=True)
+    space = opened(path, tare=(0.8, 1.0))
+    for _ in range(2):
+        with pytest.raises(ValueError, match="no finite sample"):
+            space.signals(0)
+
+
+def test_without_its_force_a_finger_needs_no_memory_for_it(path):
     recording, _ = load_for_labelling(path)
-    empty = without_forces(recording)
+    empty = without_force(recording, "thumb")
     assert empty.digest == recording.digest
     assert empty.modules["thumb"].readings.strides == (0, 0, 0)
     np.testing.assert_array_equal(empty.modules["thumb"].times, recording.modules["thumb"].times)
@@ -102,7 +115,8 @@ def test_without_forces_it_needs_no_memory_for_them(path):
 
 def test_columns_are_the_readings_by_taxel_and_axis(path):
     header, groups = parquet.read_columns(path)
-    columns = np.concatenate([group["/tactile/index"][1] for group in groups], axis=1)
+    parts = [part["/tactile/index"] for part in groups if "/tactile/index" in part]
+    columns = np.concatenate([values for _, values in parts], axis=1)
     readings = load_recording(path).modules["index"].readings
     assert header.digest == load_recording(path).digest
     np.testing.assert_array_equal(columns.T.reshape(readings.shape), readings)

@@ -3,13 +3,18 @@ import numpy as np
 import pytest
 
 from holdfast.features import fingertip_force, haar_features
-from holdfast.labelling.server.signals import SERIES, Signals, change_points, rounded
+from holdfast.labelling.server.signals import SERIES, FingerSignals, Signals, change_points, rounded
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
 RECORDING = synthetic_recording("grasp", 0, ("thumb", "index"))
 N = RECORDING.modules["thumb"].n_samples
+
+
+def signals_of(recording, tare=0.5):
+    fingers = {name: FingerSignals(module, tare) for name, module in recording.modules.items()}
+    return Signals(recording.start, recording.end, fingers)
 
 
 def expected(module, tare):
@@ -27,7 +32,7 @@ def values_of(series):
     [(0.5, (0.0, 0.5)), ("first", "first"), ("none", "none"), ((1.0, 1.2), (1.0, 1.2))],
 )
 def test_every_sample_is_returned_if_there_are_few(tare, offline):
-    part = Signals(RECORDING, tare).part(points=N)
+    part = signals_of(RECORDING, tare).part(points=N)
     assert (part.start, part.end, part.exact) == (RECORDING.start, RECORDING.end, True)
     for name, module in RECORDING.modules.items():
         series = part.fingers[name]
@@ -38,7 +43,7 @@ def test_every_sample_is_returned_if_there_are_few(tare, offline):
 @pytest.mark.parametrize("points", [2, 3, 10, 100, 777])
 @pytest.mark.parametrize(("start", "end"), [(0.0, 99.0), (2.0, 9.0), (3.33, 3.4), (-5.0, 1.0)])
 def test_minima_and_maxima_of_neighbours(points, start, end):
-    signals = Signals(RECORDING)
+    signals = signals_of(RECORDING)
     part = signals.part(start, end, points)
     exact = signals.part(start, end, N).fingers
     assert (part.start, part.end) == (start, end)
@@ -54,8 +59,8 @@ def test_minima_and_maxima_of_neighbours(points, start, end):
 
 
 def test_pairs_hold_every_sample_between_them():
-    part = Signals(RECORDING).part(points=100).fingers["thumb"]
-    exact = Signals(RECORDING).part(points=N).fingers["thumb"]
+    part = signals_of(RECORDING).part(points=100).fingers["thumb"]
+    exact = signals_of(RECORDING).part(points=N).fingers["thumb"]
     begins = np.array(part["t"][::2])
     bins = np.searchsorted(begins, exact["t"], side="right") - 1
     first, second = np.array(part["F_x"][::2]), np.array(part["F_x"][1::2])
@@ -75,7 +80,7 @@ def test_what_falls_is_drawn_falling_and_what_rises_rising(points, sign):
     readings = np.zeros((3000, 16, 3))
     readings[..., 2] = press[::sign, None]
     falling = Recording("falling", {"thumb": Tactile(sensor("uskin-4x4"), times, readings)})
-    part = Signals(falling, "none").part(points=points)
+    part = signals_of(falling, "none").part(points=points)
     assert not part.exact
     moves = sign * np.diff(part.fingers["thumb"]["F_a"])
     assert moves.max() <= 0 and moves.min() < -1000
@@ -86,7 +91,7 @@ def test_a_slope_stays_straight():
     readings = np.zeros((4096, 16, 3))
     readings[..., 2] = np.linspace(1000, 0, 4096)[:, None]
     slope = Recording("slope", {"thumb": Tactile(sensor("uskin-4x4"), times, readings)})
-    series = Signals(slope, "none").part(points=100).fingers["thumb"]
+    series = signals_of(slope, "none").part(points=100).fingers["thumb"]
     np.testing.assert_allclose(
         series["F_a"], np.interp(series["t"], times, 16 * readings[:, 0, 2]), rtol=1e-5
     )
@@ -99,13 +104,13 @@ def test_unknown_values_do_not_change_the_order(points):
     readings[..., 2] = values[:, None]
     readings[np.random.default_rng(0).random(3000) < 0.5] = np.nan
     module = Tactile(sensor("uskin-4x4"), times, readings)
-    series = Signals(Recording("holes", {"thumb": module}), "none").part(points=points)
+    series = signals_of(Recording("holes", {"thumb": module}), "none").part(points=points)
     drawn = values_of(series.fingers["thumb"])[:, 0]
     assert (np.diff(drawn[np.isfinite(drawn)]) <= 0).all()
 
 
 def test_parts_have_a_sample_on_either_side():
-    series = Signals(RECORDING).part(3.001, 3.001).fingers["thumb"]
+    series = signals_of(RECORDING).part(3.001, 3.001).fingers["thumb"]
     assert series["t"][0] <= 3.001 <= series["t"][-1]
     assert len(series["t"]) in (2, 3)
 
@@ -117,7 +122,7 @@ def test_unknown_values_are_null_and_gaps_are_shown():
     keep = np.ones(N, dtype=bool)
     keep[600:660] = False
     gappy = Tactile(module.sensor, module.times[keep], readings[keep])
-    part = Signals(Recording("gappy", {"thumb": gappy})).part(points=N)
+    part = signals_of(Recording("gappy", {"thumb": gappy})).part(points=N)
     series = part.fingers["thumb"]
     assert len(series["t"]) == N - 60 + 1
     assert series["F_a"][:3] == pytest.approx([0, 0, 0], abs=1e3)
@@ -125,7 +130,7 @@ def test_unknown_values_are_null_and_gaps_are_shown():
     assert decoded["F_a"][300] is decoded["F_a"][600] is decoded["sigma"][0] is None
     assert series["t"][600] == pytest.approx((600 - 0.5 + 30) / 150)
     assert None not in decoded["F_a"][:300]
-    coarse = Signals(Recording("gappy", {"thumb": gappy})).part(points=50).fingers["thumb"]
+    coarse = signals_of(Recording("gappy", {"thumb": gappy})).part(points=50).fingers["thumb"]
     assert np.isfinite(values_of(coarse)[:, 0]).all()
 
 
@@ -133,7 +138,7 @@ def test_modules_without_a_finite_sample():
     tip = sensor("uskin-4x4")
     silent = Tactile(tip, np.empty(0), np.empty((0, 16, 3)))
     blind = Tactile(tip, np.arange(10) / 100, np.full((10, 16, 3), np.nan))
-    signals = Signals(Recording("odd", {"silent": silent, "blind": blind}))
+    signals = signals_of(Recording("odd", {"silent": silent, "blind": blind}))
     part = signals.part().fingers
     assert part["silent"]["t"] == part["silent"]["F_a"] == []
     assert np.isnan(part["blind"]["F_a"]).all()
@@ -152,14 +157,14 @@ def test_modules_without_a_finite_sample():
 )
 def test_invalid_parts_are_rejected(start, end, points, text):
     with pytest.raises(ValueError, match=text):
-        Signals(RECORDING).part(start, end, points)
+        signals_of(RECORDING).part(start, end, points)
 
 
 def test_a_tare_without_samples_is_rejected():
     with pytest.raises(ValueError, match=r"^tare .*: no finite sample in that time$"):
-        Signals(RECORDING, (50.0, 60.0))
+        signals_of(RECORDING, (50.0, 60.0))
     with pytest.raises(ValueError, match=r"^tare: seconds above 0"):
-        Signals(RECORDING, "soon")
+        signals_of(RECORDING, "soon")
 
 
 def test_rounding_keeps_six_digits():

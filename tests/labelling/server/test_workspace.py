@@ -58,11 +58,11 @@ def test_the_rule_is_the_one_with_the_best_evidence():
 def test_threads_share_what_is_computed_once(tmp_path, monkeypatch):
     kept = workspace_of(made(tmp_path, "one"))
     made_of = []
-    signals = workspace.Signals
+    signals = workspace.FingerSignals
     monkeypatch.setattr(
         workspace,
-        "Signals",
-        lambda recording, tare: (made_of.append(tare), signals(recording, tare))[1],
+        "FingerSignals",
+        lambda module, tare: (made_of.append(module), signals(module, tare))[1],
     )
     found = []
     asked = [kept.signals, kept.changes, lambda k: kept.propose(k, "signal", {})] * 2
@@ -72,7 +72,7 @@ def test_threads_share_what_is_computed_once(tmp_path, monkeypatch):
     for thread in threads:
         thread.join()
     assert len(found) == 6
-    assert len(made_of) == 1
+    assert len(made_of) == len(kept.open(0).recording.modules)
 
 
 def test_signals_do_not_wait_for_change_points(tmp_path, monkeypatch):

@@ -294,12 +294,15 @@ def _falls_below_start(module: Tactile) -> bool:
     known = np.isfinite(force).all(axis=1)
     if not known.any():
         return False
-    times, normal = module.times[known], force[known] @ module.sensor.normal
+    force = force if known.all() else force[known]
+    times, normal = module.times[known], force @ module.sensor.normal
     noise = float(normal[times < times[0] + DEFAULT_TARE.seconds].std())
     if noise == 0:  # a start without noise shows nothing about the load
         return False
+    if normal.min() >= -FALL_OF_NOISE * noise:  # most recordings: the rest takes longer
+        return False
     lasting = lowest_maximum(normal, n_samples_of(LOADED_SECONDS, module.period))
-    largest = float(np.linalg.norm(force[known], axis=1).max())
+    largest = float(np.linalg.norm(force, axis=1).max())
     return bool(lasting < -max(FALL_OF_NOISE * noise, FALL_OF_RANGE * largest))
 
 

@@ -5,7 +5,7 @@ in the fingertip frame is kept, as the reading of a sensor with one taxel: 24 by
 instead of 180. The tare is linear, so everything that follows gives the same force.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,12 +51,11 @@ def load_for_labelling(path: Path) -> tuple[Recording, bool]:
         return _with_digest(recording, header.digest), False
 
 
-def without_forces(recording: Recording) -> Recording:
-    """Return a long recording without the forces, once they are computed: all are NaN."""
-    modules = {
-        name: replace(module, readings=np.broadcast_to(np.nan, module.readings.shape))
-        for name, module in recording.modules.items()
-    }
+def without_force(recording: Recording, finger: str) -> Recording:
+    """Return a long recording without the forces of a finger, which become NaN."""
+    module = recording.modules[finger]
+    unknown = replace(module, readings=np.broadcast_to(np.nan, module.readings.shape))
+    modules = {**recording.modules, finger: unknown}
     return _with_digest(replace(recording, modules=modules), recording.digest)
 
 
@@ -121,33 +120,51 @@ def _forces(header: Header, groups: Iterable[TimedArrays]) -> dict[str, TimedArr
             if part.stop > n_samples[topic]:
                 break
             filled[topic][0][part] = times
-            filled[topic][1][part, 0] = _force(columns, sensors[topic].rotations)
+            _sum_taxels(columns, sensors[topic].rotations, filled[topic][1][part, 0])
     if ends != n_samples:
         raise RecordingError(f"{header.name}: {ends} samples, its header names {n_samples}")
-    return filled
+    return _with_shared_times(filled)
 
 
-def _force(columns: npt.NDArray[Any], rotations: Array) -> Array:
-    """Return (n, 3) forces; NaN where a reading is not finite."""
-    force = np.zeros((3, columns.shape[1]))
-    _add_taxels(columns, rotations, force)
-    if not np.isfinite(force).all():
-        force[:, ~np.isfinite(force).all(axis=0)] = np.nan
-    return force.T
+def _with_shared_times(arrays: Mapping[str, TimedArray]) -> dict[str, TimedArray]:
+    """Return the arrays; modules with the same times, as of one driver, have them once."""
+    first, _ = next(iter(arrays.values()))
+    return {
+        topic: (first if np.array_equal(times, first) else times, values)
+        for topic, (times, values) in arrays.items()
+    }
 
 
 @compiled
-def _add_taxels(columns: npt.NDArray[Any], rotations: Array, force: Array) -> None:
-    """Add sum_i R_i f_i to (3, n) forces; a row of `columns` is an axis of a taxel."""
-    n = force.shape[1]
-    for start in range(0, n, CACHED_SAMPLES):
-        stop = min(n, start + CACHED_SAMPLES)
+def _sum_taxels(columns: npt.NDArray[Any], rotations: Array, force: Array) -> None:
+    """Fill (n, 3) F_tip = sum_i R_i f_i; NaN where a reading is not finite.
+
+    Args:
+        columns: (3 n_taxels, n) an axis of a taxel in each row.
+        rotations: (n_taxels, 3, 3) R_i.
+        force: (n, 3) is filled.
+    """
+    sums = np.empty((3, CACHED_SAMPLES))
+    for start in range(0, len(force), CACHED_SAMPLES):
+        stop = min(len(force), start + CACHED_SAMPLES)
+        sums[:] = 0.0
         for i in range(len(rotations)):
+            x, y, z = columns[3 * i], columns[3 * i + 1], columns[3 * i + 2]
             for axis in range(3):
-                column = columns[3 * i + axis]
-                x, y, z = rotations[i, 0, axis], rotations[i, 1, axis], rotations[i, 2, axis]
-                for k in range(start, stop):
-                    reading = np.float64(column[k])
-                    force[0, k] += x * reading
-                    force[1, k] += y * reading
-                    force[2, k] += z * reading
+                _add_axis(
+                    x[start:stop], y[start:stop], z[start:stop], rotations[i, axis], sums[axis]
+                )
+        for k in range(stop - start):
+            known = np.isfinite(sums[0, k] + sums[1, k] + sums[2, k])
+            for axis in range(3):
+                force[start + k, axis] = sums[axis, k] if known else np.nan
+
+
+@compiled
+def _add_axis(
+    x: npt.NDArray[Any], y: npt.NDArray[Any], z: npt.NDArray[Any], row: Array, total: Array
+) -> None:
+    """Add the product of a row of R_i and the readings of a taxel to one axis of the force."""
+    a, b, c = row[0], row[1], row[2]
+    for k in range(len(x)):
+        total[k] = total[k] + a * np.float64(x[k]) + b * np.float64(y[k]) + c * np.float64(z[k])

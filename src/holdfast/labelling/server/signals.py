@@ -14,10 +14,11 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument
-from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.recordings import GAP_PERIODS, Tactile
 from holdfast.sensors.types import Array
 
 SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
@@ -28,6 +29,8 @@ DEFAULT_POINTS = 1200
 MAX_POINTS = 10_000
 """Largest number of horizontal positions."""
 
+PLOTTED_NUMBER = np.float32
+"""Number type of the signals that are kept for plots: half the memory."""
 SIGNIFICANT_DIGITS = 6
 """Digits of a value in JSON, far more than a screen shows."""
 
@@ -84,8 +87,8 @@ class _Level(NamedTuple):
     """
 
     times: Array
-    low: Array
-    high: Array
+    low: npt.NDArray[np.floating]
+    high: npt.NDArray[np.floating]
     falls: npt.NDArray[np.bool_]
 
     def part(self, blocks: slice) -> "_Level":
@@ -105,7 +108,8 @@ class FingerSignals:
     """
 
     def __init__(self, module: Tactile, tare: TareArgument | Tare = 0.5) -> None:
-        self.times, self.values = _with_gaps(module, signal_values(module, tare))
+        values = signal_values(module, tare, number=PLOTTED_NUMBER)
+        self.times, self.values = _with_gaps(module, values)
         self._levels: dict[int, _Level] = {}  # by depth, of blocks of 2^depth samples
         depth, level = FIRST_DEPTH, self._first_level()
         self._levels[depth] = level
@@ -155,22 +159,18 @@ class FingerSignals:
         return level
 
 
-class Signals:
-    """Force and sigma of every finger of a recording, computed once.
+class Signals(NamedTuple):
+    """Force and sigma of every finger of a recording.
 
-    Args:
-        recording: the recording.
-        tare: how the baseline is found.
-
-    Raises:
-        ValueError: the tare is unknown, or no finite sample lies in its time.
+    Attributes:
+        start: of the recording [s].
+        end: of the recording [s].
+        fingers: signals by finger.
     """
 
-    def __init__(self, recording: Recording, tare: TareArgument | Tare = 0.5) -> None:
-        self.start, self.end = recording.start, recording.end
-        self.fingers: Mapping[str, FingerSignals] = {
-            name: FingerSignals(module, tare) for name, module in recording.modules.items()
-        }
+    start: float
+    end: float
+    fingers: Mapping[str, FingerSignals]
 
     def part(
         self, start: float | None = None, end: float | None = None, points: float = DEFAULT_POINTS
@@ -199,8 +199,11 @@ class Signals:
 
 
 def signal_values(
-    module: Tactile, tare: TareArgument | Tare, window: int = DEFAULT_WINDOW
-) -> Array:
+    module: Tactile,
+    tare: TareArgument | Tare,
+    window: int = DEFAULT_WINDOW,
+    number: npt.DTypeLike = np.float64,
+) -> npt.NDArray[np.floating]:
     """Return (n, n_series) force and sigma of every sample [unit of the readings].
 
     The baseline is subtracted from all samples, including those of the tare. Unknown values are
@@ -210,18 +213,19 @@ def signal_values(
         module: readings of the finger.
         tare: how the baseline is found.
         window: N_w of sigma.
+        number: type of the result; all is computed in float64.
 
     Raises:
         ValueError: the tare is unknown, or no finite sample lies in its time.
     """
-    values = np.empty((module.n_samples, len(SERIES)))
-    values[:, 1:4] = _force(module, tare)
+    values = np.empty((module.n_samples, len(SERIES)), number)
+    force = _force(module, tare)
     for start in range(0, module.n_samples, PART_SAMPLES):
         part = values[start : start + PART_SAMPLES]
-        history = min(start, window - 1)
-        force = values[start - history : start + len(part), 1:4]
-        part[:, 0] = np.linalg.norm(part[:, 1:4], axis=1)
-        part[:, 4] = haar_features(force, window)[history:, 5]
+        end, history = start + len(part), min(start, window - 1)
+        part[:, 0] = np.linalg.norm(force[start:end], axis=1)
+        part[:, 1:4] = force[start:end]
+        part[:, 4] = haar_features(force[start - history : end], window)[history:, 5]
     return values
 
 
@@ -235,7 +239,9 @@ def _force(module: Tactile, tare: TareArgument | Tare) -> Array:
         return np.full((module.n_samples, 3), np.nan)
 
 
-def _with_gaps(module: Tactile, values: Array) -> tuple[Array, Array]:
+def _with_gaps(
+    module: Tactile, values: npt.NDArray[np.floating]
+) -> tuple[Array, npt.NDArray[np.floating]]:
     """Return times and values with a row of NaN in every gap, so that lines are interrupted."""
     times = module.times
     gaps = np.flatnonzero(np.diff(times) > GAP_PERIODS * module.period) + 1
@@ -247,39 +253,41 @@ def _with_gaps(module: Tactile, values: Array) -> tuple[Array, Array]:
 
 def _halved(level: _Level) -> _Level:
     """Return the next level: two neighbouring blocks become one; the last may stay alone."""
-    n = len(level.times) // 2 * 2
-    earlier, later = level.part(slice(0, n, 2)), level.part(slice(1, n, 2))
-    half = _Level(
-        np.column_stack([earlier.times[:, 0], later.times[:, 1]]),
-        np.fmin(earlier.low, later.low),
-        np.fmax(earlier.high, later.high),
-        _falls(earlier, later),
-    )
-    if n == len(level.times):
-        return half
-    return _Level(
-        *(np.concatenate([pairs, blocks[n:]]) for pairs, blocks in zip(half, level, strict=True))
-    )
+    n = -(-len(level.times) // 2)
+    half = _Level(*(np.empty((n, *array.shape[1:]), array.dtype) for array in level))
+    _halve(level, half)
+    return half
 
 
-def _falls(earlier: _Level, later: _Level) -> npt.NDArray[np.bool_]:
-    """Return where the maximum of two neighbouring blocks comes before their minimum."""
-    unknown = np.isnan(earlier.low)
-    low_is_later = (later.low < earlier.low) | unknown
-    high_is_later = (later.high > earlier.high) | unknown
-    of_one_block = np.where(low_is_later, later.falls, earlier.falls)
-    return np.where(low_is_later == high_is_later, of_one_block, low_is_later)
+@compiled
+def _halve(level: _Level, half: _Level) -> None:
+    """Fill a level with the blocks of the level before, joined in pairs."""
+    n = len(level.times)
+    for k in range(len(half.times)):
+        first, second = 2 * k, min(2 * k + 1, n - 1)
+        half.times[k, 0], half.times[k, 1] = level.times[first, 0], level.times[second, 1]
+        for series in range(level.low.shape[1]):
+            low, high = level.low[first, series], level.high[first, series]
+            low_is_later = level.low[second, series] < low or math.isnan(low)
+            high_is_later = level.high[second, series] > high or math.isnan(high)
+            half.low[k, series] = level.low[second if low_is_later else first, series]
+            half.high[k, series] = level.high[second if high_is_later else first, series]
+            if low_is_later == high_is_later:  # both are of one block
+                falls = level.falls[second if low_is_later else first, series]
+            else:
+                falls = low_is_later
+            half.falls[k, series] = falls
 
 
-def _in_order(level: _Level) -> Array:
+def _in_order(level: _Level) -> npt.NDArray[np.floating]:
     """Return (2 n, n_series) minimum and maximum of each block, the earlier one first."""
     first = np.where(level.falls, level.high, level.low)
     second = np.where(level.falls, level.low, level.high)
     return np.stack([first, second], axis=1).reshape(-1, len(SERIES))
 
 
-def _series(times: Array, values: Array) -> Series:
-    columns = zip(SERIES, rounded(values).T, strict=True)
+def _series(times: Array, values: npt.NDArray[np.floating]) -> Series:
+    columns = zip(SERIES, rounded(np.asarray(values, dtype=np.float64)).T, strict=True)
     return {"t": times.tolist(), **{name: column.tolist() for name, column in columns}}
 
 
@@ -299,7 +307,7 @@ def rounded(values: Array) -> Array:
     return np.asarray(np.where(power >= 0, finer, coarser))
 
 
-def change_points(times: Array, force: Array, period: float) -> Array:
+def change_points(times: Array, force: npt.NDArray[np.floating], period: float) -> Array:
     """Return the times at which the force on a finger begins or ends to change.
 
     Args:
@@ -320,22 +328,26 @@ def change_points(times: Array, force: Array, period: float) -> Array:
     from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
     known = np.isfinite(force).all(axis=1)
-    known_times, values = times[known], force[known]
+    known_times, values = (times, force) if known.all() else (times[known], force[known])
     n = max(round(COMPARED_TIME / period), 1)
     if len(known_times) <= 2 * n:
         return np.empty(0)
     values = uniform_filter1d(values, 2 * round(SMOOTHING_TIME / period / 2) + 1, axis=0)
     after, before = _movements(values, n)
-    largest = float(np.quantile(np.linalg.norm(values, axis=1), 0.99))
+    zero = np.broadcast_to(np.zeros_like(values[0]), values.shape)
+    largest = float(np.quantile(_distances(values, zero), 0.99))
     tiny = float(np.finfo(float).tiny)
     noise = max(MOVEMENT_NOISE_FACTOR * float(np.median(after)), NOISE_SHARE * largest, tiny)
-    contrast = np.abs(np.log((after + noise) / (before + noise)))
+    after += noise
+    before += noise
+    contrast = np.divide(after, before, out=after)  # in place: a recording may be hours long
+    np.abs(np.log(contrast, out=contrast), out=contrast)
     width = 2 * max(round(MIN_DISTANCE / period), 1) + 1
     peaks = (contrast >= math.log(MIN_RATIO)) & (contrast == maximum_filter1d(contrast, width))
     return np.asarray(known_times[peaks])
 
 
-def _movements(force: Array, n: int) -> tuple[Array, Array]:
+def _movements(force: npt.NDArray[np.floating], n: int) -> tuple[Array, Array]:
     """Return (n_samples,) mean distances of the force to its next n samples, and to its last n.
 
     Before the first and after the last sample the force is taken as constant.
@@ -351,7 +363,7 @@ def _movements(force: Array, n: int) -> tuple[Array, Array]:
     return after / len(steps), before / len(steps)
 
 
-def _distances(a: Array, b: Array) -> Array:
+def _distances(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> Array:
     """Return (n,) distances of the rows of two arrays, computed in parts to bound the memory."""
     distances = np.empty(len(a))
     for start in range(0, len(a), PART_SAMPLES):

@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
@@ -22,9 +22,9 @@ from holdfast.labelling.rules.poses import Poses, poses_of
 from holdfast.labelling.server.long_recordings import (
     load_for_labelling,
     read_header,
-    without_forces,
+    without_force,
 )
-from holdfast.labelling.server.signals import Signals, change_points
+from holdfast.labelling.server.signals import FingerSignals, Signals, change_points
 from holdfast.labelling.server.store import (
     ModuleLabels,
     StoredLabels,
@@ -82,6 +82,7 @@ class OpenRecording:
     recording: Recording
     has_readings: bool
     tare: Tare
+    _fingers: dict[str, FingerSignals] = field(default_factory=dict)
 
     def with_readings(self) -> Recording:
         """Return the recording with its readings, which are read again if it is long.
@@ -93,11 +94,13 @@ class OpenRecording:
 
     @cached_property
     def signals(self) -> Signals:
-        """The signals that the page plots."""
-        signals = Signals(self.recording, self.tare)
-        if not self.has_readings:
-            self.recording = without_forces(self.recording)
-        return signals
+        """The signals that the page plots. The forces of a long recording are not kept."""
+        for name in tuple(self.recording.modules):
+            if name not in self._fingers:
+                self._fingers[name] = FingerSignals(self.recording.modules[name], self.tare)
+                if not self.has_readings:
+                    self.recording = without_force(self.recording, name)
+        return Signals(self.recording.start, self.recording.end, self._fingers)
 
     @cached_property
     def changes(self) -> Mapping[str, list[float]]:
@@ -169,8 +172,8 @@ class Workspace:
             if key not in self._open:
                 while len(self._open) >= MAX_RECORDINGS_IN_MEMORY:
                     self._open.popitem(last=False)
+                recording, has_readings = load_for_labelling(path)
                 with self._compute_lock:
-                    recording, has_readings = load_for_labelling(path)
                     tare = fitting_tare(recording, self._tare)
                 self._open[key] = OpenRecording(path, recording, has_readings, tare)
             self._open.move_to_end(key)
@@ -191,7 +194,7 @@ class Workspace:
         tip = sensor("uskin-4x4")
         still = Tactile(tip, np.arange(32) / tip.rate, np.zeros((32, tip.n_taxels, 3)))
         with self._compute_lock:
-            Signals(Recording("warm-up", {"finger": still}))
+            FingerSignals(still)
 
     def changes(self, index: int) -> dict[str, list[float]]:
         """Return the change points of a recording by finger [s].
