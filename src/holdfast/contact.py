@@ -109,7 +109,7 @@ UNSTABLE_MARGIN = 0.1
 MIN_CONTACT_DURATION = 0.1
 """A contact, or a loss of contact, that is shorter is not labelled [s]."""
 GLITCH_DURATION = 0.1
-"""Time after a glitch of the hand's controller in which what happens is caused by it [s]."""
+"""Time after a glitch of the hand's controller in which it is the cause of a disturbance [s]."""
 
 
 class ContactEstimate(msgspec.Struct, frozen=True, gc=False):

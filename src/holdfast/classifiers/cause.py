@@ -20,13 +20,13 @@ SLIP_CODE = ALL_CAUSES.index(Cause.SLIP) + 1
 
 
 class CauseClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Multinomial logistic regression: the cause with the largest score is the cause.
+    """Multinomial logistic regression; its answer is the cause with the largest score.
 
     The score of a cause is intercept + sum_j coefficients_j (phi_j - mean_j) / scale_j. The
     detector adds the scores of the unstable samples since the contact became unstable.
 
     Attributes:
-        causes: that it tells apart.
+        causes: between which it decides.
         mean: of each feature in training.
         scale: standard deviation of each feature in training.
         coefficients: of the standardised features, for each cause.

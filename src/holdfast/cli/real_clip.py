@@ -23,7 +23,7 @@ from holdfast.recorded import BOX_SLIPS
 
 MODEL = "builtin:any"
 MIN_DURATION = 0.15
-"""Minimum time that a new state must last to be told [s]."""
+"""Minimum duration of a new state before it is printed [s]."""
 SENTENCES = {
     "UNKNOWN": "There is no estimate.",
     "STABLE": "The robot holds the box, and nothing moves.",

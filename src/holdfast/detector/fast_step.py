@@ -71,10 +71,10 @@ STEP_SIGNATURE = "int64(int64[:, ::1], float64, int64)"
 
 
 def compiled_fast_step() -> Callable[[Integers, float, int], int]:
-    """Return `fast_step` for its argument types: a call need not find them out.
+    """Return `fast_step` for its argument types, so that a call does not look for them.
 
-    Where numba is told not to compile (`NUMBA_DISABLE_JIT=1`), `Detector.run` works, slowly, and
-    `update` does not: it needs the addresses that only compiled code can read.
+    If numba does not compile (`NUMBA_DISABLE_JIT=1`), `Detector.run` works slowly and `update`
+    fails: it needs addresses, which only compiled code can read.
     """
     dispatcher: Any = fast_step
     entry: Callable[[Integers, float, int], int] = dispatcher

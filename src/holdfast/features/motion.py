@@ -152,7 +152,7 @@ def _forget_features(memory: Memory, f: int) -> None:
 
 @compiled_step
 def _along(axis: int, x: float, y: float, z: float, nx: float, ny: float, nz: float) -> float:
-    """Return the part of a vector along the normal, which mostly is an axis."""
+    """Return the part of a vector along the normal, which is usually an axis."""
     if axis == 0:
         return x
     if axis == 2:
@@ -162,11 +162,11 @@ def _along(axis: int, x: float, y: float, z: float, nx: float, ny: float, nz: fl
 
 @compiled_step
 def _next_place(layout: Layout, memory: Memory, f: int, time: float) -> tuple[int, int, bool, bool]:
-    """Note the time of a sample in the history, which begins anew after a gap not bridged.
+    """Store the time of a sample. After a gap that is not bridged, the history starts again.
 
     Returns:
-        Places of the sample and of the one before, whether there is one before, and whether their
-        difference shows the noise: over a gap that is bridged the force may move.
+        Place of the sample, place of the sample before, whether there is a sample before, and
+        whether their difference shows the noise: the force may change in a gap that is bridged.
     """
     times, n_before = memory.track[f, at.TRACK_TIME], memory.counts[f, at.N_MOTION]
     now, before = n_before % len(times), (n_before - 1) % len(times)
@@ -184,7 +184,7 @@ def append_taxels(
 ) -> tuple[float, float, float, float]:
     """Append taxel forces, centre of pressure and moment of a sample to the history.
 
-    The history begins anew after a gap that is not bridged.
+    The history starts again after a gap that is not bridged.
 
     Returns:
         F_tip, with the bits of `sum_taxels`, and the sum of the normal readings.

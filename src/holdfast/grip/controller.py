@@ -406,7 +406,7 @@ class GripController:
 
 
 def _since(since: float, time: float, *, still: bool) -> float:
-    """Return since when something holds, NaN if it does not; a clock that went back starts anew."""
+    """Return when stillness began, NaN if there is none. If the clock went back, start again."""
     if not (still and math.isfinite(time)):
         return math.nan
     return since if since <= time else time
