@@ -226,6 +226,20 @@ class TestEstimates:
         assert 5 <= wait <= 10  # the window, and until the mask is complete
         assert max(e.instability for e in found[first + wait : 500]) < 20.0
 
+    def test_a_taxel_that_comes_back_at_once_moves_no_other(self):
+        tip = sensor(6, "tip", limits=(0.0, 30_060.0))
+        values = noise()
+        values[:, 1] = values[0, 1]  # dead
+        values[500, 0, 2] = 30_060.0
+        found = feed(Detector(model(("thumb",), which=tip, tare="none")), values)
+        assert [found[k].faulty_taxels for k in (499, 500, 501)] == [(1,), (0, 1), (1,)]
+        values[500, 0] = values[499, 0]  # what it counts for while it is masked
+        filled = []
+        for k in (500, 501):
+            healthy = sum(tip.rotations[i] @ values[k, i] for i in (0, 2, 3, 4, 5))
+            filled.append(np.array(found[k].force) - healthy)
+        np.testing.assert_allclose(filled[1], filled[0], atol=1e-6)
+
     def test_one_by_one_equals_all_at_once(self):
         values = noise()
         press = 2000.0 * np.clip(np.arange(900) / RATE - 2.0, 0.0, 1.0)

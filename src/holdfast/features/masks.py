@@ -113,7 +113,7 @@ def replace_invalid(layout: Layout, memory: Memory, readings: Array, f: int, bit
     bits |= counts[f, at.MASKED] | counts[f, at.FAULTY_TAXELS] | counts[f, at.LOST]
     if bits == counts[f, at.MASKED]:
         return bool(counts[f, at.TOO_MANY] == 0)
-    known, enough, _ = _weigh(layout, memory, readings, f, bits)
+    known, enough = _weigh(layout, memory, readings, f, bits)
     if not (known or enough):  # what they would carry stays unknown under a load as well
         for i in range(first, last):
             if bits & bit_of(i - first):
@@ -181,10 +181,8 @@ def _load_of(
 
 
 @compiled_step
-def _weigh(
-    layout: Layout, memory: Memory, readings: Array, f: int, bits: int
-) -> tuple[bool, bool, float]:
-    """Return whether the load is known, whether the other taxels carry enough, and their squares.
+def _weigh(layout: Layout, memory: Memory, readings: Array, f: int, bits: int) -> tuple[bool, bool]:
+    """Return whether the load is known, and whether the other taxels carry enough.
 
     Args:
         layout: of the stream.
@@ -194,7 +192,7 @@ def _weigh(
         bits: of the faulty taxels.
     """
     first, n_used = layout.offsets[f], layout.constants[f, at.N_USED]
-    carried = healthy = squares = all_squares = 0.0
+    carried = healthy = all_squares = 0.0
     n_masked = n_unweighed = 0
     for i in range(first, layout.offsets[f + 1]):
         if layout.ignored[i]:
@@ -208,7 +206,6 @@ def _weigh(
             n_unweighed += _is_unweighed(memory, f, i, bit_of(i - first))
         else:
             healthy += math.sqrt(square)
-            squares += square
     # Enough: sum over the healthy |h_i| >= half of that over all; and where loads are not known,
     # n - n_unknown >= n / 2.
     known = all_squares > _known_squares(layout, memory, f)  # False for NaN
@@ -218,7 +215,7 @@ def _weigh(
     else:
         left = n_used - n_masked
         enough = n_masked < n_used
-    return known, enough and left >= MIN_HEALTHY_SHARE * n_used, squares
+    return known, enough and left >= MIN_HEALTHY_SHARE * n_used
 
 
 @compiled_step
@@ -246,7 +243,8 @@ def _change_mask(
     counts, levels, masks = memory.counts, memory.levels, memory.masks
     first, last = layout.offsets[f], layout.offsets[f + 1]
     before = 0 if counts[f, at.TOO_MANY] else counts[f, at.MASKED]
-    known, enough, squares = _weigh(layout, memory, readings, f, bits)
+    known, enough = _weigh(layout, memory, readings, f, bits)
+    squares = 0.0
     for i in range(first, last):
         bit = bit_of(i - first)
         x, y, z = _load_of(layout, memory, readings, f, i)
@@ -269,6 +267,8 @@ def _change_mask(
             y,
             z,
         )
+        if not (bits & bit or layout.ignored[i]):
+            squares += x * x + y * y + z * z
     # No window holds the samples of a taxel that became noisy, nor both ways to sum a finger.
     noisy = counts[f, at.NOISY_TAXELS] & ~counts[f, at.MASKED]
     if noisy or (not enough and before):
