@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers.fitting import standardise
 from holdfast.classifiers.newton import fit_multinomial
-from holdfast.compiled import compiled_step
+from holdfast.compiled import joined_step
 from holdfast.contact import Cause
 from holdfast.errors import ModelError
 from holdfast.sensors.types import Array
@@ -101,7 +101,7 @@ def fit_causes(features: Array, causes: npt.NDArray[np.str_], c: float) -> Cause
     )
 
 
-@compiled_step
+@joined_step
 def add_scores(features: Array, weights: Array, scores: Array) -> int:
     """Add the scores of a sample to the sums. Return the code of the cause with the largest.
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_step
+from holdfast.compiled import compiled_step, joined_step
 from holdfast.errors import ModelError
 from holdfast.sensors.types import Array
 
@@ -115,7 +115,7 @@ def log_odds(features: Array, weights: Array) -> float:
     return float(value)
 
 
-@compiled_step
+@joined_step
 def linear_probability(features: Array, weights: Array) -> float:
     """Return the logistic function of the weighted sum, for offline and live detection."""
     return 1.0 / (1.0 + math.exp(-log_odds(features, weights)))

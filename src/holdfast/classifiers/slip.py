@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from holdfast.classifiers.linear import LinearClassifier
-from holdfast.compiled import compiled_step
+from holdfast.compiled import compiled_step, joined_step
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
 from holdfast.sensors.types import Array, Flags
@@ -173,7 +173,7 @@ class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return 1.0 if self.smoothing == 0 else -math.expm1(-1.0 / (rate * self.smoothing))
 
 
-@compiled_step
+@joined_step
 def add_squares(value: float, features: Array, squares: Array) -> float:
     """Return log odds with the squares of standardised features.
 

@@ -6,7 +6,7 @@ that is released and relaxes.
 
 import math
 
-from holdfast.compiled import compiled_step, inlined
+from holdfast.compiled import compiled_step, inlined, joined_step
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
 from holdfast.detector import arrays as rule_at
 from holdfast.features import arrays as at
@@ -186,7 +186,7 @@ def follow(values: Array, decided: Array, period: float) -> None:
         decided[rule_at.REST + axis] += share * (values[axis] - decided[rule_at.REST + axis])
 
 
-@compiled_step
+@joined_step
 def has_drifted(
     load: float,
     values: Array,

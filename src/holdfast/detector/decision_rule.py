@@ -18,7 +18,7 @@ from holdfast.classifiers.slip import (
     smooth,
     speed_of,
 )
-from holdfast.compiled import compiled_step, inlined
+from holdfast.compiled import compiled_step, inlined, joined_step
 from holdfast.contact import (
     NO_CONTACT,
     STABLE,
@@ -317,7 +317,7 @@ def new_decision_memory(
     )
 
 
-@compiled_step
+@joined_step
 def step(
     layout: Layout,
     memory: Memory,

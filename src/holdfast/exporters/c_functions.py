@@ -188,11 +188,13 @@ class Statements:
                          *map(_c_name, self._kinds)]
             if not _is_read(word, body)
         ]  # fmt: skip
+        any_order = getattr(self.expressions.function, "sums_in_any_order", False)
         return "\n".join(
             [
                 f"/* {self._summary()} */",
+                *["HF_ANY_ORDER"] * any_order,
                 f"static inline {self._c_result()} {name}({', '.join(parameters) or 'void'})",
-                "{", *variables, *unused, body, "}",
+                "{", *["    HF_ANY_ORDER_INSIDE"] * any_order, *variables, *unused, body, "}",
             ]
         )  # fmt: skip
 
@@ -535,7 +537,9 @@ class Statements:
             if length.known is None:
                 self.expressions.refuse(target, "a part of unknown length")
             n *= int(length.known)
-        if n and place.strides[-1] == 1:
+        if n and place.strides[-1] != 1:
+            self.expressions.refuse(target, "a part with gaps in memory")
+        if n:
             text = self.expressions.text(value)
             self._write(f"hf_fill_{place.kind}({place.text}, {n}, {text});")
 

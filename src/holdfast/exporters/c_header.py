@@ -15,6 +15,7 @@ from holdfast.classifiers import LinearClassifier
 from holdfast.contact import Cause, ContactState, Fault, Reason
 from holdfast.detector import arrays as rule_at
 from holdfast.detector import decision_rule
+from holdfast.detector.address_table import fields_of
 from holdfast.errors import ModelError
 from holdfast.exporters.c_functions import Program
 from holdfast.exporters.c_values import (
@@ -44,6 +45,8 @@ FRAME_COLUMNS = ("REPORT_TIME", "REPORT_PROBABILITY", "REPORT_SIGMA", "REPORT_FO
            "REPORT_SPEED", "REPORT_DISTANCE", "REPORT_WIDTH")  # fmt: skip
 """Columns of the report that the frame of the header reads."""
 WORDS_OF_LINE = 6
+OFFSETS = "hf_layout_offsets"
+"""Constant array that the frame of the header reads."""
 
 
 class CHeader(NamedTuple):
@@ -62,6 +65,43 @@ class CHeader(NamedTuple):
     double_fields: tuple[str, ...]
 
 
+class HeaderArray(NamedTuple):
+    """Array of a header.
+
+    Attributes:
+        name: in C.
+        values: of a constant; the first values of a member of the state.
+        taxel_axis: axis of the taxels, if it has one: the last in the memory of C, so that a loop
+            over taxels reads numbers that are next to each other, several at a time.
+    """
+
+    name: str
+    values: AnyArray
+    taxel_axis: int | None = None
+
+    @property
+    def in_memory(self) -> AnyArray:
+        """The values, with their axes in the order of C's memory."""
+        if self.taxel_axis is None:
+            return self.values
+        return np.ascontiguousarray(np.moveaxis(self.values, self.taxel_axis, -1))
+
+    @property
+    def strides(self) -> tuple[int, ...]:
+        """Distance in memory along each axis [elements]."""
+        shape = self.in_memory.shape
+        strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
+        if self.taxel_axis is not None:
+            strides.insert(self.taxel_axis, strides.pop())
+        return tuple(strides)
+
+
+def _taxel_axis(values: Any, name: str) -> int | None:  # noqa: ANN401 (any named tuple)
+    """Return the axis of the taxels of a field of a named tuple; None without one."""
+    kind = {field.name: field.kind for field in fields_of(type(values))}[name]
+    return None if kind is None else kind.taxel_axis
+
+
 class DetectorArrays(NamedTuple):
     """What the kernel receives: named tuples of constants and of memory, by their names.
 
@@ -73,16 +113,23 @@ class DetectorArrays(NamedTuple):
     constants: Mapping[str, Any]
     state: Mapping[str, Any]
 
-    def arrays(self) -> Iterator[tuple[str, AnyArray]]:
-        """Yield name and first values of all arrays of the state."""
+    def arrays(self) -> Iterator[HeaderArray]:
+        """Yield all arrays of the state, with their first values."""
         layout = self.constants["layout"]
         n_fingers, n_taxels = len(layout.windows), len(layout.rotations)
-        yield "readings", np.zeros((n_taxels, 3))
-        yield "present", np.zeros(n_fingers, dtype=np.bool_)
-        yield "report", np.zeros((n_fingers, rule_at.REPORT_WIDTH))
+        yield HeaderArray("readings", np.zeros((n_taxels, 3)), taxel_axis=0)
+        yield HeaderArray("present", np.zeros(n_fingers, dtype=np.bool_))
+        yield HeaderArray("report", np.zeros((n_fingers, rule_at.REPORT_WIDTH)))
         for record, values in self.state.items():
             for name, array in values._asdict().items():
-                yield f"{record}_{name}", array
+                yield HeaderArray(f"{record}_{name}", array, _taxel_axis(values, name))
+
+    def constant_arrays(self) -> Iterator[HeaderArray]:
+        """Yield all arrays of the constants."""
+        for record, values in self.constants.items():
+            for name, array in values._asdict().items():
+                if isinstance(array, np.ndarray):
+                    yield HeaderArray(f"hf_{record}_{name}", array, _taxel_axis(values, name))
 
 
 def header_of(
@@ -159,11 +206,14 @@ def detector_arrays(
 
 def _translate(program: Program, arrays: DetectorArrays) -> dict[str, str]:
     """Translate all that a header needs. Return the texts of its calls."""
-    state = {name: _state_array(program, name, values) for name, values in arrays.arrays()}
+    state = {array.name: _state_array(program, array) for array in arrays.arrays()}
+    constants = {array.name: _constant_array(array) for array in arrays.constant_arrays()}
     records = {
         name: CRecord(name, {f: state[f"{name}_{f}"] for f in values._fields}, is_constant=False)
         for name, values in arrays.state.items()
-    } | {name: _constant_record(name, values) for name, values in arrays.constants.items()}
+    } | {
+        name: _constant_record(name, values, constants) for name, values in arrays.constants.items()
+    }
     layout, memory, output, rule, decision = (
         records[name] for name in ("layout", "memory", "output", "rule", "decision")
     )
@@ -202,28 +252,32 @@ def _time_kind(program: Program) -> str:
     return EXACT_TIME if program.single else REAL
 
 
-def _state_array(program: Program, name: str, values: AnyArray) -> CArray:
-    kind = KIND_OF_DTYPE[values.dtype.kind]
-    if name in program.time_fields:
+def _state_array(program: Program, array: HeaderArray) -> CArray:
+    kind = KIND_OF_DTYPE[array.values.dtype.kind]
+    if array.name in program.time_fields:
         kind = EXACT_TIME
-    return _array(kind, f"d->{name}", name, values)
+    return _array(kind, f"d->{array.name}", array)
 
 
-def _array(kind: str, base: str, field: str, values: AnyArray, choices: Any = None) -> CArray:  # noqa: ANN401
-    strides = [int(np.prod(values.shape[axis + 1 :])) for axis in range(values.ndim)]
-    shape = tuple(known(int(length)) for length in values.shape)
-    return CArray(kind, base, shape, tuple(strides), field, choices=choices)
+def _constant_array(array: HeaderArray) -> CArray:
+    kind = KIND_OF_DTYPE[array.values.dtype.kind]
+    return _array(kind, array.name, array, array.values[np.newaxis])
 
 
-def _constant_record(record: str, values: Any) -> CRecord:  # noqa: ANN401 (any named tuple)
-    fields: dict[str, CNumber | CArray] = {}
-    for name, value in values._asdict().items():
-        field = f"hf_{record}_{name}"
-        if isinstance(value, np.ndarray):
-            kind = KIND_OF_DTYPE[value.dtype.kind]
-            fields[name] = _array(kind, field, field, value, value[np.newaxis])
-        else:
-            fields[name] = known(value)
+def _array(kind: str, base: str, array: HeaderArray, choices: Any = None) -> CArray:  # noqa: ANN401
+    shape = tuple(known(int(length)) for length in array.values.shape)
+    return CArray(kind, base, shape, array.strides, array.name, choices=choices)
+
+
+def _constant_record(
+    record: str,
+    values: Any,  # noqa: ANN401 (any named tuple)
+    arrays: Mapping[str, CArray],
+) -> CRecord:
+    fields: dict[str, CNumber | CArray] = {
+        name: arrays[f"hf_{record}_{name}"] if isinstance(value, np.ndarray) else known(value)
+        for name, value in values._asdict().items()
+    }
     return CRecord(record, fields, is_constant=True)
 
 
@@ -239,16 +293,17 @@ def _assembled(
     functions = _reachable(program.definitions, [*calls.values()])
     used = "\n".join(functions)
     constants = [
-        (field, value)
-        for record, values in arrays.constants.items()
-        for name, value in values._asdict().items()
-        if isinstance(value, np.ndarray)
-        and (re.search(rf"\b{(field := f'hf_{record}_{name}')}\b", used) or name == "offsets")
+        array
+        for array in arrays.constant_arrays()
+        if re.search(rf"\b{array.name}\b", used) or array.name == OFFSETS
     ]
-    kinds = {name: _state_array(program, name, values).kind for name, values in arrays.arrays()}
+    state = list(arrays.arrays())
+    kinds = {array.name: _state_array(program, array).kind for array in state}
     sizes = {BOOL: 1, INTEGER: 8, REAL: 4 if single else 8, EXACT_TIME: 8}
-    state_size = sum(max(v.size, 1) * sizes[kinds[name]] for name, v in arrays.arrays()) + 16
-    constants_size = sum(v.size * sizes[KIND_OF_DTYPE[v.dtype.kind]] for _, v in constants)
+    state_size = sum(max(x.values.size, 1) * sizes[kinds[x.name]] for x in state) + 16
+    constants_size = sum(
+        x.values.size * sizes[KIND_OF_DTYPE[x.values.dtype.kind]] for x in constants
+    )
     sensors = model.fingers_of(fingers)
     parts = {
         "VERSION": version("holdfast"),
@@ -263,17 +318,17 @@ def _assembled(
         "N_TAXELS": str(sum(sensor.n_taxels for sensor in sensors.values())),
         "ENUMS": "\n\n".join(_enums(sensors)),
         "STATE": "\n".join(
-            f"    {C_TYPES[kinds[name]]} {name}[{max(values.size, 1)}];"
-            for name, values in arrays.arrays()
+            f"    {C_TYPES[kinds[array.name]]} {array.name}[{max(array.values.size, 1)}];"
+            for array in state
         ),
         "STATE_SIZE": str(state_size),
-        "CONSTANTS": "\n\n".join(_constant(*constant, single=single) for constant in constants),
+        "CONSTANTS": "\n\n".join(_constant(array, single=single) for array in constants),
         "CONSTANTS_SIZE": str(constants_size),
         "FUNCTIONS": "\n\n".join([*map(_struct, sorted(program.tuples)), *functions]),
         "INIT": "\n".join(
             line
-            for name, values in arrays.arrays()
-            for line in _first_values(name, values, kinds[name], single=single)
+            for array in state
+            for line in _first_values(array, kinds[array.name], single=single)
         ),
         **calls,
     }
@@ -340,21 +395,22 @@ def _enum(prefix: str, members: Sequence[tuple[str, int]]) -> str:
     return f"enum {{\n{lines}\n}};"
 
 
-def _constant(name: str, values: AnyArray, *, single: bool) -> str:
+def _constant(array: HeaderArray, *, single: bool) -> str:
     """Return the definition of a constant array."""
-    words = [literal(value, single=single) for value in values.ravel().tolist()] or ["0"]
+    values = array.in_memory.ravel()
+    words = [literal(value, single=single) for value in values.tolist()] or ["0"]
     rows = [
         "    " + ", ".join(words[start : start + WORDS_OF_LINE])
         for start in range(0, len(words), WORDS_OF_LINE)
     ]
     kind = C_TYPES[KIND_OF_DTYPE[values.dtype.kind]]
     body = ",\n".join(rows)
-    return f"static const {kind} {name}[{len(words)}] = {{\n{body}\n}};"
+    return f"static const {kind} {array.name}[{len(words)}] = {{\n{body}\n}};"
 
 
-def _first_values(name: str, values: AnyArray, kind: str, *, single: bool) -> Iterator[str]:
+def _first_values(array: HeaderArray, kind: str, *, single: bool) -> Iterator[str]:
     """Yield the statements that set an array of the state to its first values."""
-    flat = values.ravel()
+    name, flat = array.name, array.in_memory.ravel()
     n = max(flat.size, 1)
     common = flat[0].item() if flat.size else 0.0
     if kind == BOOL:

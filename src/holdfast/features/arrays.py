@@ -14,10 +14,11 @@ from holdfast.sensors.types import Array, Flags, Integers
 
 
 class ArrayKind(NamedTuple):
-    """Type of the elements of an array, and number of its axes."""
+    """Type of the elements of an array, number of its axes, and the axis of its taxels, if any."""
 
     dtype: type[np.generic]
     n_axes: int
+    taxel_axis: int | None = None
 
     def fits(self, array: npt.NDArray[Any]) -> bool:
         """Return whether an array is of this kind."""
@@ -31,6 +32,11 @@ Integers1 = Annotated[Integers, ArrayKind(np.int64, 1)]
 Integers2 = Annotated[Integers, ArrayKind(np.int64, 2)]
 Integers3 = Annotated[Integers, ArrayKind(np.int64, 3)]
 Flags1 = Annotated[Flags, ArrayKind(np.bool_, 1)]
+# Of all taxels: the C header has the values of neighbouring taxels next to each other.
+Taxels1 = Annotated[Array, ArrayKind(np.float64, 1, taxel_axis=0)]
+Taxels2 = Annotated[Array, ArrayKind(np.float64, 2, taxel_axis=0)]
+Taxels3 = Annotated[Array, ArrayKind(np.float64, 3, taxel_axis=0)]
+TaxelRing = Annotated[Array, ArrayKind(np.float64, 3, taxel_axis=1)]
 
 # Codes of holdfast.contact.Reason.
 READY, TARE, WARM_UP, GAP, FAULT = range(5)
@@ -194,7 +200,8 @@ class Layout(NamedTuple):
     """Constants of a stream. The taxels of all fingers stand one after the other."""
 
     offsets: Integers1  # (n_fingers + 1,) first taxel of each finger
-    rotations: Floats3  # (n_taxels, 3, 3)
+    n_taxels: Integers1  # (n_fingers,) of each finger
+    rotations: Taxels3  # (n_taxels, 3, 3)
     constants: Floats2  # (n_fingers, CONSTANTS_WIDTH)
     specs: Integers3  # (n_fingers, n_features, SPECS_WIDTH), see `spec_codes`
     floors: Floats2  # (n_fingers, n_features)
@@ -212,7 +219,7 @@ class Layout(NamedTuple):
     has_centres: bool  # whether a lag needs the centre of pressure and the moment
     has_ratios: bool  # whether a lag needs the ratio of tangential to normal force
     families: Integers2  # (n_lags, FAMILIES_WIDTH) 1 where a lag needs these kinds, else 0
-    places: Floats2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
+    places: Taxels2  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Floats2  # (n_fingers, 3)
     normal_axes: Integers1  # (n_fingers,) axis that the normal is; 3 if it is none
     n_levels: int  # sizes of blocks of pairs, see holdfast.features.haar
@@ -221,21 +228,21 @@ class Layout(NamedTuple):
 class Memory(NamedTuple):
     """Memory of a stream."""
 
-    baseline: Floats2  # (n_taxels, 3) a sum while the tare runs, then the mean
-    previous: Floats2  # (n_taxels, 3) readings of the last valid sample
-    taxels: Floats2  # (n_taxels, TAXELS_WIDTH)
-    masks: Floats2  # (n_taxels, MASKS_WIDTH)
+    baseline: Taxels2  # (n_taxels, 3) a sum while the tare runs, then the mean
+    previous: Taxels2  # (n_taxels, 3) readings of the last valid sample
+    taxels: Taxels2  # (n_taxels, TAXELS_WIDTH)
+    masks: Taxels2  # (n_taxels, MASKS_WIDTH)
     history: Floats3  # (n_fingers, 4, 2 * longest) F_a, F_x, F_y, F_z, each written twice
     counts: Integers2  # (n_fingers, COUNTS_WIDTH)
     levels: Floats2  # (n_fingers, LEVELS_WIDTH)
     own: Floats2  # (n_fingers, n_features) values of each finger, before the maximum of the hand
     hand: Floats1  # (n_features,) this maximum, if all fingers have the same features
-    taxel_forces: Floats3  # (length, n_taxels, 3) in the fingertip frame, a ring
-    reference: Floats2  # (n_taxels, 3) taxel forces at the least normal force since the start
+    taxel_forces: TaxelRing  # (length, n_taxels, 3) in the fingertip frame, a ring
+    reference: Taxels2  # (n_taxels, 3) taxel forces at the least normal force since the start
     track: Floats3  # (n_fingers, TRACK_WIDTH, length), a ring
     motion: Floats2  # (n_fingers, MOTION_WIDTH)
     relative: Floats3  # (n_fingers, n_kinds, n_lags) relative features of the last sample
-    pressed: Floats1  # (n_taxels,) |h . n| of the last sample
+    pressed: Taxels1  # (n_taxels,) |h . n| of the last sample
     averages: Floats3  # (n_fingers, N_SECONDS, n_lags) smoothed squares of second differences
     blocks: Floats3  # (n_fingers, longest, n_channels * n_levels * 3) sums of blocks, a ring
 

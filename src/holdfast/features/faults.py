@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from holdfast.compiled import compiled_step, inlined
+from holdfast.compiled import compiled_step, inlined, joined_step
 from holdfast.features import arrays as at
 from holdfast.features.arrays import Layout, Memory
 from holdfast.sensors.types import Array, Flags, Integers
@@ -54,7 +54,7 @@ LOADED_SECONDS = 0.25
 """A pull for this long means that the tare was taken under load: nothing pulls a skin [s]."""
 
 
-@compiled_step
+@joined_step
 def scan_readings(
     readings: Array, ignored: Flags, first: int, last: int
 ) -> tuple[float, float, float]:
@@ -83,7 +83,7 @@ def scan_readings(
     return sum_x + sum_y + sum_z, least, most
 
 
-@compiled_step
+@joined_step
 def copy_readings(readings: Array, previous: Array, first: int, last: int) -> None:
     """Copy the readings of a finger. A copy by slices takes three times as long."""
     for i in range(np.uint64(first), np.uint64(last)):

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_parallel, compiled_step
+from holdfast.compiled import compiled_parallel, compiled_step, joined_step, sums_in_any_order
 from holdfast.errors import RecordingError
 from holdfast.features.tare import Tare, TareArgument, baseline_of, offline_tare
 from holdfast.recordings import Tactile
@@ -140,14 +140,25 @@ def rest_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
     return amplitude[np.isfinite(amplitude)]
 
 
-@compiled_step
+@joined_step
+@sums_in_any_order
 def sum_taxels(
-    readings: Array, baseline: Array, rotations: Array, first: int, last: int
+    readings: Array, baseline: Array, rotations: Array, first: int, n: int
 ) -> tuple[float, float, float, float]:
-    """Return F_tip = sum_i R_i (f_i - baseline_i), and the sum of the normal readings."""
+    """Return F_tip = sum_i R_i (f_i - baseline_i), and the sum of the normal readings.
+
+    Args:
+        readings: of all fingers.
+        baseline: of all fingers.
+        rotations: of all fingers.
+        first: first taxel of the finger.
+        n: number of its taxels.
+    """
     # F_tip = sum_i R_i (f_i - b_i), with the tare b_i (DESIGN, section 1); normal = sum_i z_i.
     fx = fy = fz = normal = 0.0
-    for i in range(np.uint64(first), np.uint64(last)):
+    start = np.uint64(first)
+    for j in range(np.uint64(n)):
+        i = start + j
         x = readings[i, 0] - baseline[i, 0]
         y = readings[i, 1] - baseline[i, 1]
         z = readings[i, 2] - baseline[i, 2]

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_parallel, compiled_step
+from holdfast.compiled import compiled_parallel, compiled_step, joined_step
 from holdfast.sensors.types import Array
 
 DEFAULT_WINDOW = 14
@@ -219,7 +219,7 @@ def _row_before(row: int, n: int, length: int) -> int:
     return row - n if row >= n else row - n + length
 
 
-@compiled_step
+@joined_step
 def append_pair(older: float, newer: float, blocks: Array, row: int, first: int, n: int) -> None:
     """Append the blocks that end with a pair of a stream, by the sums of `haar_windows`.
 

@@ -7,7 +7,7 @@ inlined: passing the arrays costs as much as the step.
 
 import math
 
-from holdfast.compiled import compiled_step, inlined
+from holdfast.compiled import compiled_step, inlined, joined_step
 from holdfast.features import arrays as at
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import (
@@ -48,7 +48,7 @@ NO_TRANSFORM, LOG = map(TRANSFORMS.index, ("none", "log"))
 OF_HAND = SCOPES.index("hand")
 
 
-@compiled_step
+@joined_step
 def advance(
     layout: Layout, memory: Memory, output: Output, readings: Array, present: Flags, time: float
 ) -> None:
@@ -194,9 +194,10 @@ def _measure_noise(layout: Layout, memory: Memory, readings: Array, f: int, comp
         measured = math.sqrt(levels[f, at.SQUARED_STEPS] / (6.0 * max(levels[f, at.N_STEPS], 1.0)))
         levels[f, at.NOISE] = max(measured, layout.constants[f, at.MIN_NOISE])
     elif memory.counts[f, at.N_SEEN] > 1:
-        first, last = layout.offsets[f], layout.offsets[f + 1]
+        first = layout.offsets[f]
         # step = sum_i R_i (f_i(k) - f_i(k-1)).
-        x, y, z, _ = sum_taxels(readings, memory.previous, layout.rotations, first, last)
+        n = layout.n_taxels[f]
+        x, y, z, _ = sum_taxels(readings, memory.previous, layout.rotations, first, n)
         levels[f, at.SQUARED_STEPS] += x * x + y * y + z * z
         levels[f, at.N_STEPS] += 1.0
 
@@ -225,12 +226,12 @@ def _process_force(
         enough: whether it goes on without them.
     """
     counts, levels, windows = memory.counts, memory.levels, layout.windows
-    first, last = layout.offsets[f], layout.offsets[f + 1]
     # F_tip = sum_i R_i (f_i - b_i).
     if len(layout.lags):
         x, y, z, normal = append_taxels(layout, memory, readings, f, levels[f, at.LAST_TIME])
     else:
-        x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
+        first, n = layout.offsets[f], layout.n_taxels[f]
+        x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, n)
     _append(memory.history, counts, values, f, x, y, z)
     _append_blocks(memory.history, memory.blocks, counts, f, layout.n_levels)
     if len(layout.lags):
@@ -331,7 +332,7 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
     return total
 
 
-@compiled_step
+@joined_step
 def _largest(own: Array, place: int) -> float:
     """Return the maximum over the fingers of a feature that all have."""
     # max over the fingers, of those that have the feature.
@@ -369,7 +370,7 @@ def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other:
     return float(_transform(value, transform, window, memory.levels[other, at.NOISE], floor))
 
 
-@compiled_step
+@joined_step
 def _feature(
     kind: int, window: int, history: Array, blocks: Array, counts: Integers, n_levels: int, f: int
 ) -> float:

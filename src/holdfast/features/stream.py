@@ -299,6 +299,7 @@ def _layout(plan: StreamPlan) -> Layout:
     ]
     return Layout(
         offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
+        n_taxels=np.array([sensor.n_taxels for sensor in sensors], dtype=np.int64),
         rotations=np.concatenate(rotations),
         constants=np.array(constants),
         specs=np.stack([spec_codes(specs, width, lags) for specs in features]),
