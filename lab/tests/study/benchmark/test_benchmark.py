@@ -3,6 +3,8 @@
 import csv
 import json
 import runpy
+import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -166,6 +168,24 @@ def test_the_script_writes_the_scores_of_a_model(capsys, folder, tmp_path, monke
     assert (document["left_out"], err) == ([], "")
     assert figure(document, "stability", "AUC", on="new-objects") > 0.9
     assert figure(document, "slips", "n slips", on="new-hand-and-objects") == 4
+
+
+@pytest.mark.skipif(not shutil.which("awk"), reason="there is no awk")
+def test_a_program_without_holdfast_reads_and_writes_csv(capsys, folder, tmp_path):
+    """`submission.awk`: exported tables in, a submission out."""
+    splits = ("tuning", "new-objects")
+    for split in splits:
+        words = ["export", str(folder / split), str(tmp_path / split), "--format", "csv"]
+        assert main(words) == 0
+    tables = sorted(path for split in splits for path in (tmp_path / split).glob("*.csv"))
+    command = ["awk", "-f", SCRIPTS / "submission.awk", *tables]
+    out = tmp_path / "rule.csv"
+    out.write_bytes(subprocess.run(command, check=True, capture_output=True).stdout)
+    capsys.readouterr()
+    document, err = scored(capsys, folder, out)
+    assert err == "no scores, and not scored: new-hand-and-objects\n"
+    assert list(document["tables"]) == ["stability", "events", "slips"]
+    assert figure(document, "stability", "AUC", on="new-objects") > 0.7
 
 
 def test_the_script_scores_the_methods_of_the_study(capsys, folder, tmp_path, monkeypatch):
