@@ -24,6 +24,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from holdfast_lab.study.citation import compares_methods
+
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("study.md", "study-changes.md", "study/real-data.md")
 MISSING = "–"
@@ -190,6 +192,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
     )
     figures = Figures(summary)
     names = {name: getattr(figures, name) for name in ("cell", "any_cell", "grid", "has", "ratio")}
+    names["compares_methods"] = compares_methods
     return {
         page: environment.get_template(f"{Path(page).name}.j2").render(study=summary, **names)
         for page in PAGES

@@ -1,6 +1,6 @@
 """What a publication takes from a study: a text of its methods, and its references as BibTeX."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
@@ -10,14 +10,25 @@ from holdfast_lab.study.environment import ROLES
 from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME
 from holdfast_lab.study.evaluation.evaluate_slips import SLIP_RATE
 from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.methods.learning import JAMES_LEPORA
 from holdfast_lab.study.plan import StudyPlan
 
 METHODS_FILE, REFERENCES_FILE = "methods.md", "references.bib"
 """Files beside the tables of a study."""
-COMPARING_TABLES = ("strongest", "methods", "hands", "events", "slips", "sigma_energy", "real")
-"""Tables that compare methods."""
+COMPARED_KEYS = frozenset({"method", "baseline", "measure"})
+"""Keys of rows that name what is compared."""
+CITED = {
+    "zhang": "zhang2016",
+    "slip_servo": "romano2011",
+    "spectrum": "fernandez2014",
+    "tangential": "wong2026",
+    "anyskin": "bhirangi2024",
+    **{method.name: "james2020" for method in JAMES_LEPORA},
+    "tcn": "grover2022",
+}
+"""Entries of `REFERENCES` that methods come from, by the names of the methods."""
 
-REFERENCES = """\
+REFERENCES = r"""
 @inproceedings{kitouni,
   author = {Kitouni, Dounia and Khoramshahi, Mahdi and Perdereau, Veronique},
   title = {A model-free approach to fingertip slip and disturbance detection for grasp
@@ -30,12 +41,41 @@ REFERENCES = """\
   pages = {7073},
   year = {2016},
 }
+@article{romano2011,
+  author = {Romano, Joseph M. and Hsiao, Kaijen and Niemeyer, G{\"u}nter and Chitta, Sachin and
+            Kuchenbecker, Katherine J.},
+  title = {Human-inspired robotic grasp control with tactile sensing},
+  journal = {IEEE Transactions on Robotics},
+  volume = {27},
+  year = {2011},
+}
+@article{fernandez2014,
+  author = {Fernandez, Raul and Payo, Ismael and Vazquez, Andres S. and Becedas, Jonathan},
+  title = {Micro-vibration-based slip detection in tactile force sensors},
+  journal = {Sensors},
+  volume = {14},
+  year = {2014},
+}
+@misc{bhirangi2024,
+  author = {Bhirangi, Raunaq and others},
+  title = {AnySkin: Plug-and-play skin sensing for robotic touch},
+  eprint = {2409.08276},
+  archiveprefix = {arXiv},
+  year = {2024},
+}
 @misc{james2020,
   author = {James, Jasper W. and Lepora, Nathan F.},
   title = {Slip detection for grasp stabilisation with a multi-fingered tactile robot hand},
   eprint = {2010.01928},
   archiveprefix = {arXiv},
   year = {2020},
+}
+@inproceedings{grover2022,
+  author = {Grover, Abhinav and Nadeau, Philippe and Grebe, Christopher and Kelly, Jonathan},
+  title = {Learning to detect slip with barometric tactile sensors and a temporal convolutional
+           neural network},
+  booktitle = {IEEE International Conference on Robotics and Automation},
+  year = {2022},
 }
 @article{wong2026,
   author = {Wong, Dickson Chiu Yu and Zhu, Zheng H.},
@@ -80,6 +120,11 @@ def bibliography(summary: Mapping[str, Any]) -> str:
     )
 
 
+def compares_methods(keys: Iterable[str]) -> bool:
+    """Return whether a table whose rows have these keys compares methods."""
+    return not COMPARED_KEYS.isdisjoint(keys)
+
+
 def _data_text(plan: StudyPlan, summary: Mapping[str, Any]) -> str:
     source = (
         "simulated by the physical twin of holdfast [@holdfast]"
@@ -112,7 +157,10 @@ def _protocol_text(plan: StudyPlan) -> str:
 
 
 def _methods_text(plan: StudyPlan) -> str:
-    lines = [f"- {title}: {METHODS[name].source}." for name, title in method_titles(plan).items()]
+    lines = [
+        f"- {title}{f' [@{CITED[name]}]' if name in CITED else ''}: {METHODS[name].source}."
+        for name, title in method_titles(plan).items()
+    ]
     return "\n".join(["**Methods**:", "", *lines])
 
 
@@ -120,7 +168,7 @@ def _comparisons_text(tables: Sequence[ResultTable]) -> str:
     counts = {
         table.name: sum(row.interval is not None for row in table.rows)
         for table in tables
-        if table.name in COMPARING_TABLES
+        if table.rows and compares_methods(table.rows[0].keys)
     }
     n_all = sum(row.interval is not None for table in tables for row in table.rows)
     named = ", ".join(f"{name} {n}" for name, n in counts.items())

@@ -18,7 +18,9 @@ FRICTION_SOURCE = (
 TANGENTIAL_SOURCE = (
     "Wong and Zhu, Frontiers in Robotics and AI, 10.3389/frobt.2026.1735467, 2026 (abstract only): "
     "|T_k - T_(k-1)| / max(T_(k-1), eps) above a threshold, per finger, T the tangential part of "
-    "F_tip less the tare. Own choice: eps = 0.011 N (15 counts), three times the noise"
+    "F_tip less the tare. Own choice: eps = 0.011 N (15 counts), three times the noise; the "
+    "threshold is found on the training set; a finger is engaged by the contact threshold on F_a "
+    "that all methods share (there by a threshold on the normal force)"
 )
 DIFFERENCE_SOURCE = (
     "the derivative of the force against a threshold, as in Osborn 2013, Lee 2018 and Feng 2019 "

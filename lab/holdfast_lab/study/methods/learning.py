@@ -29,11 +29,13 @@ SHEAR_WINDOW = 10
 """Samples in the window of the AnySkin features."""
 
 JAMES_LEPORA_SOURCE = (
-    "James & Lepora 2020 (arXiv 2010.01928). Of the publication only the abstract could be read. "
-    "So this is a port of its idea, the motion of the pins of an optical fingertip between two "
-    "images: magnitude and direction of the change of the shear of every taxel over 1/60 s, and "
-    "their spread over the fingertip. The features and the time between two images are our own "
-    "choice; classifiers and training are the paper's"
+    "James & Lepora 2020 (arXiv 2010.01928). Of the publication only the abstract could be read, "
+    "which names support vector machines and no features. That there are classifiers of a finger "
+    "(local) and of a hand (global), and logistic regression, is from Kitouni et al.; the idea of "
+    "the features, the motion of the pins of an optical fingertip between two images, is from "
+    "memory, not checked. Ported: magnitude and direction of the change of the shear of every "
+    "taxel over 1/60 s, and their spread over the fingertip. These features and the time between "
+    "two images are our own choice; classifiers and training are those of Kitouni et al"
 )
 MOTION_STEP = 1 / 60
 """Time over which a motion of taxels is measured [s]: between two images of a usual camera."""
