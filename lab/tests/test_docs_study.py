@@ -70,6 +70,31 @@ class TestPublished:
                     assert path.exists(), link
 
 
+def test_the_readme_quotes_the_published_study(summary):
+    figures = script.Figures(summary)
+    readme = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    ours, paper = (
+        [
+            figures.cell(
+                "confusion",
+                {"classifier": name, "on": "held out", "figure": "accuracy"},
+                field=field,
+            )
+            for name in ("LogReg", "SVM")
+        ]
+        for field in ("ours", "paper")
+    )
+    assert f"are correct in {ours[0]} and {ours[1]} % of the held-out samples" in readme
+    assert f"(the paper reports {paper[0]} and {paper[1]} %)" in readme
+    hands = {"on": "unseen objects", "error": "samples of hands [%]", "left out": "nothing"}
+    hands["baseline of"] = "all other methods"
+    rival, own = (
+        figures.cell("strongest", hands | {"figure": f"{name} [%]"})
+        for name in ("baseline", "holdfast")
+    )
+    assert f"the strongest rival has {rival} % errors by hands, our own method {own} %" in readme
+
+
 ROWS = [
     {"method": "a", "figure": "x", "ours": 91.25, "paper": 95.0, "difference": -3.75, "n": 2,
      "interval": [90.0, None]},

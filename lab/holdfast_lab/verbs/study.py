@@ -113,11 +113,12 @@ def study(
     """Repeat the experiments of the paper, and run further ones.
 
     Write OUT/report.html, every table as CSV, JSON, LaTeX and Markdown, every figure as SVG and
-    PNG, and study.json. Finished tasks are kept in OUT/work and simulated recordings in OUT/data,
-    also with --force, so the same command continues a study that was stopped. Of real recordings,
-    imported or your own, the study compares builtin:any, as it ships and adapted, with every
-    method trained on the other recordings. With recordings of the twin, the real ones are read
-    from HOLDFAST_DATA, or from ../shared/data, if they exist.
+    PNG, study.json, and methods.md and references.bib for a publication. Finished tasks are kept in
+    OUT/work and simulated recordings in OUT/data, also with --force, so the same command continues
+    a study that was stopped. Of real recordings, imported or your own, the study compares
+    builtin:any, as it ships and adapted, with every method trained on the other recordings. With
+    recordings of the twin, the real ones are read from HOLDFAST_DATA, or from ../shared/data, if
+    they exist.
 
     data FOLDER simulates the recordings of the frozen benchmark, and score FILE scores what
     another program says of them, see docs/benchmark.md.
