@@ -99,7 +99,7 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
         window: N_w.
         m: (n,) is filled.
         sigma: (n,) is filled.
-        scratch: (_SCRATCH_ROWS, n + window - 1) is overwritten.
+        scratch: (_SCRATCH_ROWS, n + window - 1 or more) is overwritten.
     """
     n, n_pairs, length = len(m), window // 2, len(x) - 1
     # P, D and S of the blocks that begin at each sample, of one size and of the next.
@@ -107,14 +107,16 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
     next_p, next_d, next_s = scratch[3], scratch[4], scratch[5]
     own_d = scratch[6, :n]
     # One pair: P = x_0 + x_1, D = x_0 - x_1, S = 0.
-    _add(x, x[1:], p[:length])
-    _subtract(x, x[1:], d[:length])
+    _pair(x, p[:length], d)
     s[:] = 0.0
     taken, size = 0, 1
     while True:
         # N_w / 2 in binary: each of its ones is a block of so many pairs, the newest first.
         if n_pairs & size:
             start = 2 * (n_pairs - taken - size)
+            if taken + size == n_pairs:
+                _fill_window(p[start:], d[start:], s[start:], size, m, own_d, sigma, taken)
+                break
             if taken == 0:
                 _copy(s[start:], sigma)
                 _copy(d[start:], own_d)
@@ -123,25 +125,59 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
                 _join(d[start:], s[start:], size, own_d, sigma, taken)
                 _add(p[start:], m, m)
             taken += size
-        if taken == n_pairs:
-            break
         step = 2 * size
         length -= step
         # Two equal halves: P = P_a + P_b, D = D_a + D_b, S = S_a + S_b + (D_a - D_b)^2 / (2 n).
         if size == 1:
-            _join_pairs(d, d[step:], next_s[:length])
+            _join_pairs(d, d[step:], next_d[:length], next_s)
         else:
             _join_equal(d, d[step:], s, s[step:], size, next_s[:length])
-        _add(d, d[step:], next_d[:length])
+            _add(d, d[step:], next_d[:length])
         _add(p, p[step:], next_p[:length])
         p, d, s, next_p, next_d, next_s = next_p, next_d, next_s, p, d, s
         size = step
+
+
+@compiled_step
+def _fill_window(
+    older_p: Array,
+    older_d: Array,
+    older_s: Array,
+    n_older: int,
+    m: Array,
+    newer_d: Array,
+    sigma: Array,
+    n_newer: int,
+) -> None:
+    """Compute m and sigma from the oldest block of each window and the sums of its newer pairs.
+
+    Args:
+        older_p: P of the oldest blocks.
+        older_d: D of the oldest blocks.
+        older_s: S of the oldest blocks.
+        n_older: pairs of the oldest block.
+        m: P of the newer pairs; becomes m.
+        newer_d: D of the newer pairs.
+        sigma: S of the newer pairs; becomes sigma.
+        n_newer: newer pairs; with 0, their sums are not used.
+    """
     # m = sum(a) / N_w = P / (sqrt(2) N_w) (equation 1).
-    for k in range(n):
-        m[k] *= _m_factor(window)
     # sigma = sqrt(sum (d - mean d)^2 / N_w) = sqrt(S / (2 N_w)) (equation 2).
-    for k in range(n):
-        sigma[k] = math.sqrt(sigma[k] * _sigma_factor(window))
+    window = 2 * (n_older + n_newer)
+    m_factor, sigma_factor = _m_factor(window), _sigma_factor(window)
+    if n_newer == 0:
+        for k in range(len(m)):
+            m[k] = older_p[k] * m_factor
+        for k in range(len(m)):
+            sigma[k] = math.sqrt(older_s[k] * sigma_factor)
+        return
+    factor = _join_factor(n_older, n_newer)
+    for k in range(len(m)):
+        m[k] = (older_p[k] + m[k]) * m_factor
+    for k in range(len(m)):
+        apart = n_newer * older_d[k] - n_older * newer_d[k]
+        spread = older_s[k] + sigma[k] + apart * apart * factor
+        sigma[k] = math.sqrt(spread * sigma_factor)
 
 
 @compiled_step
@@ -157,9 +193,10 @@ def _add(older: Array, newer: Array, total: Array) -> None:
 
 
 @compiled_step
-def _subtract(older: Array, newer: Array, difference: Array) -> None:
-    for k in range(len(difference)):
-        difference[k] = older[k] - newer[k]
+def _pair(x: Array, p: Array, d: Array) -> None:
+    """Compute P and D of the pair that begins at each sample."""
+    for k in range(len(p)):
+        p[k], d[k] = x[k] + x[k + 1], x[k] - x[k + 1]
 
 
 @compiled_step
@@ -188,11 +225,12 @@ def _join_equal(
 
 
 @compiled_step
-def _join_pairs(older_d: Array, newer_d: Array, joined: Array) -> None:
-    """Compute S of blocks of two pairs, whose own S are 0."""
-    for k in range(len(joined)):
-        apart = older_d[k] - newer_d[k]
-        joined[k] = apart * apart * 0.5
+def _join_pairs(older_d: Array, newer_d: Array, joined_d: Array, joined_s: Array) -> None:
+    """Compute D and S of blocks of two pairs, whose own S are 0."""
+    for k in range(len(joined_d)):
+        older, newer = older_d[k], newer_d[k]
+        joined_d[k] = older + newer
+        joined_s[k] = (older - newer) * (older - newer) * 0.5
 
 
 @compiled_step
@@ -290,7 +328,8 @@ def fill_features(force: Array, window: int, out: Array) -> None:
         stop = min(start + _BLOCK_SAMPLES, n)
         amplitude = np.empty(stop - start + window - 1)
         m, sigma = np.empty(stop - start), np.empty(stop - start)
-        scratch = np.empty((_SCRATCH_ROWS, len(amplitude)))
+        # Rows of whole cache lines, so that vectors are not written across two of them.
+        scratch = np.empty((_SCRATCH_ROWS, (len(amplitude) + 7) // 8 * 8))
         # F_a of the window before the block, and of the block; then equations 1 and 2.
         _fill_amplitude(force, start - window + 1, window - 1, amplitude)
         _fill_force(force[start:stop], amplitude[window - 1 :], out[start:stop])
