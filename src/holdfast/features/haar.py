@@ -17,7 +17,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_parallel, compiled_step, joined_step
+from holdfast.compiled import compiled, compiled_parallel, compiled_step, joined_step
 from holdfast.sensors.types import Array
 
 DEFAULT_WINDOW = 14
@@ -25,6 +25,10 @@ DEFAULT_WINDOW = 14
 
 FEATURE_NAMES = ("F_a", "F_x", "F_y", "F_z", "m", "sigma")
 """The paper's features, in the order of the columns of `haar_features`."""
+
+SERIAL_SAMPLES = 1 << 17
+"""Fewer samples are computed in one thread, in under a millisecond: on a machine with other work,
+threads wait for each other for several."""
 
 _BLOCK_SAMPLES = 1024
 """Samples that one thread computes at a time: they fit into the cache."""
@@ -61,7 +65,8 @@ def haar_features(force: npt.ArrayLike, window: int = DEFAULT_WINDOW) -> npt.NDA
     if values.ndim != 2 or values.shape[1] != 3:
         raise ValueError(f"a force of shape (n, 3) expected, {values.shape} given")
     out = np.empty((len(values), len(FEATURE_NAMES)))
-    fill_features(values, n_window, out)
+    fill = fill_features if len(values) > SERIAL_SAMPLES else fill_features_alone
+    fill(values, n_window, out)
     return out
 
 
@@ -321,20 +326,39 @@ def newest_variance(blocks: Array, row: int, first: int, window: int) -> tuple[f
 @compiled_parallel
 def fill_features(force: Array, window: int, out: Array) -> None:
     """Fill (n, 6) `out` with the result of `haar_features`. The arguments are not checked."""
-    n = len(force)
-    out[: min(window - 1, n)] = math.nan
-    for block in numba.prange(max(n - window + _BLOCK_SAMPLES, 0) // _BLOCK_SAMPLES):
-        start = window - 1 + block * _BLOCK_SAMPLES
-        stop = min(start + _BLOCK_SAMPLES, n)
-        amplitude = np.empty(stop - start + window - 1)
-        m, sigma = np.empty(stop - start), np.empty(stop - start)
-        # Rows of whole cache lines, so that vectors are not written across two of them.
-        scratch = np.empty((_SCRATCH_ROWS, (len(amplitude) + 7) // 8 * 8))
-        # F_a of the window before the block, and of the block; then equations 1 and 2.
-        _fill_amplitude(force, start - window + 1, window - 1, amplitude)
-        _fill_force(force[start:stop], amplitude[window - 1 :], out[start:stop])
-        haar_windows(amplitude, window, m, sigma, scratch)
-        _fill_moments(m, sigma, out[start:stop])
+    out[: min(window - 1, len(out))] = math.nan
+    for block in numba.prange(_n_blocks(len(out), window)):
+        _fill_block(force, window, block, out)
+
+
+@compiled
+def fill_features_alone(force: Array, window: int, out: Array) -> None:
+    """Do the same as `fill_features` in one thread."""
+    out[: min(window - 1, len(out))] = math.nan
+    for block in range(_n_blocks(len(out), window)):
+        _fill_block(force, window, block, out)
+
+
+@compiled_step
+def _n_blocks(n: int, window: int) -> int:
+    """Return the number of blocks that n samples have."""
+    return max(n - window + _BLOCK_SAMPLES, 0) // _BLOCK_SAMPLES
+
+
+@compiled
+def _fill_block(force: Array, window: int, block: int, out: Array) -> None:
+    """Fill the rows of a block of samples."""
+    start = window - 1 + block * _BLOCK_SAMPLES
+    stop = min(start + _BLOCK_SAMPLES, len(force))
+    amplitude = np.empty(stop - start + window - 1)
+    m, sigma = np.empty(stop - start), np.empty(stop - start)
+    # Rows of whole cache lines, so that vectors are not written across two of them.
+    scratch = np.empty((_SCRATCH_ROWS, (len(amplitude) + 7) // 8 * 8))
+    # F_a of the window before the block, and of the block; then equations 1 and 2.
+    _fill_amplitude(force, start - window + 1, window - 1, amplitude)
+    _fill_force(force[start:stop], amplitude[window - 1 :], out[start:stop])
+    haar_windows(amplitude, window, m, sigma, scratch)
+    _fill_moments(m, sigma, out[start:stop])
 
 
 @compiled_step
