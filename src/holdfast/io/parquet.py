@@ -53,6 +53,8 @@ GROUP_SIZE = 1 << 24
 """Maximum size of a row group in memory [bytes], if a row is not larger."""
 GROUP_ROWS = 1 << 16
 """Maximum number of rows in a row group."""
+MODULES_AHEAD = 4
+"""Modules of row groups that are read ahead of their use; 4 MB each for four fingertips."""
 BLOCK_SIZE = 1 << 20
 """Number of bytes that are read at a time."""
 
@@ -292,7 +294,7 @@ def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
 
 def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
     specs = _specs(header, file, path)
-    read = _GroupReader(file, path, specs, "F")
+    read = _GroupReader(file, path, "F")
     return (_by_sample(specs, read(group, specs)) for group in range(file.num_row_groups))
 
 
@@ -302,15 +304,16 @@ def _modules_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator
     Where memory is short, a new thread can end the process; so `load` has none.
     """
     specs = _specs(header, file, path)
-    read = _GroupReader(file, path, specs, "C")
-    modules = [[spec] for spec in specs if spec.track != "truth"]
+    read = _GroupReader(file, path, "C")
+    modules = [([spec], _schema([spec]).names) for spec in specs if spec.track != "truth"]
     parts = product(range(file.num_row_groups), modules)
     with ThreadPoolExecutor(1) as reader:
-        ahead = (reader.submit(read, group, module) for group, module in parts)
-        waiting = deque(islice(ahead, 1))
+        ahead = (reader.submit(read, group, *module) for group, module in parts)
+        waiting = deque(islice(ahead, MODULES_AHEAD))
         while waiting:
             waiting.extend(islice(ahead, 1))
             yield waiting.popleft().result()
+    pa.default_memory_pool().release_unused()
 
 
 def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
@@ -326,20 +329,16 @@ class _GroupReader:
     Args:
         file: the file.
         path: its path.
-        specs: of all arrays in the file.
         order: of the components of a sample in memory: "F" side by side, "C" apart.
 
     Raises:
         RecordingError: a row group is larger than recordings have.
     """
 
-    def __init__(
-        self, file: pq.ParquetFile, path: Path, specs: list[ArraySpec], order: Literal["C", "F"]
-    ) -> None:
+    def __init__(self, file: pq.ParquetFile, path: Path, order: Literal["C", "F"]) -> None:
         self._file = file
         self._path = path
         self._order = order
-        self._specs = specs
         budget = ReadBudget(path)
         for number in range(file.num_row_groups):
             group = file.metadata.row_group(number)
@@ -350,13 +349,19 @@ class _GroupReader:
                 )
             budget.unpack(max(group.num_rows * group.num_columns * 8, group.total_byte_size))
 
-    def __call__(self, group: int, specs: list[ArraySpec]) -> TimedArrays:
+    def __call__(
+        self, group: int, specs: list[ArraySpec], names: list[str] | None = None
+    ) -> TimedArrays:
         """Return some arrays of a row group, with values (n_components, n).
+
+        Args:
+            group: number of the row group.
+            specs: of the arrays.
+            names: of their columns; by default all columns of the file.
 
         Raises:
             RecordingError: it is damaged.
         """
-        names = None if specs is self._specs else _schema(specs).names
         try:
             return _columns(specs, self._file.read_row_group(group, columns=names), self._order)
         except (pa.ArrowException, OSError, ValueError) as cause:
