@@ -291,7 +291,7 @@ def _falls_below_start(module: Tactile) -> bool:
         force = tared_force(module, DEFAULT_TARE, offline=True).force
     except ValueError:  # no finite sample at the start
         return False
-    known = np.isfinite(force).all(axis=1)
+    known = np.isfinite(force[:, 0])  # a row is finite or NaN
     if not known.any():
         return False
     force = force if known.all() else force[known]

@@ -360,7 +360,9 @@ def _movements(force: npt.NDArray[np.floating], n: int) -> tuple[Array, Array]:
         before[step:] += moved
         after[-step:] += np.linalg.norm(force[-1] - force[-step:], axis=1)
         before[:step] += np.linalg.norm(force[0] - force[:step], axis=1)
-    return after / len(steps), before / len(steps)
+    after /= len(steps)
+    before /= len(steps)
+    return after, before
 
 
 def _distances(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> Array:
