@@ -133,6 +133,8 @@ class FaultWatch:
 
 def _problems(faults: list[tuple[Fault, str]]) -> list[Problem]:
     """Return one problem for each fault, in the order of `Fault`."""
+    if not faults:
+        return []
     return [
         Problem(fault, tuple(name for other, name in faults if other is fault))
         for fault in Fault

@@ -20,6 +20,7 @@ from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
 from holdfast.training.calibration import check_normalised
 
 MAX_BUFFERED_UPDATES = 4096
@@ -127,10 +128,12 @@ class StatusPublisher:
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
         """Keep the newest readings of every finger, minus the tare."""
         stream = self._session.stream
+        newest: dict[str, Array] = {}
         for update in updates[-len(stream.fingers) :]:
             if update.arrival is not None:
-                for name, readings in stream.subtract_tare(update.arrival.samples).items():
-                    self._taxels[name] = readings.round(4).tolist()
+                newest.update(update.arrival.samples)
+        for name, readings in stream.subtract_tare(newest).items():
+            self._taxels[name] = readings.round(4).tolist()
 
     def _health(self, recorder: Recorder | None) -> schema.Health:
         session, latency = self._session, self._session.latency()
