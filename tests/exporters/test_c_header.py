@@ -3,6 +3,8 @@
 import ast
 import copy
 import ctypes
+import math
+import platform
 import re
 import shutil
 import subprocess
@@ -22,6 +24,7 @@ from exporters.c_detector import (
     random_samples,
 )
 from exporters.models import HAND, MODELS, TIP, built_in, made, paper, rich
+from holdfast.compiled import sums_in_any_order
 from holdfast.contact import ContactState
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
@@ -389,6 +392,38 @@ def test_what_has_no_translation_is_named_with_file_and_line(text, expected, tmp
     with pytest.raises(NotImplementedError, match=expected) as caught:
         Program().call(names["step"], [CNumber("r", "x")])
     assert str(caught.value).startswith(f"{source}:4: ")
+
+
+def test_a_step_with_sums_in_any_order_has_no_test_for_nan():
+    def step(value):
+        return math.isnan(value)
+
+    with pytest.raises(NotImplementedError, match="a test for NaN or infinity in sums_in_any"):
+        Program().call(sums_in_any_order(step), [CNumber("r", "x")])
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or not shutil.which("gcc"),
+                    reason="vector instructions of x86-64, by gcc")  # fmt: skip
+@pytest.mark.parametrize("step", ["turn_taxels", "second_differences", "sum_taxels"])
+def test_gcc_computes_several_taxels_at_a_time(step, tmp_path):
+    model, sensors, rate = made("paper" if step == "sum_taxels" else "twin")
+    (tmp_path / "model.h").write_text(header_of(model, sensors, rate).text)
+    words = [
+        "-std=c99",
+        "-O2",
+        "-DHOLDFAST_API=extern",
+        "-x",
+        "c",
+        "-S",
+        "model.h",
+        "-o",
+        "model.s",
+    ]
+    subprocess.run(["gcc", *words], check=True, cwd=tmp_path)
+    functions = re.split(r"^(?=hf_\w+(?:\.\w+)*:)", (tmp_path / "model.s").read_text(), flags=re.M)
+    (text,) = [text for text in functions if text.startswith(f"hf_{step}.")
+               or text.startswith(f"hf_{step}:")]  # fmt: skip
+    assert "mulpd" in text
 
 
 LOOPS = {

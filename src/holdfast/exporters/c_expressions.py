@@ -63,6 +63,11 @@ TESTS = {math.isnan: "isnan", math.isinf: "isinf", math.isfinite: "isfinite"}
 CASTS = {int: INTEGER, float: REAL, bool: BOOL, np.int64: INTEGER, np.uint64: INTEGER}
 
 
+def is_any_order(function: FunctionType) -> bool:
+    """Return whether a function is marked by `holdfast.compiled.sums_in_any_order`."""
+    return getattr(function, "sums_in_any_order", False)
+
+
 class Expressions:
     """Expressions of one function.
 
@@ -316,6 +321,8 @@ class Expressions:
             return result
         if thing is len:
             return self.array(node.args[0]).shape[0]
+        if thing in TESTS and is_any_order(self.function):
+            self.refuse(node, "a test for NaN or infinity in sums_in_any_order")
         result = self._known_function(thing, [self.number(x) for x in node.args])
         if result is None:
             self.refuse(node, "a call of this function")

@@ -14,7 +14,7 @@ from functools import cache
 from types import FunctionType
 from typing import NamedTuple
 
-from holdfast.exporters.c_expressions import Expressions
+from holdfast.exporters.c_expressions import Expressions, is_any_order
 from holdfast.exporters.c_values import (
     BOOL,
     C_TYPES,
@@ -188,7 +188,7 @@ class Statements:
                          *map(_c_name, self._kinds)]
             if not _is_read(word, body)
         ]  # fmt: skip
-        any_order = getattr(self.expressions.function, "sums_in_any_order", False)
+        any_order = is_any_order(self.expressions.function)
         return "\n".join(
             [
                 f"/* {self._summary()} */",
