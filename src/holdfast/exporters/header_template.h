@@ -48,10 +48,10 @@
 
 /* Functions whose numbers are finite and whose sums may be taken in any order, so that compilers
  * compute several taxels at a time at -O2. Nothing else is computed by other rules. */
-#if defined(__clang__)
+#if defined(__clang__) && __clang_major__ >= 11
 #define HF_ANY_ORDER
 #define HF_ANY_ORDER_INSIDE _Pragma("clang fp reassociate(on)")
-#elif defined(__GNUC__)
+#elif defined(__GNUC__) && !defined(__clang__)
 #define HF_ANY_ORDER __attribute__((optimize( \
     "tree-vectorize", "vect-cost-model=dynamic", "unswitch-loops", "associative-math", \
     "no-signed-zeros", "no-trapping-math", "finite-math-only")))
