@@ -128,6 +128,7 @@ def studies(folder):
     yield "trial", document((folder / "trials" / "trial.json").read_text())
     holdfast("study", "--twin", "--quick", "--out", "study", "--force", cwd=folder)
     tables = json.loads((folder / "study" / "study.json").read_text())["tables"]
+    del tables["cost"]  # measured times
     for name, rows in tables.items():
         yield f"study/{name}", digest(json.dumps(without_clock(rows), sort_keys=True))
 
