@@ -408,18 +408,8 @@ def test_a_step_with_sums_in_any_order_has_no_test_for_nan():
 def test_gcc_computes_several_taxels_at_a_time(step, tmp_path):
     model, sensors, rate = made("paper" if step == "sum_taxels" else "twin")
     (tmp_path / "model.h").write_text(header_of(model, sensors, rate).text)
-    words = [
-        "-std=c99",
-        "-O2",
-        "-DHOLDFAST_API=extern",
-        "-x",
-        "c",
-        "-S",
-        "model.h",
-        "-o",
-        "model.s",
-    ]
-    subprocess.run(["gcc", *words], check=True, cwd=tmp_path)
+    words = "gcc -std=c99 -O2 -DHOLDFAST_API=extern -x c -S model.h -o model.s"
+    subprocess.run(words.split(), check=True, cwd=tmp_path)
     functions = re.split(r"^(?=hf_\w+(?:\.\w+)*:)", (tmp_path / "model.s").read_text(), flags=re.M)
     (text,) = [text for text in functions if text.startswith(f"hf_{step}.")
                or text.startswith(f"hf_{step}:")]  # fmt: skip

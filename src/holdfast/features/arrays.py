@@ -200,7 +200,7 @@ class Layout(NamedTuple):
     """Constants of a stream. The taxels of all fingers stand one after the other."""
 
     offsets: Integers1  # (n_fingers + 1,) first taxel of each finger
-    n_taxels: Integers1  # (n_fingers,) of each finger
+    n_taxels: Integers1  # (n_fingers,) of each finger: where all are alike, a known length in C
     rotations: Taxels3  # (n_taxels, 3, 3)
     constants: Floats2  # (n_fingers, CONSTANTS_WIDTH)
     specs: Integers3  # (n_fingers, n_features, SPECS_WIDTH), see `spec_codes`
