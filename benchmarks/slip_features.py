@@ -20,12 +20,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from holdfast.classifiers.slip import SlipRule, smooth
 from real_slips import TUG_QUIET, auc, boxes, tugs
 
 from holdfast.classifiers.fitting import Samples
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.slip import SlipRule, smooth
 from holdfast.compiled import compiled_step
 from holdfast.contact import STABLE, Cause, ContactState
 from holdfast.features.tare import Tare, baseline_of

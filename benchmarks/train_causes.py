@@ -18,8 +18,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
-
 from holdfast.classifiers.cause import CauseClassifier, fit_causes
+
 from holdfast.contact import Cause
 from holdfast.features.stream import extract
 from holdfast.io import load_dataset

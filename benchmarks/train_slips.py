@@ -29,8 +29,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 from hand_handling import NORMALISED_BY, moments_by, read_grasp
-
 from holdfast.classifiers.slip import SlipRule
+
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.specs import SLIP_FEATURES
 from holdfast.io import load_dataset

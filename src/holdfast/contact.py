@@ -81,6 +81,12 @@ class Cause(StrEnum):
     GLITCH = "glitch"
 
 
+CAUSES = tuple(Cause)
+"""Causes in the order of their codes, which begin at 1; 0 is no cause."""
+SLIP_CODE = CAUSES.index(Cause.SLIP) + 1
+"""Code of the cause slip."""
+
+
 class Phase(StrEnum):
     """Phase of an experiment."""
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from holdfast.classifiers.cause import ALL_CAUSES, CauseClassifier, add_scores, fit_causes
 from sklearn.linear_model import LogisticRegression
 
-from holdfast.classifiers.cause import ALL_CAUSES, CauseClassifier, add_scores, fit_causes
 from holdfast.contact import UNSTABLE, Cause
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError

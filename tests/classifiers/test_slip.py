@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from holdfast.classifiers.slip import SlipRule, SpeedRule, add_squares, speed_of
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule, SpeedRule, add_squares, speed_of
 from holdfast.errors import ModelError
 
 RULE = SpeedRule((1.0, 2.0), (2.0, 0.5), (0.5, -1.0), (0.25, 0.0), 3.0, 40.0)

@@ -3,10 +3,10 @@
 import itertools
 
 import numpy as np
+from holdfast.classifiers.slip import SlipRule, SpeedRule
 from msgspec.structs import replace
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule, SpeedRule
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.features.specs import MEAN_SECOND_KINDS, RATIO_KINDS, SECOND_KINDS
 from holdfast.model import FingerModel, Model

@@ -4,12 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from holdfast.classifiers.cause import ALL_CAUSES
+from holdfast.classifiers.slip import raised_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from holdfast.classifiers.cause import ALL_CAUSES
-from holdfast.classifiers.slip import raised_at
 from holdfast.contact import Cause, ContactState
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError

@@ -6,8 +6,8 @@ import shutil
 import subprocess
 
 import numpy as np
-
 from holdfast.classifiers.cause import ALL_CAUSES
+
 from holdfast.contact import ContactState, Reason, faults_of, taxels_of
 from holdfast.detector import Detector
 from holdfast.errors import StreamError

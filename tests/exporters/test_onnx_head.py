@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from holdfast.classifiers.slip import add_squares
 from msgspec.structs import replace
 
 from exporters.models import HAND, built_in, paper, rich
 from holdfast.classifiers import OnnxClassifier
 from holdfast.classifiers.linear import log_odds
-from holdfast.classifiers.slip import add_squares
 from holdfast.errors import ModelError
 from holdfast.exporters import export
 from holdfast.exporters.onnx_head import onnx_of

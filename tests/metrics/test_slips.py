@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from holdfast.classifiers.slip import raised_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.classifiers.slip import raised_at
 from holdfast.metrics.slip_thresholds import (
     THRESHOLDS,
     ThresholdChoice,

@@ -5,6 +5,8 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from holdfast.classifiers.cause import CauseClassifier, add_scores
+from holdfast.classifiers.slip import add_squares
 
 from detector.build import (
     RICH,
@@ -19,8 +21,6 @@ from detector.build import (
     tactile,
 )
 from holdfast.classifiers import OnnxClassifier
-from holdfast.classifiers.cause import CauseClassifier, add_scores
-from holdfast.classifiers.slip import add_squares
 from holdfast.contact import Cause
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError

@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from holdfast.classifiers.slip import add_squares
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,7 +26,6 @@ from detector.build import (
     tactile,
 )
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import add_squares
 from holdfast.contact import NO_CONTACT
 from holdfast.detector import detect
 from holdfast.errors import ModelError, OutputError

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from holdfast.classifiers.slip import SlipRule
 from matplotlib.figure import Figure
 from msgspec.structs import replace as replace_fields
 
-from holdfast.classifiers.slip import SlipRule
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_truth import SLIDING, STILL, Slip, SlipDecisions, SlipTruth
 from holdfast.model import Model

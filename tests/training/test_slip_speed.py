@@ -5,8 +5,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-
 from holdfast.classifiers.slip import add_squares, speed_of
+
 from holdfast.detector import detect
 from holdfast.features import parse_features
 from holdfast.features.specs import OF_TWO_TAXELS, SLIP_FEATURES

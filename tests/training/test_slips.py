@@ -5,10 +5,10 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from holdfast.classifiers.slip import add_squares
 
 from holdfast.classifiers.fitting import Samples
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.slip import add_squares
 from holdfast.contact import ContactState
 from holdfast.errors import ModelError, TrainingError
 from holdfast.features import parse_features

@@ -7,13 +7,14 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.fitting import (
+    Fitted,
     Parameters,
     Samples,
     check_classes,
     sigmoid,
     standardise,
 )
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.linear import Linear
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -61,7 +62,7 @@ class Threshold:
         del trial
         return {}
 
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit the classifier to the samples. The fit is deterministic; the seed is not used.
 
         Raises:
@@ -73,19 +74,12 @@ class Threshold:
         chosen = int(np.argmax([cut.gain for cut in cuts]))
         value, sign, _ = cuts[chosen]
         mean, scale, features = standardise(samples.features)
-        coefficients = np.zeros(len(mean))
-        coefficients[chosen] = sign
+        weights = np.zeros(len(mean))
+        weights[chosen] = sign
         intercept = sign * (mean[chosen] - value) / scale[chosen]
         slope, offset = sigmoid(sign * features[:, chosen] + intercept, samples.stable)
-        return LinearClassifier(
-            mean=tuple(mean.tolist()),
-            scale=tuple(scale.tolist()),
-            coefficients=tuple(coefficients.tolist()),
-            intercept=float(intercept),
-            slope=slope,
-            offset=offset,
-            threshold=float(1.0 / (1.0 + np.exp(-offset))),
-        )
+        rule = Linear.of(mean, scale, weights, intercept, slope=slope, offset=offset)
+        return Fitted(rule, float(1.0 / (1.0 + np.exp(-offset))))
 
 
 def best_cut(

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from holdfast.classifiers.cause import SLIP_CODE
-from holdfast.contact import SLIP_SPEED
+from holdfast.contact import SLIP_CODE, SLIP_SPEED
 from holdfast.detector import detect
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_truth import (
@@ -236,7 +235,7 @@ def _series(model: Model, recording: Recording, kind: str) -> SlipSeries:
         probability=trace.slip_probability,
         raised=trace.cause == SLIP_CODE,
         sliding=known.codes == SLIDING,
-        threshold=rule.classifier.threshold,
+        threshold=rule.threshold,
         slips=tuple(
             slip._replace(onset=slip.onset - onset, gross=slip.gross - onset) for slip in slips
         ),

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from holdfast.classifiers.cause import SLIP_CODE
+
 from holdfast_lab.figures import slips
 from holdfast_lab.figures.slips import COLUMN_WIDTH, event_kinds, slip_figure, slips_figure
 from study.example_recordings import SLIPS, recording_with_truth

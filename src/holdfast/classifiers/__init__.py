@@ -4,15 +4,16 @@ from typing import Any
 
 from holdfast.classifiers.fitting import (
     Classifier,
-    ModelClassifier,
+    Fitted,
     ModelRecipe,
     Parameters,
     Recipe,
+    Rule,
     Samples,
 )
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.logreg import Adapted, LogisticRegression
-from holdfast.classifiers.onnx_classifier import OnnxClassifier
+from holdfast.classifiers.onnx_classifier import Onnx
 from holdfast.classifiers.svm import LinearSVM
 from holdfast.plugins import PluginGroup
 
@@ -22,12 +23,13 @@ __all__ = [
     "RECIPES",
     "Adapted",
     "Classifier",
-    "LinearClassifier",
-    "ModelClassifier",
+    "Fitted",
+    "Linear",
     "ModelRecipe",
-    "OnnxClassifier",
+    "Onnx",
     "Parameters",
     "Recipe",
+    "Rule",
     "Samples",
     "recipe",
     "recipe_names",

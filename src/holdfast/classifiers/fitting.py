@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.linear import LinearClassifier
-from holdfast.classifiers.onnx_classifier import OnnxClassifier
+from holdfast.classifiers.linear import Linear
+from holdfast.classifiers.onnx_classifier import Onnx
 from holdfast.compiled import compiled
 from holdfast.errors import TrainingError
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from optuna import Trial
 
 Parameters = Mapping[str, Any]
-ModelClassifier = LinearClassifier | OnnxClassifier
-"""Classifiers that a model file can store."""
+Rule = Linear | Onnx
+"""What computes a head, and what a model file can store."""
 
 MIN_SLOPE = 1e-6
 """Minimum slope of a sigmoid: its probability rises, but is nearly the base rate."""
@@ -44,6 +44,38 @@ class Samples(NamedTuple):
     def one_class(self) -> bool:
         """Whether all labels are the same, or there are no samples."""
         return not self.stable.any() or bool(self.stable.all())
+
+
+class Fitted(NamedTuple):
+    """Classifier of two classes that a model file can store.
+
+    Attributes:
+        rule: of its probability.
+        threshold: probability from which on a sample is of class 1.
+    """
+
+    rule: Rule
+    threshold: float = 0.5
+
+    @property
+    def n_features(self) -> int:
+        """Number of features of its input."""
+        return self.rule.n_features
+
+    @property
+    def linear(self) -> Linear:
+        """The rule, which must be linear.
+
+        Raises:
+            TrainingError: it is an ONNX file.
+        """
+        if not isinstance(self.rule, Linear):
+            raise TrainingError("a linear classifier expected, an ONNX file given")
+        return self.rule
+
+    def probability(self, features: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the probability of class 1 of each row of (n, n_features); NaN if it has NaN."""
+        return self.rule.probability(features)
 
 
 class Classifier(Protocol):
@@ -89,7 +121,7 @@ class Recipe(Protocol):
 class ModelRecipe(Recipe, Protocol):
     """Way of fitting a classifier that a model file can store."""
 
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> ModelClassifier:
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit a classifier with a calibrated probability to the samples."""
         ...
 

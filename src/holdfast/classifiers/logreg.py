@@ -8,15 +8,16 @@ from msgspec.structs import replace
 
 from holdfast.classifiers.fitting import (
     MIN_SLOPE,
-    ModelClassifier,
+    Fitted,
     Parameters,
+    Rule,
     Samples,
     check_classes,
     class_ratio,
     class_weights,
     standardise,
 )
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.newton import Solution, fit_logistic
 from holdfast.errors import TrainingError
 
@@ -46,7 +47,7 @@ class LogisticRegression:
             "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
         }
 
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit the classifier to the samples by Newton's method; the seed is not used.
 
         Raises:
@@ -63,14 +64,10 @@ class LogisticRegression:
             parameters["C"],
         )
         odds = class_ratio(samples.stable) if balanced else 1.0
-        return LinearClassifier(
-            mean=tuple(mean.tolist()),
-            scale=tuple(scale.tolist()),
-            coefficients=tuple(solution.weights.tolist()),
-            intercept=solution.intercept,
-            offset=-float(np.log(odds)),
-            threshold=1.0 / (1.0 + odds),
+        rule = Linear.of(
+            mean, scale, solution.weights, solution.intercept, offset=-float(np.log(odds))
         )
+        return Fitted(rule, 1.0 / (1.0 + odds))
 
 
 @dataclass(frozen=True)
@@ -92,10 +89,12 @@ class Adapted:
     the hand.
 
     Attributes:
-        prior: the classifier to adapt.
+        prior: the linear function to adapt.
+        threshold: of the prior.
     """
 
-    prior: LinearClassifier
+    prior: Linear
+    threshold: float = 0.5
 
     @property
     def name(self) -> str:
@@ -114,7 +113,7 @@ class Adapted:
             "C": trial.suggest_float("C", 1e-6, 1e2, log=True),
         }
 
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """The classifier adapted to the samples; deterministic, the seed is not used.
 
         Raises:
@@ -133,13 +132,13 @@ class Adapted:
                 "to adapt"
             )
         if parameters["change"] == NONE:
-            return self.prior
+            return Fitted(self.prior, self.threshold)
         check_classes(samples)
         fit = _calibrated if parameters["change"] == CALIBRATION else _reweighted
-        return fit(self.prior, samples, parameters["C"])
+        return Fitted(fit(self.prior, samples, parameters["C"]), self.threshold)
 
 
-def _calibrated(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
+def _calibrated(prior: Linear, samples: Samples, c: float) -> Linear:
     odds = prior.slope * prior.decision(samples.features) + prior.offset
     identity = Solution(np.array([1.0]), 0.0)
     (slope,), shift = fit_logistic(odds[:, None], samples.stable, (1.0, 1.0), c, identity)
@@ -147,26 +146,24 @@ def _calibrated(prior: LinearClassifier, samples: Samples, c: float) -> LinearCl
     return replace(prior, slope=stretch * prior.slope, offset=stretch * prior.offset + shift)
 
 
-def _reweighted(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
+def _reweighted(prior: Linear, samples: Samples, c: float) -> Linear:
     standardised = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
     weights, intercept = fit_logistic(standardised, samples.stable, (1.0, 1.0), c, log_odds(prior))
-    return replace(
-        prior, intercept=intercept, coefficients=tuple(weights.tolist()), slope=1.0, offset=0.0
-    )
+    return Linear.of(np.array(prior.mean), np.array(prior.scale), weights, intercept)
 
 
-def linear_prior(classifier: ModelClassifier) -> LinearClassifier:
-    """Return the classifier, which must be linear to be adapted.
+def linear_prior(rule: Rule) -> Linear:
+    """Return the rule, which must be linear to be adapted.
 
     Raises:
         TrainingError: it is an ONNX file.
     """
-    if not isinstance(classifier, LinearClassifier):
+    if not isinstance(rule, Linear):
         raise TrainingError("a model with linear classifiers expected to adapt, an ONNX file given")
-    return classifier
+    return rule
 
 
-def log_odds(prior: LinearClassifier) -> Solution:
-    """Return weights and intercept of the log odds of a classifier, of standardised features."""
-    weights = prior.slope * np.array(prior.coefficients)
-    return Solution(weights, prior.slope * prior.intercept + prior.offset)
+def log_odds(prior: Linear) -> Solution:
+    """Return weights and intercept of the log odds of a rule, of standardised features."""
+    weights = prior.slope * np.array(prior.weights[0])
+    return Solution(weights, prior.slope * prior.intercepts[0] + prior.offset)

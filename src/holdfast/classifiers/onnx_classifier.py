@@ -24,27 +24,23 @@ INPUT_TYPES: dict[str, type[np.floating[Any]]] = {
 """Types of the input, by onnxruntime's names."""
 
 
-class OnnxClassifier(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag="onnx"
-):
-    """Classifier in an ONNX file: (n, n_features) to the probability of stability, (n,) or (n, 1).
+class Onnx(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag="onnx"):
+    """Classifier in an ONNX file: (n, n_features) to a probability, (n,) or (n, 1).
 
     Attributes:
         file: name of the ONNX file, in the folder of the model file.
         sha256: digest of its content, in hexadecimal.
         n_features: number of features of its input.
-        threshold: probability from which on a contact is stable.
         content: of the ONNX file; a model file does not hold it.
 
     Raises:
         ModelError: the file is not a plain name that ends in .onnx, the content is too large, has
-            another digest or names other files, or a number is out of range.
+            another digest or names other files, or there is no feature.
     """
 
     file: str
     sha256: str
     n_features: int
-    threshold: float
     content: bytes = b""
 
     def __post_init__(self) -> None:
@@ -53,8 +49,6 @@ class OnnxClassifier(
             raise ModelError(f"the name of an .onnx file without folders expected, {self.file!r}")
         if self.n_features < 1:
             raise ModelError(f"at least one feature expected, {self.n_features} given")
-        if not 0 <= self.threshold <= 1:
-            raise ModelError(f"a threshold from 0 to 1 expected, {self.threshold} given")
         if not self.content:
             return
         if len(self.content) > MAX_ONNX_SIZE:
@@ -65,13 +59,13 @@ class OnnxClassifier(
             raise ModelError(f"{self.file} keeps data in other files; a single file expected")
 
     @classmethod
-    def of(cls, content: bytes, n_features: int, threshold: float) -> Self:
+    def of(cls, content: bytes, n_features: int) -> Self:
         """Return the classifier of an ONNX content, in a file that is named by its digest."""
         digest = sha256(content).hexdigest()
-        return cls(f"{digest[:16]}.onnx", digest, n_features, threshold, content)
+        return cls(f"{digest[:16]}.onnx", digest, n_features, content)
 
     def probability(self, features: npt.ArrayLike) -> Array:
-        """Return the probability of stability of each row of (n, n_features); NaN if it has NaN.
+        """Return the probability of each row of (n, n_features); NaN if it has NaN.
 
         Raises:
             MissingExtra: onnxruntime is not installed.

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.fitting import (
+    Fitted,
     Parameters,
     Samples,
     check_classes,
@@ -17,7 +18,7 @@ from holdfast.classifiers.fitting import (
 )
 from holdfast.classifiers.folds import group_folds
 from holdfast.classifiers.interior_point import fit_svm
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.newton import Solution
 
 SIGMOID_FOLDS = 5
@@ -46,7 +47,7 @@ class LinearSVM:
             "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
         }
 
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit the classifier to the samples, to the minimum of its loss; the seed is not used.
 
         Raises:
@@ -60,15 +61,10 @@ class LinearSVM:
         if values is None:
             values = solution.decision(features)
         slope, offset = sigmoid(values, samples.stable)
-        return LinearClassifier(
-            mean=tuple(mean.tolist()),
-            scale=tuple(scale.tolist()),
-            coefficients=tuple(solution.weights.tolist()),
-            intercept=solution.intercept,
-            slope=slope,
-            offset=offset,
-            threshold=logistic(offset),
+        rule = Linear.of(
+            mean, scale, solution.weights, solution.intercept, slope=slope, offset=offset
         )
+        return Fitted(rule, logistic(offset))
 
 
 def _fit(

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.detector import Detector
@@ -19,7 +19,7 @@ from holdfast.errors import is_installed
 from holdfast.features import DEFAULT_WINDOW as WINDOW
 from holdfast.features import DEPLOYED_FEATURES, haar_features, parse_features
 from holdfast.features.haar import fill_features
-from holdfast.model import FingerModel, Model
+from holdfast.model import FingerModel, Head, Model
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
@@ -247,14 +247,11 @@ def _scipy(force: Array) -> Array:
 def _create_model() -> Model:
     """Return a model of the usual shape; its numbers have no effect on the speed."""
     features = parse_features(DEPLOYED_FEATURES, WINDOW)
-    ones = (1.0,) * len(features)
-    classifier = LinearClassifier(
-        mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1
-    )
+    ones = np.ones(len(features))
+    rule = Linear.of(ones, ones, 0.01 * ones, 0.1)
+    head = Head(name="stable", link="logit", features=features, rule=rule)
     tip = sensor("uskin-curved")
-    finger = FingerModel(
-        features=features, classifier=classifier, sensor=tip.name, contact_threshold=20.0
-    )
+    finger = FingerModel(heads=(head,), sensor=tip.name, contact_threshold=20.0)
     return Model(fingers=dict.fromkeys(FINGERS, finger), sensors={tip.name: tip}, rate=150.0)
 
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 from holdfast.cli.terminal.console import print_json, print_table
 
 if TYPE_CHECKING:
-    from holdfast.classifiers.slip import SlipRule
-    from holdfast.model import FingerModel, Handling, Model
+    from holdfast.model import FingerModel, Handling, Head, Model
 
 N_NAMES = 3
 """Number of names that are printed of a long list."""
@@ -38,10 +37,6 @@ def model_document(model: "Model") -> dict[str, Any]:
     if model.training is not None:
         training = msgspec.to_builtins(model.training)
         training["recordings"] = list(model.training.recordings)
-    tuning = None
-    if model.tuning is not None:
-        tuning = msgspec.to_builtins(model.tuning)
-        tuning["recordings"] = list(model.tuning.recordings)
     return {
         "name": model.name,
         "rate": model.rate,
@@ -49,55 +44,43 @@ def model_document(model: "Model") -> dict[str, Any]:
         "debounce": msgspec.to_builtins(model.debounce),
         "fingers": {name: _finger(model, part) for name, part in model.fingers.items()},
         "training": training,
-        "tuning": tuning,
     }
 
 
 def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
     sensor = None if part.sensor is None else model.sensors[part.sensor]
-    n = part.classifier.n_features
-    kind = part.classifier.__struct_config__.tag
     return {
         "sensor": part.sensor,
         "unit": None if sensor is None else sensor.unit,
-        "features": [str(spec) for spec in part.features],
-        "classifier": f"{kind}, {n} feature{'s' * (n > 1)}",
-        "threshold": part.classifier.threshold,
+        "heads": {head.name: _head(head) for head in part.heads},
         "contact_threshold": part.contact_threshold,
         "contact_noise": part.contact_noise,
         "contact_load": part.contact_load,
-        "slip": None if part.slip is None else _slip(part.slip),
-        "normalised": bool(part.normalised),
-        "handling": {name: _handling(handling) for name, handling in part.own_handling.items()},
+        "normalised": part.normalised,
+        "handling": {name: _handling(handling) for name, handling in part.handling.items()},
     }
+
+
+def _head(head: "Head") -> dict[str, Any]:
+    """Return the facts about a head; means, scales and weights are in the model file."""
+    import msgspec
+
+    fields: dict[str, Any] = msgspec.to_builtins(head)
+    rule, n = fields.pop("rule"), head.rule.n_features
+    fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
+    if head.choice is not None:
+        fields["choice"] |= {"recordings": list(head.choice.recordings)}
+    if head.link == "logit":
+        fields["threshold"] = head.threshold
+    return fields
 
 
 def _handling(handling: "Handling") -> dict[str, Any]:
     """Return the facts about own handling; location and scale are in the model file."""
     return {
         "seconds": handling.seconds,
-        "threshold": handling.threshold,
-        "slip_threshold": handling.slip_threshold,
+        "thresholds": handling.thresholds,
         "recordings": list(handling.recordings),
-    }
-
-
-def _slip(rule: "SlipRule") -> dict[str, Any]:
-    """Return the facts about a slip rule."""
-    import msgspec
-
-    chosen = None
-    if rule.thresholds is not None:
-        chosen = msgspec.to_builtins(rule.thresholds)
-        chosen["recordings"] = list(rule.thresholds.recordings)
-    features = () if rule.features is msgspec.UNSET else rule.features
-    return {
-        "features": [str(spec) for spec in features] or None,
-        "threshold": rule.classifier.threshold,
-        "smoothing": rule.smoothing,
-        "hold": rule.hold,
-        "highest_speed": None if rule.speed is msgspec.UNSET else rule.speed.highest,
-        "chosen_on": chosen,
     }
 
 
@@ -118,14 +101,11 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name, part in document["fingers"].items():
         finger = "any finger" if name == "*" else name
         sensor = f"{part['sensor']} ({part['unit']})" if part["sensor"] else "any"
-        yield finger, f"sensor {sensor}; {part['classifier']}"
-        yield "", f"features {_few(part['features'])}"
-        yield "", f"STABLE from a probability of {part['threshold']:.3g} on; {_contact(part)}"
-        yield from (("", line) for line in (*_slip_lines(part), *_handling_lines(part)))
+        yield finger, f"sensor {sensor}; {_contact(part)}"
+        heads = (line for head in part["heads"].values() for line in _head_lines(head))
+        yield from (("", line) for line in (*heads, *_handling_lines(part)))
     training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
-    tuned = list(_tuned_lines(document))
-    yield from zip(("tuned on", *[""] * len(tuned)), tuned or ["nothing"], strict=False)
 
 
 def _contact(part: dict[str, Any]) -> str:
@@ -140,32 +120,36 @@ def _contact(part: dict[str, Any]) -> str:
     return "no threshold of contact"
 
 
-def _slip_lines(part: dict[str, Any]) -> Iterator[str]:
-    """Yield the slip rule of a finger, and on what its threshold was chosen."""
-    slip = part["slip"]
-    if slip is None:
-        yield "no slip rule"
-        return
-    yield (
-        f"slides from a probability of {slip['threshold']:.3g} on; smoothing "
-        f"{slip['smoothing']:g} s, hold {slip['hold']:g} s"
-    )
-    if slip["features"] is not None:
-        added = [name for name in slip["features"] if name not in part["features"]]
-        yield f"slips by {len(slip['features'])} features, of them new {_few(added)}"
-    if slip["highest_speed"] is not None:
-        yield f"speed and distance of slips, up to {slip['highest_speed']:.3g} mm/s"
-    chosen = slip["chosen_on"]
-    if chosen is None:
-        yield "threshold of slips given, not chosen on recordings"
-        return
-    names = chosen["recordings"]
-    place = f"{len(names)} recordings ({_few(names)})" if names else "the training, out of fold"
-    found = "" if chosen["found"] is None else f"; {chosen['found']:.0f} % found within 0.1 s"
-    yield (
-        f"threshold of slips from {place}: {chosen['false_alarms_per_minute']:.2g} false alarms a "
-        f"minute (at most {chosen['requested']:g} wanted) in {chosen['held_minutes']:.3g} min of "
-        f"held time; {chosen['n_slips']} slips{found}"
+def _head_lines(head: dict[str, Any]) -> Iterator[str]:
+    """Yield what a head answers, from which features, and on what its threshold was chosen."""
+    name, texts = head["name"], [head["rule"]]
+    if "threshold" in head:
+        answer = "STABLE" if name == "stable" else "slides"
+        texts.append(f"{answer} from a probability of {head['threshold']:.3g} on")
+    if name == "slip":
+        texts.append(f"smoothing {head.get('smoothing', 0):g} s, hold {head.get('hold', 0):g} s")
+    if "highest" in head:
+        texts.append(f"speed and distance of slips, up to {head['highest']:.3g} mm/s")
+    if "classes" in head:
+        texts.append(", ".join(head["classes"]))
+    yield f"{name}: {'; '.join(texts)}"
+    yield f"  features {_few(head['features'])}"
+    choice = head.get("choice")
+    if choice is not None:
+        yield f"  threshold from {_chosen(name, choice)}"
+
+
+def _chosen(name: str, choice: dict[str, Any]) -> str:
+    """Return where a threshold was chosen, and what it gave there."""
+    names = choice["recordings"]
+    origin = f"{len(names)} recordings ({_few(names)})" if names else "the training, out of fold"
+    events, time = ("events", "stable") if name == "stable" else ("slips", "held")
+    within = "0.2" if name == "stable" else "0.1"
+    found = "" if choice["found"] is None else f"; {choice['found']:.0f} % found within {within} s"
+    return (
+        f"{origin}: {choice['false_alarms_per_minute']:.2g} false alarms a minute (at most "
+        f"{choice['requested']:g} wanted) in {choice['minutes']:.3g} min of {time} time; "
+        f"{choice['n']} {events}{found}"
     )
 
 
@@ -174,11 +158,8 @@ def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
     if part["normalised"] and not part["handling"]:
         yield "features normalised by default handling (holdfast calibrate: by your own)"
     for sensor, handling in part["handling"].items():
-        names, texts = handling["recordings"], []
-        if handling["threshold"] is not None:
-            texts.append(f"; STABLE from {handling['threshold']:.3g} on")
-        if handling["slip_threshold"] is not None:
-            texts.append(f"; slides from {handling['slip_threshold']:.3g} on")
+        names = handling["recordings"]
+        texts = [f"; {head} from {limit:.3g} on" for head, limit in handling["thresholds"].items()]
         yield (
             f"own handling of {sensor}: {handling['seconds']:.3g} s held in {len(names)} "
             f"recording{'s' * (len(names) != 1)} ({_few(names)}){''.join(texts)}"
@@ -193,25 +174,6 @@ def _trained(training: dict[str, Any]) -> str:
     figure = "" if auc is None else f"; {name} {auc:.3f} out of fold, by {training['split']}"
     names = training["recordings"]
     return f"{len(names)} recordings ({_few(names)}){figure}"
-
-
-def _tuned_lines(document: dict[str, Any]) -> Iterator[str]:
-    """Yield on what the threshold of stability was tuned, and on what those of slips were."""
-    if document["tuning"] is not None:
-        yield _tuned(document["tuning"])
-    rules = [part["slip"] for part in document["fingers"].values() if part["slip"] is not None]
-    chosen = [rule["chosen_on"]["recordings"] for rule in rules if rule["chosen_on"] is not None]
-    for names in dict.fromkeys(tuple(names) for names in chosen if names):
-        yield f"{len(names)} recordings ({_few(list(names))}) for slips, see above"
-
-
-def _tuned(tuning: dict[str, Any]) -> str:
-    names, missed = tuning["recordings"], tuning["missed"]["0.2"]
-    share = "no event" if missed is None else f"{missed:.0f} % missed within 0.2 s"
-    return (
-        f"{len(names)} recordings ({_few(names)}): {tuning['false_alarms_per_minute']:.2g} false "
-        f"alarms a minute (at most {tuning['requested']:g} wanted), {share}"
-    )
 
 
 def _few(names: list[str]) -> str:

@@ -153,7 +153,7 @@ def _print_slips(
     recordings.print_verdict(verdict_of_slips(tuned.chosen))
     first = {name: module.sensor for name, module in recordings.all[0].modules.items()}
     parts = [model.finger(*finger) for finger in model.fingers_of(first).items()]
-    thresholds = sorted({part.slip.classifier.threshold for part in parts if part.slip})
+    thresholds = sorted({part.slip.threshold for part in parts if part.slip})
     points = dict(tuned.points)
     if len(thresholds) == 1:
         points.setdefault(thresholds[0], tuned.before)

@@ -85,9 +85,9 @@ class DecisionRule(NamedTuple):
     causes: Floats3  # (n_fingers, n_causes, n_features + 1); n_causes is 0 without them
     slips: Floats2  # (n_fingers, n_features + 1)
     n_slip_weights: Integers1  # (n_fingers,)
-    squares: Floats3  # (n_fingers, 3, n_features) of `SlipRule.square_weights`, or n_features is 0
+    squares: Floats3  # (n_fingers, 3, n_features) of `Linear.raw_squares`, or n_features is 0
     speeds: Floats2  # (n_fingers, n_features + 1), or (n_fingers, 0) without speed rules
-    speed_squares: Floats3  # (n_fingers, 3, n_features) of `SpeedRule.square_weights`
+    speed_squares: Floats3  # (n_fingers, 3, n_features) of `Linear.raw_squares`
     slip_limits: Floats2  # (n_fingers, SLIP_LIMITS_WIDTH)
     limits: Floats2  # (n_fingers, LIMITS_WIDTH)
     hysteresis: float

@@ -4,16 +4,15 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple, Self, TypeVar
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE, add_scores
-from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
-from holdfast.classifiers.slip import (
-    SlipRule,
-    SpeedRule,
+from holdfast.classifiers import Onnx
+from holdfast.classifiers.linear import (
+    add_scores,
     add_squares,
+    linear_probability,
+    log_odds,
     probability_of,
     smooth,
     speed_of,
@@ -21,6 +20,7 @@ from holdfast.classifiers.slip import (
 from holdfast.compiled import compiled_step, inlined, joined_step
 from holdfast.contact import (
     NO_CONTACT,
+    SLIP_CODE,
     STABLE,
     UNKNOWN,
     UNSTABLE,
@@ -47,8 +47,8 @@ from holdfast.features import kernel
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.motion import NOISE_WEIGHT
-from holdfast.features.stream import FeatureStream, StreamPlan
-from holdfast.model import ANY_FINGER, FingerModel, Model
+from holdfast.features.stream import FeatureStream
+from holdfast.model import FingerModel
 from holdfast.sensors.types import Array, Flags, Integers
 
 _hand_state = compiled_step(hand_state)
@@ -125,45 +125,6 @@ def fill_report(
         report[f, rule_at.REPORT_FORCE + axis] = output.values[f, at.FORCE + axis]
 
 
-def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
-    """Return the constants of a model for the fingers of a plan, in its order."""
-    parts = [model.finger(name, sensor) for name, sensor in plan.sensors.items()]
-    width = max(part.classifier.n_features for part in parts) + 1
-    weights = np.zeros((len(parts), width))
-    for row, part in zip(weights, parts, strict=True):
-        if isinstance(part.classifier, LinearClassifier):
-            row[: part.classifier.n_features + 1] = part.classifier.weights()
-    limits = [
-        (
-            part.classifier.threshold,
-            part.contact_threshold,
-            part.contact_noise,
-            part.contact_load,
-        )
-        for part in parts
-    ]
-    slips, squares = _slip_weights(parts)
-    speeds, speed_squares = _speed_weights(parts)
-    any_finger = ANY_FINGER in model.fingers
-    return DecisionRule(
-        weights=weights,
-        n_weights=np.array([_n_weights(part) for part in parts]),
-        causes=_cause_weights(parts, width),
-        slips=slips,
-        n_slip_weights=np.array([len(part.all_features) + 1 for part in parts]),
-        squares=squares,
-        speeds=speeds,
-        speed_squares=speed_squares,
-        slip_limits=_slip_limits(parts, plan.rate),
-        limits=np.array(limits, dtype=np.float64),  # None becomes NaN
-        hysteresis=float(model.debounce.hysteresis),
-        min_duration=float(model.debounce.min_duration),
-        hold=float(model.debounce.hold),
-        switching=model.debounce.switching_rate,
-        n_model_fingers=len(plan.fingers) if any_finger else len(model.fingers),
-    )
-
-
 def replace_values(rule: DecisionRule, new: DecisionRule) -> bool:
     """Copy the arrays of another rule into those of a rule, whose addresses stay.
 
@@ -181,83 +142,6 @@ def replace_values(rule: DecisionRule, new: DecisionRule) -> bool:
     for before, after in arrays:
         before[...] = after
     return True
-
-
-def _n_weights(part: FingerModel) -> int:
-    """Return the number of weights; of a classifier that is not linear, the offset alone."""
-    is_linear = isinstance(part.classifier, LinearClassifier)
-    return part.classifier.n_features + 1 if is_linear else 1
-
-
-def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
-    """Return (n_fingers, n_causes, width); a finger without causes has the scores 0."""
-    if all(part.causes is None for part in parts):
-        return np.zeros((len(parts), 0, width))
-    weights = np.zeros((len(parts), len(ALL_CAUSES), width))
-    for row, part in zip(weights, parts, strict=True):
-        if part.causes is not None:
-            row[:, : part.causes.n_features + 1] = part.causes.weights()
-            if part.slip is not None:  # the slip rule decides about slips
-                row[SLIP_CODE - 1] = 0.0
-                row[SLIP_CODE - 1, 0] = -math.inf
-    return weights
-
-
-def _slip_weights(parts: Sequence[FingerModel]) -> tuple[Array, Array]:
-    """Return the weights of the slip rules, and of their squares, at the places of all features."""
-    width = max(len(part.all_features) for part in parts)
-    has_squares = any(part.slip is not None and part.slip.squares for part in parts)
-    weights = np.zeros((len(parts), width + 1))
-    squares = np.zeros((len(parts), 3, width if has_squares else 0))
-    for row, square, part in zip(weights, squares, parts, strict=True):
-        if part.slip is not None:
-            places = _slip_places(part, part.slip)
-            np.add.at(row, np.append(0, places + 1), part.slip.classifier.weights())
-            if has_squares:
-                square[:, places] = part.slip.square_weights()
-    return weights, squares
-
-
-def _speed_weights(parts: Sequence[FingerModel]) -> tuple[Array, Array]:
-    """Return the weights of the speed rules, and of their squares, as `_slip_weights`."""
-    width = max(len(part.all_features) for part in parts)
-    if not any(_speed_rule(part) for part in parts):
-        return np.zeros((len(parts), 0)), np.zeros((len(parts), 3, 0))
-    weights, squares = np.zeros((len(parts), width + 1)), np.zeros((len(parts), 3, width))
-    for row, square, part in zip(weights, squares, parts, strict=True):
-        speed = _speed_rule(part)
-        if part.slip is not None and speed is not None:
-            places = _slip_places(part, part.slip)
-            np.add.at(row, np.append(0, places + 1), speed.weights())
-            square[:, places] = speed.square_weights()
-    return weights, squares
-
-
-def _slip_places(part: FingerModel, rule: SlipRule) -> Integers:
-    """Return the places of the features of a slip rule in all features of its finger."""
-    used = rule.used_features(part.features)
-    return np.array([part.all_features.index(spec) for spec in used])
-
-
-def _speed_rule(part: FingerModel) -> SpeedRule | None:
-    """Return how a finger estimates the speed of a slip; None if it does not."""
-    speed = None if part.slip is None else part.slip.speed
-    return None if speed is msgspec.UNSET else speed
-
-
-def _slip_limits(parts: Sequence[FingerModel], rate: float) -> Array:
-    """Return the limits of the slip rules; NaN without a rule."""
-    limits = np.full((len(parts), rule_at.SLIP_LIMITS_WIDTH), np.nan)
-    for limit, part in zip(limits, parts, strict=True):
-        if part.slip is not None:
-            rule = part.slip
-            limit[: rule_at.HIGHEST_SPEED] = (
-                rule.classifier.threshold, rule.gain(rate), rule.hold
-            )  # fmt: skip
-            speed = _speed_rule(part)
-            if speed is not None:
-                limit[rule_at.HIGHEST_SPEED] = speed.highest
-    return limits
 
 
 class ProbabilityFeeder:
@@ -278,20 +162,19 @@ class ProbabilityFeeder:
     ) -> None:
         self._stream, self._rule = FeatureStream(stream.plan), rule
         self._stream.memory.baseline[:] = stream.memory.baseline  # a tare by interval
-        self._classifiers = {
-            place: part.classifier
+        self._rules = {
+            place: (part.indices(part.stable), part.stable.rule)
             for place, part in enumerate(parts)
-            if not isinstance(part.classifier, LinearClassifier)
+            if isinstance(part.stable.rule, Onnx)
         }
 
     def update(self, readings: Array, present: Flags, time: float) -> None:
         """Write the log odds of one sample; the arguments are those of `decision_rule.step`."""
         layout, memory, output = self._stream.layout, self._stream.memory, self._stream.output
         kernel.advance(layout, memory, output, readings.copy(), present, time)
-        for place, classifier in self._classifiers.items():
+        for place, (columns, onnx) in self._rules.items():
             if present[place] and output.status[place, at.REASON] == at.READY:
-                features = output.features[place, None, : classifier.n_features]
-                probability = classifier.probability(features)[0]
+                probability = onnx.probability(output.features[place, None, columns])[0]
                 with np.errstate(divide="ignore"):
                     self._rule.weights[place, 0] = np.log(probability / (1.0 - probability))
 

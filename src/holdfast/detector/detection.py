@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.cause import ALL_CAUSES
 from holdfast.contact import (
+    CAUSES,
     Cause,
     ContactEstimate,
     ContactState,
@@ -33,7 +33,7 @@ from holdfast.sensors.types import Array, Integers
 
 STATE_BY_CODE = tuple(ContactState)
 REASON_BY_CODE = tuple(Reason)
-CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *ALL_CAUSES)
+CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
 
 
 Decision = tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]

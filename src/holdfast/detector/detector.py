@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy import ndarray
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.contact import (
     ContactEvent,
     ContactState,
@@ -29,12 +29,12 @@ from holdfast.detector.decision_rule import (
     TraceRows,
     new_decision_memory,
     replace_values,
-    rule_of,
     run,
     split_code,
 )
 from holdfast.detector.detection import STATE_BY_CODE, Detection, detection_of, estimates_of
 from holdfast.detector.fast_step import CHANGED, UNREADABLE, StepArrays, compiled_fast_step
+from holdfast.detector.head_arrays import rule_of
 from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS
@@ -156,7 +156,7 @@ class Detector:
         self._stream = stream
         self._feeder = None
         self._n_together = len(self._slots)
-        if not all(isinstance(part.classifier, LinearClassifier) for part in self._parts):
+        if not all(isinstance(part.stable.rule, Linear) for part in self._parts):
             self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
             self._n_together = -1  # `update` takes the plain way
         n_causes = self._rule.causes.shape[1]
@@ -237,9 +237,9 @@ class Detector:
                 is not linear; nothing has changed then.
         """
         plan = self._stream.plan
-        features = {name: model.finger(name).all_features for name in plan.sensors}
+        features = {name: model.finger(name).features for name in plan.sensors}
         parts = [model.finger(*finger) for finger in plan.sensors.items()]
-        is_linear = all(isinstance(part.classifier, LinearClassifier) for part in parts)
+        is_linear = all(isinstance(part.stable.rule, Linear) for part in parts)
         if self._feeder is not None or not is_linear or features != dict(plan.features):
             raise ModelError(
                 f"{model.name or 'the model'} has other features than the model of the detector, "

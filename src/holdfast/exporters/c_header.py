@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.contact import Cause, ContactState, Fault, Reason
 from holdfast.detector import arrays as rule_at
 from holdfast.detector import decision_rule
 from holdfast.detector.address_table import fields_of
+from holdfast.detector.head_arrays import rule_of
 from holdfast.errors import ModelError
 from holdfast.exporters.c_functions import Program
 from holdfast.exporters.c_values import (
@@ -181,7 +182,7 @@ def detector_arrays(
     """Return the arrays of a new detector, if a header can hold all of it."""
     sensors = model.fingers_of(fingers)
     for name, sensor in sensors.items():
-        if not isinstance(model.finger(name, sensor).classifier, LinearClassifier):
+        if not isinstance(model.finger(name, sensor).stable.rule, Linear):
             raise ModelError(
                 f"the classifier of {name} is an ONNX file, which has no form as C; a header "
                 "holds linear classifiers (logistic regression, linear SVM) with all the rest"
@@ -194,7 +195,7 @@ def detector_arrays(
             f"the model's tare is the interval {model.tare} s of a recording; a header holds a "
             "tare of seconds, 'first' or 'none', because samples come one by one"
         )
-    stream, rule = FeatureStream(plan), decision_rule.rule_of(model, plan)
+    stream, rule = FeatureStream(plan), rule_of(model, plan)
     decision = decision_rule.new_decision_memory(
         len(sensors), rule.causes.shape[1], rule.slip_limits
     )

@@ -8,11 +8,10 @@ Sub, Mul, Abs and Min.
 from importlib import import_module
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import MAX_DEVIATION, SlipRule
+from holdfast.classifiers import Linear, Onnx
+from holdfast.classifiers.linear import MAX_DEVIATION
 from holdfast.errors import MissingExtra, ModelError
 from holdfast.model import FingerModel, Model
 from holdfast.sensors.types import Array
@@ -83,38 +82,38 @@ def onnx_of(model: Model) -> tuple[bytes, tuple[str, ...]]:
 
 
 def _add_finger(graph: _Graph, name: str, part: FingerModel) -> None:
-    if not isinstance(part.classifier, LinearClassifier):
+    if isinstance(part.stable.rule, Onnx):
         raise ModelError(
-            f"the classifier of {name} is the ONNX file {part.classifier.file!r} beside the model "
+            f"the classifier of {name} is the ONNX file {part.stable.rule.file!r} beside the model "
             "already; linear classifiers are exported"
         )
-    if part.own_handling:
+    if part.handling:
         raise ModelError(
-            f"the model has own handling of {', '.join(part.own_handling)}; a recording of the "
+            f"the model has own handling of {', '.join(part.handling)}; a recording of the "
             "hand (--like) or its sensor and fingers expected, so that one of them is used"
         )
-    value = _linear(graph, name, part.classifier)
+    value = _linear(graph, name, part.stable.linear)
     _finish(graph, f"{name}_stable", value)
     if part.slip is not None:
-        value = _linear(graph, f"{name}_slip", part.slip.classifier)
-        if part.slip.squares is not msgspec.UNSET:
-            value = _with_squares(graph, f"{name}_slip", value, part.slip)
+        value = _linear(graph, f"{name}_slip", part.slip.linear)
+        if part.slip.linear.squares:
+            value = _with_squares(graph, f"{name}_slip", value, part.slip.linear)
         _finish(graph, f"{name}_slip", value)
 
 
-def _linear(graph: _Graph, name: str, classifier: LinearClassifier) -> str:
+def _linear(graph: _Graph, name: str, rule: Linear) -> str:
     """Add w . phi + w_0, and return its name."""
-    weights = classifier.weights()
-    graph.inputs.append(graph.value(f"{name}_features", classifier.n_features))
+    weights = rule.raw_weights()[0]
+    graph.inputs.append(graph.value(f"{name}_features", rule.n_features))
     factors = graph.constant(f"{name}_weights", weights[1:, None])
     product = graph.node("MatMul", [f"{name}_features", factors], f"{name}_product")
     offset = graph.constant(f"{name}_offset", weights[:1])
     return graph.node("Add", [product, offset], f"{name}_log_odds")
 
 
-def _with_squares(graph: _Graph, name: str, value: str, rule: SlipRule) -> str:
+def _with_squares(graph: _Graph, name: str, value: str, rule: Linear) -> str:
     """Add sum_j q_j min(|u_j|, 5)^2 with u_j = (phi_j - mean_j) / scale_j; return its name."""
-    mean, scale, weight = rule.square_weights()
+    mean, scale, weight = rule.raw_squares()
     means = graph.constant(f"{name}_mean", mean)
     apart = graph.node("Sub", [f"{name}_features", means], f"{name}_apart")
     scales = graph.constant(f"{name}_scale", scale)

@@ -347,7 +347,7 @@ class ArrivalDetector:
 
     def _own_thresholds(self) -> dict[str, float]:
         return {
-            name: self.model.finger(name, sensor).classifier.threshold
+            name: self.model.finger(name, sensor).stable.threshold
             for name, sensor in self.fingers.items()
         }
 

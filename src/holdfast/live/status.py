@@ -194,15 +194,16 @@ def not_calibratable(model: Model) -> str:
 
 def operating_points(model: Model) -> list[schema.OperatingPoint]:
     """Return the errors at each threshold that was tried when the model was tuned."""
-    if model.tuning is None:
-        return []
+    choices = [part.stable.choice for part in model.fingers.values()]
     return [
         schema.OperatingPoint(
             threshold=point.threshold,
             false_alarms_per_minute=point.false_alarms_per_minute,
             missed=point.missed,
         )
-        for point in model.tuning.points
+        for choice in choices[:1]  # all fingers are tuned together
+        if choice is not None
+        for point in choice.points
     ]
 
 
@@ -237,8 +238,8 @@ def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
         rotations=sensor.rotations.tolist(),
         normal=tuple(sensor.normal.tolist()),
         contact_threshold=part.contact_threshold,
-        probability_threshold=part.classifier.threshold,
-        slip_threshold=None if part.slip is None else part.slip.classifier.threshold,
+        probability_threshold=part.stable.threshold,
+        slip_threshold=None if part.slip is None else part.slip.threshold,
     )
 
 

@@ -7,7 +7,6 @@ from typing import Literal, NamedTuple, Self
 import msgspec
 import numpy as np
 
-from holdfast.classifiers.slip import raised_at_each
 from holdfast.contact import TIME_TOLERANCE
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.slips import (
@@ -78,6 +77,33 @@ def slip_curve(decisions: SlipDecisions) -> SlipCurve:
     return SlipCurve.joined(
         [counter.count(raised_at_each(times, probability, block, hold)) for block in blocks]
     )
+
+
+def raised_at(times: Array, probability: Array, threshold: float, hold: float) -> Flags:
+    """Return where a slip is reported, from its probability: the rule of the detector.
+
+    Args:
+        times: (n,) [s].
+        probability: (n,) smoothed; NaN and 0 end a slip at once.
+        threshold: from which the finger slides.
+        hold: time for which it is still reported [s].
+
+    Returns:
+        (n,) True where the finger is reported to slide.
+    """
+    return np.asarray(raised_at_each(times, probability, np.array([threshold]), hold)[0])
+
+
+def raised_at_each(times: Array, probability: Array, thresholds: Array, hold: float) -> Flags:
+    """Return where a slip is reported at each threshold, (n_thresholds, n), as `raised_at`."""
+    with np.errstate(invalid="ignore"):
+        ended = ~(probability > 0)
+        over = probability >= thresholds[:, None]
+    end = np.maximum.accumulate(np.where(ended, times, -np.inf))
+    last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
+    period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    held = (times - last + 0.5 * period < hold) & (last > end)
+    return np.asarray((over | held) & ~ended)
 
 
 def choose_threshold(

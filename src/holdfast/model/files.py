@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import msgspec
 import numpy as np
 
-from holdfast.classifiers import OnnxClassifier
+from holdfast.classifiers import Onnx
 from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
 from holdfast.errors import ModelError, OutputError
 from holdfast.files import check_keys, read_input, whole_file, write_whole
+from holdfast.model.first_schema import upgraded
 from holdfast.model.parts import FingerModel
 from holdfast.sensors import Sensor
 
@@ -22,9 +23,10 @@ if TYPE_CHECKING:
 ModelT = TypeVar("ModelT", bound="Model")
 Fingers = Mapping[str, FingerModel]
 
-MODEL_SCHEMA = "holdfast.model/1"
+MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
+FIRST_SCHEMA = re.compile(rb'"schema"\s*:\s*"holdfast\.model/1"')
 ONNX_NAME = re.compile(r'"([0-9a-f]{16}\.onnx)"')
 """Name of an ONNX file in a model file, by the digest of its content."""
 
@@ -43,10 +45,10 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         check_keys(data)
         _check_sensors(data)
         model = decode(data, kind)
-        if any(classifier.content for classifier in _onnx_classifiers(model.fingers)):
+        if any(rule.content for rule in _onnx_rules(model.fingers)):
             raise ModelError("a model file names its ONNX file; it does not hold the content")
         folder = Path(path).parent
-        return _with_contents(model, lambda classifier: _read_onnx(folder / classifier.file))
+        return _with_contents(model, lambda rule: _read_onnx(folder / rule.file))
     except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
         raise ModelError(f"{path} is not a model of {MODEL_SCHEMA}: {cause}") from cause
 
@@ -66,11 +68,11 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
     try:
         with whole_file(path, force=force) as part:
             part.write_bytes(msgspec.json.format(encode(model), indent=1) + b"\n")
-            for classifier in _onnx_classifiers(model.fingers):
-                file = Path(path).with_name(classifier.file)
+            for rule in _onnx_rules(model.fingers):
+                file = Path(path).with_name(rule.file)
                 is_new = not file.exists()
-                if is_new or file.read_bytes() != classifier.content:
-                    write_whole(file, classifier.content, force=force)
+                if is_new or file.read_bytes() != rule.content:
+                    write_whole(file, rule.content, force=force)
                 if is_new:
                     written.append(file)
     except BaseException:
@@ -88,29 +90,35 @@ def encode(model: "Model") -> bytes:
 def decode(data: bytes, kind: type[ModelT]) -> ModelT:
     """Return the model of a JSON text, without the contents of ONNX files.
 
+    A text of the version before is read as well.
+
     Raises:
         ModelError: the fields contradict each other.
         ValueError: the text is no JSON, or of another form.
     """
+    if FIRST_SCHEMA.search(data):
+        data = msgspec.json.encode(upgraded(msgspec.json.decode(data)))
     return msgspec.json.decode(data, type=kind, dec_hook=_decode_array)
 
 
-def _onnx_classifiers(fingers: Fingers) -> list[OnnxClassifier]:
-    classifiers = (finger.classifier for finger in fingers.values())
-    return [classifier for classifier in classifiers if isinstance(classifier, OnnxClassifier)]
+def _onnx_rules(fingers: Fingers) -> list[Onnx]:
+    rules = (head.rule for finger in fingers.values() for head in finger.heads)
+    return [rule for rule in rules if isinstance(rule, Onnx)]
 
 
-def _with_contents(model: ModelT, content_of: Callable[[OnnxClassifier], bytes]) -> ModelT:
+def _with_contents(model: ModelT, content_of: Callable[[Onnx], bytes]) -> ModelT:
     """Return the model with other contents of its ONNX files."""
-    if not _onnx_classifiers(model.fingers):
-        return model
-    replace = msgspec.structs.replace
-    fingers = dict(model.fingers)
-    for name, finger in model.fingers.items():
-        if isinstance(finger.classifier, OnnxClassifier):
-            content = content_of(finger.classifier)
-            fingers[name] = replace(finger, classifier=replace(finger.classifier, content=content))
-    return replace(model, fingers=fingers)
+
+    def changed(part: FingerModel) -> FingerModel:
+        replace = msgspec.structs.replace
+        heads = [
+            replace(head, rule=replace(head.rule, content=content_of(head.rule)))
+            for head in part.heads
+            if isinstance(head.rule, Onnx)
+        ]
+        return part.with_heads(*heads)
+
+    return model.changed(changed) if _onnx_rules(model.fingers) else model
 
 
 def _read_onnx(path: Path) -> bytes:

@@ -12,11 +12,12 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.model.files import decode, encode, read_model, write_model
+from holdfast.model.heads import Head
 from holdfast.model.parts import (
     MAX_FINGERS,
     MAX_TAXELS,
@@ -24,7 +25,6 @@ from holdfast.model.parts import (
     Debounce,
     FingerModel,
     Training,
-    Tuning,
     check_limit,
 )
 from holdfast.recordings import Recording
@@ -42,7 +42,7 @@ RATE_TOLERANCE = 0.2
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Model of a hand: a classifier for each finger, or one for all fingers (`"*"`).
+    """Model of a hand: heads for each finger, or the same for all fingers (`"*"`).
 
     Attributes:
         fingers: models of the fingers, by name; `"*"` alone is for any finger.
@@ -52,7 +52,6 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         tare: how the baseline is found, as text: "0.5", "first", "none" or "START:END".
         debounce: debouncing of state changes.
         training: provenance; None for a model without training.
-        tuning: how the threshold was chosen; None if it follows from the training.
         schema: version of the file format.
         name: of the model.
 
@@ -63,6 +62,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         >>> model = Model.load("builtin:twin")
         >>> model.rate, list(model.fingers), [str(x) for x in model.finger("thumb").features[:2]]
         (150.0, ['*'], ['log(F_a)', 'log(sigma_xyz[4])'])
+        >>> [head.name for head in model.finger("thumb").heads]
+        ['stable', 'slip', 'slip_speed', 'cause']
     """
 
     fingers: dict[str, FingerModel]
@@ -72,8 +73,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     tare: str = "0.5"
     debounce: Debounce = Debounce()
     training: Training | None = None
-    tuning: Tuning | None = None
-    schema: Literal["holdfast.model/1"] = "holdfast.model/1"
+    schema: Literal["holdfast.model/2"] = "holdfast.model/2"
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -130,6 +130,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Whether the model decides of any finger whether it slides."""
         return any(part.slip is not None for part in self.fingers.values())
 
+    def changed(self, change: Callable[[FingerModel], FingerModel]) -> Self:
+        """Return the model with each of its fingers changed by a function."""
+        fingers = {name: change(part) for name, part in self.fingers.items()}
+        return msgspec.structs.replace(self, fingers=fingers)
+
     def finger(self, name: str, sensor: Sensor | None = None) -> FingerModel:
         """Return the model of a finger.
 
@@ -158,7 +163,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         for name, part in self.fingers.items():
             used = {s.name for finger, s in sensors.items() if name in (ANY_FINGER, finger)}
             folded = part.for_sensor(used.pop()) if len(used) == 1 else part
-            fingers[name] = msgspec.structs.replace(folded, handling=msgspec.UNSET)
+            fingers[name] = msgspec.structs.replace(folded, handling={})
         return msgspec.structs.replace(self, fingers=fingers)
 
     @property
@@ -167,7 +172,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         names = (
             _sensor_of(finger, name)
             for finger, part in self.fingers.items()
-            for name in part.own_handling
+            for name in part.handling
         )
         return tuple(dict.fromkeys(names))
 
@@ -234,7 +239,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`.
         """
-        features = {name: self.finger(name).all_features for name in sensors}
+        features = {name: self.finger(name).features for name in sensors}
         relative = any(spec.seconds for specs in features.values() for spec in specs)
         low, high = RELATIVE_RATES
         rate = self.rate or source_rate
@@ -253,7 +258,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def blind_features(self, finger: str, sensor: Sensor) -> tuple[str, ...]:
         """Return the kinds of features of a finger that need more taxels than a sensor has."""
-        features = self.finger(finger).all_features
+        features = self.finger(finger).features
         return tuple(dict.fromkeys(x.kind for x in features if x.min_taxels > sensor.n_taxels))
 
     def rate_fits(self, rate: float) -> bool:
@@ -278,8 +283,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         probabilities = {}
         for name in present:
             part = self.finger(name, sensors[name])
-            features = found[name].features[:, : len(part.features)]
-            probabilities[name] = part.classifier.probability(features)
+            features = found[name].features[:, part.indices(part.stable)]
+            probabilities[name] = part.stable.rule.probability(features)
         return probabilities
 
     def _any_fingers(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
@@ -352,14 +357,10 @@ def _noise_floor() -> Model:
     noise it is 0.1.
     """
     slope = 2.0
-    rule = LinearClassifier(
-        mean=(math.log(3.0),), scale=(1.0,), coefficients=(-slope,), intercept=0.0
-    )
-    finger = FingerModel(
-        features=(FeatureSpec("sigma", DEFAULT_WINDOW, "noise"),),
-        classifier=rule,
-        contact_noise=5.0,
-    )
+    rule = Linear((math.log(3.0),), (1.0,), ((-slope,),), (0.0,))
+    features = (FeatureSpec("sigma", DEFAULT_WINDOW, "noise"),)
+    head = Head(name="stable", link="logit", features=features, rule=rule)
+    finger = FingerModel(heads=(head,), contact_noise=5.0)
     return Model(name="builtin:noise-floor", fingers={ANY_FINGER: finger})
 
 

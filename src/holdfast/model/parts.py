@@ -1,18 +1,15 @@
-"""Parts of a model: finger, debouncing, provenance and tuning, as plain validated data."""
+"""Parts of a model: finger, own handling, debouncing and provenance, as plain validated data."""
 
 import math
-from collections.abc import Mapping
-from typing import Literal
 
 import msgspec
 import numpy as np
 
-from holdfast.classifiers import LinearClassifier, ModelClassifier
-from holdfast.classifiers.cause import CauseClassifier
-from holdfast.classifiers.slip import SlipRule
+from holdfast.classifiers import Linear
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
-from holdfast.sensors.types import Array
+from holdfast.model.heads import HEAD_NAMES, Head, HeadName
+from holdfast.sensors.types import Array, Integers
 
 MAX_WINDOW = 1 << 16
 """Maximum length of a window [samples]."""
@@ -28,11 +25,10 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Own handling: what the features of a sensor are while its user holds objects, without slip.
 
     Attributes:
-        location: of each feature of `FingerModel.all_features`.
+        location: of each feature of `FingerModel.features`.
         scale: of each of them, above 0.
         seconds: held time of one finger on which it rests [s].
-        threshold: probability of stability from which a contact is stable; None for the model's.
-        slip_threshold: probability from which a finger slides; None for the model's.
+        thresholds: by the name of the head; other heads keep that of the model.
         recordings: content digest of each recording, by name.
 
     Raises:
@@ -43,8 +39,7 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     location: tuple[float, ...]
     scale: tuple[float, ...]
     seconds: float
-    threshold: float | None = None
-    slip_threshold: float | None = None
+    thresholds: dict[HeadName, float] = {}
     recordings: dict[str, str] = {}
 
     def __post_init__(self) -> None:
@@ -57,184 +52,154 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             raise ModelError("a number of the own handling is not finite")
         if min((*self.scale, self.seconds)) <= 0:
             raise ModelError("scales and held time above 0 expected for own handling")
-        for threshold in (self.threshold, self.slip_threshold):
-            if threshold is not None and not 0 <= threshold <= 1:
+        for threshold in self.thresholds.values():
+            if not 0 <= threshold <= 1:
                 raise ModelError(f"a threshold from 0 to 1 expected, {threshold} given")
 
 
 class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Model of one finger.
+    """Model of one finger: its heads, its rule of contact, and own handling.
 
     Attributes:
-        features: input of the classifier, in its order.
-        classifier: maps features to a probability of stability.
+        heads: at most one of each name; `stable` is required, and `slip` for `slip_speed`.
         sensor: name of the sensor of the training; None for any sensor.
         contact_threshold: F_a below it is no contact [unit of the readings]; None for none.
         contact_noise: the same as a multiple of the noise during the tare, used if
             `contact_threshold` is None.
         contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
             for relative features; used instead of the others if it is given.
-        causes: tells the causes of an unstable contact apart; None for none.
-        slip: decides whether the finger slides, from the same features or its own; None for none.
-        normalised: the classifiers work on features that are normalised by own handling. Mean and
-            scale of `classifier`, and of the features that only `slip` has, are then those of
-            default handling; `for_sensor` replaces them.
+        normalised: `stable` and `slip` work on features that are normalised by own handling. Their
+            means and scales are then those of default handling; `for_sensor` replaces them.
         handling: own handling by the name of the sensor, of a model that is normalised.
 
     Raises:
         ModelError: the fields contradict each other.
     """
 
-    features: tuple[FeatureSpec, ...]
-    classifier: ModelClassifier
+    heads: tuple[Head, ...]
     sensor: str | None = None
     contact_threshold: float | None = None
     contact_noise: float | None = None
     contact_load: float | None = None
-    causes: CauseClassifier | None = None
-    slip: SlipRule | None = None
-    normalised: bool | msgspec.UnsetType = msgspec.UNSET
-    handling: dict[str, Handling] | msgspec.UnsetType = msgspec.UNSET
+    normalised: bool = False
+    handling: dict[str, Handling] = {}
 
     def __post_init__(self) -> None:
-        if self.causes is not None and self.causes.n_features != len(self.features):
+        names = [head.name for head in self.heads]
+        if len(set(names)) < len(names):
+            raise ModelError(f"one head of each name expected, {', '.join(names)} given")
+        if "stable" not in names or ("slip_speed" in names and "slip" not in names):
             raise ModelError(
-                f"{len(self.features)} features given, the causes expect {self.causes.n_features}"
+                f"a head stable, and slip for slip_speed, expected; {', '.join(names)} given"
             )
-        n_slip = 0 if self.slip is None else len(self.slip.used_features(self.features))
-        if self.slip is not None and self.slip.classifier.n_features != n_slip:
-            raise ModelError(
-                f"{n_slip} features given, the slip rule expects {self.slip.classifier.n_features}"
-            )
-        features = self.all_features
+        features = self.features
         check_limit("features of a finger", len(features), MAX_FEATURES)
-        longest = max((spec.window for spec in features), default=0)
-        check_limit("samples in a window", longest, MAX_WINDOW)
-        if self.contact_load is not None and not any(spec.seconds for spec in self.features):
+        check_limit("samples in a window", max((x.window for x in features), default=0), MAX_WINDOW)
+        if self.contact_load is not None and not any(x.seconds for x in self.stable.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
-        if len(self.features) != self.classifier.n_features:
-            raise ModelError(
-                f"{len(self.features)} features given, the classifier expects "
-                f"{self.classifier.n_features}"
-            )
         for value in (self.contact_threshold, self.contact_noise, self.contact_load):
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ModelError(f"a contact threshold of at least 0 expected, {value} given")
         self._check_handling()
 
     def _check_handling(self) -> None:
-        if self.normalised and not isinstance(self.classifier, LinearClassifier):
+        if self.normalised and not isinstance(self.stable.rule, Linear):
             raise ModelError("a linear classifier expected where features are normalised")
-        if self.own_handling and not self.normalised:
+        if self.handling and not self.normalised:
             raise ModelError("own handling given; it needs a model with normalised features")
-        check_limit("sensors with own handling", len(self.own_handling), MAX_FINGERS)
-        n_features = len(self.all_features)
-        for name, handling in self.own_handling.items():
+        check_limit("sensors with own handling", len(self.handling), MAX_FINGERS)
+        n_features = len(self.features)
+        for name, handling in self.handling.items():
             if len(handling.location) != n_features:
                 raise ModelError(
                     f"own handling of {len(handling.location)} features given for {name!r}, "
                     f"{n_features} expected"
                 )
-            if handling.slip_threshold is not None and self.slip is None:
-                raise ModelError(f"a slip threshold given for {name!r}; there is no slip rule")
+            for head in handling.thresholds:
+                if self.head(head) is None:
+                    raise ModelError(f"a threshold of {head} given for {name!r}; no such head")
+
+    def head(self, name: HeadName) -> Head | None:
+        """Return the head with a name; None if there is none."""
+        return next((head for head in self.heads if head.name == name), None)
 
     @property
-    def own_handling(self) -> Mapping[str, Handling]:
-        """Own handling by the name of the sensor; empty if there is none."""
-        return {} if self.handling is msgspec.UNSET else self.handling
+    def stable(self) -> Head:
+        """The head of stability."""
+        return next(head for head in self.heads if head.name == "stable")
+
+    @property
+    def slip(self) -> Head | None:
+        """The head that decides whether the finger slides; None if there is none."""
+        return self.head("slip")
+
+    @property
+    def features(self) -> tuple[FeatureSpec, ...]:
+        """Features of all heads: those of `stable` in their order, then others of the rest."""
+        ordered = sorted(self.heads, key=lambda head: HEAD_NAMES.index(head.name))
+        return tuple(dict.fromkeys(spec for head in ordered for spec in head.features))
+
+    def indices(self, head: Head) -> Integers:
+        """Return the indices of the features of a head in those of the finger."""
+        features = self.features
+        return np.array([features.index(spec) for spec in head.features], dtype=np.int64)
+
+    def with_heads(self, *heads: Head) -> "FingerModel":
+        """Return the model with some heads in place of those of the same names, or beside them."""
+        by_name = {head.name: head for head in (*self.heads, *heads)}
+        return msgspec.structs.replace(self, heads=tuple(by_name.values()))
+
+    def without_heads(self, *names: HeadName) -> "FingerModel":
+        """Return the model without some heads."""
+        heads = tuple(head for head in self.heads if head.name not in names)
+        return msgspec.structs.replace(self, heads=heads)
 
     @property
     def default_handling(self) -> tuple[Array, Array]:
-        """Location and scale of `all_features` without own handling, of a linear classifier."""
-        values: dict[FeatureSpec, tuple[float, float]] = {}
-        if self.slip is not None:
-            rule, features = self.slip.classifier, self.slip.used_features(self.features)
-            values.update(_moments(features, rule))
-        if isinstance(self.classifier, LinearClassifier):
-            values.update(_moments(self.features, self.classifier))
-        location, scale = np.array([values[spec] for spec in self.all_features]).T
+        """Location and scale of `features` without own handling: those of `stable`, else `slip`."""
+        location, scale = np.zeros(len(self.features)), np.ones(len(self.features))
+        for head in (self.slip, self.stable):
+            if head is not None and isinstance(head.rule, Linear):
+                location[self.indices(head)], scale[self.indices(head)] = head.rule.moments
         return location, scale
 
     def for_sensor(self, sensor_name: str) -> "FingerModel":
-        """Return the model with the own handling of a sensor, if it has any, in its classifiers."""
-        handling = self.own_handling.get(sensor_name)
+        """Return the model with the own handling of a sensor, if it has any, in its heads."""
+        handling = self.handling.get(sensor_name)
         return self if handling is None else self.with_handling(handling)
 
     def with_handling(self, handling: Handling) -> "FingerModel":
-        """Return the model with own handling in its classifiers.
+        """Return the model with own handling in its heads.
 
         With location l_j and scale s_j of the sensor, u_j = (phi_j - l_j) / s_j takes the place of
-        (phi_j - mean_j) / scale_j. All is linear, so the weights of the features change, and
-        nothing else.
+        (phi_j - mean_j) / scale_j in `stable` and `slip`. Means and scales of the other heads are
+        of unstable or sliding samples, so they move as the default handling does.
         """
-        replace = msgspec.structs.replace
-        values = zip(handling.location, handling.scale, strict=True)
-        moments = dict(zip(self.all_features, values, strict=True))
-        slip = self.slip
-        if slip is not None:
-            features, threshold = slip.used_features(self.features), handling.slip_threshold
-            linear = _normalised_by(slip.classifier, features, moments, threshold)
-            slip = replace(slip, classifier=linear)
-        classifier = self.classifier
-        if isinstance(classifier, LinearClassifier):
-            classifier = _normalised_by(classifier, self.features, moments, handling.threshold)
-        return replace(
-            self, classifier=classifier, slip=slip, causes=self._causes_for(handling),
-            handling=msgspec.UNSET,
-        )  # fmt: skip
+        before = self.default_handling
+        after = np.array(handling.location), np.array(handling.scale)
+        heads = []
+        for head in self.heads:
+            if isinstance(head.rule, Linear):
+                columns = self.indices(head)
+                location, scale = after[0][columns], after[1][columns]
+                if head.name not in ("stable", "slip"):
+                    mean, own_scale = head.rule.moments
+                    ratio = scale / before[1][columns]
+                    location = location + ratio * (mean - before[0][columns])
+                    scale = ratio * own_scale
+                head = head.normalised_by(location, scale)  # noqa: PLW2901
+            threshold = handling.thresholds.get(head.name, head.threshold)
+            heads.append(head if threshold == head.threshold else head.at(threshold, head.choice))
+        return msgspec.structs.replace(self, heads=tuple(heads), handling={})
 
-    def without_thresholds(self, field: Literal["threshold", "slip_threshold"]) -> "FingerModel":
-        """Return the model whose own handling does not set a threshold."""
-        if self.handling is msgspec.UNSET:
-            return self
+    def without_thresholds(self, name: HeadName) -> "FingerModel":
+        """Return the model whose own handling does not set the threshold of a head."""
         replace = msgspec.structs.replace
-        handling = {name: replace(known, **{field: None}) for name, known in self.handling.items()}
+        handling = {
+            sensor: replace(own, thresholds={k: t for k, t in own.thresholds.items() if k != name})
+            for sensor, own in self.handling.items()
+        }
         return replace(self, handling=handling)
-
-    def _causes_for(self, handling: Handling) -> CauseClassifier | None:
-        """Return the causes with own handling.
-
-        Their mean and scale are of unstable samples, so they move as the default handling does.
-        """
-        if self.causes is None:
-            return None
-        n = len(self.features)
-        location, scale = (values[:n] for values in self.default_handling)
-        ratio = np.array(handling.scale[:n]) / scale
-        mean = handling.location[:n] + ratio * (np.array(self.causes.mean) - location)
-        return msgspec.structs.replace(
-            self.causes,
-            mean=tuple(mean.tolist()),
-            scale=tuple((ratio * self.causes.scale).tolist()),
-        )
-
-    @property
-    def all_features(self) -> tuple[FeatureSpec, ...]:
-        """Features of the classifier in their order, and then those of the slip rule alone."""
-        slip = () if self.slip is None else self.slip.used_features(self.features)
-        return (*self.features, *(spec for spec in slip if spec not in self.features))
-
-
-def _moments(
-    features: tuple[FeatureSpec, ...], linear: LinearClassifier
-) -> dict[FeatureSpec, tuple[float, float]]:
-    """Return mean and scale of each feature of a classifier."""
-    return dict(zip(features, zip(linear.mean, linear.scale, strict=True), strict=True))
-
-
-def _normalised_by(
-    linear: LinearClassifier,
-    features: tuple[FeatureSpec, ...],
-    moments: Mapping[FeatureSpec, tuple[float, float]],
-    threshold: float | None,
-) -> LinearClassifier:
-    """Return a classifier with another location and scale of each feature, and a threshold."""
-    return msgspec.structs.replace(
-        linear,
-        mean=tuple(moments[spec][0] for spec in features),
-        scale=tuple(moments[spec][1] for spec in features),
-        threshold=linear.threshold if threshold is None else threshold,
-    )
 
 
 class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -305,46 +270,6 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     versions: dict[str, str] = {}
     samples: dict[str, tuple[int, int]] | msgspec.UnsetType = msgspec.UNSET
     sliding_samples: dict[str, int] | msgspec.UnsetType = msgspec.UNSET
-
-
-class ThresholdPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Errors of the hand at one threshold.
-
-    Attributes:
-        threshold: probability from which a contact is stable.
-        false_alarms_per_minute: per minute of stable label.
-        missed: share of the events without an alarm within 0.2 s [%]; None without events.
-    """
-
-    threshold: float
-    false_alarms_per_minute: float
-    missed: float | None
-
-
-class Tuning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How the threshold of a model was chosen, and the metrics of the hand that it gave.
-
-    Attributes:
-        recordings: content digest of each recording, by name.
-        requested: maximum number of false alarms per minute of stable label.
-        threshold: that was chosen.
-        false_alarms_per_minute: on the recordings.
-        missed: by `post` [s], share of the events without an alarm until then [%].
-        delay_median: of the alarms [s]; None if it is infinite, or without events.
-        n_events: number of events in the recordings.
-        stable_minutes: duration of stable labels [min].
-        points: errors at the thresholds that were tried, lowest first.
-    """
-
-    recordings: dict[str, str]
-    requested: float
-    threshold: float
-    false_alarms_per_minute: float
-    missed: dict[str, float | None]
-    delay_median: float | None
-    n_events: int
-    stable_minutes: float
-    points: tuple[ThresholdPoint, ...] = ()
 
 
 def check_limit(what: str, given: float, most: float) -> None:

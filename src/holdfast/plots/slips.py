@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FormatStrFormatter, MaxNLocator, PercentFormatter
 
-from holdfast.classifiers.cause import SLIP_CODE
-from holdfast.contact import SLIP_SPEED
+from holdfast.contact import SLIP_CODE, SLIP_SPEED
 from holdfast.detector import detect
 from holdfast.metrics import Decisions
 from holdfast.metrics.masks import Mask, runs
@@ -61,11 +60,11 @@ def slip_series(model: Model, recording: Recording) -> dict[str, SlipDecisionSer
     """
     series: dict[str, SlipDecisionSeries] = {}
     for name, trace in detect(model, recording).fingers.items():
-        rule = model.finger(name, recording.modules[name].sensor).slip
-        if rule is None or trace.slip_probability is None:
+        head = model.finger(name, recording.modules[name].sensor).slip
+        if head is None or trace.slip_probability is None:
             continue
         series[name] = SlipDecisionSeries(
-            trace.times, trace.slip_probability, trace.cause == SLIP_CODE, rule.classifier.threshold
+            trace.times, trace.slip_probability, trace.cause == SLIP_CODE, head.threshold
         )
     return series
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.classifiers import LinearClassifier, Parameters, Samples
+from holdfast.classifiers import Linear, Parameters, Samples
 from holdfast.classifiers.folds import group_folds, time_folds
 from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.model import Model
@@ -69,9 +69,7 @@ class Adaptation(NamedTuple):
         )
 
 
-def choose_adaptation(
-    pool: FingerSamples, prior: LinearClassifier, held: Collection[int] = ()
-) -> Adaptation:
+def choose_adaptation(pool: FingerSamples, prior: Linear, held: Collection[int] = ()) -> Adaptation:
     """Choose how far a classifier is adapted to samples.
 
     Every candidate is fitted without some recordings (of a single recording: without blocks of
@@ -181,7 +179,7 @@ def _folds(recordings: Integers, blocks: Integers, times: Array) -> Iterator[_Fo
 
 
 def _held_out_losses(
-    samples: Samples, fold: _Fold, candidates: Sequence[Parameters], prior: LinearClassifier,
+    samples: Samples, fold: _Fold, candidates: Sequence[Parameters], prior: Linear,
     step: int,
 ) -> Array:  # fmt: skip
     """Return (n_candidates, n_tested) log losses; a candidate that cannot be fitted is the prior.
@@ -198,6 +196,6 @@ def _held_out_losses(
     losses = []
     for candidate in candidates:
         weighted = {**candidate, "C": step * candidate["C"]}
-        rule = prior if trained.one_class else recipe.fit(trained, weighted, 0)
+        rule = prior if trained.one_class else recipe.fit(trained, weighted, 0).rule
         losses.append(log_losses(rule.probability(tested.features), tested.stable))
     return np.array(losses)

@@ -173,7 +173,7 @@ def activity(part: FingerModel, features: Array) -> float:
         The median over the samples of the mean over the features, in default scales; 0 without
         such features.
     """
-    columns = [k for k, spec in enumerate(part.all_features) if spec.kind in CHANGE_KINDS]
+    columns = [k for k, spec in enumerate(part.features) if spec.kind in CHANGE_KINDS]
     if not columns:
         return 0.0
     location, scale = part.default_handling
@@ -214,7 +214,7 @@ class _Calibration:
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
             chosen = choose_operating_point(after[key], part, false_alarms, moves=moves)
-            handling[key] = msgspec.structs.replace(normalisation, **chosen._asdict())
+            handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
         model = _with_handling(self.model, handling)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)
         sensors = tuple(
@@ -306,6 +306,6 @@ def _with_handling(model: Model, handling: Mapping[HandlingKey, Handling]) -> Mo
     fingers = {}
     for name, part in model.fingers.items():
         new = {key.sensor: value for key, value in handling.items() if key.finger == name}
-        known = {**part.own_handling, **new}
-        fingers[name] = msgspec.structs.replace(part, handling=known or msgspec.UNSET)
+        known = {**part.handling, **new}
+        fingers[name] = msgspec.structs.replace(part, handling=known)
     return msgspec.structs.replace(model, fingers=fingers)

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from holdfast.classifiers.cause import SLIP_CODE
-from holdfast.contact import SIGNAL_FAULTS, STABLE, UNKNOWN, Fault
+from holdfast.contact import SIGNAL_FAULTS, SLIP_CODE, STABLE, UNKNOWN, Fault
 from holdfast.detector import FingerTrace, detect
 from holdfast.metrics import (
     Decisions,
@@ -79,15 +78,15 @@ def _slip_decisions(
     exact: tuple[Label, ...] | None,
 ) -> SlipDecisions | None:
     """Return the decisions about the slips of a finger; None without a slip rule."""
-    rule = model.finger(finger).slip
-    if rule is None or trace.slip_probability is None:
+    head = model.finger(finger).slip
+    if head is None or trace.slip_probability is None:
         return None
     quiet = None if exact is None else label_states(exact, trace.times) == STABLE
     return SlipDecisions(
         trace.times,
         trace.slip_probability,
         trace.cause == SLIP_CODE,
-        rule.hold,
+        head.hold,
         slip_truth(recording, finger, trace.times, quiet),
     )
 

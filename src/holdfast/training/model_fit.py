@@ -12,7 +12,7 @@ from holdfast.classifiers import Parameters
 from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec
 from holdfast.metrics import SampleMetrics
-from holdfast.model import FingerModel, Model, Training
+from holdfast.model import FingerModel, Head, Model, Training
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import DatasetScan, scan_dataset
 from holdfast.training.setting import Setting
@@ -117,15 +117,21 @@ def fit_model(
         if samples.one_class:
             continue
         threshold = setting.contact_threshold
+        rule, limit = setting.recipe_of(finger).fit(samples, parameters[finger], setting.seed)
+        stable = Head(
+            name="stable", link="logit", features=setting.features, rule=rule, threshold=limit
+        )
+        slips = []
+        if finger in data.slips:
+            own = data.slip_features
+            slips = data.slips[finger].fit(held, own or setting.features, squares=own is not None)
         fingers[finger] = FingerModel(
-            features=setting.features,
-            classifier=setting.recipe_of(finger).fit(samples, parameters[finger], setting.seed),
+            heads=(stable, *slips),
             sensor=None if pool.sensor is None else pool.sensor.name,
             contact_threshold=(
                 pool.contact_threshold(recordings) if threshold is None else threshold
             ),
             contact_load=setting.contact_load_of(finger),
-            slip=data.slips[finger].fit(held, data.slip_features) if finger in data.slips else None,
         )
     if not fingers:
         return None

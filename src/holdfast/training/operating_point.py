@@ -4,18 +4,16 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from holdfast.classifiers.slip import raised_at
 from holdfast.contact import STABLE, UNSTABLE
 from holdfast.errors import TrainingError
 from holdfast.metrics import FingerDecisions
 from holdfast.metrics.masks import runs
-from holdfast.metrics.slip_thresholds import THRESHOLDS
-from holdfast.model import FingerModel
+from holdfast.metrics.slip_thresholds import THRESHOLDS, raised_at
+from holdfast.model import FingerModel, HeadName
 from holdfast.sensors.types import Array, Flags
 from holdfast.training.own_handling import held_durations, location_and_scale
 from holdfast.training.threshold import ThresholdReplay
@@ -33,16 +31,8 @@ STABLE_THRESHOLDS = 1.0 / (1.0 + np.exp(0.02 * np.arange(300, -301, -1)))
 """Thresholds of the probability of stability that are tried, lowest first."""
 
 
-class OperatingThresholds(NamedTuple):
-    """Thresholds of a model on one sensor.
-
-    Attributes:
-        threshold: probability of stability from which a contact is stable.
-        slip_threshold: probability from which a finger slides; None without a slip rule.
-    """
-
-    threshold: float
-    slip_threshold: float | None
+Thresholds = dict[HeadName, float]
+"""Thresholds of a model on one sensor, by head."""
 
 
 class HandlingFigures(msgspec.Struct, frozen=True):
@@ -125,8 +115,8 @@ class HeldFingers:
 
     def figures(self, part: FingerModel) -> HandlingFigures:
         """Return the figures at the thresholds of a model, which made the decisions."""
-        stable = part.classifier.threshold
-        slip = None if part.slip is None else part.slip.classifier.threshold
+        stable = part.stable.threshold
+        slip = None if part.slip is None else part.slip.threshold
         return HandlingFigures(
             threshold=stable,
             stable=100 * self.stable_share(stable),
@@ -174,7 +164,7 @@ def choose_operating_point(
     false_alarms: float | None = None,
     *,
     moves: bool = False,
-) -> OperatingThresholds:
+) -> Thresholds:
     """Choose the thresholds of a model on own handling.
 
     The threshold of stability is at most that of the model, the threshold of slips at least:
@@ -193,20 +183,18 @@ def choose_operating_point(
     Raises:
         TrainingError: no threshold gives so few alarms of a kind.
     """
-    usual = max(part.classifier.threshold, HIGHEST_THRESHOLD if moves else 0.0)
+    usual = max(part.stable.threshold, HIGHEST_THRESHOLD if moves else 0.0)
     tried = [*(t for t in STABLE_THRESHOLDS.tolist() if t < usual), usual]
     slips = []
     if part.slip is not None:
-        usual = part.slip.classifier.threshold
+        usual = part.slip.threshold
         slips = [usual, *(t for t in THRESHOLDS.tolist() if t > usual)]
     if false_alarms is None:
         return _by_share(handling, tried, slips)
     return _by_alarms(handling, tried, slips, false_alarms)
 
 
-def _by_share(
-    handling: HeldFingers, tried: Sequence[float], slips: Sequence[float]
-) -> OperatingThresholds:
+def _by_share(handling: HeldFingers, tried: Sequence[float], slips: Sequence[float]) -> Thresholds:
     """Return the thresholds by the shares, of those that are tried: the usual one is the last.
 
     Of slips, the usual one is the first.
@@ -216,16 +204,16 @@ def _by_share(
     calm = list(takewhile(lambda t: handling.stable_share(t) >= STABLE_SHARE, near))
     threshold = calm[-1] if calm else near[0]
     if not slips:
-        return OperatingThresholds(threshold, None)
+        return {"stable": threshold}
     highest = _probability_at(handling.slip_log_odds(), MAX_DISTANCE)
     near = [t for t in slips if t <= highest] or [slips[0]]
     silent = (t for t in near if handling.raised_share(t) <= RAISED_SHARE)
-    return OperatingThresholds(threshold, next(silent, near[-1]))
+    return {"stable": threshold, "slip": next(silent, near[-1])}
 
 
 def _by_alarms(
     handling: HeldFingers, tried: Sequence[float], slips: Sequence[float], most: float
-) -> OperatingThresholds:
+) -> Thresholds:
     """Return the thresholds by the number of alarms a minute, of those that are tried."""
     calm = list(takewhile(lambda t: handling.alarms_per_minute(t) <= most, tried))
     silent = (t for t in slips if handling.slips_per_minute(t) <= most)
@@ -234,7 +222,8 @@ def _by_alarms(
         raise _too_many(most, "alarms", map(handling.alarms_per_minute, tried))
     if slips and slip_threshold is None:
         raise _too_many(most, "reported slips", map(handling.slips_per_minute, slips))
-    return OperatingThresholds(calm[-1], slip_threshold)
+    chosen: Thresholds = {"stable": calm[-1]}
+    return chosen if slip_threshold is None else {**chosen, "slip": slip_threshold}
 
 
 def _too_many(most: float, what: str, rates: Iterable[float]) -> TrainingError:

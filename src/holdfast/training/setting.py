@@ -128,7 +128,7 @@ class Setting:
             ModelError: the fingers of the model have different features; or as the class.
             ValueError: as the class.
         """
-        features = {part.features for part in init.fingers.values()}
+        features = {part.stable.features for part in init.fingers.values()}
         if len(features) > 1:
             raise ModelError(
                 f"{_name(init)} has different features for its fingers; only a model with the same "
@@ -149,7 +149,8 @@ class Setting:
             ModelError: the model to adapt lacks the finger.
         """
         if self.init is not None:
-            return Adapted(linear_prior(self.init.finger(finger).classifier))
+            stable = self.init.finger(finger).stable
+            return Adapted(linear_prior(stable.rule), stable.threshold)
         return recipe(self.classifier)
 
     @property

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from holdfast.classifiers.fitting import standardise
-from holdfast.classifiers.slip import MAX_DEVIATION, SpeedRule
+from holdfast.classifiers.linear import MAX_DEVIATION, Linear
 from holdfast.metrics.slip_truth import DISTANCES, SLIDING, STILL, SlipTruth, has_slip_truth
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Flags, Integers
@@ -52,7 +52,7 @@ class SpeedSamples:
         columns = zip(*((part.features, part.speed, part.units) for part in parts), strict=True)
         return cls(*map(np.concatenate, columns))
 
-    def fit(self, held: Collection[int]) -> SpeedRule | None:
+    def fit(self, held: Collection[int]) -> tuple[Linear, float] | None:
         """Fit a rule to the samples that are not in held units.
 
         The root of the speed is fitted by least squares with a small penalty. So fast slides
@@ -62,7 +62,7 @@ class SpeedSamples:
             held: units whose samples are left out.
 
         Returns:
-            The rule; None with too few samples that slide.
+            The rule and the highest speed [mm/s]; None with too few samples that slide.
         """
         kept = ~np.isin(self.units, [*held])
         features, speed = self.features[kept], self.speed[kept]
@@ -73,16 +73,10 @@ class SpeedSamples:
         standard = (features - mean) / scale
         squares = np.minimum(np.abs(standard), MAX_DEVIATION) ** 2
         columns = np.hstack([np.ones((len(standard), 1)), standard, squares])
-        weights = _solve(columns, np.sqrt(speed), _sample_weights(slides)).tolist()
+        weights = _solve(columns, np.sqrt(speed), _sample_weights(slides))
         n = len(mean)
-        return SpeedRule(
-            mean=tuple(mean.tolist()),
-            scale=tuple(scale.tolist()),
-            coefficients=tuple(weights[1 : n + 1]),
-            squares=tuple(weights[n + 1 :]),
-            intercept=weights[0],
-            highest=float(speed.max()),
-        )
+        rule = Linear.of(mean, scale, weights[1 : n + 1], weights[0], weights[n + 1 :])
+        return rule, float(speed.max())
 
 
 def _sample_weights(slides: Flags) -> Array:

@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 
 from holdfast.classifiers.fitting import Samples, standardise
+from holdfast.classifiers.linear import MAX_DEVIATION, Linear
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.slip import MAX_DEVIATION, SlipRule, SlipThresholds
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.errors import ModelError, TrainingError
 from holdfast.features import FeatureSpec
@@ -27,7 +27,7 @@ from holdfast.metrics.slip_thresholds import (
 )
 from holdfast.metrics.slip_truth import SLIDING, STILL, SlipTruth, slip_truth
 from holdfast.metrics.slips import SlipCounts, SlipCurve, SlipMetrics, found_shares, slip_metrics
-from holdfast.model import ANY_FINGER, Model
+from holdfast.model import ANY_FINGER, Choice, Head, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.resampling import true_updates
@@ -35,6 +35,7 @@ from holdfast.sensors.types import Array, Flags
 from holdfast.training.dataset_scan import OneRecording, Progress
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.slip_speed import SpeedSamples, speed_samples
+from holdfast.training.threshold import with_head_threshold
 from holdfast.training.training_samples import (
     FingerSamples,
     SamplesPlan,
@@ -46,7 +47,7 @@ from holdfast.training.training_samples import (
     usable_rows,
 )
 
-SLIP_SMOOTHING, SLIP_RULE_HOLD = 0.02, 0.05
+SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
 SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
@@ -88,68 +89,60 @@ class SlipSamples:
         return int(self.own.samples.stable.sum())
 
     def fit(
-        self, held: Collection[int], features: Sequence[FeatureSpec] | None = None
-    ) -> SlipRule | None:
-        """Fit a rule to the samples that are not in held units, with a threshold of 0.5.
+        self, held: Collection[int], features: tuple[FeatureSpec, ...], *, squares: bool = False
+    ) -> list[Head]:
+        """Fit the heads of a slip to the samples that are not in held units.
 
         For a model of one hand all samples weigh alike: balanced classes fit the middle, and the
         threshold lies far in the tail. On real recordings that made a model of any hand worse.
 
         Args:
             held: units whose samples are left out.
-            features: of the samples, for a rule with features of its own and with squares, which
-                estimates the speed, too, where it is known; those of the classifier of
-                stability, without squares, by default.
+            features: of the samples.
+            squares: whether the head has squares of the features, and the speed is estimated
+                where it is known.
 
         Returns:
-            The rule; None with too few sliding samples, or none that hold still.
+            `slip`, with a threshold of 0.5, and `slip_speed` if it is estimated; none with too few
+            sliding samples, or none that hold still.
         """
         samples = self.own.without(held)
         if samples.one_class or samples.stable.sum() < MIN_SLIDING_SAMPLES:
-            return None
-        weight = "balanced" if self.own.sensor is None else None
-        rule = _fitted_rule(samples, weight, None if features is None else tuple(features))
+            return []
+        rule = _fitted_rule(samples, "balanced" if self.own.sensor is None else None, squares)
         kept = np.count_nonzero(~self.own.samples.stable)
         thinning = np.log(self.n_still / kept)  # odds of sliding fall by the samples left out
-        offset = rule.classifier.offset - float(thinning)
-        classifier = msgspec.structs.replace(rule.classifier, offset=offset, threshold=0.5)
-        rule = msgspec.structs.replace(rule, classifier=classifier)
-        return rule if features is None else self.with_speed(rule, held)
+        rule = msgspec.structs.replace(rule, offset=rule.offset - float(thinning))
+        slip = Head(
+            name="slip", link="logit", features=features, rule=rule,
+            smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD,
+        )  # fmt: skip
+        return [slip, *self.fit_speed(held, features)] if squares else [slip]
 
-    def with_speed(self, rule: SlipRule, held: Collection[int]) -> SlipRule:
-        """Return a rule that estimates the speed, too, if enough samples have one.
-
-        Args:
-            rule: with the features of the samples.
-            held: units whose samples are left out.
-        """
+    def fit_speed(self, held: Collection[int], features: tuple[FeatureSpec, ...]) -> list[Head]:
+        """Fit the head of the speed of a slip; none if too few samples have one."""
         speed = None if self.speeds is None else self.speeds.fit(held)
-        return rule if speed is None else msgspec.structs.replace(rule, speed=speed)
+        if speed is None:
+            return []
+        rule, highest = speed
+        return [
+            Head(name="slip_speed", link="square", features=features, rule=rule, highest=highest)
+        ]
 
 
-def _fitted_rule(
-    samples: Samples, class_weight: str | None, features: tuple[FeatureSpec, ...] | None
-) -> SlipRule:
-    """Return a rule fitted to samples; with squares if it gets features of its own."""
+def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> Linear:
+    """Return a rule fitted to samples, which class 1 of slides."""
     recipe = LogisticRegression()
     parameters = {**recipe.reference, "class_weight": class_weight}
-    if features is None:
-        return SlipRule(recipe.fit(samples, parameters, 0), SLIP_SMOOTHING, SLIP_RULE_HOLD)
+    if not squares:
+        return recipe.fit(samples, parameters, 0).linear
     # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
     mean, scale, standard = standardise(samples.features)
-    squares = np.minimum(np.abs(standard), MAX_DEVIATION) ** 2
-    fitted = recipe.fit(samples._replace(features=np.hstack([standard, squares])), parameters, 0)
-    weights, n = np.array(fitted.coefficients) / np.array(fitted.scale), len(features)
-    linear = msgspec.structs.replace(
-        fitted,
-        mean=tuple(mean.tolist()),
-        scale=tuple(scale.tolist()),
-        coefficients=tuple(weights[:n].tolist()),
-        intercept=fitted.intercept - float(weights @ np.array(fitted.mean)),
-    )
-    return SlipRule(
-        linear, SLIP_SMOOTHING, SLIP_RULE_HOLD, None, features, tuple(weights[n:].tolist())
-    )
+    wide = np.hstack([standard, np.minimum(np.abs(standard), MAX_DEVIATION) ** 2])
+    fitted = recipe.fit(samples._replace(features=wide), parameters, 0).linear
+    weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
+    intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
+    return Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
 
 
 def gather_slip_samples(
@@ -341,41 +334,26 @@ def _supports(counts: SlipCounts, false_alarms: float) -> bool:
 def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
     """Return the model whose slip rules have a threshold; without slip rules if there is none."""
     if chosen is None or chosen.place is None:
-        return _with_rules(model, lambda _: None)
-    record, threshold = threshold_record(chosen.counts), float(THRESHOLDS[chosen.place])
-    return _with_rules(model, lambda rule: _with_threshold(rule, threshold, record))
-
-
-def _with_rules(model: Model, change: Callable[[SlipRule], SlipRule | None]) -> Model:
-    """Return the model with changed slip rules, whose thresholds are for all sensors."""
-    replace = msgspec.structs.replace
-    fingers = {
-        name: replace(
-            part.without_thresholds("slip_threshold"), slip=part.slip and change(part.slip)
+        return model.changed(
+            lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
         )
-        for name, part in model.fingers.items()
-    }
-    return replace(model, fingers=fingers)
+    threshold = float(THRESHOLDS[chosen.place])
+    return with_head_threshold(model, "slip", threshold, slip_choice(chosen.counts))
 
 
-def _with_threshold(rule: SlipRule, threshold: float, record: SlipThresholds) -> SlipRule:
-    classifier = msgspec.structs.replace(rule.classifier, threshold=threshold)
-    return msgspec.structs.replace(rule, classifier=classifier, thresholds=record)
-
-
-def threshold_record(
+def slip_choice(
     counts: SlipCounts,
     requested: float = SLIP_FALSE_ALARMS,
     recordings: Mapping[str, str] | None = None,
-) -> SlipThresholds:
+) -> Choice:
     """Return how a threshold was chosen, for the model file."""
     minutes = counts.held_seconds / 60
-    return SlipThresholds(
+    return Choice(
         requested=requested,
         false_alarms_per_minute=counts.false_held / minutes,
         found=found_shares(counts.delays)["0.1"],
-        n_slips=len(counts.delays),
-        held_minutes=minutes,
+        n=len(counts.delays),
+        minutes=minutes,
         recordings=dict(recordings or {}),
     )
 
@@ -438,8 +416,8 @@ def tune_slips(
     place = _supported(curve, false_alarms)
     before = SlipCounts.total(counts for result in results for counts in result.slips.values())
     threshold = float(THRESHOLDS[place])
-    record = threshold_record(curve[place], false_alarms, digests)
-    tuned = _with_rules(model, lambda rule: _with_threshold(rule, threshold, record))
+    choice = slip_choice(curve[place], false_alarms, digests)
+    tuned = with_head_threshold(model, "slip", threshold, choice)
     around = range(max(place - N_SHOWN, 0), min(place + N_SHOWN + 1, len(curve)))
     return TunedSlips(
         msgspec.structs.replace(tuned, name=f"{model.name}, tuned" if model.name else ""),

@@ -33,7 +33,7 @@ from holdfast.metrics import (
     pool_events,
 )
 from holdfast.metrics.decisions import Codes
-from holdfast.model import Debounce, Model, ThresholdPoint, Tuning
+from holdfast.model import Choice, Debounce, FingerModel, HeadName, Model, ThresholdPoint
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
 from holdfast.training.evaluation import compute_decisions
@@ -51,14 +51,20 @@ N_SHOWN = 3
 
 def with_threshold(model: Model, threshold: float) -> Model:
     """Return the model with another threshold of the probability for all fingers and sensors."""
-    fingers = {
-        name: msgspec.structs.replace(
-            part.without_thresholds("threshold"),
-            classifier=msgspec.structs.replace(part.classifier, threshold=threshold),
-        )
-        for name, part in model.fingers.items()
-    }
-    return msgspec.structs.replace(model, fingers=fingers)
+    return with_head_threshold(model, "stable", threshold)
+
+
+def with_head_threshold(
+    model: Model, name: HeadName, threshold: float, choice: Choice | None = None
+) -> Model:
+    """Return the model with another threshold of a head, for all fingers and sensors."""
+
+    def changed(part: FingerModel) -> FingerModel:
+        head = part.head(name)
+        part = part.without_thresholds(name)
+        return part if head is None else part.with_heads(head.at(threshold, choice))
+
+    return model.changed(changed)
 
 
 @dataclass(frozen=True)
@@ -199,13 +205,10 @@ def tune(
     fine = [_point(replays, t) for t in _probabilities(_log_odds(first.threshold) + FINE_STEPS)]
     every = _in_order(_usable([*points, *fine]))
     chosen = _confirm(model, recordings, _ranked(every, false_alarms), false_alarms)
-    tuned = with_threshold(model, chosen.threshold)
+    choice = _record(chosen, points, digests, false_alarms)
+    tuned = with_head_threshold(model, "stable", chosen.threshold, choice)
     return Tuned(
-        msgspec.structs.replace(
-            tuned,
-            name=f"{model.name}, tuned" if model.name else "",
-            tuning=_record(chosen, points, digests, false_alarms),
-        ),
+        msgspec.structs.replace(tuned, name=f"{model.name}, tuned" if model.name else ""),
         chosen,
         _point(replays, before),
         _around(points, chosen),
@@ -215,7 +218,7 @@ def tune(
 def _threshold_before(model: Model, recording: Recording) -> float:
     """Return the highest threshold of the fingers on their sensors."""
     sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-    return max(model.finger(*finger).classifier.threshold for finger in sensors.items())
+    return max(model.finger(*finger).stable.threshold for finger in sensors.items())
 
 
 def _probabilities(log_odds: npt.NDArray[np.floating[Any]]) -> list[float]:
@@ -326,17 +329,15 @@ def _record(
     points: Sequence[ThresholdMetrics],
     digests: dict[str, str],
     false_alarms: float,
-) -> Tuning:
-    events = chosen.events
-    return Tuning(
+) -> Choice:
+    events, missed = chosen.events, chosen.events.missed["0.2"]
+    return Choice(
         recordings=digests,
         requested=false_alarms,
-        threshold=chosen.threshold,
         false_alarms_per_minute=chosen.false_alarms,
-        missed=events.missed,
-        delay_median=events.delay_median,
-        n_events=events.n_events,
-        stable_minutes=events.stable_minutes,
+        found=None if missed is None else 100 - missed,
+        n=events.n_events,
+        minutes=events.stable_minutes,
         points=tuple(_threshold_point(point) for point in _in_order([*points, chosen])),
     )
 

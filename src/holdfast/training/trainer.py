@@ -190,7 +190,7 @@ class _Trainer:
     def _with_handling(self, setting: Setting) -> Setting:
         """Return the setting; own handling of the sensors is in the classifiers to adapt."""
         init = setting.init
-        if init is None or not any(part.own_handling for part in init.fingers.values()):
+        if init is None or not any(part.handling for part in init.fingers.values()):
             return setting
         return replace(setting, init=init.with_handling_of(self.scan.sensors))
 
@@ -280,7 +280,8 @@ class _Trainer:
         """Choose how far every finger is adapted; report it if nothing is held out."""
         parameters: dict[str, Parameters] = {}
         for finger, pool in self.fingers.items():
-            adaptation = choose_adaptation(pool, linear_prior(init.finger(finger).classifier), held)
+            prior = linear_prior(init.finger(finger).stable.rule)
+            adaptation = choose_adaptation(pool, prior, held)
             parameters[finger] = adaptation.parameters
             if not held:
                 self.warn(adaptation.describe(init.name or "the model to adapt", finger))
@@ -327,7 +328,9 @@ class _Trainer:
         replace_fields, init = msgspec.structs.replace, self.setting.init
         if init is not None:
             fingers = {
-                name: replace_fields(part, slip=init.finger(name).slip)
+                name: part.with_heads(
+                    *(head for head in init.finger(name).heads if head.name != "stable")
+                )
                 for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics

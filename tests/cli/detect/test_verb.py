@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from holdfast.classifiers.slip import SlipRule, SpeedRule
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule, SpeedRule
 from holdfast.cli import main
 from holdfast.cli.detect.verb import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault

@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
+from holdfast.classifiers.slip import SlipRule, SpeedRule
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.slip import SlipRule, SpeedRule
 from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording

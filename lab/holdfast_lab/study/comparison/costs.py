@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 import msgspec
 import numpy as np
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.detector import Detector
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
 from holdfast.features.specs import HOLDFAST_FEATURES, FeatureSpec
-from holdfast.model import FingerModel, Model
+from holdfast.model import FingerModel, Head, Model
 from holdfast.recordings import Recording
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import Results, method_titles
@@ -135,11 +135,12 @@ def _measure_update(
     recording: Recording, corpus: Corpus, features: tuple[FeatureSpec, ...]
 ) -> float:
     """Return the median time of an update [s]. The weights of the rule do not matter."""
-    ones = (1.0,) * len(features)
-    rule = LinearClassifier(mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1)
+    ones = np.ones(len(features))
+    rule = Linear.of(ones, ones, 0.01 * ones, 0.1)
+    head = Head(name="stable", link="logit", features=features, rule=rule)
     modules = {name: recording.modules[name] for name in _fingers(recording, corpus)}
     fingers = {
-        name: FingerModel(features=features, classifier=rule, sensor=module.sensor.name)
+        name: FingerModel(heads=(head,), sensor=module.sensor.name)
         for name, module in modules.items()
     }
     sensors = {module.sensor.name: module.sensor for module in modules.values()}

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE
-from holdfast.contact import CONTACT_FORCE, UNSTABLE, Cause
+from holdfast.contact import CAUSES, CONTACT_FORCE, SLIP_CODE, UNSTABLE, Cause
 from holdfast.detector import detect
 from holdfast.metrics.slip_truth import (
     NOT_HELD,
@@ -24,7 +23,7 @@ TRUE_CAUSES = (Cause.SLIP.value, Cause.DISTURBANCE.value, "neither")
 """True causes of a sample that is held: the finger slides; an outside force acts and the finger
 is still; the finger is still and no outside force acts."""
 NO_CAUSE = "none"
-ESTIMATED = (NO_CAUSE, *(cause.value for cause in ALL_CAUSES))
+ESTIMATED = (NO_CAUSE, *(cause.value for cause in CAUSES))
 """Estimated causes, in the order of their codes."""
 
 

@@ -26,7 +26,7 @@ from holdfast.metrics.slip_truth import (
 from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
-from holdfast.training.slips import SLIP_RULE_HOLD, SLIP_SMOOTHING
+from holdfast.training.slips import SLIP_HOLD, SLIP_SMOOTHING
 from holdfast.training.training_samples import (
     thinning_step,
     usable_rows,
@@ -182,9 +182,7 @@ class SlipScores:
             self.score == -np.inf, 0.0, probability_of(log_odds_of(self.score, ranks))
         )
         raised = np.zeros(len(self.times), dtype=np.bool_)
-        return slip_curve(
-            SlipDecisions(self.times, probability, raised, SLIP_RULE_HOLD, self.truth)
-        )
+        return slip_curve(SlipDecisions(self.times, probability, raised, SLIP_HOLD, self.truth))
 
 
 def score_slips(fitted: FittedMethod, recording: SlipRecording) -> dict[str, SlipScores]:

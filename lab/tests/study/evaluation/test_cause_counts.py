@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE
+
 from holdfast.contact import STABLE, UNSTABLE, Cause
 from holdfast_lab.study.evaluation import cause_counts
 from holdfast_lab.study.evaluation.cause_counts import (

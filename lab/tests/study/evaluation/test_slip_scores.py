@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-
 from holdfast.classifiers.slip import SlipRule, smooth
+
 from holdfast.metrics.slip_thresholds import THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
 from holdfast.training.slips import SLIP_SMOOTHING
