@@ -12,8 +12,8 @@ from holdfast.model import Model
 from holdfast.sensors.types import Array, Flags, Integers
 from holdfast.training.dataset_scan import DatasetScan
 from holdfast.training.evaluation import was_trained_on
+from holdfast.training.finger_samples import FingerSamples, thinning_step
 from holdfast.training.splits import TIME_FOLDS, TIME_GAP
-from holdfast.training.training_samples import FingerSamples, thinning_step
 from holdfast.training.tuning import log_losses
 
 MAX_ADAPTATION_SAMPLES = 10_000

@@ -1,7 +1,7 @@
 """Fit of a model to training samples, with or without some units, and its provenance."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Self
 
@@ -15,10 +15,11 @@ from holdfast.metrics import SampleMetrics
 from holdfast.model import FingerModel, Head, Model, Training
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import DatasetScan, scan_dataset
+from holdfast.training.finger_samples import FingerSamples
 from holdfast.training.setting import Setting
-from holdfast.training.slips import SlipSamples
+from holdfast.training.slips import fit_slips
 from holdfast.training.splits import DataSplit, split_data
-from holdfast.training.training_samples import FingerSamples, gather_samples
+from holdfast.training.training_samples import HeadSamples, SamplesPlan, gather_samples
 
 FIGURES = ("accuracy", "fdr", "fnr", "auc_contact", "auc")
 """Metrics out of fold that a model file has."""
@@ -31,16 +32,16 @@ class TrainingData:
     Attributes:
         scan: of the dataset.
         data_split: of the dataset into units.
-        fingers: training samples of each classifier: by finger, or `"*"` for all fingers.
-        slips: training samples of each slip rule, likewise.
-        slip_features: of the slip rules alone; None for those of the classifiers.
+        samples: training samples of each head.
+        slip_features: of the heads of a slip.
+        slip_squares: whether they have squares.
     """
 
     scan: DatasetScan
     data_split: DataSplit
-    fingers: Mapping[str, FingerSamples]
-    slips: Mapping[str, SlipSamples] = field(default_factory=dict)
-    slip_features: tuple[FeatureSpec, ...] | None = None
+    samples: HeadSamples
+    slip_features: tuple[FeatureSpec, ...] = ()
+    slip_squares: bool = False
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], setting: Setting) -> Self:
@@ -51,7 +52,13 @@ class TrainingData:
         """
         scan = scan_dataset(recordings, setting.rate, relative=setting.relative)
         data_split = split_data(scan.recordings, setting.split, setting.seed)
-        return cls(scan, data_split, gather_samples(recordings, scan, setting, data_split))
+        plan = SamplesPlan(scan, setting, data_split, only_stable=True)
+        return cls(scan, data_split, gather_samples(recordings, plan))
+
+    @property
+    def fingers(self) -> Mapping[str, FingerSamples]:
+        """Training samples of the heads of stability."""
+        return self.samples.stable
 
     @property
     def thinned(self) -> dict[str, tuple[int, int]]:
@@ -121,12 +128,14 @@ def fit_model(
         stable = Head(
             name="stable", link="logit", features=setting.features, rule=rule, threshold=limit
         )
-        slips = []
-        if finger in data.slips:
-            own = data.slip_features
-            slips = data.slips[finger].fit(held, own or setting.features, squares=own is not None)
+        others: list[Head] = []
+        if finger in data.samples.slip:
+            slips = data.samples.slip[finger]
+            others += fit_slips(slips, held, data.slip_features, squares=data.slip_squares)
+        if finger in data.samples.cause and not held:  # no metric out of fold counts causes
+            others += data.samples.cause[finger].fit(held, setting.features)
         fingers[finger] = FingerModel(
-            heads=(stable, *slips),
+            heads=(stable, *others),
             sensor=None if pool.sensor is None else pool.sensor.name,
             contact_threshold=(
                 pool.contact_threshold(recordings) if threshold is None else threshold

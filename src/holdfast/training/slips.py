@@ -10,10 +10,8 @@ import numpy as np
 from holdfast.classifiers.fitting import Samples, standardise
 from holdfast.classifiers.linear import MAX_DEVIATION, Linear
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.errors import ModelError, TrainingError
 from holdfast.features import FeatureSpec
-from holdfast.features.stream import StreamPlan, extract
 from holdfast.metrics import RecordingResults, score_recording
 from holdfast.metrics.slip_thresholds import (
     MAX_RAISED_QUIET,
@@ -25,37 +23,17 @@ from holdfast.metrics.slip_thresholds import (
     slip_intervals,
     slip_summary,
 )
-from holdfast.metrics.slip_truth import SLIDING, STILL, SlipTruth, slip_truth
 from holdfast.metrics.slips import SlipCounts, SlipCurve, SlipMetrics, found_shares, slip_metrics
 from holdfast.model import ANY_FINGER, Choice, Head, Model
-from holdfast.parallel import Engine
 from holdfast.recordings import Recording
-from holdfast.resampling import true_updates
-from holdfast.sensors.types import Array, Flags
-from holdfast.training.dataset_scan import OneRecording, Progress
 from holdfast.training.evaluation import compute_decisions
-from holdfast.training.slip_speed import SpeedSamples, speed_samples
+from holdfast.training.slip_samples import SlipSamples
 from holdfast.training.threshold import with_head_threshold
-from holdfast.training.training_samples import (
-    FingerSamples,
-    SamplesPlan,
-    join_samples,
-    labelled_samples,
-    pool_fingers,
-    resample_if_needed,
-    sensors_of,
-    usable_rows,
-)
 
 SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
 SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
-EARLY_DURATION = 0.1
-"""Time after the onset of a slip whose samples train the rule: later it is found already [s]."""
-QUIET_STEP = 10
-"""Only every tenth sample of quiet hold trains, beside all that are disturbed: the rule must tell
-a slip from a push."""
 MIN_SLIDING_SAMPLES = 50
 """Fewer sliding samples train no slip rule."""
 N_SHOWN = 3
@@ -69,65 +47,52 @@ NO_SLIP_DECISIONS = (
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
-@dataclass(frozen=True)
-class SlipSamples:
-    """Training samples of a slip rule.
+def fit_slips(
+    slips: SlipSamples,
+    held: Collection[int],
+    features: tuple[FeatureSpec, ...],
+    *,
+    squares: bool = False,
+) -> list[Head]:
+    """Fit the heads of a slip to the samples that are not in held units.
 
-    Attributes:
-        own: of the finger; class 1 slides. All that slide are kept, and some that hold still.
-        n_still: number of samples that hold still, before thinning.
-        speeds: samples of the speed rule; None if no speed is known.
+    For a model of one hand all samples weigh alike: balanced classes fit the middle, and the
+    threshold lies far in the tail. On real recordings that made a model of any hand worse.
+
+    Args:
+        slips: samples.
+        held: units whose samples are left out.
+        features: of the samples.
+        squares: whether the head has squares of the features, and the speed is estimated
+            where it is known.
+
+    Returns:
+        `slip`, with a threshold of 0.5, and `slip_speed` if it is estimated; none with too few
+        sliding samples, or none that hold still.
     """
+    samples = slips.own.without(held)
+    if samples.one_class or samples.stable.sum() < MIN_SLIDING_SAMPLES:
+        return []
+    rule = _fitted_rule(samples, "balanced" if slips.own.sensor is None else None, squares)
+    kept = np.count_nonzero(~slips.own.samples.stable)
+    thinning = np.log(slips.n_still / kept)  # odds of sliding fall by the samples left out
+    rule = msgspec.structs.replace(rule, offset=rule.offset - float(thinning))
+    slip = Head(
+        name="slip", link="logit", features=features, rule=rule,
+        smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD,
+    )  # fmt: skip
+    return [slip, *fit_speed(slips, held, features)] if squares else [slip]
 
-    own: FingerSamples
-    n_still: int
-    speeds: SpeedSamples | None = None
 
-    @property
-    def n_sliding(self) -> int:
-        """Number of samples that slide."""
-        return int(self.own.samples.stable.sum())
-
-    def fit(
-        self, held: Collection[int], features: tuple[FeatureSpec, ...], *, squares: bool = False
-    ) -> list[Head]:
-        """Fit the heads of a slip to the samples that are not in held units.
-
-        For a model of one hand all samples weigh alike: balanced classes fit the middle, and the
-        threshold lies far in the tail. On real recordings that made a model of any hand worse.
-
-        Args:
-            held: units whose samples are left out.
-            features: of the samples.
-            squares: whether the head has squares of the features, and the speed is estimated
-                where it is known.
-
-        Returns:
-            `slip`, with a threshold of 0.5, and `slip_speed` if it is estimated; none with too few
-            sliding samples, or none that hold still.
-        """
-        samples = self.own.without(held)
-        if samples.one_class or samples.stable.sum() < MIN_SLIDING_SAMPLES:
-            return []
-        rule = _fitted_rule(samples, "balanced" if self.own.sensor is None else None, squares)
-        kept = np.count_nonzero(~self.own.samples.stable)
-        thinning = np.log(self.n_still / kept)  # odds of sliding fall by the samples left out
-        rule = msgspec.structs.replace(rule, offset=rule.offset - float(thinning))
-        slip = Head(
-            name="slip", link="logit", features=features, rule=rule,
-            smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD,
-        )  # fmt: skip
-        return [slip, *self.fit_speed(held, features)] if squares else [slip]
-
-    def fit_speed(self, held: Collection[int], features: tuple[FeatureSpec, ...]) -> list[Head]:
-        """Fit the head of the speed of a slip; none if too few samples have one."""
-        speed = None if self.speeds is None else self.speeds.fit(held)
-        if speed is None:
-            return []
-        rule, highest = speed
-        return [
-            Head(name="slip_speed", link="square", features=features, rule=rule, highest=highest)
-        ]
+def fit_speed(
+    slips: SlipSamples, held: Collection[int], features: tuple[FeatureSpec, ...]
+) -> list[Head]:
+    """Fit the head of the speed of a slip; none if too few samples have one."""
+    speed = None if slips.speeds is None else slips.speeds.fit(held)
+    if speed is None:
+        return []
+    rule, highest = speed
+    return [Head(name="slip_speed", link="square", features=features, rule=rule, highest=highest)]
 
 
 def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> Linear:
@@ -143,98 +108,6 @@ def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> L
     weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
     intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
     return Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
-
-
-def gather_slip_samples(
-    recordings: Sequence[Recording], plan: SamplesPlan, engine: Engine, progress: Progress
-) -> dict[str, SlipSamples]:
-    """Return the training samples of the slip rule of every finger, or of all under `"*"`.
-
-    Args:
-        recordings: the same that were scanned.
-        plan: of the dataset.
-        engine: that reads the recordings.
-        progress: iterates over the recordings.
-
-    Returns:
-        By finger; none without a truth or labels of slips.
-    """
-    parts: dict[str, list[FingerSamples]] = {finger: [] for finger in plan.scan.sensors}
-    speeds: dict[str, list[SpeedSamples]] = {finger: [] for finger in plan.scan.sensors}
-    calls = ((place, OneRecording(recordings, place)) for place in plan.places)
-    read = engine.map_ordered(_samples_of_part, calls, shared=(plan,))
-    for fingers in progress(read, "slips", len(plan.places)):
-        for finger, (samples, speed) in fingers.items():
-            parts[finger].append(samples)
-            speeds[finger] += [speed] if speed is not None else []
-    no_rest = np.zeros((len(plan.scan.recordings), 3))
-    by_finger = {finger: join_samples(part, no_rest) for finger, part in parts.items() if part}
-    if plan.setting.is_shared and by_finger:
-        by_finger = {ANY_FINGER: pool_fingers(by_finger)}
-        speeds = {ANY_FINGER: [part for finger in speeds.values() for part in finger]}
-    return {
-        finger: SlipSamples(
-            own,
-            own.n_usable - int(own.samples.stable.sum()),
-            SpeedSamples.joined(speeds[finger]) if speeds[finger] else None,
-        )
-        for finger, own in by_finger.items()
-        if own.samples.stable.any()
-    }
-
-
-def _samples_of_part(
-    plan: SamplesPlan, place: int, part: Sequence[Recording]
-) -> dict[str, tuple[FingerSamples, SpeedSamples | None]]:
-    """Return the samples of one recording by finger; class 1 slides.
-
-    A model of one hand learns the first 0.1 s of slips, and to tell them from pushes. On real
-    recordings that misled a model of any hand, so it learns all that slides and all that does not.
-    """
-    scan, setting = plan.scan, plan.setting
-    recording = true_updates(part[0])
-    if not scan.relative:
-        recording = resample_if_needed(recording, scan.rate)
-    rate, sensors = scan.model_rate or recording.rate, sensors_of(recording, scan)
-    features = dict.fromkeys(sensors, setting.features)
-    stream = StreamPlan(sensors, features, setting.window, setting.used_tare, rate)
-    fingers = {}
-    for finger, rows in extract(stream, recording).items():
-        module = recording.modules[finger]
-        truth = slip_truth(recording, finger, module.times)
-        if truth is None:
-            continue
-        states = np.full(module.n_samples, UNKNOWN, dtype=np.int8)
-        slides = truth.codes == SLIDING if scan.relative else _is_early(truth, module.times)
-        states[slides], states[truth.codes == STILL] = STABLE, UNSTABLE
-        usable = usable_rows(rows.features, states)
-        step = scan.recordings[place].step * plan.step
-        is_still, is_quiet = states[usable] == UNSTABLE, truth.quiet[usable]
-        quiet = usable[is_still & is_quiet][:: step * (1 if scan.relative else QUIET_STEP)]
-        disturbed = usable[is_still & ~is_quiet][::step]
-        kept = np.sort(np.concatenate([usable[~is_still], quiet, disturbed]))
-        units = plan.data_split.units_of(place, module.n_samples)
-        samples = FingerSamples(
-            None if scan.relative else module.sensor,
-            labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),
-            units[kept],
-            np.full(len(kept), place),
-            module.times[kept] - recording.start,
-            np.zeros((1, 3)),
-            len(usable),
-        )
-        speed = speed_samples(recording, finger, rows.features, truth, units)
-        fingers[finger] = samples, speed
-    return fingers
-
-
-def _is_early(truth: SlipTruth, times: Array) -> Flags:
-    """Return where a slip has begun less than `EARLY_DURATION` ago, and slides."""
-    early = np.zeros(len(times), dtype=bool)
-    for slip in truth.slips:
-        first, last = np.searchsorted(times, (slip.onset, slip.onset + EARLY_DURATION))
-        early[first:last] = True
-    return np.asarray(early & (truth.codes == SLIDING))
 
 
 def missing_slip_rules(model: Model, samples: Mapping[str, SlipSamples]) -> list[str]:

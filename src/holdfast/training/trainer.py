@@ -34,6 +34,7 @@ from holdfast.training.dataset_scan import (
     show_nothing,
 )
 from holdfast.training.evaluation import combine_decisions, judge
+from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.model_fit import (
     TrainingData,
     fit_full_model,
@@ -44,13 +45,12 @@ from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
 from holdfast.training.slips import (
     NO_SLIP_DECISIONS,
     choose_slip_threshold,
-    gather_slip_samples,
     missing_slip_rules,
     sliding_samples,
     with_slip_threshold,
 )
 from holdfast.training.splits import DataSplit, inner_folds, split_data
-from holdfast.training.training_samples import SamplesPlan, gather_samples, thin, thinning_step
+from holdfast.training.training_samples import SamplesPlan, gather_samples
 from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.training.verdict import LoadedTares, verdict
 
@@ -143,7 +143,7 @@ def train(
         final,
         metrics.pooled,
         trainer.data.thinned,
-        sliding_samples(model, trainer.data.slips),
+        sliding_samples(model, trainer.data.samples.slip),
     )
     model = msgspec.structs.replace(model, training=provenance)
     init = trainer.setting.init
@@ -173,18 +173,18 @@ class _Trainer:
             setting = replace(setting, features=self._that_fit(setting.features))
         self.setting = setting = self._with_split(self._with_handling(setting))
         self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
-        self.fingers = gather_samples(
-            recordings, self.scan, setting, self.data_split, engine, progress
-        )
-        slip_features = setting.slip_features and self._that_fit(setting.slip_features)
-        slip_setting = replace(setting, features=slip_features or setting.features)
-        plan = SamplesPlan(self.scan, slip_setting, self.data_split)
-        slips = (
-            gather_slip_samples(recordings, plan, engine, progress) if setting.init is None else {}
-        )
-        if slip_features and not slips:
+        own = setting.slip_features and self._that_fit(setting.slip_features)
+        plan = SamplesPlan(
+            self.scan, setting, self.data_split, own or setting.features,
+            only_stable=setting.init is not None,
+        )  # fmt: skip
+        samples = gather_samples(recordings, plan, engine, progress)
+        if own and not samples.slip:
             warn("no slips are known in the recordings: the model gets no slip rule")
-        self.data = TrainingData(self.scan, self.data_split, self.fingers, slips, slip_features)
+        self.fingers = samples.stable
+        self.data = TrainingData(
+            self.scan, self.data_split, samples, plan.slip_features, slip_squares=bool(own)
+        )
         self.slip_curves: list[tuple[Mapping[str, SlipCurve], int]] = []
 
     def _with_handling(self, setting: Setting) -> Setting:
@@ -334,7 +334,7 @@ class _Trainer:
                 for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics
-        for warning in missing_slip_rules(model, self.data.slips):
+        for warning in missing_slip_rules(model, self.data.samples.slip):
             self.warn(warning)
         curves = [curve for curve, _ in self.slip_curves]
         groups = [group for _, group in self.slip_curves]

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from holdfast.errors import TrainingError
 from holdfast.io import load_dataset
 from holdfast.sensors.types import Array
-from holdfast.training.training_samples import contact_threshold
+from holdfast.training.finger_samples import contact_threshold
 from holdfast_lab.study.benchmark.submission import COLUMN_TYPES, FingerScores
 from holdfast_lab.study.evaluation.fitted_method import (
     MAX_FITTED_SAMPLES,

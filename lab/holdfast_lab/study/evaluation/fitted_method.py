@@ -10,7 +10,7 @@ import numpy.typing as npt
 from holdfast.classifiers import Classifier, Samples
 from holdfast.metrics.decisions import Codes
 from holdfast.sensors.types import Array
-from holdfast.training.training_samples import (
+from holdfast.training.finger_samples import (
     concatenate,
     contact_threshold,
     labelled_samples,

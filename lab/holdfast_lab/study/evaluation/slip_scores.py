@@ -26,11 +26,8 @@ from holdfast.metrics.slip_truth import (
 from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
+from holdfast.training.finger_samples import thinning_step, usable_rows
 from holdfast.training.slips import SLIP_HOLD, SLIP_SMOOTHING
-from holdfast.training.training_samples import (
-    thinning_step,
-    usable_rows,
-)
 from holdfast_lab.study.evaluation.fitted_method import (
     ChosenRows,
     FittedMethod,

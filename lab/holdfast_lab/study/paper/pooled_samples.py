@@ -18,12 +18,8 @@ from holdfast.classifiers.folds import random_folds
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
-from holdfast.training.training_samples import (
-    concatenate,
-    labelled_samples,
-    resample_if_needed,
-    usable_rows,
-)
+from holdfast.training.finger_samples import concatenate, labelled_samples, usable_rows
+from holdfast.training.training_samples import resample_if_needed
 from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import FingerSignal, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy

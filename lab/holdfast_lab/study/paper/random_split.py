@@ -16,9 +16,9 @@ from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Sample
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.statistics import Interval, percent
 from holdfast.sensors.types import Integers
+from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
-from holdfast.training.training_samples import thin, thinning_step
 from holdfast.training.tuning import search
 from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.report.result_tables import Row

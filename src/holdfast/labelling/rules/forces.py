@@ -20,7 +20,8 @@ from holdfast.features.tare import TareArgument, baseline_of, offline_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors.types import Array
-from holdfast.training.training_samples import contact_threshold, rest_moments
+from holdfast.training.finger_samples import contact_threshold
+from holdfast.training.training_samples import rest_moments
 
 FORCE_SMOOTHING_TIME = 0.05
 """Time over which the force is averaged: short against a push, which lasts 0.2 s or more [s]."""
