@@ -11,7 +11,7 @@ PAGES = ("benchmark.md", "real-data.md", "study.md", *(
                                     "real-data", "slips", "twin")
 ))  # fmt: skip
 TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
-RESULT = re.compile(r"\bAUC\b|missed|within 100 ms|called STABLE|found within")
+RESULT = re.compile(r"\bAUC\b|missed|within 100 ms|called STABLE|found within|\btrained on\b")
 TRIVIAL = re.compile(r"always stable|never a slip|always a disturbance")
 DIFFERENCES = "| switched | to |"
 """Begin of a table that compares settings of one method."""
