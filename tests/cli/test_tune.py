@@ -70,13 +70,25 @@ def test_json_and_info(capsys, folder, tmp_path):
     assert set(document["fingers"]) == set(FINGERS)
 
 
+def test_the_verdict_is_in_sample(capsys, folder, tmp_path):
+    """It stands in the sentence of `tune`, and in that of `evaluate` on the same recordings."""
+    out = tmp_path / "tuned.json"
+    _, printed, _ = tune(capsys, folder, out, "--false-alarms", 30, "--json")
+    found = json.loads(printed)["verdict"]
+    assert " (in sample): " in found
+    _, printed, _ = run(capsys, "evaluate", out, folder / "data", "--json")
+    assert json.loads(printed)["verdict"] == found
+
+
 def test_no_verdict_on_training_recordings(capsys, folder, tmp_path):
     model, data = tmp_path / "model.json", folder / "data"
     train(load_dataset(data), Setting(trials=0)).model.save(model)
     words = ["tune", model, data, "--false-alarms", 30, "-o"]
     assert json.loads(run(capsys, *words, tmp_path / "a.json", "--json")[1])["verdict"] is None
     _, out, err = run(capsys, *words, tmp_path / "b.json")
-    assert out.startswith("No verdict: the model was trained on 2 of these 2 recordings.")
+    assert out.startswith(
+        "No verdict: in sample, the model was trained on 2 of these 2 recordings."
+    )
     assert "their metrics are optimistic" in err
 
 

@@ -114,7 +114,7 @@ def test_metrics_come_back_from_json():
 
 
 def test_a_total_without_intervals_has_the_same_metrics():
-    total = ResultTotal(intervals=False)
+    total = ResultTotal()
     for seed in range(4):
         total.add(score_recording(decisions(seed)))
     whole = summarise(decisions(seed) for seed in range(4))
