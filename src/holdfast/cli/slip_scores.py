@@ -19,6 +19,7 @@ SHARES_NOTE = (
     "all held time."
 )
 """Explanation of the columns of the scores of slips."""
+NEVER_NOTE = ' The row "never" is a model that never reports a slip.'
 SHARES_HEADER = (
     "by onset", "0.03", "0.05", "0.1", "0.1, 1 mm", "before 1 mm", "quiet", "held",
 )  # fmt: skip
@@ -45,7 +46,7 @@ def print_slips(
         [*rows, _finger_row("all", summary.pooled), _never_a_slip(summary.pooled)],
     )
     print_paragraph(SHARES_NOTE)
-    print_paragraph(_support(summary.pooled))
+    print_paragraph(_support(summary.pooled) + NEVER_NOTE)
     if summary.intervals is not None:
         print_line()
         print_paragraph(_intervals(summary.intervals, chosen=summary.threshold_chosen))
@@ -77,7 +78,7 @@ def _never_a_slip(metrics: "SlipMetrics") -> tuple[str, ...]:
     """Return the row of a model that never reports a slip."""
     n, n_over = _finger_row("", metrics)[1:3]
     shares = ["0"] * (len(SHARES_HEADER) - 2) if metrics.n else ["-"] * (len(SHARES_HEADER) - 2)
-    return "never a slip", n, n_over, *shares, "0.00", "0.00", "0.500"
+    return "never", n, n_over, *shares, "0.00", "0.00", "0.500"
 
 
 def _support(metrics: "SlipMetrics") -> str:

@@ -159,15 +159,14 @@ def without_margin(labels: Sequence[Label]) -> tuple[Label, ...]:
         [(0.0, 1.1), (1.1, 1.5)]
     """
     exact: list[Label] = []
-    for label in labels:
-        last = exact[-1] if exact else None
+    for before, label in zip((None, *labels), labels, strict=False):
         margined = label.state is ContactState.UNSTABLE and label.author in MARGIN_RULES
-        held = last is not None and last.state is ContactState.STABLE and last.end >= label.start
-        if last is None or not (margined and held):
+        held = before is not None and before.state is ContactState.STABLE
+        if before is None or not (margined and held and before.end >= label.start):
             exact.append(label)
             continue
         onset = min(label.start + UNSTABLE_MARGIN, label.end)
-        exact[-1] = replace(last, end=onset)
+        exact[-1] = replace(before, end=onset)
         if onset < label.end:
             exact.append(replace(label, start=onset))
     return tuple(exact)
