@@ -56,7 +56,7 @@ def test_the_first_compilation_is_announced_once_and_not_from_the_cache(kernels)
 
 def compile_a_kernel(_):
     """Compile a function that is in no cache."""
-    import numba
+    from holdfast.compiled import numba  # with the listener that logs compilations
 
     return numba.njit(lambda x: x + 1)(1)
 
