@@ -19,6 +19,7 @@ import typer
 from typer.main import get_command
 
 from holdfast.cli.terminal.console import print_error, print_line
+from holdfast.compile_notice import compiling_shown
 from holdfast.errors import HoldfastError, missing_extra
 
 VERBS = {
@@ -86,7 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        code = _run(words)
+        with compiling_shown():
+            code = _run(words)
         sys.stdout.flush()
     except BrokenPipeError:
         return _close_stdout()
