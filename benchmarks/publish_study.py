@@ -107,6 +107,24 @@ class Figures:
             return MISSING
         return self.cell(table, where, digits, interval=interval)
 
+    def share_stable(self, table: str, where: Where, figures: Sequence[str]) -> float:
+        """Return the accuracy of "always stable" [%]: the share of stable labels.
+
+        It follows from three figures of any method on the same samples, because
+        accuracy = share (1 - FNR) + (1 - share) (1 - FPR).
+
+        Args:
+            table: name of the table.
+            where: condition of the rows of the method.
+            figures: names of accuracy, FNR, and FPR or FDR [%].
+        """
+        accuracy, missed, false = (
+            (self.value(table, {**where, "figure": figure}) or 0.0) / 100 for figure in figures
+        )
+        if figures[2].startswith("FDR"):
+            return 100 * (1 - accuracy) / (1 - (1 - missed) * (1 - 2 * false) / (1 - false))
+        return 100 * (accuracy - 1 + false) / (false - missed)
+
     def grid(
         self,
         table: str,
@@ -191,7 +209,8 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
         keep_trailing_newline=True,
     )
     figures = Figures(summary)
-    names = {name: getattr(figures, name) for name in ("cell", "any_cell", "grid", "has", "ratio")}
+    public = ("cell", "any_cell", "grid", "has", "ratio", "share_stable")
+    names = {name: getattr(figures, name) for name in public}
     names["compares_methods"] = compares_methods
     return {
         page: environment.get_template(f"{Path(page).name}.j2").render(study=summary, **names)

@@ -6,7 +6,8 @@
     python benchmarks/slips.py train/ test/ --methods holdfast slip_servo --picture pictures/
 
 Prints the table `slips` of the study as Markdown: every method is fitted to TRAIN_FOLDER, its
-threshold is chosen there out of fold, and it is scored on TEST_FOLDER. A model has two lines: at
+threshold is chosen there out of fold, and it is scored on TEST_FOLDER. The last line is the trivial
+one that never reports a slip. A model has two lines: at
 its own threshold, and at the threshold that is chosen on TRAIN_FOLDER by the same rule. Below it,
 for the models, the causes by sample. `--picture` draws truth beside decisions of the first model,
 of the first grasp with each kind of slip event in TEST_FOLDER in which a finger slides over 1 mm:
@@ -35,7 +36,11 @@ from holdfast_lab.report.result_tables import Row
 from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison.slip_table import (
     FITTED_TO,
+    HELD_MINUTES,
     METHOD,
+    N_GROSS,
+    N_OVER_1MM,
+    N_SLIPS,
     method_keys,
     slip_rows,
     slip_table,
@@ -55,6 +60,10 @@ CHOSEN, SHIPPED = "from training", "its own"
 THRESHOLD = "threshold"
 LINES = (FITTED_TO, METHOD, THRESHOLD)
 MODEL = "its training"
+NEVER = {FITTED_TO: "-", METHOD: "never a slip", THRESHOLD: "-"}
+"""Line of the trivial baseline, which finds nothing and has no false alarm."""
+COUNTS = (N_SLIPS, N_GROSS, N_OVER_1MM, HELD_MINUTES)
+"""Columns about the recordings, the same in all lines."""
 
 
 class ModelCounts(NamedTuple):
@@ -105,6 +114,16 @@ def model_rows(name: str, train: Path, test: Path, seed: int) -> Iterator[Row]:
     yield from slip_rows({**keys, THRESHOLD: CHOSEN}, chosen)
 
 
+def never_rows(rows: Sequence[Row]) -> Iterator[Row]:
+    """Yield the rows of the trivial baseline, with the columns of another line."""
+    line = {key: rows[0].keys[key] for key in LINES}
+    for row in rows:
+        if line.items() <= row.keys.items():
+            figure = row.keys["figure"]
+            value = row.ours if figure in COUNTS else 0.5 if figure == "AUC" else 0.0
+            yield Row({**NEVER, "figure": figure}, value, None, row.n)
+
+
 def title_of(name: str) -> str:
     """Return the name of a model as it stands in the tables: of a file, without its folder."""
     return Path(name).stem if Path(name).suffix else name
@@ -150,6 +169,7 @@ def main() -> None:
     rows = list(method_rows(names, options.train, options.test, effort, options.seed))
     for name in options.model:
         rows += model_rows(name, options.train, options.test, options.seed)
+    rows += never_rows(rows)
     print(to_markdown(slip_table(rows, LINES)))
     if options.model:
         counts = {title_of(name): cause_counts(name, options.test) for name in options.model}

@@ -195,15 +195,17 @@ def _target(path: Path) -> str:
 
 @cache
 def _linked_files() -> frozenset[Path]:
-    """Return the files outside `docs/` to which its pages link."""
-    found = set()
+    """Return the files outside `docs/` to which its pages link, and those to which these do."""
+    found: set[Path] = set()
     pages = [*DOCS.rglob("*.md"), ROOT / "CHANGELOG.md"]
-    for page in pages:
+    for page in pages:  # which grows
         for link in LINK.findall(FENCE.sub("", page.read_text("utf-8"))):
             path = (page.parent / link.partition("#")[0]).resolve()
             outside = path.exists() and not path.is_relative_to(DOCS) and path != ROOT
             if outside and path.is_relative_to(ROOT) and path != ROOT / "README.md":
-                found.add(path / "README.md" if path.is_dir() else path)
+                file = path / "README.md" if path.is_dir() else path
+                pages += [file] if file.suffix == ".md" and file not in found else []
+                found.add(file)
     return frozenset(found)
 
 

@@ -1,6 +1,10 @@
 """What stops a strict build of the site, and what the generated pages hold."""
 
 import logging
+import re
+import shlex
+import subprocess
+import sys
 
 import hooks
 import pytest
@@ -56,3 +60,31 @@ def test_links_out_of_the_folder_lead_to_copies():
     assert hooks._relinked("https://x.org/", page, "live.md") == "https://x.org/"
     deep = hooks.DOCS / "study" / "skin.md"
     assert hooks._relinked("../../README.md", deep, "study/skin.md") == "../index.md"
+
+
+def test_links_of_files_outside_the_folder_have_their_copies():
+    assert hooks.ROOT / "examples" / "c" / "fingertip.ino" in hooks._linked_files()
+
+
+@pytest.mark.parametrize(("link", "code"), [("other.md#part", 0), ("no.md", 1), ("other.md#x", 1)])
+def test_a_broken_link_fails_the_check(tmp_path, link, code):
+    """With the command of `.ci/run` and the validation of `mkdocs.yml`."""
+    run = (hooks.ROOT / ".ci" / "run").read_text("utf-8")
+    options = shlex.split(re.search(r"mkdocs build (.*)", run)[1])
+    validation = (hooks.ROOT / "mkdocs.yml").read_text("utf-8").partition("validation:")[2]
+    validation = validation.partition("\nnav:")[0]
+    (tmp_path / "mkdocs.yml").write_text(f"site_name: x\nvalidation:{validation}\n")
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "index.md").write_text(f"[a]({link})")
+    (tmp_path / "docs" / "other.md").write_text("# Part")
+    build = [sys.executable, "-m", "mkdocs", "build", *options]
+    done = subprocess.run(build, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    assert (f"'{link.partition('#')[0]}'" in done.stderr) == bool(code)
+
+
+def test_the_front_page_installs_what_there_is():
+    """Nothing is on a package index before the first release."""
+    page = (hooks.DOCS / "index.md").read_text("utf-8")
+    assert "uv run holdfast demo" in page
+    assert not re.search(r"pip install [^-.]", page)

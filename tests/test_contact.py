@@ -12,6 +12,7 @@ from holdfast.contact import (
     STABLE,
     UNKNOWN,
     UNSTABLE,
+    Cause,
     ContactEstimate,
     ContactState,
     Fault,
@@ -40,6 +41,18 @@ def test_codes_are_positions_in_the_list():
         UNSTABLE,
         STABLE,
     ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "first"), [(ContactState, 0), (Reason, 0), (Fault, 0), (Cause, 1)]
+)
+def test_a_code_becomes_its_word(kind, first):
+    codes = range(first, first + len(kind))
+    assert [kind(code) for code in codes] == list(kind)
+    assert [kind(np.int8(code)) for code in codes] == list(kind)
+    for wrong in (first - 1, codes.stop, 1.5, "other"):
+        with pytest.raises(ValueError, match=rf"{wrong!r} is not a valid {kind.__name__}"):
+            kind(wrong)
 
 
 def test_no_label_is_unknown():

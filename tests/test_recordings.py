@@ -19,6 +19,7 @@ from holdfast.recordings import (
     labels_from_samples,
 )
 from holdfast.sensors import sensor
+from holdfast.synthetic import synthetic_recording
 
 SENSOR = sensor("anyskin")
 STATES = (ContactState.STABLE, ContactState.UNSTABLE, ContactState.NO_CONTACT)
@@ -326,3 +327,32 @@ class TestTruth:
         truth = Truth(np.arange(3.0), {"joints": np.ones((3, 16))})
         with pytest.raises(ValueError, match="read-only"):
             truth.hand["joints"][0] = 0
+
+
+def test_the_digest_of_readings_is_that_of_a_copy():
+    whole = synthetic_recording("a", 0, ("thumb", "index"))
+    thumb, index = whole.modules.values()
+    copy_of = {
+        "thumb": replace(thumb, times=thumb.times + 9, readings=thumb.readings * 1.0, labels=()),
+        "other": replace(index, times=index.times + 9, labels=()),
+    }
+    renamed = Recording("b", copy_of)
+    assert renamed.readings_digest == whole.readings_digest
+    assert renamed.digest != whole.digest
+    changed = np.array(thumb.readings)
+    changed[-1, -1, -1] += 1
+    other = replace(whole, modules={**whole.modules, "thumb": replace(thumb, readings=changed)})
+    assert other.readings_digest != whole.readings_digest
+
+
+def test_two_equal_modules():
+    whole = synthetic_recording("a", 0, ("thumb", "index"))
+    whole.check_modules_differ()
+    thumb = whole.modules["thumb"]
+    with pytest.raises(RecordingError) as error:
+        replace(whole, modules=dict.fromkeys(("thumb", "index"), thumb)).check_modules_differ()
+    assert str(error.value) == (
+        "recording 'a': thumb and index have the same readings; those of different sensors expected"
+    )
+    still = replace(thumb, readings=np.zeros_like(thumb.readings))
+    replace(whole, modules=dict.fromkeys(("thumb", "index"), still)).check_modules_differ()

@@ -135,6 +135,15 @@ class TestFigures:
         )
         assert "no rows" in self.figures.grid("u", {}, ["method"])
 
+    @pytest.mark.parametrize("false", ["FPR", "FDR"])
+    def test_the_share_of_stable_labels_follows_from_three_figures(self, false):
+        """80 of 200 are stable; 8 of these are missed, and 18 of the others called stable."""
+        given = {"accuracy": 87.0, "FNR": 10.0, "FPR": 15.0, "FDR": 20.0}
+        rows = [{"figure": name, "ours": value} for name, value in given.items()]
+        figures = script.Figures({"tables": {"t": rows}})
+        share = figures.share_stable("t", {}, ("accuracy", "FNR", false))
+        assert share == pytest.approx(40.0)
+
     def test_a_ratio_of_errors(self):
         b = {"method": "b", "figure": "y_z"}
         assert self.figures.ratio("t", b, {"method": "a"}) == "0.20"

@@ -8,9 +8,25 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 from numba.core.cpu import CPUTargetOptions
 
+from holdfast.compile_notice import COMPILING, LOGGER
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class _CompilationLog(event.Listener):
+    """Listener that logs each compilation; a kernel from the cache is none."""
+
+    def on_start(self, _: event.Event) -> None:
+        LOGGER.info(COMPILING)
+
+    def on_end(self, _: event.Event) -> None:
+        """Do nothing."""
+
+
+event.register("numba:compile", _CompilationLog())  # type: ignore[no-untyped-call]
 
 compiled = numba.njit(cache=True, error_model="numpy")
 compiled_parallel = numba.njit(cache=True, error_model="numpy", parallel=True)

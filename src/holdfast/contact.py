@@ -8,15 +8,36 @@ import math
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from numbers import Integral
+from typing import Any, NamedTuple, Self
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 
-class ContactState(StrEnum):
-    """State of a contact. The code of a state is its position in this list."""
+class _Coded(StrEnum):
+    """Words that arrays hold as codes. `ContactState(3)` is the state of that code."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> Self | None:
+        first = cls._first_code()
+        if not isinstance(value, Integral) or not first <= int(value) < first + len(cls):
+            return None
+        return tuple(cls)[int(value) - first]
+
+    @classmethod
+    def _first_code(cls) -> int:
+        return 0
+
+
+class ContactState(_Coded):
+    """State of a contact. The code of a state is its position in this list.
+
+    Example:
+        >>> ContactState(3), Reason(4), Cause(3)
+        (<ContactState.STABLE: 'STABLE'>, <Reason.FAULT: 'fault'>, <Cause.SLIP: 'slip'>)
+    """
 
     UNKNOWN = "UNKNOWN"
     NO_CONTACT = "NO_CONTACT"
@@ -34,7 +55,7 @@ UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = range(len(_STATES))
 """Codes of the states, for arrays."""
 
 
-class Reason(StrEnum):
+class Reason(_Coded):
     """Reason why a state is UNKNOWN. The code of a reason is its position in this list."""
 
     NONE = ""
@@ -44,8 +65,8 @@ class Reason(StrEnum):
     FAULT = "fault"
 
 
-class Fault(StrEnum):
-    """Fault of a finger. Bit i of a fault mask is position i in this list.
+class Fault(_Coded):
+    """Fault of a finger. Bit i of a fault mask is position i in this list: `Fault(i)`.
 
     The detector finds the faults up to TARE_DRIFT in the readings. A source reports the others,
     which concern the arrival of samples.
@@ -70,8 +91,8 @@ SIGNAL_FAULTS = tuple(Fault)[:8]
 """Faults that the detector finds in the readings."""
 
 
-class Cause(StrEnum):
-    """Cause of a contact that is not stable."""
+class Cause(_Coded):
+    """Cause of a contact that is not stable. The first has code 1; 0 is no cause."""
 
     CLOSING = "closing"
     DISTURBANCE = "disturbance"
@@ -79,6 +100,10 @@ class Cause(StrEnum):
     LOST = "lost"
     RELEASED = "released"
     GLITCH = "glitch"
+
+    @classmethod
+    def _first_code(cls) -> int:
+        return 1
 
 
 CAUSES = tuple(Cause)

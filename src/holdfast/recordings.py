@@ -22,6 +22,8 @@ STARTS_LOADED = "starts_loaded"
 """Field of the metadata: true if the object is held at the first sample."""
 BASELINES = "baselines"
 """Field of the metadata: readings without contact by module, for each taxel and axis."""
+HASHED_SAMPLES = 4096
+"""Number of samples that are converted at a time for a hash: bounds the memory."""
 MAX_SHOWN_CLOCK = 1e5
 """If a recording starts later than this, times are shown since its start [s]."""
 
@@ -118,6 +120,15 @@ class Tactile:
     def n_samples(self) -> int:
         """Number of samples."""
         return len(self.times)
+
+    @cached_property
+    def readings_digest(self) -> str:
+        """Hash of the readings alone, whatever their times, number type and file format."""
+        state = hashlib.blake2b(repr(self.readings.shape).encode(), digest_size=16)
+        for first in range(0, self.n_samples, HASHED_SAMPLES):
+            part = self.readings[first : first + HASHED_SAMPLES]
+            state.update(np.ascontiguousarray(part, dtype=np.float64).data)
+        return state.hexdigest()
 
     @cached_property
     def period(self) -> float:
@@ -305,6 +316,27 @@ class Recording:
             state.update(np.ascontiguousarray(module.times).data)
             state.update(readings.data)
         return state.hexdigest()
+
+    @cached_property
+    def readings_digest(self) -> str:
+        """Hash of the readings of all modules, without times and names: copies have the same."""
+        parts = sorted(module.readings_digest for module in self.modules.values())
+        return hashlib.blake2b("".join(parts).encode(), digest_size=16).hexdigest()
+
+    def check_modules_differ(self) -> None:
+        """Check that no two modules have the same readings, unless these never change.
+
+        Raises:
+            RecordingError: two modules have the same readings.
+        """
+        names: dict[str, str] = {}
+        for name, module in self.modules.items():
+            first = names.setdefault(module.readings_digest, name)
+            if first != name and (module.readings[1:] != module.readings[:-1]).any():
+                raise RecordingError(
+                    f"recording {self.name!r}: {first} and {name} have the same readings; those "
+                    "of different sensors expected"
+                )
 
     def with_labels(self, labels: Mapping[str, Sequence[Label]]) -> Self:
         """Return the same recording with these labels in place of its own.

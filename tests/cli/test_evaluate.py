@@ -80,6 +80,75 @@ def test_training_recordings_are_named_even_if_renamed(capsys, folder, tmp_path)
     assert err.endswith("their metrics are optimistic\n")
 
 
+def restamped(recording, name):
+    """The recording an hour later, as floats, under another name."""
+    modules = {
+        finger: replace(
+            m,
+            times=m.times + 3600.0,
+            readings=m.readings.astype(float),
+            labels=tuple(replace(x, start=x.start + 3600, end=x.end + 3600) for x in m.labels),
+        )
+        for finger, m in recording.modules.items()
+    }
+    return replace(recording, name=name, modules=modules)
+
+
+def test_a_copy_with_other_times_is_found(capsys, folder, tmp_path):
+    """A copy of a training recording is one; a copy of a new one counts once for the verdict."""
+    save_recording(restamped(load_dataset(folder / "seen")[0], "a"), tmp_path / "a.parquet")
+    new = load_dataset(folder / "new")[0]
+    save_recording(replace(new, name="b"), tmp_path / "b.parquet")
+    save_recording(restamped(new, "c"), tmp_path / "c.parquet")
+    _, out, err = run(capsys, folder / "model.json", tmp_path, "--json")
+    assert json.loads(out)["trained_on"] == ["a"]
+    assert (
+        err.splitlines()[0]
+        == "copies, with the same readings: c of b; the verdict counts them once"
+    )
+    _, alone, _ = run(capsys, folder / "model.json", tmp_path / "b.parquet", "--json")
+    assert json.loads(out)["verdict"] == json.loads(alone)["verdict"] + (
+        " From 1 of 3 recordings: the model was trained on the others, copies count once."
+    )
+
+
+def test_two_equal_fingers_are_refused(capsys, folder, tmp_path):
+    whole = load_dataset(folder / "new")[0]
+    equal = replace(whole, modules=dict.fromkeys(FINGERS, whole.modules["thumb"]))
+    save_recording(equal, tmp_path / "equal.parquet")
+    assert refusal(capsys, folder / "model.json", tmp_path) == (
+        "recording 'grasp-2': thumb and index have the same readings; those of different sensors "
+        "expected"
+    )
+
+
+def test_onsets_by_a_rule_are_scored_without_their_margin(capsys, folder, tmp_path):
+    whole = load_dataset(folder / "new")[0]
+    labels = {
+        name: [replace(label, author="rule:signal") for label in module.labels]
+        for name, module in whole.modules.items()
+    }
+    save_recording(whole.with_labels(labels), tmp_path / "rule.parquet")
+    _, out, _ = run(capsys, folder / "model.json", tmp_path)
+    assert "by labels of a rule, without their margin)" in out
+    hand = evaluate(Model.load(folder / "model.json"), load_dataset(tmp_path)).events.hand
+    by_hand = evaluate(Model.load(folder / "model.json"), [whole]).events.hand
+    assert (hand.onsets, by_hand.onsets, hand.n_events) == ("rule", "labels", by_hand.n_events)
+    longer = 60 * (hand.stable_minutes - by_hand.stable_minutes)
+    assert longer == pytest.approx(0.1 * hand.n_events, abs=0.06)
+
+
+def test_the_tables_have_the_trivial_baseline(capsys, folder):
+    _, out, _ = run(capsys, folder / "model.json", folder / "new")
+    _, document, _ = run(capsys, folder / "model.json", folder / "new", "--json")
+    rows = [line.split()[2:] for line in out.splitlines() if "always STABLE " in line]
+    (tn, fp), (fn, tp) = json.loads(document)["pooled"]["confusion"]
+    n, n_events = tn + fp + fn + tp, json.loads(document)["events"]["hand"]["n_events"]
+    share = f"{100 * (fn + tp) / n:.1f}"
+    assert rows[-2][:2] == [str(n), share]
+    assert rows[-1] == [str(n_events), "100.0", "100.0", "100.0", "never", "never", "0.0"]
+
+
 def test_new_labels_do_not_hide_training_recordings(capsys, folder, tmp_path):
     """A recording with other labels is the same recording."""
     seen = load_dataset(folder / "seen")[0]
@@ -102,8 +171,8 @@ def test_no_verdict_on_training_recordings(capsys, folder):
     assert json.loads(out)["verdict"] is None
     _, out, _ = run(capsys, folder / "model.json", folder / "seen")
     assert " ".join(out.split()).startswith(
-        "No verdict: the model was trained on 2 of these 2 recordings. It needs labelled "
-        "recordings that the model has not seen. by sample"
+        "No verdict: in sample, the model was trained on 2 of these 2 recordings. It needs "
+        "labelled recordings that the model has not seen. by sample"
     )
 
 

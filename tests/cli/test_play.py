@@ -12,6 +12,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.cli import play as verb
+from holdfast.cli.options import awaited
 from holdfast.contact import Fault
 from holdfast.detector import Detector, detect
 from holdfast.devices.sources import open_source
@@ -182,6 +183,7 @@ def test_the_number_of_clients_is_printed(capsys, path, monkeypatch):
     _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)
     listener.join()
     assert "1 client" in err.splitlines()
+    assert verb._clients(0, port) == f"waiting for a client on port {port}"
 
 
 def test_a_terminal_shows_the_rate(capsys, path, monkeypatch):
@@ -240,6 +242,18 @@ class TestRefusals:
             "holdfast: finger1: readings from 0 to 65535 counts expected, -2 to -2 given; "
             "packets of a XELA server hold no others"
         )
+
+
+@pytest.mark.parametrize(
+    ("source", "text"),
+    [
+        ("xela://auto", "waiting for the first packet of xela://auto"),
+        ("twin:?object=can", "simulating the first grasp of twin:?object=can"),
+        ("grasp.parquet", ""),
+    ],
+)
+def test_what_a_command_waits_for(source, text):
+    assert awaited(source) == text
 
 
 def test_only_the_twin_takes_commands(capsys, path):

@@ -14,7 +14,8 @@ from holdfast.cli import serve as verb
 from holdfast.cli.serve import open_browser
 from holdfast.devices.hands import Claim
 from holdfast.devices.hands.local import LogFile
-from holdfast.errors import HandError
+from holdfast.devices.sources import Source
+from holdfast.errors import HandError, SourceError
 from holdfast.io import load_recording, save_recording
 from holdfast.live.loop import watchdog
 from holdfast.model import Model
@@ -313,3 +314,29 @@ def test_estimates_that_ros_refuses_are_reported(capsys, monkeypatch, grasp):
     assert err.endswith(
         "Refuser: ROS refused 7 estimates, 2 were dropped because it was too slow\n"
     )
+
+
+class Slow(Source):
+    """Source that has no packet while it is opened, and then fails."""
+
+    name = "xela://127.0.0.1:1"
+
+    def open(self):
+        time.sleep(0.5)
+        raise SourceError("no packet came")
+
+    def read(self, timeout):
+        return None
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize("command", [("serve", MODEL), ("play",)])
+def test_what_it_waits_for_is_printed(capsys, monkeypatch, command):
+    monkeypatch.setattr("holdfast.devices.sources.open_source", lambda *_, **__: Slow())
+    assert main([*command, Slow.name, "--port", "0", "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "waiting for the first packet of xela://127.0.0.1:1" in err.splitlines()
+    assert err.splitlines()[-1] == "holdfast: no packet came"

@@ -70,13 +70,25 @@ def test_json_and_info(capsys, folder, tmp_path):
     assert set(document["fingers"]) == set(FINGERS)
 
 
+def test_the_verdict_is_in_sample(capsys, folder, tmp_path):
+    """It stands in the sentence of `tune`, and in that of `evaluate` on the same recordings."""
+    out = tmp_path / "tuned.json"
+    _, printed, _ = tune(capsys, folder, out, "--false-alarms", 30, "--json")
+    found = json.loads(printed)["verdict"]
+    assert " (in sample): " in found
+    _, printed, _ = run(capsys, "evaluate", out, folder / "data", "--json")
+    assert json.loads(printed)["verdict"] == found
+
+
 def test_no_verdict_on_training_recordings(capsys, folder, tmp_path):
     model, data = tmp_path / "model.json", folder / "data"
     train(load_dataset(data), Setting(trials=0)).model.save(model)
     words = ["tune", model, data, "--false-alarms", 30, "-o"]
     assert json.loads(run(capsys, *words, tmp_path / "a.json", "--json")[1])["verdict"] is None
     _, out, err = run(capsys, *words, tmp_path / "b.json")
-    assert out.startswith("No verdict: the model was trained on 2 of these 2 recordings.")
+    assert out.startswith(
+        "No verdict: in sample, the model was trained on 2 of these 2 recordings."
+    )
     assert "their metrics are optimistic" in err
 
 
@@ -147,7 +159,7 @@ def test_the_threshold_of_slips(capsys, sliding, tmp_path, monkeypatch):
     rules = [part.slip for part in Model.load(out).fingers.values()]
     assert all(rule.thresholds.false_alarms_per_minute <= 5 for rule in rules)
     lines = printed.splitlines()
-    assert lines[0].startswith("Slips: ")
+    assert " Slips: " in " ".join(printed.split())
     assert sum(line.endswith("chosen") for line in lines) == 1
     assert lines[-1].startswith(f"{out}: a slip from a probability of ")
     assert all(len(line) <= 80 for line in lines[:-1])
@@ -159,7 +171,16 @@ def test_json_and_info_of_slips(capsys, sliding, tmp_path):
     code, printed, _ = tune(capsys, sliding, out, *words)
     report = json.loads(printed)
     assert code == 0
-    assert list(report) == ["model", "for", "threshold", "chosen", "before", "around", "trained_on"]
+    assert list(report) == [
+        "model",
+        "verdict",
+        "for",
+        "threshold",
+        "chosen",
+        "before",
+        "around",
+        "trained_on",
+    ]
     assert report["for"] == "slip"
     assert report["chosen"]["false_alarms_per_minute"]["held"] <= 5
     chosen = next(p for p in report["around"] if p["threshold"] == report["threshold"])
@@ -223,6 +244,7 @@ def test_evaluate_prints_slips(capsys, sliding, monkeypatch):
     rows = {line.split()[0]: line.split() for line in lines[place:] if line.strip()}
     assert rows["all"][1] == "32"
     assert rows["thumb"][1] == rows["index"][1] == "16"
+    assert rows["never"][1:] == ["32", rows["all"][2], *["0"] * 6, "0.00", "0.00", "0.500"]
     assert "without a choice of the threshold" in " ".join(printed.split())
     assert "Slips: " in " ".join(lines[:6])
     assert all(len(line) <= 80 for line in lines[:-1])

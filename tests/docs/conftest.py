@@ -52,16 +52,17 @@ def public_box(folder, data_folder, monkeypatch):
 def csv_recordings(folder):
     """A function that writes grasps as CSV files, as a logger does, to a folder."""
 
-    def write(name, seeds=(0, 1, 2), fingers=("thumb", "index")):
+    def write(name, seeds=(0, 1, 2), fingers=("thumb", "index"), *, plain=False):
         (folder / name).mkdir()
         for seed in seeds:
             recording = synthetic_recording(f"grasp{seed}", seed, fingers)
-            write_csv(recording, folder / name / f"grasp{seed}.csv")
+            write_csv(recording, folder / name / f"grasp{seed}.csv", plain=plain)
 
     return write
 
 
-def write_csv(recording, path):
+def write_csv(recording, path, *, plain):
+    """Write a recording; without the names of sensors, and channels that have numbers, if plain."""
     modules = recording.modules
     first = next(iter(modules.values()))
     names = [
@@ -73,6 +74,8 @@ def write_csv(recording, path):
     columns = [first.times[:, None]]
     columns += [one.readings.reshape(one.n_samples, -1) for one in modules.values()]
     header = [f"# sensor: {module}={one.sensor.name}" for module, one in modules.items()]
+    if plain:
+        header, names = [], [f"s{k}" for k in range(len(names))]
     np.savetxt(
         path, np.hstack(columns), fmt=["%.6f"] + ["%d"] * len(names), delimiter=",",
         header="\n".join([*header, ",".join(["time", *names])]), comments="",

@@ -43,7 +43,7 @@ def test_the_demo_and_what_it_made(folder, short_demo):
 
 
 def test_recordings_of_ones_own(folder, csv_recordings):
-    csv_recordings("my-data", fingers=("thumb",))
+    csv_recordings("my-data", fingers=("thumb",), plain=True)
     assert blocks.run_page(README, {}, RECORDINGS) == 1
     assert (folder / "model.json").exists()
 

@@ -12,10 +12,8 @@ from holdfast.metrics import (
     Decisions,
     FingerDecisions,
     Metrics,
-    ResultTotal,
     event_metrics,
     sample_metrics,
-    score_recording,
     summarise,
 )
 
@@ -111,14 +109,6 @@ def test_json_has_the_fields_of_the_contract():
 def test_metrics_come_back_from_json():
     metrics = summarise([decisions(1), decisions(2)])
     assert msgspec.json.decode(msgspec.json.encode(metrics), type=Metrics) == metrics
-
-
-def test_a_total_without_intervals_has_the_same_metrics():
-    total = ResultTotal(intervals=False)
-    for seed in range(4):
-        total.add(score_recording(decisions(seed)))
-    whole = summarise(decisions(seed) for seed in range(4))
-    assert total.metrics() == msgspec.structs.replace(whole, intervals=None)
 
 
 def test_intervals_hold_their_figures():

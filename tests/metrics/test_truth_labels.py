@@ -6,8 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.contact import Cause, ContactState, Phase
-from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
-from holdfast.recordings import Truth, label_states
+from holdfast.metrics.truth_labels import (
+    LabelRule,
+    common_onsets,
+    labels_by_rule,
+    labels_from_truth,
+    phases_from_touch,
+    without_margin,
+)
+from holdfast.recordings import Label, Truth, label_states
 
 RATE = 150
 RULE = LabelRule()
@@ -306,3 +313,46 @@ class TestGlitch:
     def test_with_an_empty_hand_it_is_not_labelled(self):
         rows = label_rows(truth(*GRASP, glitch=[(0.2, 0.3)]))
         assert Cause.GLITCH not in [row[3] for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("author", "push", "spans"),
+    [
+        ("rule:signal", (1.0, 1.5), [(0.0, 1.1), (1.1, 1.5)]),
+        ("rule:tracking", (1.0, 1.2), [(0.0, 1.1), (1.1, 1.2)]),
+        ("rule:signal", (1.0, 1.05), [(0.0, 1.05)]),
+        ("rule:signal", (1.2, 1.5), [(0.0, 1.0), (1.2, 1.5)]),
+        ("rule:command", (1.0, 1.5), [(0.0, 1.0), (1.0, 1.5)]),
+        ("a person", (1.0, 1.5), [(0.0, 1.0), (1.0, 1.5)]),
+    ],
+)
+def test_the_margin_of_a_rule_before_an_onset(author, push, spans):
+    labels = [Label(0.0, 1.0, "STABLE", author=author), Label(*push, "UNSTABLE", author=author)]
+    assert [(x.start, x.end) for x in without_margin(labels)] == [
+        pytest.approx(span) for span in spans
+    ]
+    assert labels_by_rule(labels) == author.startswith("rule:")
+
+
+def test_an_exact_slip_within_the_margin_is_the_onset():
+    author = "rule:tracking"
+    labels = [
+        Label(0.0, 1.0, "STABLE", author=author),
+        Label(1.0, 1.04, "UNSTABLE", "disturbance", author=author),
+        Label(1.04, 1.5, "UNSTABLE", "slip", author=author),
+    ]
+    assert [(x.start, x.end) for x in without_margin(labels)] == [(0.0, 1.04), (1.04, 1.5)]
+
+
+@pytest.mark.parametrize(
+    ("parts", "common"),
+    [
+        ((), "labels"),
+        (("truth",), "truth"),
+        (("truth", "labels"), "mixed"),
+        (("truth", "rule"), "rule"),
+        (("labels", "rule"), "rule"),
+    ],
+)
+def test_where_onsets_of_several_recordings_come_from(parts, common):
+    assert common_onsets(set(parts)) == common

@@ -165,11 +165,11 @@ def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
         "mine was trained on 1 of these 3 recordings (grasp-30): the metrics on them are too good"
     ]
     assert set(known.training.recordings.values()) <= set(adapted.training.recordings.values())
-    assert adapted.training.recordings["grasp-30"] == seen.digest
+    assert adapted.training.recordings["grasp-30"] == seen.readings_digest
     trained = train([seen, *few], Setting.adapting(known, trials=0))
     assert (trained.known, trained.verdict) == (("grasp-30",), None)
     assert train(few, Setting.adapting(known, trials=0)).verdict is not None
-    assert adapted.training.recordings["grasp-41 (init)"] == tiny_recording(41).digest
+    assert adapted.training.recordings["grasp-41 (init)"] == tiny_recording(41).readings_digest
 
 
 # --- what is refused -------------------------------------------------------------------------

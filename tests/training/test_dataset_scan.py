@@ -49,7 +49,7 @@ def same_samples():
         ),
         (
             same_samples(),
-            "recordings 'grasp-0' and 'copy' hold the same samples: one would be tested by "
+            "recordings 'grasp-0' and 'copy' hold the same readings: one would be tested by "
             "a model that was trained on the other",
         ),
         (

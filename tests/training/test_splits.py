@@ -19,7 +19,8 @@ ALONE = "the split by {} needs at least two, 1 given ({}); the split by time nee
 
 def entries(*objects):
     return [
-        ScannedRecording(f"grasp-{k}", str(k), thing, 100.0, {}) for k, thing in enumerate(objects)
+        ScannedRecording(f"grasp-{k}", str(k), str(k), thing, 100.0, {})
+        for k, thing in enumerate(objects)
     ]
 
 

@@ -62,7 +62,7 @@ def test_the_model_keeps_how_it_was_tuned(model, others, tmp_path):
     assert found.tuning == tuned.tuning
     assert found.name == "mine, tuned"
     assert found.tuning.requested == 40.0
-    assert found.tuning.recordings == {each.name: each.digest for each in others}
+    assert found.tuning.recordings == {each.name: each.readings_digest for each in others}
     assert {p.classifier.threshold for p in found.fingers.values()} == {found.tuning.threshold}
     assert found.training == model.training
 

@@ -1,12 +1,14 @@
 """The sentence on what a model is good for: each of its forms."""
 
+import msgspec
 import numpy as np
 import pytest
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions, summarise
+from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
 from holdfast.metrics.slips import SlipMetrics
-from holdfast.training.verdict import LoadedTares, verdict, verdict_of_events, verdict_of_slips
+from holdfast.training.verdict import LoadedTares, verdict
 
 TIMES = np.arange(12_000) * 0.01
 LABELS = np.where(np.arange(12_000) % 1000 < 800, STABLE, UNSTABLE)
@@ -14,10 +16,11 @@ LABELS = np.where(np.arange(12_000) % 1000 < 800, STABLE, UNSTABLE)
 RIGHT = np.where(LABELS == STABLE, 0.9, 0.1)
 
 
-def metrics(states, probability=RIGHT, labels=LABELS):
+def metrics(states, probability=RIGHT, labels=LABELS, n=1, **exact):
+    """Metrics of so many equal recordings."""
     probability = np.where(states == UNKNOWN, np.nan, probability)
-    finger = FingerDecisions(TIMES, labels, np.asarray(states, dtype=np.int8), probability)
-    return summarise([Decisions.of("one", {"thumb": finger}, 1)])
+    finger = FingerDecisions(TIMES, labels, np.asarray(states, dtype=np.int8), probability, **exact)
+    return summarise([Decisions.of(f"{k}", {"thumb": finger}, 1) for k in range(n)])
 
 
 def with_false_alarms(every, first=50):
@@ -56,26 +59,29 @@ def test_a_model_like_chance():
 def test_a_threshold_with_many_false_alarms():
     found = verdict(metrics(with_false_alarms(100)))
     assert found == (
-        "Not good enough: 60 false alarms a minute at this threshold (see holdfast tune); 99 % of "
-        "the samples right (always STABLE: 80 %)."
+        "Not good enough: 60 false alarms a minute at this threshold (see holdfast tune), 0 % of "
+        "12 onsets of instability missed within 0.2 s; 99 % of the samples right (always STABLE: "
+        "80 %)."
     )
 
 
 def test_a_good_model():
-    assert verdict(metrics(LABELS)) == (
-        "Good for an automatic reaction: 0.0 false alarms a minute, 0 % of 12 onsets of "
+    assert verdict(metrics(LABELS, n=7)) == (
+        "Good for an automatic reaction: at most 0.27 false alarms a minute, 0 % of 84 onsets of "
         "instability missed within 0.2 s; 100 % of the samples right (always STABLE: 80 %)."
     )
 
 
 def test_a_model_for_a_person_who_watches():
-    found = verdict(metrics(late(2)))
-    assert found.startswith("Good for a person who watches: 0.0 false alarms a minute, 17 % of 12")
+    found = verdict(metrics(late(2), n=7))
+    assert found.startswith(
+        "Good for a person who watches: at most 0.27 false alarms a minute, 17 % of 84"
+    )
 
 
 def test_a_model_that_misses_events():
     assert verdict(metrics(late(5))).startswith(
-        "Not good enough: 0.0 false alarms a minute, 42 % of 12 onsets"
+        "Not good enough: at most 1.9 false alarms a minute, 42 % of 12 onsets"
     )
 
 
@@ -95,8 +101,9 @@ def test_recordings_without_events():
     labels = np.where(np.arange(12_000) < 5000, UNSTABLE, STABLE)
     found = verdict(metrics(labels, np.where(labels == STABLE, 0.9, 0.1), labels))
     assert found == (
-        "No event to judge by: 0.0 false alarms a minute, no instability after a stable hold in "
-        "these recordings; 100 % of the samples right (always STABLE: 58 %)."
+        "Not enough data: 0 of 20 events, 1.1 of 10 held minutes, 1 of 5 recordings: at most 2.6 "
+        "false alarms a minute, no instability after a stable hold in these recordings; 100 % of "
+        "the samples right (always STABLE: 58 %)."
     )
 
 
@@ -106,59 +113,125 @@ def test_tares_under_load_are_named():
     assert "tare" not in verdict(metrics(LABELS), LoadedTares(0, 5))
 
 
+def test_labels_that_are_never_stable():
+    labels = np.full(12_000, UNSTABLE)
+    assert verdict(metrics(LABELS, labels=labels)).startswith(
+        "Not enough data: 0 of 20 events, 0 of 10 held minutes, 1 of 5 recordings: the hand is "
+        "never labelled stable, no instability"
+    )
+
+
+def changed(whole, n_recordings=5, **fields):
+    """Metrics of five recordings with other counts, rates and intervals of the hand."""
+    replace, hand = msgspec.structs.replace, whole.events.hand
+    limits = {name: fields.pop(name) for name in ("rate_limits", "missed_limits") if name in fields}
+    intervals = replace(
+        whole.intervals.hand,
+        false_alarms_per_minute=limits.get("rate_limits", (0.0, 0.0)),
+        missed={"0.2": limits.get("missed_limits", (0.0, 0.0))},
+    )
+    return replace(
+        whole,
+        recordings=whole.recordings[:n_recordings],
+        events=replace(whole.events, hand=replace(hand, **fields)),
+        intervals=replace(whole.intervals, hand=intervals),
+    )
+
+
+ENOUGH = {"n_events": 20, "stable_minutes": 10.0}
+
+
 @pytest.mark.parametrize(
-    ("states", "text"),
+    ("fields", "start"),
     [
+        ({}, "Good for an automatic reaction: at most 0.3 false alarms a minute, 0 % of 20"),
+        ({"n_events": 12}, "Not enough data: 12 of 20 events: at most 0.3 false alarms"),
+        ({"stable_minutes": 9.99}, "Not enough data: 9.9 of 10 held minutes: at most 0.3 false"),
+        ({"n_recordings": 4}, "Not enough data: 4 of 5 recordings: at most 0.3 false"),
         (
-            LABELS,
-            "Good for an automatic reaction: 0.0 false alarms a minute, 0 % of 12 onsets of "
-            "instability missed within 0.2 s.",
+            {"n_events": 1, "stable_minutes": 0.4, "n_recordings": 1},
+            "Not enough data: 1 of 20 events, 0.4 of 10 held minutes, 1 of 5 recordings: at most "
+            "7.5 false alarms a minute, 0 % of 1 onset of",
         ),
         (
-            late(5),
-            "Not good enough: 0.0 false alarms a minute, 42 % of 12 onsets of instability missed "
-            "within 0.2 s.",
+            {"false_alarms_per_minute": 0.5, "rate_limits": (0.1, 1.2)},
+            "Good for a person who watches: 0.5 (up to 1.2) false alarms a minute",
         ),
+        (
+            {"missed": {"0.2": 5.0}, "missed_limits": (0.0, 15.0)},
+            "Good for a person who watches: at most 0.3 false alarms a minute, 5 % (up to 15 %)",
+        ),
+        (
+            {"false_alarms_per_minute": 8.0, "rate_limits": (2.0, 14.0)},
+            "Not good enough: 8 (up to 14) false alarms a minute,",
+        ),
+        ({"n_events": 12, "false_alarms_per_minute": 14.0}, "Not good enough: 14 false alarms"),
+        ({"onsets": "rule"}, "Good for an automatic reaction (labels by rule): at most"),
     ],
 )
-def test_events_alone(states, text):
-    assert verdict_of_events(metrics(states).events.hand) == text
+def test_the_rule_of_events(fields, start):
+    assert verdict(changed(metrics(LABELS, n=5), **ENOUGH | fields)).startswith(start)
 
 
-def slips(n=40, found=95.0, rate=1.0, onsets="truth"):
+def test_in_sample_stands_in_both_sentences():
+    whole = changed(metrics(LABELS, n=5), **ENOUGH, onsets="rule")
+    found = verdict(with_slips(slips(onsets="rule"), whole), in_sample=True)
+    assert found.startswith("Good for an automatic reaction (in sample, labels by rule): at most")
+    assert found.endswith("automatic reaction to slips (in sample, labels by rule).")
+
+
+def slips(n=40, found=95.0, rate=1.0, onsets="truth", minutes=10.0):
     shares = {"before": 0.0, "0.03": 0.0, "0.05": 0.0, "0.1": found if n else None}
     known = onsets == "truth" and n
     return SlipMetrics(
         n=n, n_over_1mm=n if known else 0, n_gross=0, incipient=shares, gross={}, over_1mm=shares,
         before_1mm=found if known else None, before_3mm=None, raised_quiet=0.0,
         false_alarms_per_minute={"quiet": 0.0, "held": rate}, auc=0.9, quiet_minutes=5.0,
-        held_minutes=9.0, onsets=onsets,
+        held_minutes=minutes, onsets=onsets,
     )  # fmt: skip
 
 
+def with_slips(pooled, whole=None, found=None, rate=None):
+    """Metrics of five recordings with these slips, and the intervals of shares and rate."""
+    whole = metrics(LABELS, n=5) if whole is None else whole
+    shares = dict.fromkeys(("before", "0.03", "0.05", "0.1"), found)
+    limits = SlipIntervals(shares, {}, shares, found, None, None, {"quiet": None, "held": rate})
+    return msgspec.structs.replace(whole, slips=SlipSummary({}, pooled, limits))
+
+
+def slip_sentence(*arguments, **intervals):
+    return verdict(with_slips(*arguments, **intervals)).partition(" Slips: ")[2]
+
+
 @pytest.mark.parametrize(
-    ("metrics", "use"),
+    ("pooled", "intervals", "use"),
     [
-        (slips(), "good for an automatic reaction to slips"),
-        (slips(found=90.0, rate=1.5), "good for an automatic reaction to slips"),
-        (slips(rate=1.6), "not good enough"),
-        (slips(found=89.0), "not good enough"),
-        (slips(n=19), "too few to judge an automatic reaction (19 of 20 needed)"),
-        (slips(onsets="labels"), "good for an automatic reaction to slips"),
-        (slips(found=80.0, onsets="labels"), "not good enough"),
+        (slips(), {}, "good for an automatic reaction to slips."),
+        (slips(found=90.0, rate=1.5), {}, "good for an automatic reaction to slips."),
+        (slips(rate=1.6), {}, "not good enough"),
+        (slips(found=89.0), {}, "not good enough"),
+        (slips(), {"rate": (0.5, 1.6)}, "not good enough"),
+        (slips(), {"found": (80.0, 99.0)}, "not good enough for an automatic reaction to slips: "
+         "before 1 mm 95 % (down to 80 %), 90 % needed at 1.5 false alarms a minute."),
+        (slips(n=19), {}, "not enough data: 19 of 20 slips over 1 mm."),
+        (slips(minutes=9.0), {}, "not enough data: 9 of 10 held minutes."),
+        (slips(onsets="labels"), {}, "good for an automatic reaction to slips."),
+        (slips(onsets="rule"), {}, "good for an automatic reaction to slips (labels by rule)."),
+        (slips(n=19, onsets="labels"), {}, "not enough data: 19 of 20 slips."),
+        (slips(found=80.0, onsets="labels"), {}, "not good enough"),
     ],
-)
-def test_what_slips_are_good_for(metrics, use):
-    assert verdict_of_slips(metrics).split("; ")[1].startswith(use)
+)  # fmt: skip
+def test_what_slips_are_good_for(pooled, intervals, use):
+    assert slip_sentence(pooled, **intervals).split("; ")[1].startswith(use)
 
 
 def test_the_sentence_about_slips():
-    assert verdict_of_slips(slips(found=35.0)) == (
-        "Slips: 35 % of 40 slips of fingers found within 0.1 s at 1 false alarms a minute of held "
-        "time; not good enough for an automatic reaction to slips (before 1 mm: 35 %, 90 % needed "
-        "at 1.5 false alarms a minute)."
+    assert slip_sentence(slips(found=35.0), rate=(0.5, 1.4)) == (
+        "35 % of 40 slips of fingers found within 0.1 s, 1 (up to 1.4) false alarms a minute of "
+        "held time; not good enough for an automatic reaction to slips: before 1 mm 35 %, 90 % "
+        "needed at 1.5 false alarms a minute."
     )
-    assert " (by labels) found within 0.1 s" in verdict_of_slips(slips(onsets="labels"))
-    assert verdict_of_slips(slips(n=0)) == (
-        "Slips: none in these recordings, at 1 false alarms a minute of held time."
+    assert " (by labels) found within 0.1 s" in slip_sentence(slips(onsets="labels"))
+    assert slip_sentence(slips(n=0, rate=0.0)) == (
+        "none in these recordings, at most 0.3 false alarms a minute of held time."
     )

@@ -19,6 +19,7 @@ import typer
 from typer.main import get_command
 
 from holdfast.cli.terminal.console import print_error, print_line
+from holdfast.compile_notice import compiling_shown
 from holdfast.errors import HoldfastError, missing_extra
 
 VERBS = {
@@ -57,7 +58,7 @@ CONFIGURED_VERBS = ("detect", "serve", "record", "hold", "calibrate")
 HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or
 disturbed, from its tactile sensors, at every sample.
 
-Start with: holdfast demo. It needs no hand and takes a minute or two."""
+Start with: holdfast demo. It needs no hand and takes a few minutes."""
 EPILOG = (
     "Each verb has its own help with an example: holdfast VERB --help. With a hand: holdfast "
     "doctor finds it, and holdfast serve builtin:any xela://auto shows it. The tutorials and all "
@@ -86,7 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        code = _run(words)
+        with compiling_shown():
+            code = _run(words)
         sys.stdout.flush()
     except BrokenPipeError:
         return _close_stdout()

@@ -97,7 +97,7 @@ def evaluate(
         raise TrainingError(
             f"{data}: none of its recordings ({len(recordings)}) has labels; labels expected"
         )
-    warn_about_training(evaluation.trained_on, len(recordings))
+    warn_about_recordings(evaluation, len(recordings))
     figure.save(lambda: _draw(evaluation))
     if as_json:
         document = {"trained_on": evaluation.trained_on, "verdict": evaluation.verdict}
@@ -130,8 +130,13 @@ def _draw(evaluation: "Evaluation") -> "Figure":
     return draw_evaluation(evaluation.metrics, evaluation.decisions)
 
 
-def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
-    """Print the names of recordings on which the model was trained, if there are any."""
+def warn_about_recordings(evaluation: "Evaluation", n_recordings: int) -> None:
+    """Print the names of recordings on which the model was trained, and of copies."""
+    if evaluation.copies:
+        pairs = [f"{name} of {original}" for name, original in evaluation.copies]
+        names = ", ".join(pairs[:5]) + (" ..." if len(pairs) > 5 else "")
+        print_message(f"copies, with the same readings: {names}; the verdict counts them once")
+    trained_on = evaluation.trained_on
     if trained_on:
         names = ", ".join(trained_on[:5]) + (" ..." if len(trained_on) > 5 else "")
         print_message(
@@ -152,7 +157,7 @@ def print_metrics(metrics: "Metrics") -> None:
     print_line("by sample")
     print_table(
         ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC in contact", "AUC of all"),
-        [*rows, _sample_row("all", metrics.pooled)],
+        [*rows, _sample_row("all", metrics.pooled), _always_stable(metrics.pooled)],
     )
     print_paragraph(AUC_NOTE)
     print_line()
@@ -161,7 +166,7 @@ def print_metrics(metrics: "Metrics") -> None:
     print_table(
         ("", "events", "missed in 0.05 s %", "0.1 s %", "0.2 s %", "median delay s", "p95 s",
          "false alarms/min"),
-        [_event_row(name, finger) for name, finger in events],
+        [*(_event_row(name, finger) for name, finger in events), _never_an_alarm(metrics)],
     )  # fmt: skip
     if metrics.intervals is not None:
         _print_intervals(metrics.intervals)
@@ -172,13 +177,29 @@ def print_metrics(metrics: "Metrics") -> None:
 def _onsets(metrics: "Metrics") -> str:
     """Return where the onsets of the events come from."""
     origin = metrics.events.hand.onsets
-    return "by truth or labels" if origin == "mixed" else f"by the {origin}"
+    words = {"mixed": "by truth or labels", "rule": "by labels of a rule, without their margin"}
+    return words.get(origin, f"by the {origin}")
 
 
 def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
     percents = (format_number(getattr(metrics, field), 1) for field in PERCENT_FIELDS)
     aucs = (format_number(metrics.auc_contact, 3), format_number(metrics.auc, 3))
     return name, str(metrics.n), *percents, *aucs
+
+
+def _always_stable(metrics: "SampleMetrics") -> tuple[str, ...]:
+    """Return the row of a model that decides every one of these samples stable."""
+    (tn, fp), (fn, tp) = metrics.confusion
+    n_stable, n = fn + tp, max(metrics.n, 1)
+    share, wrong = (format_number(100 * k / n, 1) for k in (n_stable, tn + fp))
+    return "always STABLE", str(metrics.n), share, wrong, "100.0", "0.0", "0.500", "0.500"
+
+
+def _never_an_alarm(metrics: "Metrics") -> tuple[str, ...]:
+    """Return the row of the events of a model that always decides STABLE."""
+    n = metrics.events.hand.n_events
+    missed = ["100.0" if n else format_number(None, 1)] * len(metrics.events.hand.missed)
+    return "always STABLE", str(n), *missed, "never", "never", "0.0"
 
 
 def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:

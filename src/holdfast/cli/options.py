@@ -412,6 +412,13 @@ def check_seconds(seconds: float | None) -> None:
         raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
 
 
+def awaited(source: str) -> str:
+    """Return what a command waits for while it opens a source; empty for a recording."""
+    if source.startswith("twin:"):
+        return f"simulating the first grasp of {source}"
+    return f"waiting for the first packet of {source}" if "://" in source else ""
+
+
 def check_speed(source: str, speed: float) -> None:
     """Check that the source can be played at this speed.
 

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,9 +14,10 @@ from holdfast.cli.options import (
     OnceOption,
     PortOption,
     SourceArgument,
+    awaited,
     check_speed,
 )
-from holdfast.cli.terminal.console import print_json, print_message
+from holdfast.cli.terminal.console import message_if_slow, print_json, print_message
 from holdfast.cli.terminal.control import handle_stop_signals
 
 if TYPE_CHECKING:
@@ -66,9 +67,9 @@ def play(
     the end the number of packets. Stop it with Ctrl-C.
 
     SOURCE is the path of a recording, or twin:?object=can&seed=1. It begins when the first client
-    connects, and again for all clients when another one connects, so that each client can take
-    its tare while nothing is touched. It is repeated, unless --once is given, which waits for a
-    client and plays it once.
+    connects. When another one connects, the next grasp of the twin begins for all clients (a
+    recording begins again), so that each client can take its tare while nothing is touched. It is
+    repeated, unless --once is given, which waits for a client and plays it once.
 
     Example:
       holdfast play twin:?object=can
@@ -76,14 +77,16 @@ def play(
       holdfast play twin:?object=can --hand "ros2:plexus?effort=0.1&max_effort=0.3"
       holdfast detect builtin:any xela://127.0.0.1:5000
     """
-    from holdfast.devices.sources.xela.encoder import is_part_of_hand
-    from holdfast.live.publishers.xela_server import XelaServer
-
     check_speed(source, speed)
     if not speed:
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
     once = once or bool(hand)
-    with _open(source, hand, speed, loop=not once) as opened:
+    with ExitStack() as stack:
+        with message_if_slow(awaited(source)):
+            from holdfast.devices.sources.xela.encoder import is_part_of_hand
+            from holdfast.live.publishers.xela_server import XelaServer
+
+            opened = stack.enter_context(_open(source, hand, speed, loop=not once))
         whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
             opened, version=version, host=host, port=port, whole_hand=whole,
@@ -127,16 +130,17 @@ def _print_status(server: "XelaServer") -> None:
         now = time.monotonic()
         if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
             rate = (server.n_packets - n_sent) / (now - updated_at)
-            sys.stderr.write(f"\r{_clients(server.n_clients)}, {rate:.1f} packets/s \033[K")
+            clients = _clients(server.n_clients, server.port)
+            sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
             updated_at, n_sent = now, server.n_packets
         elif not sys.stderr.isatty() and server.n_clients != n_clients:
             n_clients = server.n_clients
-            print_message(_clients(n_clients))
+            print_message(_clients(n_clients, server.port))
     if sys.stderr.isatty():
         print_message("")
 
 
-def _clients(number: int) -> str:
+def _clients(number: int, port: int) -> str:
     if not number:
-        return "waiting for a client"
+        return f"waiting for a client on port {port}"
     return "1 client" if number == 1 else f"{number} clients"

@@ -28,10 +28,11 @@ from holdfast.cli.options import (
     ServerOptions,
     SourceArgument,
     SpeedOption,
+    awaited,
     check_speed,
     report_missing_slip_rules,
 )
-from holdfast.cli.terminal.console import print_json, print_message
+from holdfast.cli.terminal.console import message_if_slow, print_json, print_message
 
 if TYPE_CHECKING:
     from holdfast.devices.hands import HandDevice
@@ -83,15 +84,17 @@ def serve(
       holdfast serve model.json grasp.parquet --host 0.0.0.0 \
         --token-file secret.txt
     """
-    from holdfast.live.stream_detector import compile_kernels
     from holdfast.web.guard import Guard
 
     settings.check()
     token = access.find_token()
     guard = Guard(access.host, token)
     check_speed(source, speed)
-    loaded = options.load_model(model)
-    compile_kernels()
+    with message_if_slow(f"loading the detector for {source}" if awaited(source) else ""):
+        from holdfast.live.stream_detector import compile_kernels
+
+        loaded = options.load_model(model)
+        compile_kernels()
 
     def announce(url: str) -> None:
         report_missing_slip_rules(loaded)
@@ -129,7 +132,8 @@ def _open_session(
 
     with ExitStack() as stack:
         watchdog = None if hand is None else connect_hand(stack, settings, hand)
-        stack.enter_context(source)
+        with message_if_slow(awaited(source.name)):
+            stack.enter_context(source)
         session = stack.enter_context(Session(options.create_stream(model, source)))
         grip = None
         if hand is not None:

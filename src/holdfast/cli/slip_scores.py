@@ -19,6 +19,7 @@ SHARES_NOTE = (
     "all held time."
 )
 """Explanation of the columns of the scores of slips."""
+NEVER_NOTE = ' The row "never" is a model that never reports a slip.'
 SHARES_HEADER = (
     "by onset", "0.03", "0.05", "0.1", "0.1, 1 mm", "before 1 mm", "quiet", "held",
 )  # fmt: skip
@@ -42,10 +43,10 @@ def print_slips(
     rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]
     print_table(
         ("", "slips", "over 1 mm", *SHARES_HEADER, "AUC"),
-        [*rows, _finger_row("all", summary.pooled)],
+        [*rows, _finger_row("all", summary.pooled), _never_a_slip(summary.pooled)],
     )
     print_paragraph(SHARES_NOTE)
-    print_paragraph(_support(summary.pooled))
+    print_paragraph(_support(summary.pooled) + NEVER_NOTE)
     if summary.intervals is not None:
         print_line()
         print_paragraph(_intervals(summary.intervals, chosen=summary.threshold_chosen))
@@ -53,11 +54,7 @@ def print_slips(
 
 def slips_origin(metrics: "SlipMetrics") -> str:
     """Return where the slips come from."""
-    return "by truth or labels" if metrics.onsets == "mixed" else f"by {_article(metrics.onsets)}"
-
-
-def _article(onsets: str) -> str:
-    return "the truth" if onsets == "truth" else "labels"
+    return {"truth": "by the truth", "mixed": "by truth or labels"}.get(metrics.onsets, "by labels")
 
 
 def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
@@ -71,10 +68,17 @@ def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
 
 
 def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
-    n_over = "-" if metrics.onsets == "labels" else str(metrics.n_over_1mm)
+    n_over = "-" if metrics.onsets in ("labels", "rule") else str(metrics.n_over_1mm)
     return (
         name, str(metrics.n), n_over, *share_cells(metrics), format_number(metrics.auc, 3)
     )  # fmt: skip
+
+
+def _never_a_slip(metrics: "SlipMetrics") -> tuple[str, ...]:
+    """Return the row of a model that never reports a slip."""
+    n, n_over = _finger_row("", metrics)[1:3]
+    shares = ["0"] * (len(SHARES_HEADER) - 2) if metrics.n else ["-"] * (len(SHARES_HEADER) - 2)
+    return "never", n, n_over, *shares, "0.00", "0.00", "0.500"
 
 
 def _support(metrics: "SlipMetrics") -> str:

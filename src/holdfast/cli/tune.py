@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.evaluate import print_verdict, warn_about_training
+from holdfast.cli.evaluate import print_verdict, warn_about_recordings
 from holdfast.cli.options import (
     ForceOption,
     InContactOption,
@@ -23,7 +23,6 @@ from holdfast.errors import require_extras
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from holdfast.io import Dataset
     from holdfast.metrics.slips import SlipMetrics
     from holdfast.model import Model
     from holdfast.recordings import Recording
@@ -78,62 +77,42 @@ def tune(
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.model import Model
+    from holdfast.training import Tuned
     from holdfast.training import tune as choose
-    from holdfast.training.slips import tune_slips
+    from holdfast.training.evaluation import evaluate_recordings
+    from holdfast.training.slips import TunedSlips, tune_slips
+    from holdfast.training.verdict import no_verdict
 
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
-    recordings = _Recordings(loaded, load_dataset(data, in_contact=in_contact))
-    report_handling(loaded, recordings.all)
+    recordings = load_dataset(data, in_contact=in_contact)
+    n = len(recordings)
+    report_handling(loaded, recordings)
+
+    def deciding(items: "Iterable[Recording]") -> "Iterator[Recording]":
+        return progress(items, "deciding", n)
+
+    tuned: Tuned | TunedSlips
     if question is TunedQuestion.SLIP:
-        slips = tune_slips(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
-        recordings.warn()
-        slips.model.save(out, force=force)
-        _print_slips(loaded, slips, out, recordings, as_json=as_json)
-        return
-    tuned = choose(loaded, recordings.all, false_alarms, progress=recordings.with_progress)
-    recordings.warn()
+        tuned = tune_slips(loaded, recordings, false_alarms, progress=deciding)
+    else:
+        tuned = choose(loaded, recordings, false_alarms, progress=deciding)
+    evaluation = evaluate_recordings(tuned.model, recordings, progress=progress)
+    warn_about_recordings(evaluation, n)
     tuned.model.save(out, force=force)
-    _print_stable(tuned, out, recordings, as_json=as_json)
-
-
-class _Recordings:
-    """Recordings that a model is tuned on, and the names of those that it was trained on."""
-
-    def __init__(self, model: "Model", recordings: "Dataset") -> None:
-        self.model, self.all = model, recordings
-        self.trained_on: list[str] = []
-
-    def with_progress(self, items: "Iterable[Recording]") -> "Iterator[Recording]":
-        """Yield the recordings with a bar of progress, and keep the names."""
-        from holdfast.training.evaluation import was_trained_on
-
-        for recording in progress(items, "deciding", len(self.all)):
-            if was_trained_on(self.model, recording):
-                self.trained_on.append(recording.name)
-            yield recording
-
-    def warn(self) -> None:
-        """Print the names, if there are any."""
-        warn_about_training(self.trained_on, len(self.all))
-
-    def print_verdict(self, sentence: str) -> None:
-        """Print the sentence, or why there is none."""
-        from holdfast.training.verdict import no_verdict
-
-        n = len(self.trained_on)
-        print_verdict(no_verdict(n, len(self.all)) if n else sentence)
-
-
-def _print_stable(tuned: "Tuned", out: Path, recordings: _Recordings, *, as_json: bool) -> None:
-    from holdfast.training.verdict import verdict_of_events
-
-    sentence = verdict_of_events(tuned.chosen.events)
     if as_json:
-        known = recordings.trained_on
-        print_json(_document(tuned, out, None if known else sentence, known))
+        document = _slip_document(tuned) if isinstance(tuned, TunedSlips) else _document(tuned)
+        known = evaluation.trained_on
+        print_json({"model": out, "verdict": evaluation.verdict, **document, "trained_on": known})
         return
-    recordings.print_verdict(sentence)
+    print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), n))
+    if isinstance(tuned, TunedSlips):
+        _print_slips(loaded, tuned, recordings[0], out)
+    else:
+        _print_stable(tuned, out)
+
+
+def _print_stable(tuned: "Tuned", out: Path) -> None:
     _print_points(tuned)
     print_line()
     print_line(
@@ -142,17 +121,9 @@ def _print_stable(tuned: "Tuned", out: Path, recordings: _Recordings, *, as_json
     )
 
 
-def _print_slips(
-    model: "Model", tuned: "TunedSlips", out: Path, recordings: _Recordings, *, as_json: bool
-) -> None:
-    from holdfast.training.verdict import verdict_of_slips
-
-    if as_json:
-        print_json(_slip_document(tuned, out, recordings.trained_on))
-        return
-    recordings.print_verdict(verdict_of_slips(tuned.chosen))
-    first = {name: module.sensor for name, module in recordings.all[0].modules.items()}
-    parts = [model.finger(*finger) for finger in model.fingers_of(first).items()]
+def _print_slips(model: "Model", tuned: "TunedSlips", first: "Recording", out: Path) -> None:
+    sensors = {name: module.sensor for name, module in first.modules.items()}
+    parts = [model.finger(*finger) for finger in model.fingers_of(sensors).items()]
     thresholds = sorted({part.slip.threshold for part in parts if part.slip})
     points = dict(tuned.points)
     if len(thresholds) == 1:
@@ -164,15 +135,13 @@ def _print_slips(
     print_line(f"{out}: a slip from a probability of {tuned.threshold:.3g} on, was {before}")
 
 
-def _slip_document(tuned: "TunedSlips", out: Path, trained_on: list[str]) -> dict[str, object]:
+def _slip_document(tuned: "TunedSlips") -> dict[str, object]:
     return {
-        "model": out,
         "for": TunedQuestion.SLIP.value,
         "threshold": tuned.threshold,
         "chosen": tuned.chosen,
         "before": tuned.before,
         "around": [_slip_point(threshold, metrics) for threshold, metrics in tuned.points],
-        "trained_on": trained_on,
     }
 
 
@@ -182,17 +151,12 @@ def _slip_point(threshold: float, metrics: "SlipMetrics") -> dict[str, object]:
     return {"threshold": threshold, **to_builtins(metrics)}
 
 
-def _document(
-    tuned: "Tuned", out: Path, sentence: str | None, trained_on: list[str]
-) -> dict[str, object]:
+def _document(tuned: "Tuned") -> dict[str, object]:
     return {
-        "model": out,
-        "verdict": sentence,
         "threshold": tuned.chosen.threshold,
         "chosen": tuned.chosen,
         "before": tuned.before,
         "around": tuned.points,
-        "trained_on": trained_on,
     }
 
 

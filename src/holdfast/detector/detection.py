@@ -88,15 +88,16 @@ class FingerTrace(NamedTuple):
 
     Attributes:
         times: (n,) [s].
-        state: (n,) codes of `ContactState`.
-        reason: (n,) codes of `Reason`.
+        state: (n,) codes of `ContactState`; `ContactState(code)` is the state.
+        reason: (n,) codes of `Reason`; `Reason(code)` is the reason.
         stable_probability: (n,); NaN while UNKNOWN.
         instability: (n,) sigma [unit of the readings].
         force: (n, 3) F_tip in the fingertip frame [unit of the readings].
-        faults: (n,) bits in the order of `Fault`.
+        faults: (n,) bits in the order of `Fault`; `faults_of(bits)` of `holdfast.contact` are the
+            faults.
         faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
-        cause: (n,) codes of the causes while UNSTABLE, or while it slides: 1 is the first of
-            `Cause`; 0 for none.
+        cause: (n,) codes of the causes while UNSTABLE, or while it slides; 0 for none, of which
+            any other is `Cause(code)`.
         slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
         slip_speed: (n,) speed of the slip [mm/s]; 0 while the finger does not slide, NaN while
             UNKNOWN. None for a model without a speed rule.

@@ -156,6 +156,7 @@ class Session:
             because one packet may hold the samples of several instants, each of another module.
         n_lost: packets that are missing by the device's own count.
         n_refused: packets that could not be decoded.
+        delay: delay of the newest sample relative to the quickest one of the source [s].
         ended: True if the source has ended, or the detector has failed.
         failure: the exception that ended the session.
         lock: why the tare and the thresholds cannot be changed now; empty if they can.
@@ -165,6 +166,7 @@ class Session:
         self.stream = stream
         self.source = stream.source
         self.n_packets = self.n_lost = self.n_refused = 0
+        self.delay = 0.0
         self.ended = False
         self.failure: Exception | None = None
         self.lock = ""
@@ -293,6 +295,8 @@ class Session:
             latency = time.monotonic() - arrival.received
             self._latencies[self._n_latencies % MAX_LATENCIES] = latency
             self._n_latencies += 1
+        if arrival.samples:
+            self.delay = arrival.delay
         for module in arrival.samples:
             self._n_samples[module] += 1
         self.n_packets = max(self._n_samples.values(), default=0)

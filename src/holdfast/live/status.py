@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from holdfast.contact import ContactState, HandEstimate
+from holdfast.contact import ContactState, Fault, HandEstimate
 from holdfast.detector.slips import SlipWatch
 from holdfast.errors import ModelError
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.documents import Vector, finger_document
-from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
+from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch, Problem
 from holdfast.live.handling import SessionCalibration
 from holdfast.live.loop.live_grip import LiveGrip
 from holdfast.live.recorder import Recorder
@@ -99,7 +99,7 @@ class StatusPublisher:
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
             problems=[
-                schema.ProblemDocument(problem.fault, problem.fingers, problem.text)
+                schema.ProblemDocument(problem.fault, problem.fingers, self._problem_text(problem))
                 for problem in self._faults.current
             ],
             thresholds=dict(self._session.stream.thresholds),
@@ -125,6 +125,11 @@ class StatusPublisher:
             for problem in self._faults.update(estimate):
                 self.add_notice(problem.text)
 
+    def _problem_text(self, problem: Problem) -> str:
+        if problem.fault is not Fault.LATE:
+            return problem.text
+        return f"{problem.text} ({1000 * self._session.delay:.0f} ms)"
+
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
         """Keep the newest readings of every finger, minus the tare."""
         stream = self._session.stream
@@ -145,6 +150,7 @@ class StatusPublisher:
             n_dropped=0 if recorder is None else recorder.status.n_dropped,
             silent=session.stream.silent,
             latency=schema.LatencyInfo(latency.p50, latency.p99, latency.largest),
+            delay=session.delay,
         )
 
     def _packet_rate(self) -> float:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, enough_contacts, hand_states
 from holdfast.metrics.slip_truth import SlipDecisions
+from holdfast.metrics.truth_labels import Onsets, common_onsets
 from holdfast.sensors.types import Array
 
 Codes = npt.NDArray[np.int8]
@@ -27,8 +28,10 @@ class FingerDecisions:
         states: (n,) codes of the decided states.
         stable_probability: (n,) probability that the contact is stable; NaN if the state is
             UNKNOWN. All NaN for a hand, whose state follows from those of its fingers.
-        exact_labels: (n,) codes of the states by the truth; None if it is not known. Events are
-            found in them, because a person draws labels with a margin around a disturbance.
+        exact_labels: (n,) codes of the states by the truth, or by a rule without its margin; None
+            if neither is known. Events are found in them, because a person draws labels with a
+            margin around a disturbance.
+        onsets: where the exact labels come from.
         slip: decisions about slips; None for a hand, or a model without a slip rule.
 
     Raises:
@@ -41,6 +44,7 @@ class FingerDecisions:
     stable_probability: Array
     exact_labels: Codes | None = None
     slip: SlipDecisions | None = None
+    onsets: Onsets = "truth"
 
     def __post_init__(self) -> None:
         arrays: dict[str, npt.NDArray[Any]] = {
@@ -119,6 +123,7 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
         of_hand([finger.states for finger in hand]),
         np.full(len(times), np.nan),
         of_hand(exact) if hand and len(exact) == len(hand) else None,
+        onsets=common_onsets({finger.onsets for finger in hand}),
     )
 
 

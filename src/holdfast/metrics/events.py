@@ -17,7 +17,7 @@ from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE, Conta
 from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
-from holdfast.metrics.truth_labels import Onsets
+from holdfast.metrics.truth_labels import Onsets, common_onsets
 from holdfast.sensors.types import Array
 
 MIN_EVENT_DURATION = 0.05
@@ -147,7 +147,8 @@ class EventMetrics(msgspec.Struct, frozen=True):
         delay_p95: 95th percentile of the same.
         false_alarms_per_minute: per minute of stable label; None without stable labels.
         false_alarms: number of false alarms by labelled state; UNKNOWN without a label.
-        onsets: `truth` where the recordings have it, else `labels`; `mixed` if some have it.
+        onsets: `truth` where the recordings have it, else `labels`; `mixed` if some have it;
+            `rule` if a rule made labels of one.
     """
 
     n_events: int
@@ -232,10 +233,12 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
 
 
 def match_decisions(finger: FingerDecisions) -> AlarmMatch:
-    """Return the events and alarms of a finger, or hand; events by the truth where it is known."""
+    """Return the events and alarms of a finger, or hand; events by the exact labels, if known."""
     if finger.exact_labels is None:
         return match_alarms(finger.times, finger.labels, finger.states)
-    return replace(match_alarms(finger.times, finger.exact_labels, finger.states), onsets="truth")
+    return replace(
+        match_alarms(finger.times, finger.exact_labels, finger.states), onsets=finger.onsets
+    )
 
 
 def alarm_places(states: Codes) -> npt.NDArray[np.intp]:
@@ -277,7 +280,7 @@ def event_metrics_of(counts: EventCounts) -> EventMetrics:
         delay_p95=finite_or_none(quantile(counts.delays, 0.95)),
         false_alarms_per_minute=counts.n_false / minutes if minutes else None,
         false_alarms={str(state): n for state, n in counts.false_alarms.items()},
-        onsets=next(iter(counts.onsets), "labels") if len(counts.onsets) < 2 else "mixed",
+        onsets=common_onsets(counts.onsets),
     )
 
 

@@ -22,7 +22,7 @@ from holdfast.contact import (
     ContactState,
 )
 from holdfast.metrics.masks import Mask, join_runs, runs
-from holdfast.metrics.truth_labels import Onsets
+from holdfast.metrics.truth_labels import Onsets, labels_by_rule
 from holdfast.recordings import Label, Recording, Truth
 from holdfast.sensors.types import Array
 
@@ -185,7 +185,8 @@ def slip_truth(
     if not module.labels:
         return None
     codes = _label_codes(module.labels, times)
-    return SlipTruth(codes, stable & (codes == STILL), label_slips(module.labels), "labels")
+    onsets: Onsets = "rule" if labels_by_rule(module.labels) else "labels"
+    return SlipTruth(codes, stable & (codes == STILL), label_slips(module.labels), onsets)
 
 
 def has_slip_truth(truth: Truth, finger: str) -> bool:

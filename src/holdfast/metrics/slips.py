@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -22,7 +21,7 @@ from holdfast.metrics.slip_truth import (
     sample_durations,
 )
 from holdfast.metrics.statistics import percent
-from holdfast.metrics.truth_labels import Onsets
+from holdfast.metrics.truth_labels import Onsets, common_onsets
 from holdfast.sensors.types import Array, Integers
 
 EARLIEST_ALARM = 0.5
@@ -357,7 +356,7 @@ class SlipMetrics(msgspec.Struct, frozen=True):
         auc: sliding samples against held samples that do not slide.
         quiet_minutes: quiet among it [min].
         held_minutes: of one finger, without creep, slips and the time of their alarms [min].
-        onsets: `truth`, `labels`, or `mixed`.
+        onsets: `truth`, `labels`, `rule` (labels by a rule), or `mixed`.
     """
 
     n: int
@@ -404,7 +403,7 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
         auc=float((sliding * below).sum()) / pairs if pairs else None,
         quiet_minutes=quiet,
         held_minutes=held,
-        onsets=_common(counts.onsets),
+        onsets=common_onsets(counts.onsets),
     )
 
 
@@ -416,7 +415,3 @@ def found_shares(delays: Array) -> dict[str, float | None]:
         n_found = int((delays <= limit + TIME_TOLERANCE).sum())
         shares[str(limit)] = percent(n_found, len(delays))
     return shares
-
-
-def _common(onsets: AbstractSet[Onsets]) -> Onsets:
-    return next(iter(onsets), "labels") if len(onsets) < 2 else "mixed"

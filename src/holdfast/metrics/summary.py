@@ -245,14 +245,9 @@ class _Group:
 
 
 class ResultTotal:
-    """Results of the recordings so far, and their metrics.
+    """Results of the recordings so far, and their metrics."""
 
-    Args:
-        intervals: keep what the bootstrap needs of each recording.
-    """
-
-    def __init__(self, *, intervals: bool = True) -> None:
-        self._keeps_groups = intervals
+    def __init__(self) -> None:
         self.recordings: list[RecordingMetrics] = []
         self.fingers: dict[str, SampleTotal] = {}
         self.pooled = SampleTotal()
@@ -268,7 +263,7 @@ class ResultTotal:
         self.recordings.append(results.metrics)
         self.events.append(results.events)
         self.hands.append(results.hand)
-        group = self._group() if results.events and self._keeps_groups else _Group()
+        group = self._group() if results.events else _Group()
         if results.hand is not None:
             group.hand.append(results.hand)
         for name, counts in results.slips.items():

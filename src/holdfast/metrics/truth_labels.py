@@ -4,6 +4,8 @@ A finger that shakes the object leaves it three to eight times a second, so "an 
 acts" changes often within one shake. A person labels the shake as a whole, and so does this.
 """
 
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -26,8 +28,13 @@ from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
 from holdfast.recordings import Label, Recording, Truth, cut_labels, labels_from_samples
 from holdfast.sensors.types import Array
 
-Onsets = Literal["truth", "labels", "mixed"]
-"""Where onsets come from: the truth, the labels, or one in each recording."""
+Onsets = Literal["truth", "labels", "rule", "mixed"]
+"""Where onsets come from: the truth, labels, labels by a rule (if any are), or truth and labels."""
+
+BY_RULE = "rule:"
+"""Beginning of the author of a label that a rule made."""
+MARGIN_RULES = ("rule:signal", "rule:tracking")
+"""Rules that begin an unstable interval `UNSTABLE_MARGIN` before the change that they found."""
 
 HAND_TRUTH = {"phase", "outside_force"}
 """Arrays of the truth of the hand without which there are no labels."""
@@ -133,6 +140,43 @@ def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[La
     """
     truth, known = recording.truth, fingers_with_truth(recording)
     return {} if truth is None else {name: labels_from_truth(truth, name, rule) for name in known}
+
+
+def labels_by_rule(labels: Sequence[Label]) -> bool:
+    """Return whether a rule made one of the labels."""
+    return any(label.author.startswith(BY_RULE) for label in labels)
+
+
+def without_margin(labels: Sequence[Label]) -> tuple[Label, ...]:
+    """Return labels in which the margin of a rule before an onset of instability is stable.
+
+    What follows it within the margin is exact: there the onset is. Ends keep their margin.
+
+    Example:
+        >>> stable = Label(0.0, 1.0, "STABLE", author="rule:signal")
+        >>> push = Label(1.0, 1.5, "UNSTABLE", "disturbance", author="rule:signal")
+        >>> [(label.start, label.end) for label in without_margin([stable, push])]
+        [(0.0, 1.1), (1.1, 1.5)]
+    """
+    exact: list[Label] = []
+    for before, label in zip((None, *labels), labels, strict=False):
+        margined = label.state is ContactState.UNSTABLE and label.author in MARGIN_RULES
+        held = before is not None and before.state is ContactState.STABLE
+        if before is None or not (margined and held and before.end >= label.start):
+            exact.append(label)
+            continue
+        onset = min(label.start + UNSTABLE_MARGIN, label.end)
+        exact[-1] = replace(before, end=onset)
+        if onset < label.end:
+            exact.append(replace(label, start=onset))
+    return tuple(exact)
+
+
+def common_onsets(onsets: AbstractSet[Onsets]) -> Onsets:
+    """Return where the onsets of several recordings come from."""
+    if "rule" in onsets:
+        return "rule"
+    return next(iter(onsets), "labels") if len(onsets) < 2 else "mixed"
 
 
 def fingers_with_truth(recording: Recording) -> list[str]:

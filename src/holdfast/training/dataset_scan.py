@@ -74,6 +74,7 @@ class ScannedRecording:
     Attributes:
         name: of the recording.
         digest: of its samples.
+        readings_digest: of its readings alone, which a copy with other times shares.
         object: object that was held; None if the metadata do not name it.
         rate: samples per second [Hz].
         n_labelled: number of labelled samples of each finger that has any.
@@ -82,6 +83,7 @@ class ScannedRecording:
 
     name: str
     digest: str
+    readings_digest: str
     object: str | None
     rate: float
     n_labelled: dict[str, int]
@@ -149,7 +151,7 @@ def scan_dataset(
 
     Raises:
         TrainingError: there are no recordings or no labels, two recordings have the same
-            samples or name, a finger has different sensors, or relative features are not
+            readings or name, a finger has different sensors, or relative features are not
             made for the rate of a recording.
     """
     scans = (scan_recording(recording, relative=relative) for recording in recordings)
@@ -161,8 +163,11 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
 
     Raises:
         TrainingError: relative features are not made for its rate.
+        RecordingError: two fingers have the same readings.
     """
-    digest, recording = recording.digest, true_updates(recording)
+    recording.check_modules_differ()
+    digest, readings_digest = recording.digest, recording.readings_digest
+    recording = true_updates(recording)
     modules = {name: module for name, module in recording.modules.items() if module.labels}
     counts = {name: int((module.label_states > 0).sum()) for name, module in modules.items()}
     counts = {name: count for name, count in counts.items() if count}
@@ -174,6 +179,7 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
     scanned = ScannedRecording(
         name=recording.name,
         digest=digest,
+        readings_digest=readings_digest,
         object=None if held_object is None else str(held_object),
         rate=recording.rate,
         n_labelled=counts,
@@ -231,9 +237,9 @@ def _check_no_duplicates(recordings: list[ScannedRecording]) -> None:
                 f"two recordings are called {recording.name!r}; different names expected"
             )
         names.add(recording.name)
-        if recording.digest in name_of_digest:
+        first = name_of_digest.setdefault(recording.readings_digest, recording.name)
+        if first != recording.name:
             raise TrainingError(
-                f"recordings {name_of_digest[recording.digest]!r} and {recording.name!r} hold "
-                "the same samples: one would be tested by a model that was trained on the other"
+                f"recordings {first!r} and {recording.name!r} hold the same readings: one would "
+                "be tested by a model that was trained on the other"
             )
-        name_of_digest[recording.digest] = recording.name

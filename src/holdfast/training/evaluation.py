@@ -1,7 +1,8 @@
 """Evaluation of models: the decisions of a model beside the labels, and their metrics."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,12 @@ from holdfast.metrics import (
 )
 from holdfast.metrics.decisions import hand_decisions
 from holdfast.metrics.slip_truth import NOT_HELD, SlipDecisions, SlipTruth, slip_truth
-from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
+from holdfast.metrics.truth_labels import (
+    LabelRule,
+    labels_by_rule,
+    labels_by_truth,
+    without_margin,
+)
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording, label_states
@@ -38,9 +44,11 @@ TARE_LOADED_BIT = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
 def compute_decisions(model: Model, recording: Recording) -> Decisions:
     """Return the decisions of a model about a recording, with the labels.
 
-    If the recording has a truth, the decisions have exact labels too, without a margin.
+    If the recording has a truth, or labels by a rule, the decisions have exact labels too, without
+    a margin.
 
     Raises:
+        RecordingError: two fingers have the same readings.
         ModelError: the recording has other fingers or sensors.
     """
     return judge(model, recording)[0]
@@ -52,9 +60,13 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
     Raises:
         ModelError: the recording has other fingers or sensors.
     """
+    recording.check_modules_differ()
     detection = detect(model, recording)
     loaded = any((trace.faults & TARE_LOADED_BIT).any() for trace in detection.fingers.values())
-    exact = labels_by_truth(recording, LabelRule(margin=0.0))
+    by_truth = labels_by_truth(recording, LabelRule(margin=0.0))
+    labels = {name: module.labels for name, module in recording.modules.items()} | by_truth
+    by_rule = any(map(labels_by_rule, labels.values()))
+    exact = {name: without_margin(own) for name, own in labels.items()} if by_rule else by_truth
     fingers = {
         name: FingerDecisions(
             times=trace.times,
@@ -62,7 +74,8 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
             states=trace.state,
             stable_probability=trace.stable_probability,
             exact_labels=label_states(exact[name], trace.times) if name in exact else None,
-            slip=_slip_decisions(model, recording, name, trace, exact.get(name)),
+            slip=_slip_decisions(model, recording, name, trace, by_truth.get(name)),
+            onsets="rule" if by_rule else "truth",
         )
         for name, trace in detection.fingers.items()
     }
@@ -92,8 +105,21 @@ def _slip_decisions(
 
 
 def was_trained_on(model: Model, recording: Recording | ScannedRecording) -> bool:
-    """Return whether a model was trained on a recording, by the digest of its samples."""
-    return model.training is not None and recording.digest in model.training.recordings.values()
+    """Return whether a model was trained on a recording, or on a copy with other times."""
+    return model.training is not None and _is_among(recording, [model.training.recordings])
+
+
+def was_tuned_on(model: Model, recording: Recording) -> bool:
+    """Return whether a threshold of a model was chosen on a recording, or a copy of it."""
+    heads = [head for part in model.fingers.values() for head in part.heads]
+    chosen = [head.choice.recordings for head in heads if head.choice is not None]
+    return _is_among(recording, chosen)
+
+
+def _is_among(recording: Recording | ScannedRecording, known: Iterable[Mapping[str, str]]) -> bool:
+    """Return whether one of the digests is known; older models have those with the times."""
+    digests = {recording.digest, recording.readings_digest}
+    return any(not digests.isdisjoint(recordings.values()) for recordings in known)
 
 
 @dataclass(frozen=True)
@@ -102,9 +128,11 @@ class Evaluation:
 
     Attributes:
         metrics: of all recordings.
-        unseen: of the recordings that the model was not trained on, without intervals where
-            there are others.
+        unseen: of the recordings that the model was not trained on, each once.
         trained_on: names of the recordings that the model was trained on.
+        copies: of each recording whose readings are those of an earlier one: its name, and that
+            of the other.
+        in_sample: whether a threshold of the model was chosen on one that is unseen.
         tares: recordings whose tare was taken under load, of those that are unseen.
         decisions: about each recording, if they are kept.
     """
@@ -112,6 +140,8 @@ class Evaluation:
     metrics: Metrics
     unseen: Metrics
     trained_on: list[str]
+    copies: list[tuple[str, str]]
+    in_sample: bool
     tares: LoadedTares
     decisions: list[Decisions]
 
@@ -119,12 +149,13 @@ class Evaluation:
     def verdict(self) -> str | None:
         """What the model is good for; None if it was trained on all labelled recordings."""
         n, n_unseen = len(self.metrics.recordings), len(self.unseen.recordings)
-        if n_unseen == n:
-            return verdict(self.unseen, self.tares)
-        if self.unseen.pooled.n + self.unseen.pooled.n_undecided == 0:
+        if self.trained_on and self.unseen.pooled.n + self.unseen.pooled.n_undecided == 0:
             return None
-        sentence = verdict(self.unseen, self.tares)
-        return f"{sentence} From {n_unseen} of {n} recordings: the model was trained on the others."
+        sentence = verdict(self.unseen, self.tares, in_sample=self.in_sample)
+        others = ["the model was trained on the others"] * bool(self.trained_on)
+        others += ["copies count once"] * bool(self.copies)
+        note = f" From {n_unseen} of {n} recordings: {', '.join(others)}." if others else ""
+        return sentence + note
 
 
 def evaluate(
@@ -178,21 +209,32 @@ def evaluate_recordings(
     trained_on: list[str] = []
     tares: list[bool] = []
     kept: list[Decisions] = []
-    total, unseen = ResultTotal(), ResultTotal(intervals=False)
+    copies: list[tuple[str, str]] = []
+    originals: dict[str, str] = {}
+    in_sample = False
+    total, unseen = ResultTotal(), ResultTotal()
     evaluated = engine.map_ordered(_evaluate_part, parts, shared=(model, keep))
-    for results, loaded, known, decisions in progress(evaluated, "evaluating", len(recordings)):
+    for results, origin, decisions in progress(evaluated, "evaluating", len(recordings)):
+        name = results.metrics.name
         total.add(results)
         kept.extend(decisions)
-        if known:
-            trained_on.append(results.metrics.name)
-        else:
+        is_copy = origin.digest in originals
+        if is_copy:
+            copies.append((name, originals[origin.digest]))
+        originals.setdefault(origin.digest, name)
+        if origin.trained_on:
+            trained_on.append(name)
+        elif not is_copy:
             unseen.add(results)
-            tares.append(loaded)
+            tares.append(origin.loaded)
+            in_sample |= origin.tuned_on
     metrics = total.metrics(seed=seed)
     return Evaluation(
         metrics,
-        unseen.metrics() if trained_on else metrics,
+        unseen.metrics(seed=seed) if trained_on or copies else metrics,
         trained_on,
+        copies,
+        in_sample,
         LoadedTares(sum(tares), len(tares)),
         kept,
     )
@@ -200,12 +242,22 @@ def evaluate_recordings(
 
 def _evaluate_part(
     model: Model, keep: bool, part: Sequence[Recording]
-) -> tuple[RecordingResults, bool, bool, list[Decisions]]:
-    """Return results, loaded tare, whether it was trained on, and the decisions if kept."""
+) -> tuple[RecordingResults, "_Origin", list[Decisions]]:
+    """Return results, where the recording comes from, and the decisions if they are kept."""
     (recording,) = part
     decisions, loaded = judge(model, recording)
-    known = was_trained_on(model, recording)
-    return score_recording(decisions), loaded, known, [decisions] if keep else []
+    known, tuned_on = was_trained_on(model, recording), was_tuned_on(model, recording)
+    origin = _Origin(recording.readings_digest, loaded, known, tuned_on)
+    return score_recording(decisions), origin, [decisions] if keep else []
+
+
+class _Origin(NamedTuple):
+    """Digest of a recording, whether its tare is loaded, and what the model took from it."""
+
+    digest: str
+    loaded: bool
+    trained_on: bool
+    tuned_on: bool
 
 
 def _combined_slips(

@@ -203,7 +203,7 @@ def training_record(
     before = {} if init is None else init.recordings
     return Training(
         recordings={f"{name} (init)": digest for name, digest in before.items()}
-        | {recording.name: recording.digest for recording in scan.recordings},
+        | {recording.name: recording.readings_digest for recording in scan.recordings},
         split=setting.split,
         parameters={finger: dict(chosen) for finger, chosen in parameters.items()},
         figures={name: getattr(pooled, name) for name in FIGURES},

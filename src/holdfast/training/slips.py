@@ -281,7 +281,7 @@ def tune_slips(
     digests: dict[str, str] = {}
     results: list[RecordingResults] = []
     for recording in progress(recordings):
-        digests[recording.name] = recording.digest
+        digests[recording.name] = recording.readings_digest
         results.append(score_recording(compute_decisions(model, recording), slip_curves=True))
     curve = SlipCurve.total([curve for result in results for curve in result.slip_curves.values()])
     if not curve:

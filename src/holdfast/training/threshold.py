@@ -197,7 +197,7 @@ def tune(
     digests: dict[str, str] = {}
     replays, before = [], 0.0
     for recording in progress(recordings):
-        digests[recording.name] = recording.digest
+        digests[recording.name] = recording.readings_digest
         before = max(before, _threshold_before(model, recording))
         replays.append(ThresholdReplay.of(model, recording))
     points = _usable([_point(replays, t) for t in _probabilities(LOG_ODDS)])

@@ -1,5 +1,7 @@
 import io
 import json
+import sys
+import time
 from contextlib import redirect_stdout
 
 import numpy as np
@@ -8,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.cli.terminal.console import (
+    message_if_slow,
     print_error,
     print_json,
     print_line,
@@ -150,3 +153,15 @@ def printed_table(header, rows):
 def test_empty_table(capsys):
     print_table(("name", "rate"), [])
     assert capsys.readouterr().out == "name  rate\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "after", "printed"),
+    [("waiting", 0.0, "waiting\n"), ("waiting", 60.0, ""), ("", 0.0, "")],
+)
+def test_a_message_if_slow(capsys, text, after, printed):
+    with message_if_slow(text, after):
+        deadline = time.monotonic() + 20
+        while printed and time.monotonic() < deadline and not sys.stderr.getvalue():
+            time.sleep(0.01)
+    assert capsys.readouterr().err == printed

@@ -103,6 +103,52 @@ def test_clocks_that_drift_are_not_late():
     assert not any(s.faults for s in stamped)
 
 
+def late_times(delay_of, seconds=30.0):
+    """Stamps [s] of the late samples, given the delay of a sample from its stamp."""
+    n = round(seconds / PERIOD)
+    stamped = stamps([(k * PERIOD, 50.0 + k * PERIOD + delay_of(k * PERIOD)) for k in range(n)])
+    assert not any(Fault.CLOCK_JUMP in one.faults for one in stamped)
+    return [one.time for one in stamped if Fault.LATE in one.faults]
+
+
+@pytest.mark.parametrize("lag", [0.15, 0.45, 3.0])
+@pytest.mark.parametrize("begin", [5.0, 5.7, 6.4])
+def test_a_constant_lag_ends(lag, begin):
+    late = late_times(lambda t: lag * (t >= begin) + 0.004 * math.sin(40 * t))
+    assert begin <= min(late) < begin + 0.01
+    assert max(late) < begin + 5.0
+
+
+def test_a_link_that_is_quick_again_makes_a_new_lag_late():
+    late = late_times(lambda t: 0.4 * (5 <= t < 12 or t >= 20))
+    seconds = {int(t) for t in late}
+    assert {5, 6, 7, 20, 21, 22} <= seconds <= {5, 6, 7, 8, 9, 20, 21, 22, 23, 24}
+
+
+@pytest.mark.parametrize(
+    ("delay_of", "begin", "end"),
+    [
+        (lambda t: 0.01 * max(t - 5, 0), 16, 30),
+        (lambda t: 0.3 * max(t - 5, 0), 6, 30),
+        (lambda t: 4 - 0.2 * (t - 5) if 5 <= t < 25 else 0, 5, 24),
+    ],
+    ids=["queue that grows slowly", "queue that grows", "link that catches up"],
+)
+def test_a_delay_that_changes_stays_late(delay_of, begin, end):
+    late = late_times(delay_of)
+    expected = [k * PERIOD for k in range(4500) if begin <= k * PERIOD < end]
+    assert len(set(expected) - set(late)) == 0
+
+
+def test_the_delay_of_the_newest_sample():
+    timeline = Timeline()
+    delays = []
+    for device_time, received in ((1.0, 5.0), (2.0, 6.34), (3.0, 7.0)):
+        timeline.stamp(device_time, received)
+        delays.append(round(timeline.delay, 2))
+    assert delays == [0.0, 0.34, 0.0]
+
+
 def share_of_faults(pairs):
     """Share of the samples after the first second that have a fault."""
     stamped = stamps(pairs)[150:]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from holdfast.cli import simulate as verb
-from holdfast.devices.sources import open_source
+from holdfast.devices.sources import open_source, replay
 from holdfast.devices.sources import twin as module
 from holdfast.devices.sources.twin import GRASP_ATTEMPTS, Twin, grasp_of, write
 from holdfast.devices.uri import parse
@@ -118,12 +118,25 @@ def test_the_next_repeats_follow(quick):
     np.testing.assert_allclose(times[1:, 0] - times[:-1, -1], 1.0)
 
 
-def test_it_starts_the_current_grasp_again(quick):
-    with open_source("twin:?repeat=4", speed=0, loop=True) as source:
-        list(itertools.islice(source, 13))  # three samples of the second grasp
+@pytest.mark.parametrize(
+    ("n_read", "then"), [(1, [40, 50]), (5, [50, 60]), (11, [50, 60]), (13, [60, 70])]
+)
+def test_a_restart_begins_the_next_grasp_unless_one_has_only_begun(quick, n_read, then):
+    with open_source("twin:?repeat=4", speed=1000.0, loop=True) as source:
+        list(itertools.islice(source, n_read))
         source.restart()
         arrivals = list(itertools.islice(source, 20))
-    assert [int(a.samples["thumb"][0, 0]) for a in arrivals] == [50] * 10 + [60] * 10
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == then
+
+
+def test_a_restart_does_not_wait_long_for_the_next_grasp(quick, monkeypatch):
+    monkeypatch.setattr(replay, "RESTART_WAIT", 0.01)
+    with open_source("twin:?repeat=4", speed=1000.0, loop=True) as source:
+        list(itertools.islice(source, 5))
+        source._simulator._process = subprocess.Popen(["sleep", "60"])
+        source.restart()
+        arrivals = list(itertools.islice(source, 10))
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals] == [40] * 10
 
 
 def test_the_next_grasp_is_simulated_by_another_process(monkeypatch):

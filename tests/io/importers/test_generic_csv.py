@@ -354,3 +354,66 @@ def test_a_folder_of_folders(tmp_path):
     )
     recordings = list(import_recordings(tmp_path, sensors=ANY))
     assert [recording.name for recording in recordings] == ["log", "other"]
+
+
+def write_numbers(path, header, *more):
+    """Write three samples of an AnySkin, with a time unless the header has none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [",".join(map(str, [f"{k / 100:.2f}", *range(k, k + 15), *more])) for k in range(3)]
+    path.write_text("\n".join([*([header] if header else []), *rows]) + "\n")
+
+
+PLAIN = {
+    "numbered": ",".join(["time", *(f"s{k}" for k in range(15))]),
+    "time has another name": ",".join(["elapsed", *(f"s{k}" for k in range(15))]),
+    "numbers as names": ",".join(map(str, range(16))),
+    "no header": "",
+}
+
+
+@pytest.mark.parametrize("header", PLAIN.values(), ids=PLAIN)
+@pytest.mark.parametrize("name", ["a.csv", "b.CSV", "deeper/a.csv"])
+def test_a_folder_of_plain_files_and_a_sensor(tmp_path, header, name):
+    write_numbers(tmp_path / name, header)
+    texts = []
+    (recording,) = import_recordings(tmp_path, sensors=ANY, report=texts.append)
+    module = recording.modules["finger1"]
+    np.testing.assert_allclose(module.times, [0.0, 0.01, 0.02])
+    assert module.readings[2].tolist() == np.arange(2, 17).reshape(5, 3).tolist()
+    option = texts[1].split("'")[1]  # what was guessed can be given
+    (again,) = import_recordings(tmp_path, sensors=ANY, columns=option)
+    assert again.digest == recording.digest
+
+
+def test_plain_columns_beside_labels(tmp_path):
+    write_numbers(tmp_path / "a.csv", PLAIN["numbered"] + ",label", "stable")
+    (recording,) = import_recordings(tmp_path, sensors=ANY)
+    assert recording.modules["finger1"].label_states.tolist() == [STABLE] * 3
+
+
+@pytest.mark.parametrize(
+    ("header", "sensors", "text"),
+    [
+        ("when,a,b", None, "no column of times among 'when', 'a', 'b': give --columns time=COL"),
+        (
+            PLAIN["numbered"],
+            None,
+            "no taxel columns such as x1, y1, z1, x2 among 'time', 's0', 's1', 's2', 's3', 's4' "
+            "and 10 more: give --columns 'taxels=F{axis}{taxel}' or, for consecutive columns, "
+            "taxels=FIRST..LAST, or --sensor alone if all other columns are x, y, z of its taxels",
+        ),
+        (PLAIN["numbered"], {"*": sensor("gtac")}, "no taxel columns such as x1, y1, z1, x2"),
+        (PLAIN["no header"], None, "no column of times among 'column1', 'column2', 'column3',"),
+    ],
+)
+def test_a_folder_that_fails_has_the_reason_of_its_first_file(tmp_path, header, sensors, text):
+    for name in ("b.csv", "a.csv"):
+        write_numbers(tmp_path / name, header)
+    with pytest.raises(RecordingError) as caught:
+        list(import_recordings(tmp_path, sensors=sensors))
+    assert str(caught.value).startswith(f"{tmp_path / 'a.csv'}: {text}")
+
+
+def test_a_folder_without_csv_files(tmp_path):
+    with pytest.raises(RecordingError, match=r"no CSV file in .*; files NAME\.csv expected"):
+        import_recordings(tmp_path, sensors=ANY)

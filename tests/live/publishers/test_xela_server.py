@@ -481,3 +481,19 @@ def test_a_source_without_a_beginning_continues_for_each_client():
             with open_source(server.uri) as source:
                 taken(source, 20)
         assert server.failure is None
+
+
+def test_each_grasp_is_stamped_when_it_is_sent(monkeypatch):
+    """The second grasp begins 0.7 s later than its times, as after a slow simulation."""
+    now = [1000.0]
+    monkeypatch.setattr(module.time, "time", lambda: now[0])
+    with Made() as source:
+        server = XelaServer(source)
+        stamps = []
+        for time_of_sample, at in ((3.0, 0.0), (3.1, 0.1), (3.2, 0.4), (4.2, 1.9), (4.3, 2.0)):
+            now[0] = 1000.0 + at
+            batch = module.SampleBatch(
+                samples_of(TIPS, 0), time_of_sample, dict.fromkeys(TIPS, time_of_sample)
+            )
+            stamps.append(json.loads(server._packet(batch))["time"] - 1000.0)
+    assert stamps == pytest.approx([0.0, 0.1, 0.2, 1.9, 2.0])

@@ -482,7 +482,7 @@ def test_a_fault_that_lasts_is_a_problem_and_a_notice():
             return hello, document, notices
 
     hello, document, notices = run(work())
-    text = f"thumb: {hello['faults']['late']['advice']}"
+    text = f"thumb: {hello['faults']['late']['advice']} (0 ms)"
     assert document["problems"] == [{"fault": "late", "fingers": ["thumb"], "text": text}]
     assert [notice["text"] for notice in notices] == [text]
     assert set(hello["faults"]) == set(map(str, Fault))

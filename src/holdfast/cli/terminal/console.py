@@ -6,12 +6,16 @@ terminal or begin a line: characters that are not printable are shown as escapes
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import zip_longest
 from shutil import get_terminal_size
 from textwrap import wrap
+from threading import Timer
 
 MAX_ERROR_LENGTH = 2000
 """Number of characters of an error message that are printed."""
+SLOW_AFTER = 0.3
+"""Time that a wait may last before a message says what for [s]."""
 MIN_TEXT_WIDTH = 12
 """Width to which a column of text can shrink, if its longest cell is wider."""
 _GAP = "  "
@@ -47,6 +51,19 @@ def _json_escape(character: str) -> str:
 def print_message(text: str) -> None:
     """Print a message for a person on stderr, in one line."""
     sys.stderr.write(f"{visible(text)}\n")
+
+
+@contextmanager
+def message_if_slow(text: str, after: float = SLOW_AFTER) -> Iterator[None]:
+    """Print a message if the body takes longer than `after` [s]; an empty message never."""
+    timer = Timer(after, print_message, (text,))
+    timer.daemon = True
+    if text:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def print_error(text: str) -> None:

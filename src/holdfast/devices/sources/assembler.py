@@ -214,6 +214,7 @@ class Assembler:
                 n_lost=self.n_lost,
                 n_refused=self.n_refused,
                 notices=tuple(self._notices),
+                delay=self._timeline.delay,
             )
             self.n_lost = self.n_refused = 0
         self._instants, self._faults, self._notices = {}, {}, []

@@ -41,6 +41,8 @@ class Arrival(NamedTuple):
         n_lost: number of packets missing before this one, by the device's own counter.
         n_refused: number of packets dropped since the last arrival because they are not valid.
         notices: messages for the user, one line each.
+        delay: delay from the device's stamp to `received`, relative to the quickest sample [s];
+            0 where the stamps are not of a device.
     """
 
     time: float
@@ -50,6 +52,7 @@ class Arrival(NamedTuple):
     n_lost: int = 0
     n_refused: int = 0
     notices: tuple[str, ...] = ()
+    delay: float = 0.0
 
 
 def notice_arrival(
@@ -113,7 +116,7 @@ class Source(Openable):
         return False
 
     def restart(self) -> None:
-        """Begin again, where the source has a beginning; a device continues."""
+        """Begin the next recording, where the source has recordings; a device continues."""
 
     @abstractmethod
     def close(self) -> None:

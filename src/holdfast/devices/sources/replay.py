@@ -24,6 +24,8 @@ SAMPLES_PER_CHUNK = 1024
 PAUSE = 1.0
 """Time between the last sample of a recording and the first of the next [s]; a detector
 recognizes it as a gap."""
+RESTART_WAIT = 2.0
+"""Longest wait for the next recording when a client begins it [s]; clients wait 5 s for samples."""
 
 
 class TimedSamples(NamedTuple):
@@ -169,9 +171,18 @@ class Player(Source):
         return None if due > now + timeout else self._arrival(item)
 
     def restart(self) -> None:
-        """Play the current recording from its beginning again; time continues after a pause."""
-        if not math.isnan(self._last):  # else it is still at its beginning
+        """Play the next recording; time continues after a pause.
+
+        The current one is played again if it has only begun, or if the next is not ready in time.
+        """
+        if math.isnan(self._last):
+            return
+        only_begun = self._start is None or self._last <= self._start[1]
+        if only_begun or not (self._continues and self._is_ready(self._number + 1, RESTART_WAIT)):
             self._begin(self._same_chunks())
+        else:
+            self._number += 1
+            self._begin(self._late_chunks(self._number))
 
     def close(self) -> None:
         """Release the recording."""
@@ -228,7 +239,7 @@ class Player(Source):
             self._shift = self._last + PAUSE - first.time
             # A recording that was not ready in time still plays at its own speed.
             now = time.monotonic()
-            self._start = max(now, self._due(first.time, now)), self._last + PAUSE
+            self._start = max(now, self._due(first.time, now)), first.time + self._shift
         return first
 
     def _same_chunks(self) -> Iterator[Recording]:

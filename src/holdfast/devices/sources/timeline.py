@@ -10,7 +10,13 @@ MAX_BACKWARD_STEP = 0.05
 MIN_CLOCK_JUMP = 0.5
 """A stamp that is ahead of the host's clock by more than this is a jump [s]."""
 MIN_LATE_DELAY = 0.1
-"""A sample is late if it arrives later than the quickest one by more than this [s]."""
+"""A sample is late if its delay is longer than the usual one by more than this [s]."""
+DELAY_INTERVAL = 1.5
+"""A delay is constant if it is the same in two intervals of this length, one after the other [s].
+The first begins at most one interval after the delay did, so that it is usual after 4.5 s."""
+MAX_CONSTANT_CHANGE = 0.01
+"""Change of the shortest delay from interval to interval up to which it is constant [s]: the
+minimum on a busy machine varies by a few ms, a queue that grows by 1 % changes by 15 ms."""
 MAX_CLOCK_DRIFT = 1e-4
 """Largest drift between two clocks [s/s]."""
 MAX_TIME = 1e11
@@ -50,6 +56,13 @@ class Stamp(NamedTuple):
 class TransportDelay:
     """Delay of samples relative to the quickest one, for clocks that drift by at most 1e-4.
 
+    A sample is late relative to the usual delay. This is that of the quickest sample, until a
+    longer delay stays constant: then it is a property of the link, and no sample is late by it. A
+    queue that grows, and a link that stalls and catches up, have no constant delay.
+
+    Attributes:
+        delay: delay of the newest sample relative to the quickest [s].
+
     Example:
         >>> delay = TransportDelay()
         >>> [round(delay.update(t, at), 2) for t, at in ((0.0, 5.0), (1.0, 6.25), (2.0, 7.0))]
@@ -61,23 +74,41 @@ class TransportDelay:
 
     def reset(self) -> None:
         """Start again, because the device's clock changed."""
-        self._least = math.inf
-        self._received = math.nan
+        self._least = self._usual = math.inf
+        self._received = self._begun = math.nan
+        self.delay = 0.0
+        self._shortest = self._shortest_before = math.inf
 
     def update(self, time: float, received: float) -> float:
         """Return the delay of a sample relative to the quickest, this one included [s]."""
-        age = received - time
-        self._least = min(self._least + self._drift(received), age)
+        age, drift = received - time, self._drift(received)
+        self._least = min(self._least + drift, age)
+        self._usual = min(self._usual + drift, age)
         self._received = received
-        return age - self._least
+        self._follow_constant(age, received)
+        self.delay = age - self._least
+        return self.delay
 
     def is_late(self, time: float, received: float) -> bool:
         """Update the delay, and return whether the sample is late."""
-        return self.update(time, received) > MIN_LATE_DELAY
+        self.update(time, received)
+        return received - time - self._usual > MIN_LATE_DELAY
 
     def lead(self, time: float, received: float) -> float:
         """Return by how much a sample is quicker than the quickest; mostly below 0 [s]."""
         return self._least - (received - time) - self._drift(received)
+
+    def _follow_constant(self, age: float, received: float) -> None:
+        """Take the delay as usual if it was constant over the last two intervals."""
+        self._shortest = min(self._shortest, age)
+        if math.isnan(self._begun):
+            self._begun = received
+        if received - self._begun < DELAY_INTERVAL:
+            return
+        # A delay that falls is not constant either: a link that stalled catches up.
+        if abs(self._shortest - self._shortest_before) <= MAX_CONSTANT_CHANGE:
+            self._usual = max(self._usual, min(self._shortest, self._shortest_before))
+        self._shortest_before, self._shortest, self._begun = self._shortest, math.inf, received
 
     def _drift(self, received: float) -> float:
         """Return the largest drift of the clocks since the last sample [s]."""
@@ -144,11 +175,12 @@ class Timeline:
     If the device's clock jumps, time continues by as much as passed on the host's clock. A jump
     is a stamp that goes back, or a stamp from the future. A burst of samples after a stall, and
     a gap in the samples, are no jumps. A sample is late if the delay from its stamp to its
-    arrival is longer than that of the quickest sample; the clocks may differ, and drift by 1e-4.
+    arrival is longer than the usual one; the clocks may differ, and drift by 1e-4.
     While the device's clock is too fast or jumps again and again, every sample has a fault.
 
     Attributes:
         offset: sum of the device's clock jumps, added to its stamps [s].
+        delay: delay of the newest sample relative to the quickest [s].
         clock: pace of the device's clock.
 
     Example:
@@ -158,7 +190,7 @@ class Timeline:
     """
 
     def __init__(self) -> None:
-        self.offset = 0.0
+        self.offset = self.delay = 0.0
         self._last = self._received = math.nan
         self._delay = TransportDelay()
         self.clock = ClockPace()
@@ -185,6 +217,7 @@ class Timeline:
         if time <= self._last:  # False before the first
             time = math.nextafter(self._last, math.inf)
         late = self._delay.is_late(time, received)
+        self.delay = self._delay.delay
         if not math.isnan(self._last):
             self.clock.update(lead, received - self._received, jumped=jumped)
         self._last, self._received = time, received

@@ -121,7 +121,8 @@ def import_parts(
     name = _format_of(place, format, sensors, given)
     with recording_errors(place):
         source = _importer(name)
-        parts: list[Path] = source.parts(place, given) if name == "csv" else source.parts(place)
+        more = (given, sensors) if name == "csv" else ()
+        parts: list[Path] = source.parts(place, *more)
     return name, parts
 
 

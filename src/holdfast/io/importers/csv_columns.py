@@ -132,9 +132,10 @@ class Columns:
         Raises:
             RecordingError: nothing in the header looks like times or taxels.
         """
-        time = self.time or _guessed_time(names)
+        time = self.time or _guessed_time(names) or _first_of_run(names, n_taxels)
         others = [name for name in names if name != time]
-        taxels = self.taxels or _guessed_taxels(others, n_taxels) or _guessed_taxels(others, ())
+        taxels = self.taxels or _guessed_taxels(others, n_taxels)
+        taxels = taxels or _guessed_run(others, n_taxels) or _guessed_taxels(others, ())
         label = self.label or ("label" if "label" in names else None)
         cause = self.cause or ("cause" if "cause" in names else None)
         if time is None:
@@ -145,7 +146,9 @@ class Columns:
         if taxels is None:
             raise RecordingError(
                 f"no taxel columns such as x1, y1, z1, x2 among {some_names(names)}: give "
-                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, taxels=FIRST..LAST"
+                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, "
+                "taxels=FIRST..LAST, or --sensor alone if all other columns are x, y, z of its "
+                "taxels"
             )
         return replace(self, time=time, taxels=taxels, label=label, cause=cause)
 
@@ -312,6 +315,18 @@ def _guessed_taxels(names: Sequence[str], n_taxels: Collection[int]) -> str | No
         return None
     most = max(sizes.values())
     return _with_module([pattern for pattern, size in sizes.items() if size == most])
+
+
+def _guessed_run(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
+    """Return all columns as x, y, z of taxel after taxel, if a sensor has so many."""
+    run = [name for name in names if name not in ("label", "cause")]
+    fits = any(len(run) == 3 * n for n in n_taxels) and run == list(names[: len(run)])
+    return f"{run[0]}{RUN}{run[-1]}" if fits else None
+
+
+def _first_of_run(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
+    """Return the first column as that of times, if the others are those of a sensor."""
+    return names[0] if _guessed_run(names[1:], n_taxels) else None
 
 
 def _patterns(name: str) -> Iterator[tuple[str, tuple[int, str]]]:

@@ -5,7 +5,7 @@ In the generic CSV the names of the columns are fixed. The columns of any other 
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,8 +54,9 @@ def can_read(path: Path) -> bool:
 
 
 def can_guess(path: Path) -> bool:
-    """Return whether `path` is a CSV file, or a folder with one, whose columns can be guessed."""
-    return any(_is_guessable(header_line(file)) for file in csv_files(path))
+    """Return whether `path` is a CSV file, or a folder with one: by its name, or its columns."""
+    files = csv_files(path)
+    return any(f.suffix.lower() == ".csv" or _is_guessable(header_line(f), ()) for f in files)
 
 
 def read(
@@ -85,40 +86,48 @@ def read(
 
     return (
         replace(recording, name=f"{prefix}{recording.name}")
-        for file, prefix in name_prefixes(parts(path, columns)).items()
+        for file, prefix in name_prefixes(parts(path, columns, sensors)).items()
         for recording in [_recording(file, sensors or {}, columns, report_once)]
     )
 
 
-def parts(path: Path, columns: Columns | None = None) -> list[Path]:
+def parts(
+    path: Path, columns: Columns | None = None, sensors: Mapping[str, Sensor] | None = None
+) -> list[Path]:
     """Return the file, or the CSV files of a folder with columns that can be read.
+
+    If none can, return all of them, so that reading the first gives the reason.
 
     Args:
         path: path of the file or folder.
         columns: as in `read`.
+        sensors: as in `read`.
 
     Raises:
-        RecordingError: there is none.
+        RecordingError: there is no CSV file.
     """
     files = csv_files(path)
-    if path.is_dir():
-        files = [file for file in files if columns or _is_header(header_line(file))] or [
-            file for file in files if _is_guessable(header_line(file))
-        ]
     if not files:
-        raise RecordingError(
-            f"no CSV file in {path} with a column {TIME!r} and taxel columns; both are expected"
-        )
-    return files
+        raise RecordingError(f"no CSV file in {path}; files NAME.csv expected")
+    if path.is_file() or columns:
+        return files
+    n_taxels = _numbers_of_taxels(sensors or {})
+    generic = [file for file in files if _is_header(header_line(file))]
+    guessable = (file for file in files if _is_guessable(header_line(file), n_taxels))
+    return generic or list(guessable) or files
 
 
 def _is_header(names: tuple[str, ...]) -> bool:
     return TIME in names and any(_TAXEL.fullmatch(name) for name in names)
 
 
-def _is_guessable(names: tuple[str, ...]) -> bool:
+def _numbers_of_taxels(sensors: Mapping[str, Sensor]) -> set[int]:
+    return {one.n_taxels for one in sensors.values()}
+
+
+def _is_guessable(names: tuple[str, ...], n_taxels: Collection[int]) -> bool:
     try:
-        Columns().completed(names, ())
+        Columns().completed(names, n_taxels)
     except RecordingError:
         return False
     return True
@@ -160,8 +169,7 @@ def _of_any_logger(
 ) -> Recording:
     """Return the recording in a file with any names of the columns; report a guess."""
     names = header_line(path) or read_table(path)[0].names  # which reports what is wrong
-    n_taxels = {one.n_taxels for one in sensors.values()}
-    chosen = columns.completed(names, n_taxels)
+    chosen = columns.completed(names, _numbers_of_taxels(sensors))
     layout = {module or DEFAULT_MODULE: own for module, own in chosen.layout(names).items()}
     used = {name for own in layout.values() for name in own.values()}
     text = {"label": chosen.label, "cause": chosen.cause}

@@ -27,6 +27,8 @@ SEPARATORS = ",;"
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
 
+_ANY_CASE = "*.[cC][sS][vV]"
+_NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
 _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 """Characters with which Python reads numbers that no other program writes, such as `1_000`."""
 
@@ -65,7 +67,10 @@ class Table(NamedTuple):
 
 
 def header_line(path: Path) -> tuple[str, ...]:
-    """Return the names of the columns of a CSV file; none if it is not text."""
+    """Return the names of the columns of a CSV file, `column1` and so on without a header.
+
+    None if it is not text.
+    """
     try:
         return _head(path)[1]
     except (RecordingError, UnicodeError):
@@ -215,9 +220,9 @@ def csv_files(path: Path) -> list[Path]:
     """
     if path.is_file():
         return [path]
-    if inside := sorted(path.glob("*.csv"), key=natural_order):
+    if inside := sorted(path.glob(_ANY_CASE), key=natural_order):
         return inside
-    deeper = (file for file in path.glob("*/*.csv") if not file.parent.name.startswith("."))
+    deeper = (file for file in path.glob(f"*/{_ANY_CASE}") if not file.parent.name.startswith("."))
     return sorted(deeper, key=lambda file: (natural_order(file.parent), natural_order(file)))
 
 
@@ -298,7 +303,10 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int, str]:
                     comments.append(line[1:].strip())
                 elif line.strip():
                     names, separator = _names(line.rstrip("\r\n"))
-                    return tuple(comments), names, number + 1, separator
+                    if not _is_sample(names):
+                        return tuple(comments), names, number + 1, separator
+                    names = tuple(f"column{k + 1}" for k in range(len(names)))
+                    return tuple(comments), names, number, separator
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
@@ -315,6 +323,16 @@ def _names(header: str) -> tuple[tuple[str, ...], str]:
             if len(names) > 1:
                 return tuple(name.strip() for name in names), separator
     return (header.strip().strip('"'),), SEPARATORS[0]
+
+
+def _is_sample(names: Sequence[str]) -> bool:
+    """Return whether the first line has numbers, other than those with which columns are named."""
+    named = [str(k) for k in range(len(names) + 1)]
+    return (
+        len(names) > 3
+        and list(names) not in (named[:-1], named[1:])
+        and all(map(_NUMBER.fullmatch, names))
+    )
 
 
 def _first_lines(file: TextIO) -> Iterator[str]:

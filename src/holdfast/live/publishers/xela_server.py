@@ -42,6 +42,8 @@ MAX_CLIENTS = 64
 """Maximum number of clients."""
 CLOSE_TIMEOUT = 1.0
 """Time for the closing handshake of a client [s]."""
+MIN_PAUSE = 0.5
+"""A longer step between the times of the source is a pause between two grasps [s]."""
 DRAIN_TIMEOUT = 10.0
 """Maximum time, after the source has ended, to wait for clients that read slowly [s]."""
 
@@ -52,8 +54,9 @@ _SILENT_LOGGER.addHandler(logging.NullHandler())
 class XelaServer:
     """XELA server that sends the samples of a source; it runs in its own threads.
 
-    The time stamps are the times of the source, shifted by a constant so that the first one is
-    the current time; again so when a client connects to a server without clients. Packets are
+    The time stamps are the times of the source, shifted so that the first one is the current time;
+    again so after each pause of the source, and when a client connects to a server without
+    clients. Time stamps never go back. Packets are
     sent as soon as the source provides the samples. A client that does not read delays no other
     client, and is disconnected. Requests of web pages from another origin are refused.
 
@@ -64,8 +67,8 @@ class XelaServer:
         port: 0 for any free port.
         whole_hand: send fingertips as part of a whole hand.
         wait: start to read the source when the first client connects.
-        restart: begin the source again for each client that connects, and do not read it while
-            there is no client. A client then receives a recording from its beginning.
+        restart: begin the next recording of the source for each client that connects, and do not
+            read it while there is no client. A client then receives it from its beginning.
 
     Attributes:
         encoder: encoder of the packets.
@@ -108,7 +111,7 @@ class XelaServer:
             self._client_seen.set()
         self._restarts = restart
         self._joined = Event()
-        self._time_offset = -math.inf
+        self._time_offset = self._sent_time = -math.inf
         self._has_offset = False
         self._server_thread = Thread(target=self._serve, name="holdfast-play", daemon=True)
         self._source_thread = Thread(
@@ -124,6 +127,11 @@ class XelaServer:
     def ended(self) -> bool:
         """Whether the source has ended, or sending has failed."""
         return self._ended.is_set()
+
+    @property
+    def port(self) -> int:
+        """Port on which it listens."""
+        return self._address[1]
 
     @property
     def uri(self) -> str:
@@ -192,7 +200,7 @@ class XelaServer:
         return True
 
     def _restart_source(self) -> None:
-        """Begin the source again. Clients that joined receive nothing from before."""
+        """Begin the next recording. Clients that joined receive nothing from before."""
         self._queue_packets(self._batcher.flush())
         self._batcher = self._new_batcher()
         self._has_offset = self._has_offset and bool(self._clients)
@@ -213,7 +221,10 @@ class XelaServer:
 
     def _packet(self, batch: SampleBatch) -> str:
         now = time.time()
-        if not self._has_offset:  # time stamps never go back
+        # A grasp that began later than the source planned would be late to its end.
+        paused = batch.time - self._sent_time > MIN_PAUSE
+        self._sent_time = batch.time
+        if paused or not self._has_offset:  # time stamps never go back
             self._time_offset = max(self._time_offset, now - batch.time)
             self._has_offset = True
         times = {name: one + self._time_offset for name, one in batch.times.items()}

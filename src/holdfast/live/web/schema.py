@@ -190,6 +190,7 @@ class Health(Struct, frozen=True, kw_only=True, gc=False):
         n_dropped: samples that the recorder dropped.
         silent: whether no samples arrive.
         latency: from packet to estimate.
+        delay: how much later the newest sample arrived than the quickest one [s].
     """
 
     rate: Number
@@ -199,6 +200,7 @@ class Health(Struct, frozen=True, kw_only=True, gc=False):
     n_dropped: int
     silent: bool
     latency: LatencyInfo
+    delay: float = 0.0
 
 
 class RecordingInfo(Struct, frozen=True, kw_only=True, gc=False):

@@ -522,11 +522,20 @@ def test_a_silent_source_is_shown(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
     health = {"rate": None, "n_packets": 12, "n_lost": 3, "n_refused": 1, "n_dropped": 0,
-              "silent": True, "latency": {"p50": None, "p99": None, "max": None}}  # fmt: skip
+              "silent": True, "latency": {"p50": None, "p99": None, "max": None},
+              "delay": 0.34}  # fmt: skip
     service.patch = {"health": health}
     shows(page, "#alert", "No samples")
-    shows(page, "#health", r"rate –\s*latency p50 –[\s\S]*packets 12\s*lost 3\s*refused 1")
-    assert page.locator("#health .bad").all_inner_texts() == ["lost 3", "refused 1"]
+    shows(
+        page,
+        "#health",
+        r"rate –\s*latency p50 –[\s\S]*late by 340\u202fms\s*packets 12\s*lost 3\s*refused 1",
+    )
+    assert page.locator("#health .bad").all_inner_texts() == [
+        "late by 340\u202fms",
+        "lost 3",
+        "refused 1",
+    ]
 
 
 def test_a_token_is_passed_on(visit):

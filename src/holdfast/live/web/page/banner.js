@@ -1,7 +1,7 @@
 // Banner with the state of the hand, alert below it, and status line at the foot of the page.
 
 import { byId, make, setText } from "../web/dom.js";
-import { NO_VALUE, latency, stateKey, stateWord } from "./format.js";
+import { NO_VALUE, delay, isLate, latency, stateKey, stateWord } from "./format.js";
 
 const ANNOUNCE_INTERVAL = 1500; // [ms]; a screen reader cannot follow 20 announcements a second
 
@@ -52,6 +52,7 @@ export class HealthLine {
     footer.append(make("span", "link", make("i", "dot"), this.link));
     this.rate = part("rate", "rate");
     this.latencies = { p50: part("latency", "latency p50"), p99: part("late", "p99"), max: part("worst", "max") };
+    this.delay = part("delay", "late by");
     this.packets = part("packets", "packets");
     this.counts = ["lost", "refused", "dropped"].map((key) => part(key, key));
     this.footer = footer;
@@ -66,6 +67,8 @@ export class HealthLine {
     const whole = (n) => (n === null || n === undefined ? NO_VALUE : n.toLocaleString("en").replaceAll(",", "\u202f"));
     setText(this.rate, health.rate === null || health.rate === undefined ? NO_VALUE : `${health.rate.toFixed(1)} Hz`);
     for (const [key, element] of Object.entries(this.latencies)) setText(element, latency(health.latency?.[key]));
+    setText(this.delay, delay(health.delay));
+    this.delay.parentElement.classList.toggle("bad", isLate(health.delay));
     setText(this.packets, whole(health.n_packets));
     [health.n_lost, health.n_refused, health.n_dropped].forEach((n, k) => {
       setText(this.counts[k], whole(n));

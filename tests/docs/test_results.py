@@ -1,0 +1,47 @@
+"""Each table of results has the trivial baseline; sentences that once did not hold stay away."""
+
+import re
+
+import pytest
+
+from . import blocks
+
+PAGES = ("benchmark.md", "real-data.md", "study.md", *(
+    f"study/{name}.md" for name in ("adaptation", "built-in-models", "labels-by-rules", "live",
+                                    "real-data", "slips", "twin")
+))  # fmt: skip
+TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
+RESULT = re.compile(r"\bAUC\b|missed|within 100 ms|called STABLE|found within|\btrained on\b")
+TRIVIAL = re.compile(r"always stable|never a slip|always a disturbance")
+DIFFERENCES = "| switched | to |"
+"""Begin of a table that compares settings of one method."""
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_table_of_results_has_the_trivial_baseline(page):
+    text = (blocks.ROOT / "docs" / page).read_text("utf-8")
+    results = [table for table in TABLE.findall(text) if RESULT.search(table)]
+    assert results
+    for table in results:
+        assert TRIVIAL.search(table) or table.startswith(DIFFERENCES), table.partition("\n")[0]
+
+
+@pytest.mark.parametrize(
+    ("page", "sentence"),
+    [
+        ("README.md", "about nine of ten"),
+        ("README.md", "one of five"),
+        ("README.md", "in a minute or two"),
+        ("docs/real-data.md", "never makes the model more sensitive"),
+        ("docs/study/slips.md", "300 randomized hands"),
+        ("docs/study/built-in-models.md", "300 randomized hands"),
+    ],
+)
+def test_a_sentence_that_does_not_hold(page, sentence):
+    assert sentence not in (blocks.ROOT / page).read_text("utf-8")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_first_lines_say_what_was_never_tried(page):
+    text = (blocks.ROOT / page).read_text("utf-8")
+    assert "No sensor and no hand was ever connected" in text[:900]
