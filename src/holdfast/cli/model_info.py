@@ -70,8 +70,8 @@ def _head(head: "Head") -> dict[str, Any]:
     fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
     if head.choice is not None:
         fields["choice"] |= {"recordings": list(head.choice.recordings)}
-    if head.link == "logit":
-        fields["threshold"] = head.threshold
+    if head.link != "logit":
+        del fields["threshold"]
     return fields
 
 
@@ -127,16 +127,15 @@ def _head_lines(head: dict[str, Any]) -> Iterator[str]:
         answer = "STABLE" if name == "stable" else "slides"
         texts.append(f"{answer} from a probability of {head['threshold']:.3g} on")
     if name == "slip":
-        texts.append(f"smoothing {head.get('smoothing', 0):g} s, hold {head.get('hold', 0):g} s")
-    if "highest" in head:
+        texts.append(f"smoothing {head['smoothing']:g} s, hold {head['hold']:g} s")
+    if head["highest"] is not None:
         texts.append(f"speed and distance of slips, up to {head['highest']:.3g} mm/s")
-    if "classes" in head:
+    if head["classes"]:
         texts.append(", ".join(head["classes"]))
     yield f"{name}: {'; '.join(texts)}"
     yield f"  features {_few(head['features'])}"
-    choice = head.get("choice")
-    if choice is not None:
-        yield f"  threshold from {_chosen(name, choice)}"
+    if head["choice"] is not None:
+        yield f"  threshold from {_chosen(name, head['choice'])}"
 
 
 def _chosen(name: str, choice: dict[str, Any]) -> str:
