@@ -67,7 +67,7 @@ def test_the_model_keeps_how_it_was_tuned(model, others, tmp_path):
         assert choice.requested == 40.0
         assert choice.recordings == {each.name: each.digest for each in others}
         assert (choice.n, choice.minutes) == (chosen.events.n_events, chosen.events.stable_minutes)
-        assert choice.found == 100 - chosen.missed
+        assert choice.found == 100 - chosen.events.missed["0.2"]
         assert choice.false_alarms_per_minute == chosen.false_alarms
         assert part.stable.threshold == chosen.threshold
     assert found.training == model.training

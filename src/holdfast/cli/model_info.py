@@ -68,6 +68,7 @@ def _head(head: "Head") -> dict[str, Any]:
     fields: dict[str, Any] = msgspec.to_builtins(head)
     rule, n = fields.pop("rule"), head.rule.n_features
     fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
+    fields["features"] = [str(spec) for spec in head.features]
     if head.choice is not None:
         fields["choice"] |= {"recordings": list(head.choice.recordings)}
     if head.link != "logit":
