@@ -255,8 +255,12 @@ def test_all_heads_of_a_model_are_shown(capsys):
     for head, n in ((stable, 15), (slip, 39), (speed, 39), (cause, 15)):
         assert len(head["features"]) == n
         assert f"{head['name']}: linear, {n} features; " in out
-        assert f" features {', '.join(head['features'][:3])}, ..." in out
-    assert slip["features"][0] == "relative(second_all[0.0067 s])"
+    assert f" features {', '.join(stable['features'][:3])}, ..." in out
+    for name in ("slip", "slip_speed"):
+        assert re.search(
+            rf" {name}: linear, 39 features; [^:]* of them new relative\(second_all\[0.0067 s\]\), ",
+            out,
+        )
     assert f"STABLE from a probability of {stable['threshold']:.3g} on" in out
     assert f"slides from a probability of {slip['threshold']:.3g} on; smoothing 0.02 s, hold" in out
     assert f"speed and distance of slips, up to {speed['highest']:.3g} mm/s" in out

@@ -103,7 +103,8 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         finger = "any finger" if name == "*" else name
         sensor = f"{part['sensor']} ({part['unit']})" if part["sensor"] else "any"
         yield finger, f"sensor {sensor}; {_contact(part)}"
-        heads = (line for head in part["heads"].values() for line in _head_lines(head))
+        known = part["heads"]["stable"]["features"]
+        heads = (line for head in part["heads"].values() for line in _head_lines(head, known))
         yield from (("", line) for line in (*heads, *_handling_lines(part)))
     training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
@@ -121,8 +122,11 @@ def _contact(part: dict[str, Any]) -> str:
     return "no threshold of contact"
 
 
-def _head_lines(head: dict[str, Any]) -> Iterator[str]:
-    """Yield what a head answers, from which features, and on what its threshold was chosen."""
+def _head_lines(head: dict[str, Any], known: list[str]) -> Iterator[str]:
+    """Yield what a head answers, from which features, and on what its threshold was chosen.
+
+    Of features that `stable` has not, the first are named.
+    """
     name, texts = head["name"], [head["rule"]]
     if "threshold" in head:
         answer = "STABLE" if name == "stable" else "slides"
@@ -134,7 +138,8 @@ def _head_lines(head: dict[str, Any]) -> Iterator[str]:
     if head["classes"]:
         texts.append(", ".join(head["classes"]))
     yield f"{name}: {'; '.join(texts)}"
-    yield f"  features {_few(head['features'])}"
+    added = [feature for feature in head["features"] if feature not in known]
+    yield f"  of them new {_few(added)}" if added else f"  features {_few(head['features'])}"
     if head["choice"] is not None:
         yield f"  threshold from {_chosen(name, head['choice'])}"
 
