@@ -34,7 +34,7 @@ from real_slips import auc, boxes, tugs
 from sklearn.metrics import roc_auc_score
 from train_any import FEATURES, N_FOLDS, fit, model_of, out_of_fold, untrained
 
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.features.stream import extract
 from holdfast.io import load_dataset
@@ -93,7 +93,7 @@ class RealSets:
             [(real_fingers(model, x), slipped) for x, slipped in tugs(folder / "eflesh_slip")],
         )
 
-    def figures(self, classifier: LinearClassifier, used: np.ndarray) -> list[float]:
+    def figures(self, classifier: Linear, used: np.ndarray) -> list[float]:
         """Return the AUC of boxes and tugs, each with own and default handling."""
         slipping = {finger.recording for finger in self.boxes if finger.slips.any()}
         calm = [finger for finger in self.boxes if finger.recording not in slipping]
@@ -115,9 +115,7 @@ class RealSets:
             figures.append(float(np.mean(aucs)))
         return [*figures, self.tug_auc(classifier, used, own=True), self.tug_auc(classifier, used)]
 
-    def tug_auc(
-        self, classifier: LinearClassifier, used: np.ndarray, *, own: bool = False
-    ) -> float:
+    def tug_auc(self, classifier: Linear, used: np.ndarray, *, own: bool = False) -> float:
         largest: tuple[list[float], list[float]] = [], []
         for half in (0, 1):
             moments = None
@@ -167,7 +165,7 @@ def only(moments: Moments, used: np.ndarray) -> Moments:
 
 
 def score(
-    classifier: LinearClassifier, features: np.ndarray, used: np.ndarray, moments: Moments | None
+    classifier: Linear, features: np.ndarray, used: np.ndarray, moments: Moments | None
 ) -> np.ndarray:
     """Return one minus the probability of stability, with own or default handling."""
     if moments is not None:

@@ -105,7 +105,9 @@ def models_of(
                 continue
             parameters = setting.recipe_of("*").reference
             if setting.init is not None:
-                parameters = choose_adaptation(own, START.fingers["*"].classifier, held).parameters
+                parameters = choose_adaptation(
+                    own, START.fingers["*"].stable.linear, held
+                ).parameters
             model = fit_model(data, setting, {"*": parameters}, held)
             found[size, name] = model or START, str(parameters.get("change", ""))
     return dict(sorted(found.items(), key=lambda item: item[0][0]))

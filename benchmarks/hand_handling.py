@@ -92,7 +92,7 @@ def read_grasp(
         features = changed(finger.features, module) if changed else finger.features
         parts = features, held, stable, truth.codes == SLIDING, truth.codes == STILL
         columns.append(tuple(part[kept] for part in parts))
-    empty = (np.empty((0, len(model.finger("*").all_features))), *(np.empty(0, bool),) * 4)
+    empty = (np.empty((0, len(model.finger("*").features))), *(np.empty(0, bool),) * 4)
     metadata = recording.metadata
     return HandGrasp(
         str(metadata.get("hand", recording.name)),

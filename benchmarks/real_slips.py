@@ -78,15 +78,15 @@ def tug_figures(
     largest, quiet = [], []
     for recording, _ in sequences:
         sensor = next(iter(recording.modules.values())).sensor
-        rule = model.finger("*", sensor).slip
+        head = model.finger("*", sensor).slip
         traces = detect(model, recording).fingers.values()
         values = np.array([score(trace) for trace in traces])
         times = np.arange(values.shape[1]) / SEQUENCE_RATE
         with np.errstate(invalid="ignore"):
             largest.append(np.nanmax(values[:, times > TUG_QUIET[1]]))
         inside = values[:, (times > TUG_QUIET[0]) & (times < TUG_QUIET[1])]
-        if rule is not None:
-            quiet.append(np.mean(inside < rule.classifier.threshold))
+        if head is not None:
+            quiet.append(np.mean(inside < head.threshold))
     slipped = np.array([slip for _, slip in sequences])
     peaks = np.array(largest)
     return auc(peaks[slipped], peaks[~slipped]), float(np.mean(quiet)) if quiet else math.nan

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.detector import Detector
 from holdfast.features import DEPLOYED_FEATURES, parse_features
-from holdfast.model import FingerModel, Model
+from holdfast.model import FingerModel, Head, Model
 from holdfast.sensors import sensor
 
 FINGERS = ("thumb", "index", "middle", "ring")
@@ -27,11 +27,10 @@ N_WARM_UP = 200
 def paper_model() -> Model:
     """Return a model with the features of the paper; its numbers have no effect on the speed."""
     features = parse_features(DEPLOYED_FEATURES, 14)
-    ones = (1.0,) * len(features)
-    classifier = LinearClassifier(
-        mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1
-    )
-    finger = FingerModel(features=features, classifier=classifier, contact_threshold=20.0)
+    ones = np.ones(len(features))
+    rule = Linear.of(ones, ones, 0.01 * ones, 0.1)
+    stable = Head(name="stable", link="logit", features=features, rule=rule)
+    finger = FingerModel(heads=(stable,), contact_threshold=20.0)
     return Model(fingers={"*": finger}, rate=RATE)
 
 

@@ -70,7 +70,7 @@ class RunningHandling:
 
     def current(self) -> Model:
         """Return the model with the handling of now."""
-        known = dict(self.part.own_handling)
+        known = dict(self.part.handling)
         for sensor, moments in self.now.items():
             before = known.get(sensor)
             values = {
@@ -121,7 +121,7 @@ class RunningHandling:
                 detector.set_model(self.current())
 
     def _moments(self, sensor: str) -> Moments:
-        handling = self.part.own_handling.get(sensor)
+        handling = self.part.handling.get(sensor)
         if handling is None:
             return Moments(*self.part.default_handling)
         return Moments(np.array(handling.location), np.array(handling.scale))

@@ -15,16 +15,16 @@ recordings that have slip, and of the sequences of the tugs.
 """
 
 import argparse
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from holdfast.classifiers.slip import SlipRule, smooth
 from real_slips import TUG_QUIET, auc, boxes, tugs
 
 from holdfast.classifiers.fitting import Samples
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.linear import Linear, smooth
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.compiled import compiled_step
 from holdfast.contact import STABLE, Cause, ContactState
@@ -40,7 +40,7 @@ from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.slips import EARLY_DURATION, SLIP_RULE_HOLD, SLIP_SMOOTHING
+from holdfast.training.slips import EARLY_DURATION, SLIP_HOLD, SLIP_SMOOTHING
 
 LAG_SECONDS = (0.0067, 0.0267, 0.0533, 0.107, 0.213)
 """Lags of first differences [s]."""
@@ -264,15 +264,15 @@ class Fitted:
     names: tuple[str, ...]
     mean: Array
     scale: Array
-    classifier: LinearClassifier
+    classifier: Linear
 
     def scores(self, rows: FingerRows) -> Array:
         """Return the smoothed log odds of each sample."""
         raw = _expand(np.stack([rows.columns[n] for n in self.names], 1), self.mean, self.scale)
-        weights = self.classifier.weights()
+        (weights,) = self.classifier.raw_weights()
         rate = 1 / np.median(np.diff(rows.times))
         out = np.empty(len(raw))
-        gain = SlipRule(self.classifier, SLIP_SMOOTHING).gain(float(rate))
+        gain = -math.expm1(-1.0 / (float(rate) * SLIP_SMOOTHING))
         averaged(raw @ weights[1:] + weights[0], gain, out)
         return out
 
@@ -280,7 +280,7 @@ class Fitted:
         """Return the counts of slips at all thresholds."""
         probability = 1 / (1 + np.exp(-self.scores(rows)))
         none = np.zeros(len(probability), bool)
-        return slip_curve(SlipDecisions(rows.times, probability, none, SLIP_RULE_HOLD, rows.truth))
+        return slip_curve(SlipDecisions(rows.times, probability, none, SLIP_HOLD, rows.truth))
 
 
 def _expand(raw: Array, mean: Array, scale: Array) -> Array:
@@ -303,7 +303,7 @@ def fit(rows: Sequence[FingerRows], names: Sequence[str]) -> Fitted:
     scale[scale == 0] = 1.0
     samples = Samples(_expand(raw, mean, scale), sliding, np.zeros(len(raw), dtype=np.int64))
     fitted = LogisticRegression().fit(samples, {"C": 1.0, "class_weight": None}, 0)
-    return Fitted(tuple(names), mean, scale, fitted)
+    return Fitted(tuple(names), mean, scale, fitted.linear)
 
 
 def simulated(

@@ -29,15 +29,14 @@ from hand_handling import (
     moments_of_others,
     read_grasp,
 )
-from msgspec.structs import replace
 from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.metrics import roc_auc_score
 
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.io import load_dataset
-from holdfast.model import Debounce, FingerModel, Model, Training
+from holdfast.model import Debounce, FingerModel, Head, Model, Training
 
 FEATURES = parse_features("any")
 C = 1e-3
@@ -75,7 +74,7 @@ def fit(
     grasps: Sequence[HandGrasp],
     moments: Sequence[Moments | None],
     features: Sequence[FeatureSpec] = FEATURES,
-) -> LinearClassifier:
+) -> Linear:
     """Fit a logistic regression in which more change is never more stable.
 
     The sign of every weight is fixed, except that of the ratio of load to noise. This costs
@@ -104,10 +103,7 @@ def fit(
     fitted = minimize(loss, np.zeros(1 + len(features)), jac=True, bounds=bounds, method="L-BFGS-B")
     coefficients = fitted.x[1:] / spread
     location, scale = default_handling(grasps)
-    return LinearClassifier(
-        tuple(location.tolist()), tuple(scale.tolist()), tuple(coefficients.tolist()),
-        float(fitted.x[0] - coefficients @ mean),
-    )  # fmt: skip
+    return Linear.of(location, scale, coefficients, fitted.x[0] - coefficients @ mean)
 
 
 def training_samples(
@@ -183,19 +179,15 @@ def calibration_error(probability: np.ndarray, stable: np.ndarray) -> float:
     )
 
 
-def untrained() -> LinearClassifier:
-    """Return a classifier that knows nothing, for features and contact."""
-    n = len(FEATURES)
-    return LinearClassifier((0.0,) * n, (1.0,) * n, (0.0,) * n, 0.0)
+def untrained() -> Linear:
+    """Return a rule that knows nothing, for features and contact."""
+    zeros = np.zeros(len(FEATURES))
+    return Linear.of(zeros, zeros + 1.0, zeros, 0.0)
 
 
-def model_of(classifier: LinearClassifier, training: Training | None = None) -> Model:
-    finger = FingerModel(
-        features=FEATURES,
-        classifier=classifier,
-        contact_load=LOAD_TO_NOISE_OF_CONTACT,
-        normalised=True,
-    )
+def model_of(rule: Linear, threshold: float = 0.5, training: Training | None = None) -> Model:
+    stable = Head(name="stable", link="logit", features=FEATURES, rule=rule, threshold=threshold)
+    finger = FingerModel(heads=(stable,), contact_load=LOAD_TO_NOISE_OF_CONTACT, normalised=True)
     return Model(
         fingers={"*": finger},
         tare="first",
@@ -206,7 +198,7 @@ def model_of(classifier: LinearClassifier, training: Training | None = None) -> 
 
 
 def save(
-    classifier: LinearClassifier,
+    classifier: Linear,
     threshold: float,
     digests: dict[str, str],
     figures: dict[str, float],
@@ -219,8 +211,7 @@ def save(
         figures=figures,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )
-    chosen = replace(classifier, threshold=threshold)
-    model_of(chosen, training).save(out, force=True)
+    model_of(classifier, threshold, training).save(out, force=True)
     print(f"threshold {threshold:.3f}; {out} written")
 
 

@@ -1,11 +1,11 @@
-"""Add a rule of causes to a model: why a contact that does not slide is unstable.
+"""Add a head of causes to a model: why a contact that does not slide is unstable.
 
     holdfast simulate twin/ --seed 0
     python benchmarks/train_causes.py builtin:twin twin/ -o src/holdfast/models/twin.json
     holdfast simulate hands/ --randomize --repeats 300 --seed 0
     python benchmarks/train_causes.py builtin:any hands/ -o src/holdfast/models/any.json
 
-Slip is no cause here: the slip rule decides it (`train_slips.py`). The true cause is that of the
+Slip is no cause here: its own head decides it (`train_slips.py`). The true cause is that of the
 labels made from the truth, by sample; samples that slide are left out. Prints the confusion on
 objects (or hands) left out. Nothing here reads a real recording.
 """
@@ -18,13 +18,13 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
-from holdfast.classifiers.cause import CauseClassifier, fit_causes
 
+from holdfast.classifiers.causes import fit_causes
 from holdfast.contact import Cause
 from holdfast.features.stream import extract
 from holdfast.io import load_dataset
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
-from holdfast.model import Model
+from holdfast.model import Head, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import true_updates
 from holdfast.sensors.types import Array, Integers
@@ -48,15 +48,15 @@ class UnstableSamples(NamedTuple):
 
 
 def main(name: str, folder: Path, out: Path | None) -> None:
-    """Fit the rule, print its confusion out of fold, and write the model."""
+    """Fit the head, print its confusion out of fold, and write the model."""
     model = Model.load(name)
     recordings = load_dataset(folder)
     samples = [samples_of(model, recording) for recording in recordings]
     groups = sorted({sample.group for sample in samples})
     folds = np.array([groups.index(sample.group) % N_FOLDS for sample in samples])
-    print_confusion(samples, folds)
+    print_confusion(model, samples, folds)
     if out is not None:
-        save(model, fit(samples), recordings, out)
+        save(model, fit(model, samples), recordings, out)
 
 
 def samples_of(model: Model, recording: Recording) -> UnstableSamples:
@@ -64,10 +64,10 @@ def samples_of(model: Model, recording: Recording) -> UnstableSamples:
     recording = true_updates(recording)
     sensors = model.fingers_of({name: item.sensor for name, item in recording.modules.items()})
     extracted = extract(model.plan(sensors, recording.rate), recording)
-    n_features = len(model.finger("*").features)  # the slip rule may have more
-    rows = {finger: part.features[:, :n_features] for finger, part in extracted.items()}
+    columns = model.finger("*").indices(model.finger("*").stable)  # other heads may have more
+    rows = {finger: part.features[:, columns] for finger, part in extracted.items()}
     step = max(1, round(recording.rate / MAX_RATE))
-    features, causes = [np.empty((0, n_features))], [np.empty(0, "U12")]
+    features, causes = [np.empty((0, len(columns)))], [np.empty(0, "U12")]
     for finger, labels in labels_by_truth(recording, LabelRule(margin=0.0)).items():
         if finger not in rows:
             continue
@@ -89,19 +89,22 @@ def samples_of(model: Model, recording: Recording) -> UnstableSamples:
     )
 
 
-def fit(samples: Sequence[UnstableSamples]) -> CauseClassifier:
-    """Fit the rule to the samples of some recordings."""
+def fit(model: Model, samples: Sequence[UnstableSamples]) -> Head:
+    """Fit the head to the samples of some recordings."""
     features = np.concatenate([sample.features for sample in samples])
-    return fit_causes(features, np.concatenate([sample.causes for sample in samples]), C)
+    causes = np.concatenate([sample.causes for sample in samples])
+    rule, classes = fit_causes(features, causes, C)
+    used = model.finger("*").stable.features
+    return Head(name="cause", link="softmax", features=used, rule=rule, classes=classes)
 
 
-def print_confusion(samples: Sequence[UnstableSamples], folds: Integers) -> None:
+def print_confusion(model: Model, samples: Sequence[UnstableSamples], folds: Integers) -> None:
     """Print the estimated causes of single samples of folds left out, in percent of a row."""
     counts = np.zeros((len(CAUSES), len(CAUSES)), dtype=np.int64)
     for fold in range(N_FOLDS):
-        rule = fit([sample for sample, own in zip(samples, folds, strict=True) if own != fold])
-        weights = rule.weights()[rule.codes() - 1]
-        names = np.array(rule.causes)
+        others = [sample for sample, own in zip(samples, folds, strict=True) if own != fold]
+        head = fit(model, others)
+        weights, names = head.linear.raw_weights(), np.array(head.classes)
         for k in np.flatnonzero(folds == fold):
             scores = samples[k].features @ weights[:, 1:].T + weights[:, 0]
             places = (np.searchsorted(CAUSES, samples[k].causes),)
@@ -113,16 +116,15 @@ def print_confusion(samples: Sequence[UnstableSamples], folds: Integers) -> None
         print(f"| {cause} | {row.sum()} | {shares} |")
 
 
-def save(model: Model, rule: CauseClassifier, recordings: Sequence[Recording], out: Path) -> None:
-    """Write the model; its provenance names the recordings of the rule, too."""
+def save(model: Model, head: Head, recordings: Sequence[Recording], out: Path) -> None:
+    """Write the model; its provenance names the recordings of the head, too."""
     training = model.training
     if training is not None:
         known = set(training.recordings.values())
         added = {item.name: item.digest for item in recordings if item.digest not in known}
         training = msgspec.structs.replace(training, recordings=training.recordings | added)
-    part = msgspec.structs.replace(model.finger("*"), causes=rule)
-    changed = msgspec.structs.replace(model, fingers={"*": part}, training=training, name=out.stem)
-    changed.save(out, force=True)
+    changed = model.changed(lambda part: part.with_heads(head))
+    msgspec.structs.replace(changed, training=training, name=out.stem).save(out, force=True)
     print(f"{out} written")
 
 

@@ -1,4 +1,4 @@
-"""Add a slip rule to a model, or the speed of slips: trained on true sliding.
+"""Add a head of slips to a model, or the speed of slips: trained on true sliding.
 
     holdfast simulate twin/ --seed 0
     holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
@@ -10,14 +10,15 @@
     python benchmarks/train_slips.py builtin:twin twin/ slips/ --only-speed \
         -o src/holdfast/models/twin.json
 
-With --only-speed, the slip rule of the model gets a speed rule, and the model stays as it is.
+With --only-speed, the model gets a head of the speed, with the features of its head of slips, and
+stays as it is.
 
-The features and the classifier of stability stay. With --own-features, the rule gets the list
-`SLIP_FEATURES` and squares; else it has the features of that classifier. It is fitted without a
+The head of stability stays. With --own-features, that of slips gets the list `SLIP_FEATURES` and
+squares; else it has the features of stability. It is fitted without a
 fifth of the objects (or hands), five times; the threshold is the lowest with at most one false
 alarm a minute of all held time in the decisions about what was left out. Below the metrics of all
 recordings, by thresholds that were chosen without them, are those of each folder at the threshold
-of the model. A model of normalised features gets a rule on them: those of a grasp are normalised by
+of the model. A model of normalised features gets a head on them: those of a grasp are normalised by
 the other grasps of the same hand. Nothing here reads a real recording.
 """
 
@@ -29,14 +30,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 from hand_handling import NORMALISED_BY, moments_by, read_grasp
-from holdfast.classifiers.slip import SlipRule
 
+from holdfast.classifiers import Linear
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.specs import SLIP_FEATURES
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
 from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
-from holdfast.model import Model
+from holdfast.model import Head, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset, show_nothing
@@ -59,12 +60,12 @@ def main(options: argparse.Namespace) -> None:
     if options.only_speed:
         add_speed(model, options, engine)
         return
-    features = None
+    features = model.finger("*").stable.features
     if options.own_features:
         left_out = tuple(options.without)
-        features = [x for x in SLIP_FEATURES if not any(text in str(x) for text in left_out)]
+        features = tuple(x for x in SLIP_FEATURES if not any(text in str(x) for text in left_out))
     recordings = [recording for folder in options.folders for recording in named(folder)]
-    plan = plan_of(model, recordings, features or model.finger("*").features)
+    plan = plan_of(model, recordings, features)
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
     if model.finger("*").normalised:
         samples = normalised_samples(model, samples, recordings, options.normalised_by)
@@ -72,7 +73,8 @@ def main(options: argparse.Namespace) -> None:
     folds = folds_of_recordings(plan, recordings)
     units = plan.data_split.group_of
     held = [units[folds == fold].tolist() for fold in range(N_FOLDS)]
-    models = [replaced(model, fitted(model, samples, left, features)) for left in held]
+    squares = options.own_features
+    models = [replaced(model, fitted(model, samples, left, features, squares)) for left in held]
     calls = ((models[fold], item) for fold, item in zip(folds, recordings, strict=True))
     curves = list(engine.map_ordered(curves_of, calls))
     chosen = choose_slip_threshold(curves, folds.tolist(), seed=0)
@@ -81,29 +83,30 @@ def main(options: argparse.Namespace) -> None:
     print_metrics(chosen.metrics.pooled)
     for folder in options.folders:
         print_folder(folder.name, recordings, curves, chosen.place)
-    complete = with_slip_threshold(replaced(model, fitted(model, samples, [], features)), chosen)
-    print(msgspec.json.encode(complete.finger("*").slip.thresholds).decode())
+    complete = replaced(model, fitted(model, samples, [], features, squares))
+    complete = with_slip_threshold(complete, chosen)
+    print(msgspec.json.encode(complete.finger("*").slip.choice).decode())
     if out is not None:
         save(complete, recordings, out)
 
 
 def add_speed(model: Model, options: argparse.Namespace, engine: Engine) -> None:
-    """Write the model with a speed rule in its slip rule, and change nothing else."""
+    """Write the model with a head of the speed, and change nothing else."""
     part = model.finger("*")
     if part.slip is None:
         raise SystemExit(f"{options.model} has no slip rule; one expected, whose features it uses")
     recordings = [recording for folder in options.folders for recording in named(folder)]
-    plan = plan_of(model, recordings, part.slip.used_features(part.features))
+    plan = plan_of(model, recordings, part.slip.features)
     samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
-    rule = samples.with_speed(part.slip, [])
-    if samples.speeds is None or rule == part.slip:
+    heads = samples.fit_speed([], part.slip.features)
+    if samples.speeds is None or not heads:
         raise SystemExit(
             f"too few samples whose true speed is known in {len(recordings)} recordings"
         )
     print(f"{samples.speeds.n_sliding} sliding samples of slips over 1 mm")
     if options.out is not None:
-        named_model = msgspec.structs.replace(replaced(model, rule), name=options.out.stem)
-        named_model.save(options.out, force=True)
+        complete = model.changed(lambda own: own.with_heads(*heads))
+        msgspec.structs.replace(complete, name=options.out.stem).save(options.out, force=True)
         print(f"{options.out} written")
 
 
@@ -150,31 +153,28 @@ def fitted(
     model: Model,
     samples: SlipSamples,
     held: Collection[int],
-    features: Sequence[FeatureSpec] | None,
-) -> SlipRule | None:
-    """Return a rule fitted without held units, on the raw features.
+    features: tuple[FeatureSpec, ...],
+    squares: bool,
+) -> list[Head]:
+    """Return the heads of slips fitted without held units, on the raw features.
 
-    Of a model of normalised features, mean and scale of the rule are default handling.
+    Of a model of normalised features, mean and scale of the rule of slips are default handling.
     """
-    rule, part = samples.fit(held, features), model.finger("*")
-    if rule is None or not part.normalised:
-        return rule
-    linear = rule.classifier
-    location, scale = part.default_handling
-    weights = np.array(linear.coefficients) / np.array(linear.scale)
-    classifier = msgspec.structs.replace(
-        linear,
-        mean=tuple(location.tolist()),
-        scale=tuple(scale.tolist()),
-        coefficients=tuple(weights.tolist()),
-        intercept=linear.intercept - float(weights @ np.array(linear.mean)),
-    )
-    return msgspec.structs.replace(rule, classifier=classifier)
+    heads, part = samples.fit(held, features, squares=squares), model.finger("*")
+    if not heads or not part.normalised:
+        return heads
+    slip, *others = heads
+    rule, columns = slip.linear, part.indices(part.stable)
+    location, scale = (values[columns] for values in part.default_handling)
+    weights = np.array(rule.weights[0]) / np.array(rule.scale)
+    intercept = rule.intercepts[0] - float(weights @ np.array(rule.mean))
+    linear = Linear.of(location, scale, weights, intercept, slope=rule.slope, offset=rule.offset)
+    return [msgspec.structs.replace(slip, rule=linear), *others]
 
 
-def replaced(model: Model, rule: SlipRule | None) -> Model:
-    part = msgspec.structs.replace(model.finger("*"), slip=rule)
-    return msgspec.structs.replace(model, fingers={"*": part})
+def replaced(model: Model, heads: Sequence[Head]) -> Model:
+    """Return the model with these heads of slips, and no others."""
+    return model.changed(lambda part: part.without_heads("slip", "slip_speed").with_heads(*heads))
 
 
 def print_folder(
@@ -202,7 +202,7 @@ def print_metrics(metrics: SlipMetrics) -> None:
 
 
 def save(model: Model, recordings: Sequence[Recording], out: Path) -> None:
-    """Write the model; its provenance names the recordings of the slip rule, too."""
+    """Write the model; its provenance names the recordings of the head of slips, too."""
     training = model.training
     if training is not None:
         known = set(training.recordings.values())
@@ -226,5 +226,5 @@ if __name__ == "__main__":
                         help="leave out those of them whose names contain it")  # fmt: skip
     parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="others",
                         help="of a model of normalised features")  # fmt: skip
-    parser.add_argument("--only-speed", action="store_true", help="add a speed rule, no more")
+    parser.add_argument("--only-speed", action="store_true", help="add the speed, no more")
     main(parser.parse_args())

@@ -84,8 +84,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from holdfast.classifiers.fitting import check_classes
-from holdfast.classifiers.onnx_classifier import OnnxClassifier
+from holdfast.classifiers.fitting import Fitted, check_classes
+from holdfast.classifiers.onnx_classifier import Onnx
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Sphere:
         )
         opset = [helper.make_opsetid("", 18)]
         model = helper.make_model(graph, opset_imports=opset, ir_version=9)
-        return OnnxClassifier.of(model.SerializeToString(), len(mean), 0.5)
+        return Fitted(Onnx.of(model.SerializeToString(), len(mean)))
 '''
 
 MIDDLE = '''
@@ -131,8 +131,8 @@ MIDDLE = '''
 
 from dataclasses import dataclass, field
 
-from holdfast.classifiers.fitting import check_classes, sigmoid, standardise
-from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.fitting import Fitted, check_classes, sigmoid, standardise
+from holdfast.classifiers.linear import Linear
 
 
 @dataclass(frozen=True)
@@ -152,10 +152,7 @@ class Middle:
         mean, scale, rows = standardise(samples.features)
         high, low = rows[samples.stable].mean(axis=0), rows[~samples.stable].mean(axis=0)
         slope, offset = sigmoid(rows @ (high - low), samples.stable)
-        return LinearClassifier(
-            tuple(mean.tolist()), tuple(scale.tolist()), tuple((high - low).tolist()), 0.0,
-            slope, offset,
-        )
+        return Fitted(Linear.of(mean, scale, high - low, 0.0, slope=slope, offset=offset))
 '''
 
 

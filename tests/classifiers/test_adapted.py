@@ -8,30 +8,33 @@ import pytest
 from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
-from holdfast.classifiers import Adapted, LinearClassifier, OnnxClassifier
+from holdfast.classifiers import Adapted, Fitted, Linear, Onnx
 from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, linear_prior, log_odds
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples
 
-PRIOR = LinearClassifier(
+PRIOR = Linear(
     mean=(5010.0, 1.01, 0.3),
     scale=(90.0, 0.02, 2.0),
-    coefficients=(0.2, -0.4, 1.5),
-    intercept=0.6,
+    weights=((0.2, -0.4, 1.5),),
+    intercepts=(0.6,),
 )
-UNLIKE = msgspec.structs.replace(PRIOR, slope=2.5, offset=-0.7, threshold=0.2)
-"""A calibration and a threshold of its own."""
+UNLIKE = msgspec.structs.replace(PRIOR, slope=2.5, offset=-0.7)
+"""A calibration of its own."""
+THRESHOLDS = {PRIOR: 0.5, UNLIKE: 0.2}
 
 GIVEN = samples(600, share=0.3)
 
 
 def adapted(C, given=GIVEN, prior=PRIOR, change=WEIGHTS):
-    return Adapted(prior).fit(given, {"change": change, "C": C}, 0)
+    fitted = Adapted(prior, THRESHOLDS.get(prior, 0.5)).fit(given, {"change": change, "C": C}, 0)
+    assert fitted.threshold == THRESHOLDS.get(prior, 0.5)
+    return fitted.rule
 
 
-def decided(rule, given=GIVEN):
-    return rule.probability(given.features) >= rule.threshold
+def decided(rule, given=GIVEN, threshold=0.5):
+    return rule.probability(given.features) >= threshold
 
 
 def odds_of(prior):
@@ -40,7 +43,7 @@ def odds_of(prior):
 
 
 def rule_of(rule):
-    return np.array([rule.intercept, *rule.coefficients])
+    return np.array([*rule.intercepts, *rule.weights[0]])
 
 
 def loss(v, rows, stable, known, C):
@@ -54,7 +57,7 @@ def loss(v, rows, stable, known, C):
 def test_the_weights_have_the_least_loss_of_the_docstring(prior, C):
     scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
     rows = np.column_stack([np.ones(len(scaled)), scaled])
-    known = prior.slope * np.array([prior.intercept, *prior.coefficients])
+    known = prior.slope * rule_of(prior)
     known[0] += prior.offset
     given = (rows, GIVEN.stable, known, C)
     found = rule_of(adapted(C, prior=prior))
@@ -81,10 +84,12 @@ def test_the_calibration_has_the_least_loss_of_the_docstring(C):
 @pytest.mark.parametrize("change", [CALIBRATION, WEIGHTS])
 def test_with_a_small_c_decisions_and_probabilities_of_the_prior_stay(prior, change):
     found = adapted(1e-12, prior=prior, change=change)
-    assert np.array_equal(decided(found), decided(prior))
+    threshold = THRESHOLDS[prior]
+    before = decided(prior, threshold=threshold)
+    assert np.array_equal(decided(found, threshold=threshold), before)
     known = prior.probability(GIVEN.features)
     assert found.probability(GIVEN.features) == pytest.approx(known, abs=1e-6)
-    assert 0.1 < decided(prior).mean() < 0.9
+    assert 0.1 < before.mean() < 0.9
 
 
 def test_without_a_change_the_prior_is_returned():
@@ -100,12 +105,12 @@ def test_the_calibration_is_that_of_scikit_learn_on_the_log_odds():
     found = adapted(1e6, prior=UNLIKE, change=CALIBRATION)
     expected = peer.predict_proba(odds)[:, 1]
     assert found.probability(GIVEN.features) == pytest.approx(expected, abs=1e-4)
-    assert (found.coefficients, found.threshold) == (UNLIKE.coefficients, UNLIKE.threshold)
+    assert found.weights == UNLIKE.weights
 
 
 def test_a_prior_that_is_upside_down_loses_its_slope():
     """A calibration does not turn the order of the samples round."""
-    flipped = msgspec.structs.replace(PRIOR, coefficients=tuple(-c for c in rule_of(PRIOR)[1:]))
+    flipped = msgspec.structs.replace(PRIOR, weights=((-0.2, 0.4, -1.5),))
     given = samples(600, share=0.3)
     other = given._replace(stable=~decided(flipped, given))
     found = adapted(1e3, other, flipped, CALIBRATION)
@@ -139,9 +144,10 @@ def test_a_larger_c_moves_away_from_the_prior():
 
 def test_probabilities_are_of_the_base_rate_and_the_threshold_stays():
     given = samples(6000, share=0.15)
-    found = adapted(1.0, given, UNLIKE)
+    found = Adapted(UNLIKE, 0.2).fit(given, {"change": WEIGHTS, "C": 1.0}, 0)
     assert found.probability(given.features).mean() == pytest.approx(0.15, abs=0.02)
-    assert found.threshold == UNLIKE.threshold
+    assert found.threshold == 0.2
+    assert found == Fitted(adapted(1.0, given, UNLIKE), 0.2)
 
 
 def test_it_is_deterministic():
@@ -153,7 +159,7 @@ def test_few_samples_help_a_prior_that_is_nearly_right():
     """Forty samples, and a prior whose cut is off."""
     world = samples(20_000, seed=7)
     rule = adapted(1e3, world)
-    prior = msgspec.structs.replace(rule, intercept=rule.intercept + 2.0)
+    prior = msgspec.structs.replace(rule, intercepts=(rule.intercepts[0] + 2.0,))
     few = samples(40, seed=8)
     test = samples(4000, seed=9)
 
@@ -183,9 +189,10 @@ def test_another_number_of_features_is_refused():
 
 def test_every_prior_has_a_name_of_its_own():
     """The journal of a search depends on it."""
-    near = msgspec.structs.replace(PRIOR, intercept=np.nextafter(0.6, 1))
+    near = msgspec.structs.replace(PRIOR, intercepts=(np.nextafter(0.6, 1),))
     assert Adapted(PRIOR).name == replace(Adapted(PRIOR)).name
     assert len({Adapted(prior).name for prior in (PRIOR, UNLIKE, near)}) == 3
+    assert Adapted(PRIOR, 0.2).name != Adapted(PRIOR).name  # the search may count errors
 
 
 def test_an_unknown_change_is_refused():
@@ -212,7 +219,7 @@ def test_the_search_covers_the_reference():
 def test_a_classifier_that_is_not_linear_is_refused():
     assert linear_prior(PRIOR) is PRIOR
     with pytest.raises(TrainingError) as raised:
-        linear_prior(OnnxClassifier.of(b"any", 3, 0.5))
+        linear_prior(Onnx.of(b"any", 3))
     assert str(raised.value) == (
         "a model with linear classifiers expected to adapt, an ONNX file given"
     )

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
+from holdfast.classifiers.linear import add_scores, add_squares, speed_of
 from holdfast.errors import ModelError
 
 numbers = st.floats(-1e3, 1e3)
@@ -14,9 +15,9 @@ positive = st.floats(1e-2, 1e3)
 def classifiers(n):
     many = st.tuples(*[numbers] * n)
     scales = st.tuples(*[positive] * n)
-    return st.builds(
-        LinearClassifier, many, scales, many, numbers, st.floats(1e-3, 10), st.floats(-5, 5)
-    )
+    rows, intercepts, none = st.tuples(many), st.tuples(numbers), st.just(())
+    slope, offset = st.floats(1e-3, 10), st.floats(-5, 5)
+    return st.builds(Linear, many, scales, rows, intercepts, none, slope, offset)
 
 
 @given(rule=classifiers(3), seed=st.integers(0, 99))
@@ -25,7 +26,7 @@ def test_weights_decision_and_probability_agree(rule, seed):
     features = np.random.default_rng(seed).normal(scale=100, size=(20, 3))
     with np.errstate(over="ignore"):
         by_decision = 1 / (1 + np.exp(-(rule.slope * rule.decision(features) + rule.offset)))
-        weights = rule.weights()
+        weights = rule.raw_weights()[0]
         by_weights = 1 / (1 + np.exp(-(weights[0] + features @ weights[1:])))
     found = rule.probability(features)
     assert found == pytest.approx(by_decision, abs=1e-6)
@@ -33,26 +34,26 @@ def test_weights_decision_and_probability_agree(rule, seed):
 
 
 def test_the_equation():
-    rule = LinearClassifier((1.0, 2.0), (2.0, 4.0), (3.0, -1.0), 0.5, slope=2.0, offset=-0.25)
+    rule = Linear((1.0, 2.0), (2.0, 4.0), ((3.0, -1.0),), (0.5,), slope=2.0, offset=-0.25)
     assert rule.decision(np.array([[3.0, 6.0]])).tolist() == [0.5 + 3.0 - 1.0]
     assert rule.probability([[3.0, 6.0]])[0] == pytest.approx(1 / (1 + np.exp(-4.75)))
     assert rule.n_features == 2
 
 
 def test_nan_features_have_no_probability():
-    rule = LinearClassifier((0.0,), (1.0,), (1.0,), 0.0)
+    rule = Linear((0.0,), (1.0,), ((1.0,),), (0.0,))
     assert np.isnan(rule.probability([[np.nan], [0.0]])).tolist() == [True, False]
     assert rule.probability(np.empty((0, 1))).shape == (0,)
 
 
 def test_far_from_the_boundary_it_is_certain():
-    rule = LinearClassifier((0.0,), (1.0,), (1.0,), 0.0)
+    rule = Linear((0.0,), (1.0,), ((1.0,),), (0.0,))
     assert rule.probability([[1e9], [-1e9]]).tolist() == [1.0, 0.0]
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.int64])
 def test_features_of_any_type(kind):
-    rule = LinearClassifier((0.0, 1.0), (1.0, 2.0), (1.0, -1.0), 0.2)
+    rule = Linear((0.0, 1.0), (1.0, 2.0), ((1.0, -1.0),), (0.2,))
     features = np.arange(8).reshape(4, 2)
     assert np.array_equal(rule.probability(features.astype(kind)), rule.probability(features))
 
@@ -60,40 +61,119 @@ def test_features_of_any_type(kind):
 @pytest.mark.parametrize("shape", [(4, 1), (4, 3), (2,), (1, 4, 2)])
 @pytest.mark.parametrize("of", ["probability", "decision"])
 def test_refuses_other_shapes(shape, of):
-    rule = LinearClassifier((0.0, 1.0), (1.0, 2.0), (1.0, -1.0), 0.2)
+    rule = Linear((0.0, 1.0), (1.0, 2.0), ((1.0, -1.0),), (0.2,))
     with pytest.raises(ValueError) as raised:
         getattr(rule, of)(np.zeros(shape))
     assert str(raised.value) == f"features of shape (n, 2) expected, {shape} given"
 
 
-GOOD = {"mean": (0.0,), "scale": (1.0,), "coefficients": (1.0,), "intercept": 0.0}
+GOOD = {"mean": (0.0,), "scale": (1.0,), "weights": ((1.0,),), "intercepts": (0.0,)}
+NOT_FINITE = "a number of the weights is not finite, or a scale is too small"
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"mean": (0.0, 1.0)},
-         "2 means, 1 scales and 1 coefficients given; the same number of each expected"),
-        ({"mean": (np.nan,)}, "a number of the classifier is not finite"),
-        ({"coefficients": (np.inf,)}, "a number of the classifier is not finite"),
-        ({"intercept": np.nan}, "a number of the classifier is not finite"),
-        ({"offset": -np.inf}, "a number of the classifier is not finite"),
-        ({"slope": np.nan}, "a number of the classifier is not finite"),
+         "means, scales and rows of weights and squares of 2, 1, 1 features given; the same "
+         "number of each expected"),
+        ({"weights": ((1.0,), (1.0, 2.0)), "intercepts": (0.0, 0.0)},
+         "means, scales and rows of weights and squares of 1, 1, 1, 2 features given; the same "
+         "number of each expected"),
+        ({"squares": ((1.0, 2.0),)},
+         "means, scales and rows of weights and squares of 1, 1, 1, 2 features given; the same "
+         "number of each expected"),
+        ({"intercepts": (0.0, 0.0)},
+         "1 rows of weights, 2 intercepts and 0 rows of squares given; one of each for every "
+         "output expected"),
+        ({"squares": ((1.0,), (2.0,))},
+         "1 rows of weights, 1 intercepts and 2 rows of squares given; one of each for every "
+         "output expected"),
+        ({"weights": (), "intercepts": ()},
+         "0 rows of weights, 0 intercepts and 0 rows of squares given; one of each for every "
+         "output expected"),
+        ({"mean": (np.nan,)}, NOT_FINITE),
+        ({"weights": ((np.inf,),)}, NOT_FINITE),
+        ({"intercepts": (np.nan,)}, NOT_FINITE),
+        ({"squares": ((np.nan,),)}, NOT_FINITE),
+        ({"squares": ((1e308,),), "slope": 1e3}, NOT_FINITE),
+        ({"squares": ((0.0,),), "scale": (1e-320,), "weights": ((0.0,),)}, NOT_FINITE),
+        ({"offset": -np.inf}, NOT_FINITE),
+        ({"slope": np.nan}, NOT_FINITE),
         ({"slope": 0.0}, "scales and slope above 0 expected"),
         ({"scale": (0.0,)}, "scales and slope above 0 expected"),
         ({"scale": (-1.0,)}, "scales and slope above 0 expected"),
-        ({"scale": (1e-300,), "coefficients": (1e300,)},
-         "the weights of the classifier overflow: a scale is too small"),
-        ({"threshold": 1.5}, "a threshold from 0 to 1 expected, 1.5 given"),
-        ({"threshold": np.nan}, "a threshold from 0 to 1 expected, nan given"),
+        ({"scale": (1e-300,), "weights": ((1e300,),)}, NOT_FINITE),
     ],
 )  # fmt: skip
 def test_refusals(change, message):
     with pytest.raises(ModelError) as raised:
-        LinearClassifier(**(GOOD | change))
+        Linear(**(GOOD | change))
     assert str(raised.value) == message
 
 
 @given(classifiers(4))
 def test_saved_and_loaded_it_is_the_same(rule):
-    assert msgspec.json.decode(msgspec.json.encode(rule), type=LinearClassifier) == rule
+    assert msgspec.json.decode(msgspec.json.encode(rule), type=Linear) == rule
+
+
+def test_arrays_of_one_output_and_of_several():
+    mean, scale, rows = np.array([1.0, 2.0]), np.array([2.0, 4.0]), np.array([[3.0, -1.0], [0, 1]])
+    one = Linear.of(mean, scale, rows[0], 0.5, rows[1], slope=2.0)
+    assert one == Linear((1.0, 2.0), (2.0, 4.0), ((3.0, -1.0),), (0.5,), ((0.0, 1.0),), slope=2.0)
+    two = Linear.of(mean, scale, rows, [0.5, 0.25])
+    assert (two.n_features, two.n_outputs) == (2, 2)
+    expected = (np.array([[7.0, 8.0]]) - mean) / scale @ rows.T + [0.5, 0.25]
+    raw = two.raw_weights()
+    assert raw[:, 0] + raw[:, 1:] @ [7.0, 8.0] == pytest.approx(expected[0])
+
+
+SPEED = Linear((1.0, 2.0), (2.0, 0.5), ((0.5, -1.0),), (3.0,), ((0.25, 0.0),))
+HIGHEST = 40.0
+
+
+def speed(features):
+    weights = SPEED.raw_weights()[0]
+    value = weights[0] + features @ weights[1:]
+    return speed_of(add_squares(value, features, SPEED.raw_squares()), HIGHEST)
+
+
+@pytest.mark.parametrize(
+    ("features", "expected"),
+    [
+        ([1.0, 2.0], 3.0**2),  # the means
+        ([3.0, 2.0], (3.0 + 0.5 + 0.25) ** 2),
+        ([1.0, 3.5], 0.0),  # z = 3 - 3
+        ([1.0, 9.0], 0.0),  # z < 0
+        ([21.0, 2.0], 40.0),  # the highest
+        ([-99.0, -48.0], 40.0),  # squares of at most 5 deviations: 3 - 25 + 100 + 6.25
+    ],
+)
+def test_values_of_a_speed(features, expected):
+    assert speed(np.array(features)) == pytest.approx(expected)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2))
+def test_a_speed_is_never_negative_nor_above_the_highest(features):
+    assert 0 <= speed(np.array(features)) <= HIGHEST
+
+
+def test_squares_by_hand():
+    rule = Linear((1.0, -2.0), (4.0, 9.0), ((0.0, 0.0),), (0.0,), ((0.3, -0.2),), slope=0.4)
+    assert Linear(rule.mean, rule.scale, rule.weights, (0.0,)).raw_squares()[2].tolist() == [0, 0]
+    phi = np.array([3.0, -900.0])
+    u = (phi - np.array(rule.mean)) / np.array(rule.scale)
+    assert abs(u[1]) > 5
+    expected = rule.slope * np.array(rule.squares[0]) @ np.minimum(np.abs(u), 5.0) ** 2
+    assert add_squares(0.5, phi, rule.raw_squares()) == pytest.approx(0.5 + expected)
+
+
+def test_the_largest_sum_of_scores_wins():
+    rule = Linear((1.0, 2.0), (2.0, 4.0), ((1.0, -1.0), (0.5, 3.0)), (0.25, -0.5))
+    rows = np.array([[0.0, 1.0], [5.0, 9.0]])
+    standardised = (rows - rule.mean) / rule.scale
+    wanted = (standardised @ np.array(rule.weights).T + rule.intercepts).cumsum(axis=0)
+    scores = np.zeros(2)
+    for row, sums in zip(rows, wanted, strict=True):
+        assert add_scores(row, rule.raw_weights(), scores) == sums.argmax() + 1
+        assert scores == pytest.approx(sums)

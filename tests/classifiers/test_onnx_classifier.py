@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.classifiers import LinearClassifier
-from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE, OnnxClassifier
+from holdfast.classifiers import Linear
+from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE, Onnx
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.detector import Detector, detect
 from holdfast.errors import MissingExtra, ModelError, OutputError
 from holdfast.features import FeatureSpec
-from holdfast.model import ANY_FINGER, Debounce, FingerModel, Model
+from holdfast.model import ANY_FINGER, Debounce, FingerModel, Head, Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import evaluate
 
@@ -23,7 +23,7 @@ FEATURES = (
     FeatureSpec("F_a", transform="log", floor=1.0),
     FeatureSpec("sigma", 14, "log", floor=1.0),
 )
-UNREAD = OnnxClassifier.of(b"not read", 2, 0.5)
+UNREAD = Onnx.of(b"not read", 2)
 
 
 def content(outputs=1, output="p"):
@@ -53,14 +53,15 @@ def expected(rows):
     return 1 / (1 + np.exp(np.abs(rows[:, 0] - rows[:, 1]) - 2))
 
 
-def hand_model(classifier):
-    finger = FingerModel(features=FEATURES, classifier=classifier, contact_noise=5.0)
+def hand_model(rule, threshold=0.4):
+    stable = Head(name="stable", link="logit", features=FEATURES, rule=rule, threshold=threshold)
+    finger = FingerModel(heads=(stable,), contact_noise=5.0)
     return Model(fingers={ANY_FINGER: finger}, debounce=Debounce(hold=0.05))
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    return OnnxClassifier.of(content(), 2, 0.4)
+    return Onnx.of(content(), 2)
 
 
 def test_the_probability(fitted):
@@ -81,10 +82,10 @@ def test_a_saved_and_loaded_model_is_the_same(fitted, tmp_path):
     assert (tmp_path / fitted.file).read_bytes() == fitted.content
     found = Model.load(tmp_path / "m.json")
     assert (found, found.digest) == (model, model.digest)
-    classifier = json.loads((tmp_path / "m.json").read_text())["fingers"]["*"]["classifier"]
-    assert classifier == {
-        "type": "onnx", "file": fitted.file, "sha256": fitted.sha256, "n_features": 2,
-        "threshold": 0.4,
+    (head,) = json.loads((tmp_path / "m.json").read_text())["fingers"]["*"]["heads"]
+    assert head["threshold"] == 0.4
+    assert head["rule"] == {
+        "type": "onnx", "file": fitted.file, "sha256": fitted.sha256, "n_features": 2
     }  # fmt: skip
     model.save(tmp_path / "other.json")  # the same ONNX file serves both
 
@@ -93,11 +94,11 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-LINEAR = LinearClassifier((0.0, 0.0), (1.0, 1.0), (1.0, 1.0), 0.0)
+LINEAR = Linear((0.0, 0.0), (1.0, 1.0), ((1.0, 1.0),), (0.0,))
 
 
 def test_a_model_that_is_replaced_leaves_no_onnx_file(tmp_path):
-    path, again = tmp_path / "m.json", OnnxClassifier.of(b"another", 2, 0.5)
+    path, again = tmp_path / "m.json", Onnx.of(b"another", 2)
     hand_model(UNREAD).save(path)
     with pytest.raises(OutputError):
         hand_model(LINEAR).save(path)
@@ -132,7 +133,7 @@ def test_an_update_gives_what_the_whole_recording_gives(fitted):
     tried = detect(hand_model(fitted), recording).fingers.values()
     known = np.concatenate([trace.stable_probability for trace in tried])
     threshold = float(np.quantile(known[known > 0], 0.3))
-    model = hand_model(msgspec.structs.replace(fitted, threshold=threshold))
+    model = hand_model(fitted, threshold)
     found = detect(model, recording)
     expected_p = model.predict_proba(recording)
     detector = Detector.for_recording(model, recording)
@@ -171,7 +172,7 @@ def test_it_is_evaluated(fitted):
 )
 def test_a_name_with_folders_is_refused(name):
     with pytest.raises(ModelError) as raised:
-        OnnxClassifier(name, "0" * 64, 2, 0.5)
+        Onnx(name, "0" * 64, 2)
     assert str(raised.value) == f"the name of an .onnx file without folders expected, {name!r}"
 
 
@@ -179,7 +180,6 @@ def test_a_name_with_folders_is_refused(name):
     ("changes", "message"),
     [
         ({"n_features": 0}, "at least one feature expected, 0 given"),
-        ({"threshold": 1.5}, "a threshold from 0 to 1 expected, 1.5 given"),
         ({"content": b"other"}, "{} is not the file of the model: its sha256 differs"),
         ({"content": bytes(MAX_ONNX_SIZE + 1)}, "{} has more than 16777216 bytes"),
     ],
@@ -192,7 +192,7 @@ def test_refusals(changes, message):
 
 def test_data_in_another_file_is_refused():
     with pytest.raises(ModelError) as raised:
-        OnnxClassifier.of(b"x\x0a\x08location\x12\x0b/etc/passwd", 2, 0.5)
+        Onnx.of(b"x\x0a\x08location\x12\x0b/etc/passwd", 2)
     assert str(raised.value).endswith("keeps data in other files; a single file expected")
 
 
@@ -205,7 +205,7 @@ def test_a_file_that_is_no_onnx_is_one_line():
 
 
 def test_an_output_that_is_no_probability_is_refused():
-    unbounded = OnnxClassifier.of(content(output="odds"), 2, 0.5)
+    unbounded = Onnx.of(content(output="odds"), 2)
     with pytest.raises(ModelError) as raised:
         unbounded.probability(np.zeros((1, 2)))
     assert str(raised.value) == f"{unbounded.file}: probabilities from 0 to 1 expected"
@@ -233,7 +233,7 @@ def test_a_file_that_is_missing_or_another_is_refused(damage, message, tmp_path)
     with pytest.raises(ModelError) as raised:
         Model.load(path)
     text = message.format(UNREAD.file)
-    assert str(raised.value) == f"{path} is not a model of holdfast.model/1: {text}"
+    assert str(raised.value) == f"{path} is not a model of holdfast.model/2: {text}"
 
 
 def test_a_content_in_the_model_file_is_refused(tmp_path):
@@ -257,9 +257,9 @@ def test_it_is_saved_whole_or_not_at_all(tmp_path):
 
 
 def test_a_second_file_that_fails_takes_the_first_with_it(tmp_path):
-    first, second = UNREAD, OnnxClassifier.of(b"second", 2, 0.5)
-    finger = hand_model(first).fingers[ANY_FINGER]
-    fingers = {"a": finger, "b": msgspec.structs.replace(finger, classifier=second)}
+    second = Onnx.of(b"second", 2)
+    models = {"a": hand_model(UNREAD), "b": hand_model(second)}
+    fingers = {name: model.fingers[ANY_FINGER] for name, model in models.items()}
     (tmp_path / second.file).write_bytes(b"of somebody else")
     with pytest.raises(OutputError):
         Model(fingers=fingers).save(tmp_path / "m.json")
@@ -269,8 +269,8 @@ def test_a_second_file_that_fails_takes_the_first_with_it(tmp_path):
 def test_without_the_extra_a_line_names_it():
     program = (
         "import sys; sys.modules['onnxruntime'] = None\n"
-        "from holdfast.classifiers import OnnxClassifier\n"
-        "try: OnnxClassifier.of(b'x', 1, 0.5).probability([[1.0]])\n"
+        "from holdfast.classifiers import Onnx\n"
+        "try: Onnx.of(b'x', 1).probability([[1.0]])\n"
         "except Exception as cause: print(type(cause).__name__, cause)"
     )
     command = [sys.executable, "-c", program]

@@ -93,7 +93,7 @@ def test_json(capsys, folder, tmp_path):
     }  # fmt: skip
     assert seen["after"]["alarms_per_minute"] <= 4
     handling = Model.load(out).fingers["*"].handling["pad"]
-    assert handling.threshold == seen["after"]["threshold"]
+    assert handling.thresholds["stable"] == seen["after"]["threshold"]
 
 
 def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
@@ -103,7 +103,7 @@ def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
     _, printed, _ = run(capsys, "info", out)
     text = " ".join(printed.split())
     assert "own handling of pad: 39." in text
-    assert "s held in 2 recordings (handling-0, handling-1); STABLE from" in text
+    assert "s held in 2 recordings (handling-0, handling-1); stable from" in text
     document = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["*"]
     assert document["normalised"] is True
     assert document["handling"]["pad"]["recordings"] == ["handling-0", "handling-1"]

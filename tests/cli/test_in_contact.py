@@ -61,7 +61,7 @@ def test_train_and_tune(capsys, folder, tmp_path):
     command = ["tune", model, str(folder), "-o", tuned, "--false-alarms", "60", "--in-contact"]
     assert main(command) == 0
     capsys.readouterr()
-    assert 0 < Model.load(tuned).finger("thumb").classifier.threshold < 1
+    assert 0 < Model.load(tuned).finger("thumb").stable.threshold < 1
 
 
 def test_training_takes_no_threshold_of_contact_from_a_held_start(folder):

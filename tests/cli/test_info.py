@@ -246,15 +246,34 @@ def test_refusals(capsys, path):
     assert refusal(capsys, path) == f"{path} is damaged: its content does not match its checksum"
 
 
-def test_features_of_the_slip_rule_are_shown(capsys):
+def test_all_heads_of_a_model_are_shown(capsys):
     assert main(["info", "builtin:twin"]) == 0
     out = re.sub(r"\s+", " ", capsys.readouterr().out)
-    assert "slips by 39 features, of them new relative(second_all[0.0067 s])," in out
-    slip = info_json(capsys, "builtin:twin")["fingers"]["*"]["slip"]
-    assert len(slip["features"]) == 39
-    assert f"speed and distance of slips, up to {slip['highest_speed']:.3g} mm/s" in out
-    assert info_json(capsys, "builtin:any")["fingers"]["*"]["slip"]["highest_speed"] is None
-    assert info_json(capsys, "builtin:any")["fingers"]["*"]["slip"]["features"] is None
+    heads = info_json(capsys, "builtin:twin")["fingers"]["*"]["heads"]
+    assert list(heads) == ["stable", "slip", "slip_speed", "cause"]
+    stable, slip, speed, cause = heads.values()
+    for head, n in ((stable, 15), (slip, 39), (speed, 39), (cause, 15)):
+        assert len(head["features"]) == n
+        assert f"{head['name']}: linear, {n} features; " in out
+    assert f" features {', '.join(stable['features'][:3])}, ..." in out
+    for name in ("slip", "slip_speed"):
+        assert re.search(
+            rf" {name}: linear, 39 features; [^:]* of them new relative\(second_all\[0.0067 s\]\), ",
+            out,
+        )
+    assert f"STABLE from a probability of {stable['threshold']:.3g} on" in out
+    assert f"slides from a probability of {slip['threshold']:.3g} on; smoothing 0.02 s, hold" in out
+    assert f"speed and distance of slips, up to {speed['highest']:.3g} mm/s" in out
+    assert ", ".join(cause["classes"]) in out
+    choice = slip["choice"]
+    assert (
+        f"threshold from the training, out of fold: {choice['false_alarms_per_minute']:.2g}" in out
+    )
+    assert f"; {choice['n']} slips; {choice['found']:.0f} % found within 0.1 s" in out
+    assert (stable["choice"], "threshold" in speed, "threshold" in cause) == (None, False, False)
+    heads = info_json(capsys, "builtin:any")["fingers"]["*"]["heads"]
+    assert list(heads) == ["stable", "slip", "cause"]
+    assert heads["slip"]["features"] == heads["stable"]["features"]
 
 
 def test_a_model_without_a_figure_is_refused(capsys, path):

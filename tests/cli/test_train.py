@@ -314,7 +314,7 @@ def test_hold_and_our_own_features(capsys, data, model):
     assert run(capsys, data, "-o", model, *words)[0] == 0
     made = Model.load(model)
     assert made.debounce == Debounce(0.0, 0.1, 0.2)  # the hysteresis by default
-    assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].features
+    assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].stable.features
 
 
 def test_own_slip_features(capsys, data, model):

@@ -44,11 +44,12 @@ def test_a_model_is_written_with_a_table(capsys, folder, tmp_path, monkeypatch):
     code, printed, err = tune(capsys, folder, out, "--false-alarms", 30)
     assert (code, err) == (0, "")
     model = Model.load(out)
-    assert model.tuning.false_alarms_per_minute <= 30
+    stable = model.finger("thumb").stable
+    assert stable.choice.false_alarms_per_minute <= 30
     lines = printed.splitlines()
     assert "false alarms a minute" in " ".join(lines[:3])
     assert sum(line.rstrip().endswith("chosen") for line in lines) == 1
-    assert lines[-1].startswith(f"{out}: STABLE from a probability of {model.tuning.threshold:.3g}")
+    assert lines[-1].startswith(f"{out}: STABLE from a probability of {stable.threshold:.3g}")
     assert all(len(line) <= 80 for line in lines[:-1])
 
 
@@ -64,8 +65,10 @@ def test_json_and_info(capsys, folder, tmp_path):
     code, printed, _ = run(capsys, "info", out, "--json")
     document = json.loads(printed)
     assert code == 0
-    assert document["tuning"]["threshold"] == report["threshold"]
-    assert document["tuning"]["recordings"] == ["grasp-0", "grasp-1"]
+    for finger in document["fingers"].values():
+        stable = finger["heads"]["stable"]
+        assert stable["threshold"] == report["threshold"]
+        assert stable["choice"]["recordings"] == ["grasp-0", "grasp-1"]
     assert document["training"]["recordings"] == ["grasp-2", "grasp-3"]
     assert set(document["fingers"]) == set(FINGERS)
 
@@ -157,7 +160,7 @@ def test_the_threshold_of_slips(capsys, sliding, tmp_path, monkeypatch):
     code, printed, err = tune(capsys, sliding, out, "--false-alarms", 5, "--for", "slip")
     assert (code, err) == (0, "")
     rules = [part.slip for part in Model.load(out).fingers.values()]
-    assert all(rule.thresholds.false_alarms_per_minute <= 5 for rule in rules)
+    assert all(rule.choice.false_alarms_per_minute <= 5 for rule in rules)
     lines = printed.splitlines()
     assert " Slips: " in " ".join(printed.split())
     assert sum(line.endswith("chosen") for line in lines) == 1

@@ -3,13 +3,13 @@
 import itertools
 
 import numpy as np
-from holdfast.classifiers.slip import SlipRule, SpeedRule
 from msgspec.structs import replace
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
+from holdfast.contact import Cause
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.features.specs import MEAN_SECOND_KINDS, RATIO_KINDS, SECOND_KINDS
-from holdfast.model import FingerModel, Model
+from holdfast.model import FingerModel, Head, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 
@@ -36,21 +36,28 @@ def sensor(n_taxels=2, name="tiny", rate=RATE, limits=(0.0, 1000.0), unit="count
     return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate, unit, limits)
 
 
-def classifier(n_features, seed=0, **options):
+def linear(n_features, seed=0, **options):
+    """Return a linear rule of one output."""
     rng = np.random.default_rng(seed)
-    options.setdefault("intercept", 0.3)
-    return LinearClassifier(
-        mean=tuple(rng.normal(size=n_features).tolist()),
-        scale=tuple(rng.uniform(20, 80, size=n_features).tolist()),
-        coefficients=tuple(rng.normal(size=n_features).tolist()),
-        **options,
-    )
+    fields = {
+        "mean": rng.normal(size=n_features),
+        "scale": rng.uniform(20, 80, size=n_features),
+        "weights": rng.normal(size=n_features),
+        "intercepts": 0.3,
+    }
+    return Linear.of(**(fields | options))
 
 
-def finger_model(features=None, seed=0, **options):
+def stable_head(features=None, seed=0, rule=None, threshold=0.5):
     features = parse_features("F_a,F_x,F_y,F_z,sigma", 6) if features is None else features
-    options.setdefault("classifier", classifier(len(features), seed))
-    return FingerModel(features=features, **options)
+    rule = linear(len(features), seed) if rule is None else rule
+    return Head(name="stable", link="logit", features=features, rule=rule, threshold=threshold)
+
+
+def finger_model(features=None, seed=0, *heads, rule=None, threshold=0.5, **options):
+    """Return a model of one finger: a head of stability, and others that are given."""
+    stable = stable_head(features, seed, rule, threshold)
+    return FingerModel(heads=(stable, *heads), **options)
 
 
 SLIP_OWN = (
@@ -58,37 +65,46 @@ SLIP_OWN = (
     FeatureSpec("F_x"),
     FeatureSpec("sigma_xyz", 4, "log", "hand", 0.5),
 )
-"""Features of a slip rule; the second is one of the classifier of stability, too."""
+"""Features of a head of slips; the second is one of the head of stability, too."""
 TAXELS = tuple(
     FeatureSpec(kind, transform="relative", seconds=0.02)
     for kind in (*SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
 )
-"""Features of a slip rule that need the taxels."""
+"""Features of a head of slips that need the taxels."""
 
 
-def slip_rule(n_features, seed=0, smoothing=0.02, hold=0.05):
-    return SlipRule(classifier(n_features, 90 + seed), smoothing, hold)
+def slip_head(features, seed=0, **fields):
+    fields = {"rule": linear(len(features), 90 + seed), "smoothing": 0.02, "hold": 0.05} | fields
+    return Head(name="slip", link="logit", features=tuple(features), **fields)
 
 
-def squared_rule(features, seed=0, scale=20.0):
-    """Return a slip rule with features of its own and squares."""
+def squared_head(features, seed=0, scale=20.0):
+    """Return a head of slips with squares."""
     rng = np.random.default_rng([seed, 7])
-    linear = classifier(len(features), 90 + seed)
-    linear = replace(linear, scale=tuple(scale / value for value in linear.scale), slope=0.4)
+    rule = linear(len(features), 90 + seed)
+    scales = tuple(scale / value for value in rule.scale)
     squares = tuple((0.2 * rng.normal(size=len(features))).tolist())
-    return SlipRule(linear, 0.02, 0.05, features=tuple(features), squares=squares)
+    rule = replace(rule, scale=scales, slope=0.4, squares=(squares,))
+    return slip_head(features, rule=rule)
 
 
-def speed_rule(linear, seed=0):
-    """Return a speed rule for the features of a classifier; some samples reach its highest."""
+def speed_head(slip, seed=0):
+    """Return a head of the speed for the features of a slip; some samples reach its highest."""
     rng = np.random.default_rng([seed, 11])
-    squares = tuple((0.1 * rng.normal(size=len(linear.mean))).tolist())
-    return SpeedRule(linear.mean, linear.scale, linear.coefficients, squares, 1.5, 3.0)
+    squares = tuple((0.1 * rng.normal(size=slip.rule.n_features)).tolist())
+    rule = replace(slip.rule, squares=(squares,), intercepts=(1.5,), slope=1.0)
+    return Head(name="slip_speed", link="square", features=slip.features, rule=rule, highest=3.0)
 
 
-def with_speed(rule):
-    """Return a slip rule that estimates the speed, too."""
-    return replace(rule, speed=speed_rule(rule.classifier))
+def cause_head(features, seed=3, classes=(Cause.CLOSING, Cause.GLITCH)):
+    rng, n = np.random.default_rng(seed), len(features)
+    rule = Linear.of(
+        rng.normal(size=n),
+        rng.uniform(1, 3, size=n),
+        rng.normal(size=(len(classes), n)),
+        np.linspace(0.1, -0.2, len(classes)),
+    )
+    return Head(name="cause", link="softmax", features=tuple(features), rule=rule, classes=classes)
 
 
 def model(
@@ -101,22 +117,20 @@ def model(
     speeds=(),
     **options,
 ):
-    """Return a model; the fingers in `slips` have a slip rule, with own features if given.
+    """Return a model; the fingers in `slips` have a head of slips, with own features if given.
 
-    Those in `speeds` have a speed rule, too.
+    Those in `speeds` have one of the speed, too.
     """
     which = sensor() if which is None else which
-    n_features = 5 if features is None else len(features)
-    rule = (lambda _, seed: squared_rule(own, seed)) if own else slip_rule
-    parts = {
-        name: finger_model(
-            features, seed, sensor=which.name, contact_threshold=threshold,
-            slip=rule(n_features, seed) if name in slips else None,
-        )
-        for seed, name in enumerate(fingers)
-    }  # fmt: skip
-    for name in speeds:
-        parts[name] = replace(parts[name], slip=with_speed(parts[name].slip))
+    parts = {}
+    for seed, name in enumerate(fingers):
+        part = finger_model(features, seed, sensor=which.name, contact_threshold=threshold)
+        if name in slips:
+            slip = squared_head(own, seed) if own else slip_head(part.features, seed)
+            part = part.with_heads(slip)
+        if name in speeds:
+            part = part.with_heads(speed_head(part.slip))
+        parts[name] = part
     options = {"rate": which.rate, "window": 6, "tare": "0.2"} | options
     return Model(fingers=parts, sensors={which.name: which}, **options)
 

@@ -178,8 +178,7 @@ class Finger:
         self.above = "under"
         self.sensor, self.part, self.window, self.period = sensor, part, window, period
         self.kind, self.seconds = tare.kind, tare.seconds
-        slip = part.slip.features if part.slip and part.slip.features else ()
-        self.longest = max([window, *(spec.window for spec in (*part.features, *slip))])
+        self.longest = max([window, *(spec.window for spec in part.features)])
         self.samples = []  # every finite sample: (time, readings)
         self.stretch = []  # forces since the last interruption
         self.last = None
@@ -426,7 +425,7 @@ class Finger:
 
     def decide(self, time, fingers, debounce):
         if self.status == "":
-            features = [self.feature(spec, fingers) for spec in self.part.features]
+            features = [self.feature(spec, fingers) for spec in self.part.stable.features]
             if any(math.isnan(value) for value in features):
                 self.status = "tare"
             elif self.drifted(time):
@@ -443,62 +442,60 @@ class Finger:
             else:
                 self.status = ""
             return
-        state = self.contact_state(features, debounce.hysteresis)
+        state = self.contact_state(fingers, debounce.hysteresis)
         begins = state != "NO_CONTACT" and self.candidate == "NO_CONTACT"
         if state == "UNSTABLE" or begins:
             self.unstable_at = time
         if state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
             state = "UNSTABLE"
         self.debounce(state, time, debounce.min_duration)
-        self.decide_slip(features, fingers, time)
+        self.decide_slip(fingers, time)
         if state == "NO_CONTACT":
             self.rest += min(1, self.period / 3) * (np.array(self.force) - self.rest)
+
+    def value(self, head, fingers):
+        """The value z of the first output of a head."""
+        rule = head.rule
+        (weights,), (z,) = rule.weights, rule.intercepts
+        (squares,) = rule.squares or ([0.0] * rule.n_features,)
+        features = [self.feature(spec, fingers) for spec in head.features]
+        for value, mean, scale, weight, square in zip(
+            features, rule.mean, rule.scale, weights, squares, strict=True
+        ):
+            u = (value - mean) / scale
+            z += weight * u + square * min(abs(u), 5.0) ** 2
+        return rule.slope * z + rule.offset
 
     def end_slip(self, probability):
         self.speed = self.distance = probability
         self.slid_at = None
         self.slip, self.odds, self.slid, self.slides = probability, None, -math.inf, False
 
-    def decide_slip(self, features, fingers, time):
+    def decide_slip(self, fingers, time):
         """Smoothed log odds; it slides from the threshold on, and for the hold time after it."""
-        rule = self.part.slip
-        if rule is None:
+        head = self.part.slip
+        if head is None:
             return
         if self.empty:
             self.end_slip(0.0)
             return
-        if rule.features:
-            features = [self.feature(spec, fingers) for spec in rule.features]
-        linear = rule.classifier
-        z = linear.intercept
-        squares = rule.squares or [0.0] * len(features)
-        for value, c, mean, scale, square in zip(
-            features, linear.coefficients, linear.mean, linear.scale, squares, strict=True
-        ):
-            u = (value - mean) / scale
-            z += c * u + square * min(abs(u), 5.0) ** 2
-        odds = linear.slope * z + linear.offset
-        gain = 1 - math.exp(-self.period / rule.smoothing) if rule.smoothing else 1
+        odds = self.value(head, fingers)
+        gain = 1 - math.exp(-self.period / head.smoothing) if head.smoothing else 1
         self.odds = odds if self.odds is None else self.odds + gain * (odds - self.odds)
         self.slip = 1 / (1 + math.exp(min(-self.odds, 700)))
-        if self.slip >= linear.threshold:
+        if self.slip >= head.threshold:
             self.slid = time
-        self.slides = time == self.slid or time - self.slid + self.period / 2 < rule.hold
-        if rule.speed:
-            self.follow_slip(rule.speed, features, time)
+        self.slides = time == self.slid or time - self.slid + self.period / 2 < head.hold
+        speed = self.part.head("slip_speed")
+        if speed:
+            self.follow_slip(speed.highest, self.value(speed, fingers), time)
 
-    def follow_slip(self, rule, features, time):
+    def follow_slip(self, highest, z, time):
         """Speed, and its sum over time since the slip began."""
         if not self.slides:
             self.speed, self.distance, self.slid_at = 0.0, 0.0, None
             return
-        z = rule.intercept
-        for value, c, square, mean, scale in zip(
-            features, rule.coefficients, rule.squares, rule.mean, rule.scale, strict=True
-        ):
-            u = (value - mean) / scale
-            z += c * u + square * min(abs(u), 5.0) ** 2
-        self.speed = min(max(z, 0.0) ** 2, rule.highest)
+        self.speed = min(max(z, 0.0) ** 2, highest)
         before, step = self.distance, self.period
         if self.slid_at is None:
             before = 0.0
@@ -557,20 +554,15 @@ class Finger:
             self.above = "drift" if long and jump <= threshold / 2 else "touch"
         return self.above == "drift"
 
-    def contact_state(self, features, hysteresis):
+    def contact_state(self, fingers, hysteresis):
         if self.empty:
             self.probability = 0.0
             return "NO_CONTACT"
-        rule = self.part.classifier
-        z = rule.intercept
-        for value, c, mean, scale in zip(
-            features, rule.coefficients, rule.mean, rule.scale, strict=True
-        ):
-            z += c * (value - mean) / scale
-        self.probability = 1 / (1 + math.exp(min(-(rule.slope * z + rule.offset), 700)))
+        head = self.part.stable
+        self.probability = 1 / (1 + math.exp(min(-self.value(head, fingers), 700)))
         if self.leaving:
             return "UNSTABLE"
-        limit = rule.threshold
+        limit = head.threshold
         if self.state == "STABLE":
             limit -= hysteresis
         elif self.state != "UNKNOWN":
@@ -604,9 +596,11 @@ class Hand:
     def row(finger):
         last = NAN if finger.last is None else finger.last
         names = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
-        rule = finger.part.slip
-        speed = (finger.speed, finger.distance) if rule and rule.speed else (None, None)
-        slip = None if rule is None else (finger.slip, finger.slides, *speed)
+        head = finger.part.slip
+        speed = (None, None)
+        if finger.part.head("slip_speed"):
+            speed = (finger.speed, finger.distance)
+        slip = None if head is None else (finger.slip, finger.slides, *speed)
         return names, (last, finger.probability, finger.sigma, *finger.force), slip
 
     def state(self):

@@ -4,17 +4,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from holdfast.classifiers.cause import ALL_CAUSES
-from holdfast.classifiers.slip import raised_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from holdfast.contact import Cause, ContactState
+from holdfast.contact import SLIP_CODE, ContactState
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import fingertip_force
 from holdfast.metrics.masks import runs
+from holdfast.metrics.slip_thresholds import raised_at
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
@@ -285,9 +284,8 @@ class TestSlip:
         hand_model = model(threshold=20.0, slips=("thumb", "index"))
         n_raised = 0
         for name, trace in detect(hand_model, made).fingers.items():
-            rule = hand_model.finger(name).slip
-            threshold = rule.classifier.threshold
-            expected = raised_at(trace.times, trace.slip_probability, threshold, rule.hold)
+            head = hand_model.finger(name).slip
+            expected = raised_at(trace.times, trace.slip_probability, head.threshold, head.hold)
             found = trace.cause == SLIP_CODE
             assert np.array_equal(found, expected)
             n_raised += found.sum()
@@ -297,7 +295,7 @@ class TestSlip:
         """s(k) = s(k-1) + gain (z(k) - s(k-1)), from the log odds z without smoothing."""
         made = recording(thumb=tactile(seed=1))
         smoothed = model(("thumb",), slips=("thumb",))
-        plain = with_rule(smoothed, smoothing=0.0)
+        plain = with_slip(smoothed, smoothing=0.0)
         values = [log_odds_of(detect(one, made).fingers["thumb"]) for one in (plain, smoothed)]
         gain = smoothed.finger("thumb").slip.gain(RATE)
         assert 0 < gain < 1
@@ -333,8 +331,8 @@ class TestSlip:
         values[140:160] = values[:20]  # as during the tare
         made = recording(thumb=type(module)(module.sensor, module.times, values))
         hand_model = model(("thumb",), threshold=20.0, slips=("thumb",))
-        sure = replace(hand_model.finger("thumb").slip.classifier, threshold=1e-9)
-        trace = detect(with_rule(hand_model, hold=10.0, classifier=sure), made).fingers["thumb"]
+        sure = with_slip(hand_model, hold=10.0, threshold=1e-9)
+        trace = detect(sure, made).fingers["thumb"]
         slides = trace.cause == SLIP_CODE
         assert slides[144] and slides[165]
         empty = trace.slip_probability == 0
@@ -342,20 +340,13 @@ class TestSlip:
         assert not slides[empty].any()
 
 
-SLIP_CODE = ALL_CAUSES.index(Cause.SLIP) + 1
-
-
 def log_odds_of(trace):
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.log(trace.slip_probability) - np.log1p(-trace.slip_probability)
 
 
-def with_rule(hand_model, **fields):
-    fingers = {
-        name: replace(part, slip=replace(part.slip, **fields))
-        for name, part in hand_model.fingers.items()
-    }
-    return replace(hand_model, fingers=fingers)
+def with_slip(hand_model, **fields):
+    return hand_model.changed(lambda part: part.with_heads(replace(part.slip, **fields)))
 
 
 class TestIntervalTare:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from holdfast.classifiers import Linear
 from holdfast.contact import ContactEvent, ContactState, Fault, Reason
 from holdfast.detector import HAND, Detector, detect
 from holdfast.detector import detector as detector_module
@@ -20,7 +21,6 @@ from holdfast.model import ANY_FINGER, Debounce, Model
 
 from .build import (
     RATE,
-    classifier,
     feed,
     finger_model,
     lively,
@@ -38,11 +38,9 @@ N_TARE = 20
 
 def by_force(threshold=0.5, **options):
     """Stable where F_x is above 100: the probability is exactly half there."""
-    rule = classifier(1, intercept=0.0)
-    rule = type(rule)(
-        mean=(100.0,), scale=(10.0,), coefficients=(1.0,), intercept=0.0, threshold=threshold
-    )
-    part = finger_model((FeatureSpec("F_x"),), classifier=rule, contact_threshold=5.0)
+    rule = Linear((100.0,), (10.0,), ((1.0,),), (0.0,))
+    features = (FeatureSpec("F_x"),)
+    part = finger_model(features, rule=rule, threshold=threshold, contact_threshold=5.0)
     options = {"tare": "none", "window": 2, "rate": RATE} | options
     return Model(fingers={ANY_FINGER: part}, **options)
 

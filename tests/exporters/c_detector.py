@@ -6,15 +6,15 @@ import shutil
 import subprocess
 
 import numpy as np
-from holdfast.classifiers.cause import ALL_CAUSES
 
+from holdfast.contact import CAUSES as KNOWN_CAUSES
 from holdfast.contact import ContactState, Reason, faults_of, taxels_of
 from holdfast.detector import Detector
 from holdfast.errors import StreamError
 from holdfast.exporters.c_header import header_of
 
 WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-STATES, REASONS, CAUSES = tuple(ContactState), tuple(Reason), (None, *ALL_CAUSES)
+STATES, REASONS, CAUSES = tuple(ContactState), tuple(Reason), (None, *KNOWN_CAUSES)
 EXACT, SINGLE = 1e-9, 2e-3
 """Tolerance of probabilities of a header of double precision; and of single precision."""
 

@@ -3,9 +3,9 @@
 from msgspec.structs import replace
 
 from detector.build import RICH, SLIP_OWN, TAXELS, model
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.features import DEPLOYED_FEATURES, parse_features
-from holdfast.model import FingerModel, Model
+from holdfast.model import FingerModel, Head, Model
 from holdfast.sensors import sensor
 
 TIP, PATCH, NEWTON = sensor("uskin-curved"), sensor("uskin-4x4"), sensor("papillarray")
@@ -16,15 +16,14 @@ def paper(**options):
     """A model of the paper's features."""
     features = parse_features(DEPLOYED_FEATURES, 14)
     n = len(features)
-    linear = LinearClassifier(
-        mean=(5.0,) * n, scale=(50.0,) * n, coefficients=(0.3, -0.1, 0.1, 0.2, -2.0), intercept=0.7
-    )
-    finger = FingerModel(features=features, classifier=linear, contact_threshold=20.0)
+    rule = Linear((5.0,) * n, (50.0,) * n, ((0.3, -0.1, 0.1, 0.2, -2.0),), (0.7,))
+    stable = Head(name="stable", link="logit", features=features, rule=rule)
+    finger = FingerModel(heads=(stable,), contact_threshold=20.0)
     return Model(fingers={"*": finger}, rate=150.0, **options)
 
 
 def rich(**options):
-    """A model of every feature, with slip and speed rules, for two fingers."""
+    """A model of every feature, with heads of slips and their speed, for two fingers."""
     options = {"slips": ("thumb", "index"), "speeds": ("index",)} | options
     own = (*SLIP_OWN, *TAXELS)
     return model(features=RICH, which=PATCH, own=own, threshold=60.0, **options)

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from holdfast.classifiers.slip import add_squares
 from msgspec.structs import replace
 
 from exporters.models import HAND, built_in, paper, rich
-from holdfast.classifiers import OnnxClassifier
-from holdfast.classifiers.linear import log_odds
+from holdfast.classifiers import Onnx
+from holdfast.classifiers.linear import add_squares, log_odds
 from holdfast.errors import ModelError
 from holdfast.exporters import export
 from holdfast.exporters.onnx_head import onnx_of
@@ -32,15 +31,15 @@ def test_probabilities_are_those_of_the_classifiers(make):
     n_checked = 0
     for name, part in model.fingers.items():
         own = "any" if name == "*" else name
-        expected = part.classifier.probability(rows[f"{own}_features"])
+        expected = part.stable.rule.probability(rows[f"{own}_features"])
         np.testing.assert_allclose(got[f"{own}_stable"][:, 0], expected, atol=1e-12)
         n_checked += 1
         if part.slip is not None:
+            rule = part.slip.linear
             values = [
-                add_squares(log_odds(row, part.slip.classifier.weights()), row,
-                            part.slip.square_weights())
+                add_squares(log_odds(row, rule.raw_weights()[0]), row, rule.raw_squares())
                 for row in rows[f"{own}_slip_features"]
-            ]  # fmt: skip
+            ]
             expected = 1.0 / (1.0 + np.exp(-np.array(values)))
             np.testing.assert_allclose(got[f"{own}_slip"][:, 0], expected, atol=1e-9)
             n_checked += 1
@@ -61,8 +60,8 @@ def test_only_basic_operators_are_used():
 
 def test_a_classifier_that_is_onnx_already_is_named(tmp_path):
     model = paper()
-    other = OnnxClassifier.of(b"content", 5, 0.5)
-    model = replace(model, fingers={"*": replace(model.fingers["*"], classifier=other)})
+    other = replace(model.finger("*").stable, rule=Onnx.of(b"content", 5))
+    model = model.changed(lambda part: part.with_heads(other))
     with pytest.raises(ModelError, match=r"ONNX file '.*' beside the model already; linear"):
         export(model, tmp_path / "model.onnx")
     with pytest.raises(ModelError, match="ONNX file, which has no form as C; a header holds"):

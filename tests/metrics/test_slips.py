@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from holdfast.classifiers.slip import raised_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from holdfast.metrics.slip_thresholds import (
     ThresholdChoice,
     choose_threshold,
     held_out_places,
+    raised_at,
     slip_curve,
     slip_intervals,
     slip_summary,

@@ -5,46 +5,36 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from holdfast.classifiers.cause import CauseClassifier, add_scores
-from holdfast.classifiers.slip import add_squares
 
 from detector.build import (
     RICH,
     SLIP_OWN,
     TAXELS,
-    classifier,
+    cause_head,
     finger_model,
     lively,
     recording,
     sensor,
-    squared_rule,
+    squared_head,
     tactile,
 )
-from holdfast.classifiers import OnnxClassifier
-from holdfast.contact import Cause
+from holdfast.classifiers import Onnx
+from holdfast.classifiers.linear import add_scores, add_squares
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError
 from holdfast.live.arrival_detector import ArrivalDetector
-from holdfast.model import ANY_FINGER, FingerModel, Handling, Model
+from holdfast.model import ANY_FINGER, Handling, Model
 from holdfast.model.files import encode
 
 replace = msgspec.structs.replace
 RNG = np.random.default_rng(3)
-CAUSES = CauseClassifier(
-    causes=(Cause.CLOSING, Cause.GLITCH),
-    mean=tuple(RNG.normal(size=len(RICH)).tolist()),
-    scale=tuple(RNG.uniform(1, 3, size=len(RICH)).tolist()),
-    coefficients=tuple(tuple(row) for row in RNG.normal(size=(2, len(RICH))).tolist()),
-    intercepts=(0.1, -0.2),
-)
-PART = finger_model(RICH, slip=squared_rule(SLIP_OWN), causes=CAUSES, normalised=True)
-N = len(PART.all_features)
+PART = finger_model(RICH, 0, squared_head(SLIP_OWN), cause_head(RICH), normalised=True)
+N = len(PART.features)
 HANDLING = Handling(
     location=tuple(RNG.normal(scale=30, size=N).tolist()),
     scale=tuple(RNG.uniform(0.3, 60, size=N).tolist()),
     seconds=12.5,
-    threshold=0.31,
-    slip_threshold=0.83,
+    thresholds={"stable": 0.31, "slip": 0.83},
     recordings={"one": "0a1b"},
 )
 CALIBRATED = replace(PART, handling={"tiny": HANDLING})
@@ -53,7 +43,7 @@ ROWS = RNG.normal(scale=40, size=(50, N))
 
 
 def places(features):
-    return [PART.all_features.index(spec) for spec in features]
+    return [PART.features.index(spec) for spec in features]
 
 
 def own_units(rows, features):
@@ -68,48 +58,49 @@ def model(part=CALIBRATED, **options):
 
 
 def test_the_classifier_sees_features_in_own_units():
-    rule = PART.classifier
-    z = own_units(ROWS, RICH) @ rule.coefficients + rule.intercept
+    rule = PART.stable.rule
+    z = own_units(ROWS, RICH) @ rule.weights[0] + rule.intercepts[0]
     columns = places(RICH)
-    assert OWN.classifier.decision(ROWS[:, columns]) == pytest.approx(z, abs=1e-12, rel=1e-12)
+    assert OWN.stable.rule.decision(ROWS[:, columns]) == pytest.approx(z, abs=1e-12, rel=1e-12)
     expected = 1 / (1 + np.exp(-z))
-    assert OWN.classifier.probability(ROWS[:, columns]) == pytest.approx(expected, abs=1e-12)
-    assert OWN.classifier.threshold == 0.31
+    assert OWN.stable.rule.probability(ROWS[:, columns]) == pytest.approx(expected, abs=1e-12)
+    assert OWN.stable.threshold == 0.31
 
 
 def test_the_slip_rule_sees_them_in_own_units_and_so_do_its_squares():
-    rule = PART.slip.classifier
+    rule = PART.slip.rule
     u = own_units(ROWS, SLIP_OWN)
-    linear = rule.slope * (u @ rule.coefficients + rule.intercept) + rule.offset
-    squares = rule.slope * (np.minimum(np.abs(u), 5.0) ** 2 @ PART.slip.squares)
-    weights, table = OWN.slip.classifier.weights(), OWN.slip.square_weights()
+    linear = rule.slope * (u @ rule.weights[0] + rule.intercepts[0]) + rule.offset
+    squares = rule.slope * (np.minimum(np.abs(u), 5.0) ** 2 @ rule.squares[0])
+    (weights,), table = OWN.slip.rule.raw_weights(), OWN.slip.rule.raw_squares()
     rows = ROWS[:, places(SLIP_OWN)]
     found = [add_squares(weights[0] + row @ weights[1:], row, table) for row in rows]
     assert found == pytest.approx(linear + squares, abs=1e-12, rel=1e-12)
-    assert OWN.slip.classifier.threshold == 0.83
+    assert OWN.slip.threshold == 0.83
 
 
 def test_causes_move_as_the_default_handling_does():
     columns = places(RICH)
     location, scale = PART.default_handling
     default = location[columns] + scale[columns] * own_units(ROWS, RICH)
-    scores = [np.zeros(6), np.zeros(6)]
+    scores = [np.zeros(2), np.zeros(2)]
+    rules = [part.head("cause").rule.raw_weights() for part in (OWN, PART)]
     for own_row, default_row in zip(ROWS[:, columns], default, strict=True):
-        add_scores(own_row, OWN.causes.weights(), scores[0])
-        add_scores(default_row, PART.causes.weights(), scores[1])
+        add_scores(own_row, rules[0], scores[0])
+        add_scores(default_row, rules[1], scores[1])
         assert scores[0] == pytest.approx(scores[1], rel=1e-9)
 
 
 def test_default_handling_is_mean_and_scale_of_the_classifiers():
     location, scale = PART.default_handling
-    only_slips = [spec for spec in PART.all_features if spec not in RICH]
+    only_slips = [spec for spec in PART.features if spec not in RICH]
     assert only_slips
-    assert location[: len(RICH)].tolist() == list(PART.classifier.mean)
-    assert scale[: len(RICH)].tolist() == list(PART.classifier.scale)
+    assert location[: len(RICH)].tolist() == list(PART.stable.rule.mean)
+    assert scale[: len(RICH)].tolist() == list(PART.stable.rule.scale)
     for spec in only_slips:
         at = SLIP_OWN.index(spec)
-        assert location[places([spec])] == PART.slip.classifier.mean[at]
-        assert scale[places([spec])] == PART.slip.classifier.scale[at]
+        assert location[places([spec])] == PART.slip.rule.mean[at]
+        assert scale[places([spec])] == PART.slip.rule.scale[at]
 
 
 def test_another_sensor_has_default_handling():
@@ -134,11 +125,11 @@ def test_another_finger_has_default_handling():
 
 
 def test_thresholds_may_be_those_of_the_model():
-    handling = replace(HANDLING, threshold=None, slip_threshold=None)
+    handling = replace(HANDLING, thresholds={})
     own = PART.with_handling(handling)
-    assert own.classifier.threshold == PART.classifier.threshold
-    assert own.slip.classifier.threshold == PART.slip.classifier.threshold
-    assert own.classifier.mean == OWN.classifier.mean
+    assert own.stable.threshold == PART.stable.threshold
+    assert own.slip.threshold == PART.slip.threshold
+    assert own.stable.rule.mean == OWN.stable.rule.mean
 
 
 def states(estimates):
@@ -167,27 +158,21 @@ def test_every_way_to_detect_uses_it():
 
 def test_the_live_threshold_is_that_of_the_sensor():
     sensors = {"thumb": sensor(), "index": sensor(name="other")}
-    usual = PART.classifier.threshold
+    usual = PART.stable.threshold
     assert ArrivalDetector(model(), sensors).thresholds == {"thumb": 0.31, "index": usual}
 
 
 def test_two_sensors_of_one_hand():
     other = sensor(name="other")
     hand = recording(thumb=tactile(200), index=tactile(200, which=other))
-    part = replace(CALIBRATED, features=TAXELS, **relative_parts())
+    n = len(TAXELS)
+    handling = replace(HANDLING, location=(0.2,) * n, scale=(0.5,) * n, thresholds={"stable": 0.31})
+    part = finger_model(TAXELS, normalised=True, handling={"tiny": handling})
     found = detect(model(part), hand).fingers
-    alone = {"thumb": part.for_sensor("tiny"), "index": replace(part, handling=msgspec.UNSET)}
+    alone = {"thumb": part.for_sensor("tiny"), "index": replace(part, handling={})}
     for name, own in alone.items():
         expected = detect(model(own), recording(**{name: hand.modules[name]})).fingers[name]
         np.testing.assert_array_equal(found[name].stable_probability, expected.stable_probability)
-
-
-def relative_parts():
-    n = len(TAXELS)
-    handling = replace(HANDLING, location=(0.2,) * n, scale=(0.5,) * n, slip_threshold=None)
-    return {
-        "classifier": classifier(n), "slip": None, "causes": None, "handling": {"tiny": handling}
-    }  # fmt: skip
 
 
 def test_it_is_saved_with_the_model(tmp_path):
@@ -195,19 +180,16 @@ def test_it_is_saved_with_the_model(tmp_path):
     assert Model.load(tmp_path / "mine.json") == model(name="mine")
 
 
-def test_a_model_without_it_is_written_as_before():
-    text = encode(model(finger_model(RICH)))
-    assert b"handling" not in text
-    assert b"normalised" not in text
+def test_a_model_without_it_says_so():
+    (part,) = msgspec.json.decode(encode(model(finger_model(RICH))))["fingers"].values()
+    assert (part["handling"], part["normalised"]) == ({}, False)
 
 
 def test_the_handling_of_some_sensors_can_be_folded_in():
     folded = model().with_handling_of({"thumb": sensor()})
     assert folded.fingers[ANY_FINGER] == OWN
     both = {"thumb": sensor(), "index": sensor(name="other")}
-    assert model().with_handling_of(both).fingers[ANY_FINGER] == replace(
-        PART, handling=msgspec.UNSET
-    )
+    assert model().with_handling_of(both).fingers[ANY_FINGER] == PART
 
 
 @pytest.mark.parametrize(
@@ -217,8 +199,8 @@ def test_the_handling_of_some_sensors_can_be_folded_in():
         ({"location": (math.nan,) * N}, "a number of the own handling is not finite"),
         ({"scale": (0.0,) * N}, "scales and held time above 0 expected for own handling"),
         ({"seconds": 0.0}, "scales and held time above 0 expected for own handling"),
-        ({"threshold": 1.5}, "a threshold from 0 to 1 expected, 1.5 given"),
-        ({"slip_threshold": -0.5}, "a threshold from 0 to 1 expected, -0.5 given"),
+        ({"thresholds": {"stable": 1.5}}, "a threshold from 0 to 1 expected, 1.5 given"),
+        ({"thresholds": {"slip": -0.5}}, "a threshold from 0 to 1 expected, -0.5 given"),
     ],
 )
 def test_refused_handling(fields, message):
@@ -226,7 +208,7 @@ def test_refused_handling(fields, message):
         replace(HANDLING, **fields)
 
 
-SHORT = replace(HANDLING, location=(1.0,), scale=(1.0,), slip_threshold=None)
+SHORT = replace(HANDLING, location=(1.0,), scale=(1.0,), thresholds={})
 
 
 @pytest.mark.parametrize(
@@ -245,13 +227,13 @@ def test_refused_parts(fields, message):
         replace(CALIBRATED, **fields)
 
 
-def test_a_slip_threshold_needs_a_slip_rule():
+def test_a_threshold_needs_its_head():
     handling = {"x": replace(HANDLING, location=(0.0,) * 15, scale=(1.0,) * 15)}
-    with pytest.raises(ModelError, match="a slip threshold given for 'x'; there is no slip rule"):
+    with pytest.raises(ModelError, match="a threshold of slip given for 'x'; no such head"):
         finger_model(RICH, normalised=True, handling=handling)
 
 
 def test_other_classifiers_are_not_normalised():
-    network = OnnxClassifier.of(b"onnx", len(RICH), 0.5)
+    network = Onnx.of(b"onnx", len(RICH))
     with pytest.raises(ModelError, match="a linear classifier expected where features are"):
-        FingerModel(features=RICH, classifier=network, normalised=True)
+        finger_model(RICH, rule=network, normalised=True)

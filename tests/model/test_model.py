@@ -1,37 +1,33 @@
 import json
-import math
 import os
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
-from holdfast.classifiers.slip import add_squares
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from detector.build import (
     RATE,
     RICH,
-    SLIP_OWN,
     TAXELS,
-    classifier,
     finger_model,
+    linear,
     model,
     recording,
     sensor,
-    slip_rule,
-    squared_rule,
     tactile,
 )
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.contact import NO_CONTACT
 from holdfast.detector import detect
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.features.specs import SLIP_FEATURES
-from holdfast.model import ANY_FINGER, Debounce, FingerModel, Model, Training
+from holdfast.model import ANY_FINGER, Debounce, Model, Training
 from holdfast.model.files import encode
 from holdfast.sensors import sensor as built_in_sensor
 from holdfast.synthetic import synthetic_recording
@@ -50,7 +46,6 @@ FULL = model(
 )
 
 
-STEEP = msgspec.structs.replace(squared_rule(SLIP_OWN).classifier, slope=1e3)
 WITH_SQUARES = model(features=RICH, slips=("thumb",), own=TAXELS)
 
 
@@ -69,22 +64,20 @@ class TestSaveAndLoad:
     @given(st.integers(0, 2**32), st.floats(0, 1), st.floats(0, 1e300))
     @settings(max_examples=30, deadline=None)
     def test_every_bit(self, seed, threshold, contact):
-        part = finger_model(
-            classifier=classifier(5, seed, threshold=threshold), contact_threshold=contact
-        )
+        part = finger_model(None, seed, threshold=threshold, contact_threshold=contact)
         hand_model = Model(fingers={ANY_FINGER: part}, rate=1 / 3)
         assert msgspec.json.decode(msgspec.json.encode(hand_model), type=Model) == hand_model
 
-    def test_a_slip_rule_without_features_has_the_bytes_of_older_files(self):
-        document = json.loads(encode(model(slips=("thumb",))))
-        fields = {"classifier", "smoothing", "hold", "thresholds"}
-        assert document["fingers"]["thumb"]["slip"].keys() == fields
+    @pytest.mark.parametrize("hand_model", [Model.load("builtin:any"), model(), WITH_SQUARES])
+    def test_a_copy_has_the_same_bytes(self, hand_model, tmp_path):
+        """As one that another process returns."""
+        copy = pickle.loads(pickle.dumps(hand_model))
+        assert encode(copy) == encode(hand_model)
+        assert copy.digest == Model.load(saved(copy, tmp_path / "m.json")).digest
 
     def test_numbers_of_numpy(self, tmp_path):
-        rule = LinearClassifier((np.float64(1.5),), (2.0,), (3.0,), np.float64(0.25))
-        hand_model = Model(
-            fingers={ANY_FINGER: finger_model((FeatureSpec("F_x"),), classifier=rule)}
-        )
+        rule = Linear((np.float64(1.5),), (2.0,), ((3.0,),), (np.float64(0.25),))
+        hand_model = Model(fingers={ANY_FINGER: finger_model((FeatureSpec("F_x"),), rule=rule)})
         assert Model.load(saved(hand_model, tmp_path / "m.json")) == hand_model
 
     def test_it_gives_the_same_probabilities(self, tmp_path):
@@ -119,30 +112,51 @@ def change(path, *keys):
 
 DEEP = b"[" * 100_000
 
-ANY = {
-    "features": [{"kind": "F_a"}],
-    "classifier": {
-        "type": "linear", "mean": [0], "scale": [1], "coefficients": [1], "intercept": 0
-    },
+HEAD = {
+    "name": "stable", "link": "logit", "features": [{"kind": "F_a"}],
+    "rule": {"type": "linear", "mean": [0], "scale": [1], "weights": [[1]], "intercepts": [0]},
 }  # fmt: skip
+ANY = {"heads": [HEAD]}
+STABLE = ("fingers", "thumb", "heads", 0)
+RULE = (*STABLE, "rule")
+
+
+def head_of(n_features, name="stable", **fields):
+    """A head of some features, in plain data."""
+    rule = HEAD["rule"] | {
+        "mean": [0] * n_features, "scale": [1] * n_features, "weights": [[1] * n_features]
+    }  # fmt: skip
+    features = [{"kind": "sigma", "window": 2 * k + 4} for k in range(n_features)]
+    return HEAD | {"name": name, "features": features, "rule": rule} | fields
+
 
 CHANGES = {
     "extra field": ((), {"colour": 1}, "Object contains unknown field `colour`"),
     "extra field of a finger": (("fingers", "thumb"), {"colour": 1},
                                 "Object contains unknown field `colour`"),
-    "extra field of a classifier": (("fingers", "thumb", "classifier"), {"colour": 1},
-                                    "Object contains unknown field `colour`"),
-    "extra field of a feature": (("fingers", "thumb", "features", 0), {"colour": 1},
+    "extra field of a head": (STABLE, {"colour": 1}, "Object contains unknown field `colour`"),
+    "extra field of a rule": (RULE, {"colour": 1}, "Object contains unknown field `colour`"),
+    "extra field of a feature": ((*STABLE, "features", 0), {"colour": 1},
                                  "Object contains unknown field `colour`"),
     "extra field of a sensor": (("sensors", "tiny"), {"colour": 1}, "unknown fields ['colour']"),
-    "schema": ((), {"schema": "holdfast.model/2"}, "Invalid enum value 'holdfast.model/2'"),
-    "kind of classifier": (("fingers", "thumb", "classifier"), {"type": "forest"}, "forest"),
-    "kind of feature": (("fingers", "thumb", "features", 0), {"kind": "F_q"}, "F_q"),
-    "odd window": (("fingers", "thumb", "features", 4), {"window": 7}, "7 given"),
-    "weights": (("fingers", "thumb", "classifier"), {"mean": [0.0]}, "1 means, 15 scales"),
-    "text": (("fingers", "thumb", "classifier"), {"intercept": "high"}, "Expected `float`"),
-    "null": (("fingers", "thumb", "classifier"), {"intercept": None}, "Expected `float`"),
-    "scale": (("fingers", "thumb", "classifier"), {"scale": [0.0] * len(RICH)}, "above 0 expected"),
+    "schema": ((), {"schema": "holdfast.model/3"}, "Invalid enum value 'holdfast.model/3'"),
+    "name of a head": (STABLE, {"name": "rolls"}, "Invalid enum value 'rolls'"),
+    "link of a head": (STABLE, {"link": "probit"}, "Invalid enum value 'probit'"),
+    "link of another head": (STABLE, {"link": "square"},
+                             "stable: the link logit expected, square given"),
+    "a name twice": (("fingers", "thumb"), {"heads": [HEAD, HEAD]},
+                     "one head of each name expected, stable, stable given"),
+    "no head of stability": (("fingers", "thumb"), {"heads": [HEAD | {"name": "slip"}]},
+                             "a head stable, and slip for slip_speed, expected; slip given"),
+    "width of a head": (STABLE, {"features": [{"kind": "F_a"}]},
+                        "stable: 1 features given, the rule expects 15"),
+    "kind of rule": (RULE, {"type": "forest"}, "forest"),
+    "kind of feature": ((*STABLE, "features", 0), {"kind": "F_q"}, "F_q"),
+    "odd window": ((*STABLE, "features", 4), {"window": 7}, "7 given"),
+    "weights": (RULE, {"mean": [0.0]}, "squares of 1, 15, 15 features given"),
+    "text": (RULE, {"intercepts": ["high"]}, "Expected `float`"),
+    "null": (RULE, {"intercepts": [None]}, "Expected `float`"),
+    "scale": (RULE, {"scale": [0.0] * len(RICH)}, "above 0 expected"),
     "rate": ((), {"rate": -1.0}, "a rate above 0 Hz expected, -1.0 given"),
     "tare": ((), {"tare": "soon"}, "'soon' given"),
     "window": ((), {"window": 5}, "an even window of at least 2 samples expected, 5 given"),
@@ -153,7 +167,7 @@ CHANGES = {
     "a sensor's rotation": (("sensors", "tiny"), {"rotations": [np.zeros((3, 3)).tolist()] * 2},
                             "rotation"),
     "no sensor": (("sensors",), {"tiny": 5}, "are missing in a sensor"),
-    "huge window": (("fingers", "thumb", "features", 4), {"window": 10**9},
+    "huge window": ((*STABLE, "features", 4), {"window": 10**9},
                     "at most 65536 samples in a window expected, 1000000000 given"),
     "window beyond 64 bits": ((), {"window": 2**63}, "at most 65536 samples in a window expected"),
     "window beyond all": ((), {"window": 2**90}, ""),
@@ -164,8 +178,11 @@ CHANGES = {
     "a sensor's rate without end": (("sensors", "tiny"), {"rate": 10**400}, ""),
     "many fingers": ((), {"sensors": {}, "fingers": {f"f{k}": ANY for k in range(300)}},
                      "at most 256 fingers expected, 300 given"),
-    "many features": (("fingers", "thumb"), {"features": [{"kind": "F_a"}] * 2000},
+    "many features": (("fingers", "thumb"), {"heads": [head_of(2000)]},
                       "at most 1024 features of a finger expected, 2000 given"),
+    "many features of two heads": (
+        ("fingers", "thumb"), {"heads": [head_of(600), head_of(1100, "slip")]},
+        "at most 1024 features of a finger expected, 1100 given"),
     "many taxels": (("sensors", "tiny"), {"positions": [[0.0] * 3] * 5000,
                                           "rotations": [np.eye(3).tolist()] * 5000},
                     "at most 4096 taxels of tiny expected, 5000 given"),
@@ -182,7 +199,7 @@ def test_refuses_to_load(keys, new, message, tmp_path):
     with pytest.raises(ModelError) as raised:
         Model.load(path)
     text = str(raised.value)
-    assert text.startswith(f"{path} is not a model of holdfast.model/1: ")
+    assert text.startswith(f"{path} is not a model of holdfast.model/2: ")
     assert message in text
     assert "\n" not in text
 
@@ -190,7 +207,7 @@ def test_refuses_to_load(keys, new, message, tmp_path):
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999"])
 @pytest.mark.parametrize(
     "keys",
-    [("rate",), ("fingers", "thumb", "classifier", "intercept"), ("sensors", "tiny", "rate")],
+    [("rate",), (*RULE, "intercepts", 0), ("sensors", "tiny", "rate")],
 )
 def test_refuses_numbers_that_are_not_finite(number, keys, tmp_path):
     path = saved(FULL, tmp_path / "m.json")
@@ -210,7 +227,7 @@ def test_refuses_other_files(content, tmp_path):
     path.write_bytes(content)
     with pytest.raises(ModelError) as raised:
         Model.load(path)
-    assert str(raised.value).startswith(f"{path} is not a model of holdfast.model/1: ")
+    assert str(raised.value).startswith(f"{path} is not a model of holdfast.model/2: ")
     assert "\n" not in str(raised.value)
 
 
@@ -231,10 +248,10 @@ def test_refuses_an_unknown_name():
 
 
 class TestFingers:
-    def test_features_and_classifier_fit(self):
+    def test_features_and_rule_fit(self):
         with pytest.raises(ModelError) as raised:
-            FingerModel(features=(FeatureSpec("F_a"),), classifier=classifier(2))
-        assert str(raised.value) == "1 features given, the classifier expects 2"
+            finger_model((FeatureSpec("F_a"),), rule=linear(2))
+        assert str(raised.value) == "stable: 1 features given, the rule expects 2"
 
     @pytest.mark.parametrize("name", ["contact_threshold", "contact_noise"])
     @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
@@ -335,66 +352,11 @@ class TestPredictProba:
         assert list(model().predict_proba(recording(index=tactile()))) == ["index"]
 
 
-class TestSlipRule:
-    """Slip rules with features of their own, and squares."""
-
-    def test_all_features_are_those_of_both_classifiers_once(self):
-        part = model(features=RICH, slips=("thumb",), own=SLIP_OWN).finger("thumb")
-        assert part.all_features == (*RICH, SLIP_OWN[0], SLIP_OWN[2])
-        assert model(features=RICH, slips=("thumb",)).finger("thumb").all_features == RICH
-
-    @pytest.mark.parametrize(
-        ("changes", "message"),
-        [
-            ({"features": SLIP_OWN[:2]}, "2 features given, the slip rule expects 3"),
-            ({"squares": (1.0,)}, "1 squares given, the slip rule expects 3"),
-            ({"squares": (1.0, 2.0, math.nan)}, "a number of the squares is not finite"),
-            ({"squares": (1.0, 2.0, 1e308), "classifier": STEEP}, "a number of the squares is not"),
-            ({"features": (SLIP_OWN[0],) * 3}, "a feature of the slip rule is given twice"),
-            ({"features": msgspec.UNSET}, "squares given without features; a slip rule with both"),
-        ],
-    )
-    def test_fields_that_contradict_each_other_are_refused(self, changes, message):
-        with pytest.raises(ModelError, match=message):
-            msgspec.structs.replace(squared_rule(SLIP_OWN), **changes)
-
-    def test_a_rule_for_other_features_is_refused(self):
-        with pytest.raises(ModelError, match="5 features given, the slip rule expects 3"):
-            finger_model(slip=slip_rule(3))
-
-    def test_long_windows_of_its_features_are_refused(self):
-        rule = squared_rule((FeatureSpec("change", 1 << 17),))
-        with pytest.raises(ModelError, match="at most 65536 samples in a window expected"):
-            finger_model(slip=rule)
-
-    def test_squares_by_hand(self):
-        rule = squared_rule(SLIP_OWN)
-        linear, phi = rule.classifier, np.array([3.0, -900.0, 1.0])
-        u = (phi - np.array(linear.mean)) / np.array(linear.scale)
-        assert abs(u[1]) > 5
-        expected = linear.slope * np.array(rule.squares) @ np.minimum(np.abs(u), 5.0) ** 2
-        assert add_squares(0.5, phi, rule.square_weights()) == pytest.approx(0.5 + expected)
-
-    def test_relative_features_of_a_rule_need_a_rate_for_which_they_are_made(self):
-        part = finger_model(slip=squared_rule(TAXELS))
-        with pytest.raises(ModelError, match="10 Hz given, the model expects 30 to 1000 Hz"):
-            Model(fingers={ANY_FINGER: part}).plan({"thumb": sensor()}, 10.0)
-
-    def test_features_that_compare_taxels_need_two(self):
-        hand_model = Model(fingers={ANY_FINGER: finger_model(slip=squared_rule(TAXELS))})
-        assert hand_model.blind_features("thumb", sensor(2)) == ()
-        assert hand_model.blind_features("thumb", sensor(1)) == (
-            "second_shared", "second_own", "second_top",
-            "mean_second_shared", "mean_second_own", "mean_second_top",
-        )  # fmt: skip
-        assert model().blind_features("thumb", sensor(1)) == ()
-
-
 def test_the_noise_floor():
     hand_model = Model.load("builtin:noise-floor")
     part = hand_model.fingers[ANY_FINGER]
     assert part.features == (FeatureSpec("sigma", 14, "noise"),)
-    at = part.classifier.probability(np.log([[1.0], [3.0], [9.0]]))
+    at = part.stable.rule.probability(np.log([[1.0], [3.0], [9.0]]))
     assert at == pytest.approx([0.9, 0.5, 0.1])
 
 
@@ -417,9 +379,10 @@ class TestTwin:
         hand_model = Model.load("builtin:twin")
         assert list(hand_model.fingers) == [ANY_FINGER]
         part = hand_model.fingers[ANY_FINGER]
-        assert part.features == parse_features("holdfast")
+        assert part.stable.features == parse_features("holdfast")
         assert part.slip.features == SLIP_FEATURES
-        assert len(part.slip.squares) == len(part.all_features) == 39
+        assert len(part.slip.rule.squares[0]) == len(part.features) == 39
+        assert [head.name for head in part.heads] == ["stable", "slip", "slip_speed", "cause"]
         assert part.sensor == "uskin-curved"
         assert hand_model.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}
         assert hand_model.rate == pytest.approx(150.0, rel=1e-3)
@@ -461,8 +424,8 @@ def test_a_key_that_is_given_twice_is_refused(tmp_path):
     path.write_text(text.replace('"rate":', '"rate": 100.0, "rate":', 1))
     with pytest.raises(ModelError, match="the key 'rate' is given twice"):
         Model.load(path)
-    path.write_text(text.replace('"threshold":', '"threshold": 0.5, "thr\\u0065shold":', 1))
-    with pytest.raises(ModelError, match="the key 'threshold' is given twice"):
+    path.write_text(text.replace('"tare":', '"tare": "first", "t\\u0061re":', 1))
+    with pytest.raises(ModelError, match="the key 'tare' is given twice"):
         Model.load(path)
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from holdfast.classifiers.slip import SlipRule
 from matplotlib.figure import Figure
 from msgspec.structs import replace as replace_fields
 
@@ -71,10 +70,11 @@ def grasp():
 def model():
     """The built-in model with the rule that a finger slides where it is not stable."""
     built_in = Model.load("builtin:twin")
-    part = built_in.fingers["*"]
-    negative = tuple(-value for value in part.classifier.coefficients)
-    rule = SlipRule(replace_fields(part.classifier, coefficients=negative), hold=0.1)
-    return replace_fields(built_in, fingers={"*": replace_fields(part, slip=rule)})
+    part = built_in.fingers["*"].without_heads("slip_speed")
+    (weights,) = part.stable.rule.weights
+    rule = replace_fields(part.stable.rule, weights=(tuple(-value for value in weights),))
+    slip = replace_fields(part.stable, name="slip", rule=rule, hold=0.1)
+    return replace_fields(built_in, fingers={"*": part.with_heads(slip)})
 
 
 def test_decisions_stand_below_the_truth(grasp, model):

@@ -1,6 +1,5 @@
 """Small recordings for the tests of training."""
 
-import msgspec
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
@@ -123,7 +122,4 @@ def handling_recording(seed, fingers=("thumb", "index"), name=None, **options):
 def normalised_model():
     """Return `builtin:any`, whose features are normalised, with a threshold that is too high."""
     model = Model.load("builtin:any")
-    part = model.fingers["*"]
-    classifier = msgspec.structs.replace(part.classifier, threshold=0.95)
-    part = msgspec.structs.replace(part, classifier=classifier)
-    return msgspec.structs.replace(model, fingers={"*": part})
+    return model.changed(lambda part: part.with_heads(part.stable.at(0.95)))

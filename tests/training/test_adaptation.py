@@ -4,14 +4,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.classifiers import LinearClassifier, Samples
+from holdfast.classifiers import Linear, Samples
 from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
 from holdfast.training.adaptation import Adaptation, choose_adaptation, choose_nearest
 from holdfast.training.training_samples import FingerSamples
 
-RIGHT = LinearClassifier(
-    mean=(0.0, 0.0, 0.0), scale=(1.0, 1.0, 1.0), coefficients=(2.0, -1.0, 0.0), intercept=0.5
-)
+RIGHT = Linear((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), ((2.0, -1.0, 0.0),), (0.5,))
 
 
 def hand(n_recordings, rule=RIGHT, *, seed=0, n=400):
@@ -43,7 +41,7 @@ def test_a_model_whose_calibration_is_off_is_calibrated():
 
 
 def test_with_enough_recordings_wrong_weights_are_replaced():
-    wrong = msgspec.structs.replace(RIGHT, coefficients=(0.2, 1.0, 1.0))
+    wrong = msgspec.structs.replace(RIGHT, weights=((0.2, 1.0, 1.0),))
     found = choose_adaptation(hand(8), wrong)
     assert found.parameters["change"] == WEIGHTS
     assert found.parameters["C"] >= 1e-3

@@ -34,6 +34,12 @@ def by_finger(model):
     return msgspec.structs.replace(model, fingers=parts)
 
 
+def with_rule(part, **fields):
+    """Return a part whose rule of stability has other fields."""
+    rule = msgspec.structs.replace(part.stable.rule, **fields)
+    return part.with_heads(msgspec.structs.replace(part.stable, rule=rule))
+
+
 def train_with_warnings(recordings, setting):
     warnings = []
     return train(recordings, setting, warn=warnings.append).model, warnings
@@ -48,8 +54,8 @@ def test_the_features_window_and_tare_of_the_model_are_kept(known, few):
     assert set(adapted.fingers) == {"thumb", "index"}
     assert {part.features for part in adapted.fingers.values()} == {FEATURES}
     assert (adapted.window, adapted.tare, adapted.debounce) == (8, "0.4", Debounce(0.02, 0.05, 0.1))
-    scales = {part.classifier.scale for part in adapted.fingers.values()}
-    assert scales == {known.fingers[ANY_FINGER].classifier.scale}
+    scales = {part.stable.rule.scale for part in adapted.fingers.values()}
+    assert scales == {known.fingers[ANY_FINGER].stable.rule.scale}
     assert adapted.training.parameters == {
         finger: {"change": "calibration", "C": 1e-3} for finger in ("thumb", "index")
     }
@@ -78,12 +84,9 @@ def test_with_few_samples_adapting_is_better_than_training(known):
 
 def test_recordings_correct_a_wrong_model(known, few):
     part = known.fingers[ANY_FINGER]
-    rule = msgspec.structs.replace(part.classifier, intercept=part.classifier.intercept + 4.0)
-    wrong = msgspec.structs.replace(
-        known,
-        fingers={ANY_FINGER: msgspec.structs.replace(part, classifier=rule)},
-        debounce=Debounce(),
-    )
+    (intercept,) = part.stable.rule.intercepts
+    moved = with_rule(part, intercepts=(intercept + 4.0,))
+    wrong = msgspec.structs.replace(known, fingers={ANY_FINGER: moved}, debounce=Debounce())
     rest = [tiny_recording(seed) for seed in range(60, 64)]
     adapted = train(few, Setting.adapting(wrong, trials=5)).model
     assert accuracy(adapted, rest) > accuracy(wrong, rest) + 5.0
@@ -92,13 +95,12 @@ def test_recordings_correct_a_wrong_model(known, few):
 def test_each_finger_is_adapted_from_its_own_classifier(known, few):
     own = by_finger(known)
     part = own.fingers["index"]
-    other = msgspec.structs.replace(part.classifier, scale=(7.0,) * len(FEATURES))
-    fingers = own.fingers | {"index": msgspec.structs.replace(part, classifier=other)}
+    fingers = own.fingers | {"index": with_rule(part, scale=(7.0,) * len(FEATURES))}
     adapted = train(
         few, Setting.adapting(msgspec.structs.replace(own, fingers=fingers), trials=0)
     ).model
-    assert adapted.fingers["index"].classifier.scale == (7.0,) * len(FEATURES)
-    assert adapted.fingers["thumb"].classifier.scale == part.classifier.scale
+    assert adapted.fingers["index"].stable.rule.scale == (7.0,) * len(FEATURES)
+    assert adapted.fingers["thumb"].stable.rule.scale == part.stable.rule.scale
 
 
 def test_one_recording_is_split_by_time(known, few):
@@ -187,7 +189,8 @@ def test_a_shared_classifier_cannot_be_adapted_from_one_for_each_finger(known):
 def test_fingers_with_different_features(known):
     own = by_finger(known)
     other = parse_features("F_a,F_x,F_y,F_z,m,sigma", 10)
-    part = msgspec.structs.replace(own.fingers["index"], features=other)
+    stable = msgspec.structs.replace(own.fingers["index"].stable, features=other)
+    part = own.fingers["index"].with_heads(stable)
     unlike = msgspec.structs.replace(own, fingers=own.fingers | {"index": part})
     with pytest.raises(ModelError) as raised:
         Setting.adapting(unlike)

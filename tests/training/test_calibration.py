@@ -77,9 +77,9 @@ def test_the_summary_says_what_was_seen(model, calibrated):
     assert 0.1 < summary.load_change < 0.4
     assert 0 < summary.n_changed <= summary.n_features == 31
     assert summary.before.stable < 60 < 89 < summary.after.stable
-    assert summary.before.threshold == model.fingers["*"].classifier.threshold
-    assert summary.after.threshold == handling_of(calibrated.model).threshold
-    assert summary.after.slip_threshold == handling_of(calibrated.model).slip_threshold
+    assert summary.before.threshold == model.fingers["*"].stable.threshold
+    after = {"stable": summary.after.threshold, "slip": summary.after.slip_threshold}
+    assert handling_of(calibrated.model).thresholds == after
 
 
 def test_once_more_gives_the_same_model(calibrated):
@@ -99,7 +99,7 @@ def test_labels_have_no_part_in_it(model, calibrated):
         }
         labelled.append(Recording(recording.name, modules))
     handling, usual = handling_of(calibrate(model, labelled)), handling_of(calibrated.model)
-    assert (handling.location, handling.threshold) == (usual.location, usual.threshold)
+    assert (handling.location, handling.thresholds) == (usual.location, usual.thresholds)
 
 
 def scaled(recording, factor):
@@ -116,8 +116,8 @@ def test_the_unit_of_the_readings_changes_nothing(model, calibrated, factor):
     handling = handling_of(calibrated.model)
     assert other.location == pytest.approx(handling.location, abs=1e-8)
     assert other.scale == pytest.approx(handling.scale, rel=1e-8)
-    thresholds = handling.threshold, handling.slip_threshold
-    assert (other.threshold, other.slip_threshold) == pytest.approx(thresholds, rel=1e-12)
+    assert other.thresholds.keys() == {"stable", "slip"}
+    assert other.thresholds == pytest.approx(handling.thresholds, rel=1e-12)
 
 
 def test_a_tenth_of_slip_changes_little(model, calibrated):
@@ -240,14 +240,14 @@ def test_no_recordings(model):
 
 def test_a_threshold_that_is_tuned_later_wins(calibrated):
     moved = with_threshold(calibrated.model, 0.125).finger("*", PAD)
-    assert moved.classifier.threshold == 0.125
-    assert moved.classifier.mean == handling_of(calibrated.model).location
+    assert moved.stable.threshold == 0.125
+    assert moved.stable.rule.mean == handling_of(calibrated.model).location
     assert moved.slip == calibrated.model.finger("*", PAD).slip
 
 
 def test_tuning_starts_from_the_threshold_of_the_sensor(calibrated):
     part = calibrated.model.fingers["*"]
-    handling = msgspec.structs.replace(part.handling["pad"], threshold=0.0625)
+    handling = msgspec.structs.replace(part.handling["pad"], thresholds={"stable": 0.0625})
     part = msgspec.structs.replace(part, handling={"pad": handling})
     own = msgspec.structs.replace(calibrated.model, fingers={"*": part})
     times = DATA[0].modules["thumb"].times
@@ -256,7 +256,7 @@ def test_tuning_starts_from_the_threshold_of_the_sensor(calibrated):
     labelled = Recording("held", {"thumb": Tactile(PAD, times, module.readings, labels=(label,))})
     tuned = tune(own, [labelled], false_alarms=100.0)
     assert tuned.before.threshold == 0.0625
-    assert tuned.model.finger("*", PAD).classifier.threshold == tuned.chosen.threshold
+    assert tuned.model.finger("*", PAD).stable.threshold == tuned.chosen.threshold
 
 
 def test_labels_are_learned_from_the_own_handling(calibrated):
@@ -266,6 +266,6 @@ def test_labels_are_learned_from_the_own_handling(calibrated):
                                          for k in range(2)])  # fmt: skip
     trained = train(data, Setting.adapting(own, trials=0, shared=True)).model
     part = trained.fingers["*"]
-    assert part.classifier.mean == handling_of(own, "tiny").location
+    assert part.stable.rule.mean == handling_of(own, "tiny").location
     assert not part.handling
     assert not part.normalised

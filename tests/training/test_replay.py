@@ -44,5 +44,5 @@ def test_a_lower_threshold_is_stable_more_often(model):
 
 def test_the_threshold_is_that_of_all_fingers(model):
     changed = with_threshold(model, 0.25)
-    assert {part.classifier.threshold for part in changed.fingers.values()} == {0.25}
+    assert {part.stable.threshold for part in changed.fingers.values()} == {0.25}
     assert with_threshold(changed, 0.5).fingers.keys() == model.fingers.keys()

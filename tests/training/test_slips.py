@@ -5,9 +5,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from holdfast.classifiers.slip import add_squares
 
 from holdfast.classifiers.fitting import Samples
+from holdfast.classifiers.linear import add_squares
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.contact import ContactState
 from holdfast.errors import ModelError, TrainingError
@@ -22,7 +22,7 @@ from holdfast.training.evaluation import combine_decisions
 from holdfast.training.slips import (
     MIN_SLIDING_SAMPLES,
     SLIP_FALSE_ALARMS,
-    SLIP_RULE_HOLD,
+    SLIP_HOLD,
     SLIP_SMOOTHING,
     SlipSamples,
     choose_slip_threshold,
@@ -79,17 +79,16 @@ def slips_of(model, recordings):
 
 def unsmoothed(model):
     """The model whose probability of a slip is that of each sample alone."""
-    part = model.fingers["*"]
-    rule = msgspec.structs.replace(part.slip, smoothing=0.0)
-    parts = {"*": msgspec.structs.replace(part, slip=rule)}
-    return msgspec.structs.replace(model, fingers=parts)
+    return model.changed(
+        lambda part: part.with_heads(msgspec.structs.replace(part.slip, smoothing=0.0))
+    )
 
 
 class TestTraining:
     def test_the_rule_finds_slips_of_other_recordings(self, trained, others):
         model, warnings = trained[0].model, trained[1]
         rule = rule_of(model)
-        assert (rule.smoothing, rule.hold) == (SLIP_SMOOTHING, SLIP_RULE_HOLD)
+        assert (rule.smoothing, rule.hold) == (SLIP_SMOOTHING, SLIP_HOLD)
         metrics = slips_of(model, others)
         assert metrics.n == 6 * 2 * 4
         assert metrics.incipient["0.1"] > 50
@@ -98,11 +97,11 @@ class TestTraining:
 
     def test_the_threshold_of_the_record_holds_out_of_fold(self, trained):
         metrics = trained[0].cross_validation.slips
-        record = rule_of(trained[0].model).thresholds
+        record = rule_of(trained[0].model).choice
         assert record.requested == SLIP_FALSE_ALARMS
         assert record.false_alarms_per_minute <= SLIP_FALSE_ALARMS
-        assert record.n_slips == metrics.pooled.n == 6 * 2 * 4
-        assert record.held_minutes == pytest.approx(metrics.pooled.held_minutes)
+        assert record.n == metrics.pooled.n == 6 * 2 * 4
+        assert record.minutes == pytest.approx(metrics.pooled.held_minutes)
         assert record.recordings == {}
         assert metrics.threshold_chosen
         low, high = metrics.intervals.false_alarms_per_minute["held"]
@@ -131,9 +130,9 @@ class TestTraining:
         separate = train(recordings, replace(SETTING, shared=False)).model
         rules = {name: part.slip for name, part in separate.fingers.items()}
         assert set(rules) == {"thumb", "index"}
-        assert rules["thumb"].classifier.coefficients != rules["index"].classifier.coefficients
-        assert rules["thumb"].classifier.threshold == rules["index"].classifier.threshold
-        assert rules["thumb"].thresholds == rules["index"].thresholds
+        assert rules["thumb"].rule.weights != rules["index"].rule.weights
+        assert rules["thumb"].threshold == rules["index"].threshold
+        assert rules["thumb"].choice == rules["index"].choice
 
     def test_a_rule_with_squares_is_the_logistic_regression_of_features_and_squares(self):
         rng = np.random.default_rng(0)
@@ -141,22 +140,23 @@ class TestTraining:
         features[0, 1] = 40.0  # more than five standard deviations
         slides = rng.random(4000) < 1 / (1 + np.exp(3 - np.abs(features[:, 0] - 3.0)))
         own = finger_samples(features, slides)
-        rule = SlipSamples(own, int(np.count_nonzero(~slides))).fit((), FEATURES[:2])
+        gathered = SlipSamples(own, int(np.count_nonzero(~slides)))
+        (head,) = gathered.fit((), FEATURES[:2], squares=True)
         deviation = (features - features.mean(axis=0)) / features.std(axis=0)
         squares = np.minimum(np.abs(deviation), 5.0) ** 2
         rows = Samples(np.hstack([deviation, squares]), slides, np.zeros(4000, dtype=np.int64))
-        expected = LogisticRegression().fit(rows, {"C": 1.0, "class_weight": None}, 0)
-        weights, table = rule.classifier.weights(), rule.square_weights()
+        expected = LogisticRegression().fit(rows, {"C": 1.0, "class_weight": None}, 0).rule
+        (weights,), table = head.rule.raw_weights(), head.rule.raw_squares()
         found = [add_squares(weights[0] + weights[1:] @ row, row, table) for row in features]
         expected_odds = expected.slope * expected.decision(rows.features) + expected.offset
         np.testing.assert_allclose(found, expected_odds, atol=1e-9)
-        assert rule.squares[0] > 0.3  # it slides on either side of the mean
-        assert rule.features == FEATURES[:2]
-        assert rule.classifier.threshold == 0.5
+        assert head.rule.squares[0][0] > 0.3  # it slides on either side of the mean
+        assert (head.name, head.features) == ("slip", FEATURES[:2])
+        assert head.threshold == 0.5
 
     def test_without_a_list_the_rule_has_the_features_of_the_classifier(self, model):
-        assert rule_of(model).features is msgspec.UNSET
-        assert rule_of(model).squares is msgspec.UNSET
+        assert rule_of(model).features == FEATURES
+        assert rule_of(model).rule.squares == ()
 
     def test_slips_may_come_from_labels(self, recordings):
         labelled = [replace(made, truth=None) for made in recordings]
@@ -260,11 +260,12 @@ class TestTuning:
         tuned = tune_slips(named, others, 5.0)
         rule = rule_of(tuned.model)
         assert tuned.model.name == "mine, tuned"
-        assert rule.classifier.threshold == tuned.threshold
-        assert rule.thresholds.requested == 5.0
-        assert rule.thresholds.recordings == {made.name: made.digest for made in others}
-        assert rule.thresholds.found == tuned.chosen.incipient["0.1"]
-        assert tuned.model.tuning == model.tuning
+        assert rule.threshold == tuned.threshold
+        assert rule.choice.requested == 5.0
+        assert rule.choice.recordings == {made.name: made.digest for made in others}
+        assert rule.choice.found == tuned.chosen.incipient["0.1"]
+        (before,), (after,) = (m.fingers.values() for m in (model, tuned.model))
+        assert after.stable == before.stable
 
     @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
     def test_a_rate_that_is_none(self, model, others, rate):
@@ -289,7 +290,7 @@ class TestTuning:
         quiet = tiny_recording(1, states=(ContactState.NO_CONTACT, *[ContactState.STABLE] * 3))
         tuned = tune_slips(model, [quiet], 60.0)
         assert tuned.chosen.n == 0
-        assert rule_of(tuned.model).thresholds.found is None
+        assert rule_of(tuned.model).choice.found is None
 
     def test_a_held_time_that_is_too_short(self, model, others):
         with pytest.raises(TrainingError) as refusal:

@@ -56,14 +56,20 @@ def test_no_other_threshold_shown_misses_less_for_that_rate(model, others):
 
 def test_the_model_keeps_how_it_was_tuned(model, others, tmp_path):
     named = msgspec.structs.replace(model, name="mine")
-    tuned = tune(named, others, 40.0).model
-    tuned.save(tmp_path / "tuned.json")
+    tuned = tune(named, others, 40.0)
+    chosen = tuned.chosen
+    tuned.model.save(tmp_path / "tuned.json")
     found = Model.load(tmp_path / "tuned.json")
-    assert found.tuning == tuned.tuning
+    assert found == tuned.model
     assert found.name == "mine, tuned"
-    assert found.tuning.requested == 40.0
-    assert found.tuning.recordings == {each.name: each.readings_digest for each in others}
-    assert {p.classifier.threshold for p in found.fingers.values()} == {found.tuning.threshold}
+    for part in found.fingers.values():
+        choice = part.stable.choice
+        assert choice.requested == 40.0
+        assert choice.recordings == {each.name: each.readings_digest for each in others}
+        assert (choice.n, choice.minutes) == (chosen.events.n_events, chosen.events.stable_minutes)
+        assert choice.found == 100 - chosen.events.missed["0.2"]
+        assert choice.false_alarms_per_minute == chosen.false_alarms
+        assert part.stable.threshold == chosen.threshold
     assert found.training == model.training
 
 
@@ -80,8 +86,9 @@ def test_a_threshold_that_misses_every_event_is_not_used(model, others):
     """Below the hysteresis, a contact that was stable stays so, whatever happens."""
     lazy = msgspec.structs.replace(model, debounce=Debounce(hysteresis=0.05))
     tuned = tune(lazy, others, 1e6)
-    assert len(tuned.model.tuning.points) > 1
-    assert all(point.missed < 100 for point in tuned.model.tuning.points)
+    for part in tuned.model.fingers.values():
+        assert len(part.stable.choice.points) > 1
+        assert all(point.missed < 100 for point in part.stable.choice.points)
 
 
 # --- what is refused -------------------------------------------------------------------------

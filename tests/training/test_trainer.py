@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Samples, recipe
+from holdfast.classifiers import Fitted, Linear, Samples, recipe
 from holdfast.contact import STABLE, UNSTABLE, ContactState
 from holdfast.errors import TrainingError
 from holdfast.features import Tare, parse_features
@@ -125,14 +124,8 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
             fit = recipe("logreg").fit(samples, parameters, seed)
             calls.append(len(samples.stable))
             number = len(calls) - 1  # two fingers of the whole, then two of each fold
-            return msgspec.structs.replace(
-                fit,
-                coefficients=(0.0,) * 3,
-                intercept=0.1 * number,
-                slope=1.0,
-                offset=0.0,
-                threshold=0.5,
-            )
+            rule = Linear.of(*fit.linear.moments, np.zeros(3), 0.1 * number)
+            return Fitted(rule, 0.5)
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
     given_decisions = []

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from holdfast.classifiers.cause import SLIP_CODE
 
+from holdfast.contact import SLIP_CODE
 from holdfast_lab.figures import slips
 from holdfast_lab.figures.slips import COLUMN_WIDTH, event_kinds, slip_figure, slips_figure
 from study.example_recordings import SLIPS, recording_with_truth
@@ -38,7 +38,7 @@ def model(monkeypatch, recording):
     )
     detection = SimpleNamespace(fingers=dict.fromkeys(recording.modules, trace))
     monkeypatch.setattr(slips, "detect", lambda *_: detection)
-    rule = SimpleNamespace(classifier=SimpleNamespace(threshold=0.3))
+    rule = SimpleNamespace(threshold=0.3)
     return SimpleNamespace(name="mine", finger=lambda *_: SimpleNamespace(slip=rule))
 
 

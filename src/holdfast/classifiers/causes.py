@@ -1,4 +1,4 @@
-"""Fit of the rule that tells causes apart."""
+"""Fit of the causes of an unstable contact: multinomial logistic regression."""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ from holdfast.sensors.types import Array
 def fit_causes(
     features: Array, causes: npt.NDArray[np.str_], c: float
 ) -> tuple[Linear, tuple[Cause, ...]]:
-    """Fit a multinomial logistic regression to unstable samples; all causes weigh alike.
+    """Fit the scores of causes to unstable samples; all causes weigh alike.
 
     Args:
         features: (n, n_features) finite.
@@ -21,7 +21,7 @@ def fit_causes(
         c: inverse strength of the L2 penalty on the weights of standardised features.
 
     Returns:
-        The rule, and the cause of each of its outputs.
+        The rule, and the causes of its outputs.
     """
     names, classes, counts = np.unique(causes, return_inverse=True, return_counts=True)
     mean, scale, standardised = standardise(features)

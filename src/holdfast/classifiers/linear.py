@@ -16,9 +16,7 @@ MAX_DEVIATION = 5.0
 of a slip, nor of a glitch."""
 
 
-class Linear(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag="linear"
-):
+class Linear(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linear"):
     """Linear function of standardised features, with one value for each output.
 
     With the standardised features u_j = (phi_j - mean_j) / scale_j, output k has the value

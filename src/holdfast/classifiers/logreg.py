@@ -99,7 +99,7 @@ class Adapted:
     @property
     def name(self) -> str:
         """Name of the recipe, with the prior: another prior is another search."""
-        return f"adapted {self.prior}"
+        return f"adapted {self.prior} at {self.threshold}"
 
     @property
     def reference(self) -> Parameters:

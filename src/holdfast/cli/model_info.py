@@ -68,10 +68,11 @@ def _head(head: "Head") -> dict[str, Any]:
     fields: dict[str, Any] = msgspec.to_builtins(head)
     rule, n = fields.pop("rule"), head.rule.n_features
     fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
+    fields["features"] = [str(spec) for spec in head.features]
     if head.choice is not None:
         fields["choice"] |= {"recordings": list(head.choice.recordings)}
-    if head.link == "logit":
-        fields["threshold"] = head.threshold
+    if head.link != "logit":
+        del fields["threshold"]
     return fields
 
 
@@ -102,7 +103,8 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         finger = "any finger" if name == "*" else name
         sensor = f"{part['sensor']} ({part['unit']})" if part["sensor"] else "any"
         yield finger, f"sensor {sensor}; {_contact(part)}"
-        heads = (line for head in part["heads"].values() for line in _head_lines(head))
+        known = part["heads"]["stable"]["features"]
+        heads = (line for head in part["heads"].values() for line in _head_lines(head, known))
         yield from (("", line) for line in (*heads, *_handling_lines(part)))
     training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
@@ -120,23 +122,26 @@ def _contact(part: dict[str, Any]) -> str:
     return "no threshold of contact"
 
 
-def _head_lines(head: dict[str, Any]) -> Iterator[str]:
-    """Yield what a head answers, from which features, and on what its threshold was chosen."""
+def _head_lines(head: dict[str, Any], known: list[str]) -> Iterator[str]:
+    """Yield what a head answers, from which features, and on what its threshold was chosen.
+
+    Of features that `stable` has not, the first are named.
+    """
     name, texts = head["name"], [head["rule"]]
     if "threshold" in head:
         answer = "STABLE" if name == "stable" else "slides"
         texts.append(f"{answer} from a probability of {head['threshold']:.3g} on")
     if name == "slip":
-        texts.append(f"smoothing {head.get('smoothing', 0):g} s, hold {head.get('hold', 0):g} s")
-    if "highest" in head:
+        texts.append(f"smoothing {head['smoothing']:g} s, hold {head['hold']:g} s")
+    if head["highest"] is not None:
         texts.append(f"speed and distance of slips, up to {head['highest']:.3g} mm/s")
-    if "classes" in head:
+    if head["classes"]:
         texts.append(", ".join(head["classes"]))
     yield f"{name}: {'; '.join(texts)}"
-    yield f"  features {_few(head['features'])}"
-    choice = head.get("choice")
-    if choice is not None:
-        yield f"  threshold from {_chosen(name, choice)}"
+    added = [feature for feature in head["features"] if feature not in known]
+    yield f"  of them new {_few(added)}" if added else f"  features {_few(head['features'])}"
+    if head["choice"] is not None:
+        yield f"  threshold from {_chosen(name, head['choice'])}"
 
 
 def _chosen(name: str, choice: dict[str, Any]) -> str:

@@ -174,7 +174,7 @@ class ProbabilityFeeder:
         kernel.advance(layout, memory, output, readings.copy(), present, time)
         for place, (columns, onnx) in self._rules.items():
             if present[place] and output.status[place, at.REASON] == at.READY:
-                probability = onnx.probability(output.features[place, None, columns])[0]
+                probability = onnx.probability(output.features[place, columns][None])[0]
                 with np.errstate(divide="ignore"):
                     self._rule.weights[place, 0] = np.log(probability / (1.0 - probability))
 

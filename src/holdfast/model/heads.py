@@ -39,7 +39,7 @@ class ThresholdPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     missed: float | None
 
 
-class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the threshold of a head was chosen, and what it gave where it was counted.
 
     Attributes:
@@ -64,9 +64,7 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     points: tuple[ThresholdPoint, ...] = ()
 
 
-class Head(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True
-):
+class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One answer about a finger.
 
     The link makes the answer from the values z of the rule:
@@ -89,7 +87,7 @@ class Head(
         smoothing: time constant of z [s]; 0 for none.
         hold: time for which a slip is still reported [s].
         classes: causes of the outputs of the rule, for the link `softmax`.
-        highest: largest value, for the link `square`: that of the training.
+        highest: largest value, for the link `square` alone: that of the training.
         choice: how the threshold was chosen; None if it was given.
 
     Raises:
@@ -104,7 +102,7 @@ class Head(
     smoothing: float = 0.0
     hold: float = 0.0
     classes: tuple[Cause, ...] = ()
-    highest: float = math.inf
+    highest: float | None = None
     choice: Choice | None = None
 
     def __post_init__(self) -> None:
@@ -150,7 +148,10 @@ class Head(
             raise ModelError(
                 f"{self.name}: a threshold from 0 to 1 expected, {self.threshold} given"
             )
-        if not self.highest > 0 or (self.link == "square" and self.highest == math.inf):
+        if self.link != "square":
+            if self.highest is not None:
+                raise ModelError(f"{self.name}: no highest value expected, {self.highest} given")
+        elif self.highest is None or not 0 < self.highest < math.inf:
             raise ModelError(
                 f"{self.name}: a finite highest value above 0 expected, {self.highest} given"
             )

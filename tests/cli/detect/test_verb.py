@@ -8,9 +8,8 @@ import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from holdfast.classifiers.slip import SlipRule, SpeedRule
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.cli import main
 from holdfast.cli.detect.verb import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
@@ -23,7 +22,7 @@ from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
-from holdfast.model import Debounce, FingerModel, Model
+from holdfast.model import Debounce, FingerModel, Head, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording
@@ -33,6 +32,7 @@ FIELDS = [
     "faulty_taxels", "cause", "slip_probability", "slip_speed", "slip_distance",
 ]  # fmt: skip
 NOISE_FLOOR = "builtin:noise-floor"
+SIGMA = (FeatureSpec("sigma", 14),)
 NO_SLIP_RULE = (
     "{} has no slip rule: slip_probability is null (holdfast train on recordings with a truth "
     "adds one)\n"
@@ -40,10 +40,12 @@ NO_SLIP_RULE = (
 
 
 def finger_model(name):
-    rule = LinearClassifier(mean=(10.0,), scale=(3.0,), coefficients=(-2.0,), intercept=0.0)
-    return FingerModel(
-        features=(FeatureSpec("sigma", 14),), classifier=rule, sensor=name, contact_threshold=50.0
-    )
+    stable = Head(name="stable", link="logit", features=SIGMA, rule=rule_of_sigma(-2.0, 0.0))
+    return FingerModel(heads=(stable,), sensor=name, contact_threshold=50.0)
+
+
+def rule_of_sigma(weight, intercept):
+    return Linear((10.0,), (3.0,), ((weight,),), (intercept,))
 
 
 @pytest.fixture(scope="module")
@@ -244,9 +246,9 @@ def test_a_model_without_a_slip_rule_says_so_once(capsys, model, grasp):
 
 def with_slip_rule(model, fingers=("thumb", "index")):
     """Return a model whose fingers slide where sigma is over 13; the rule has no hold."""
-    classifier = LinearClassifier(mean=(10.0,), scale=(3.0,), coefficients=(2.0,), intercept=-2.0)
+    slip = Head(name="slip", link="logit", features=SIGMA, rule=rule_of_sigma(2.0, -2.0))
     parts = {
-        name: msgspec.structs.replace(part, slip=SlipRule(classifier) if name in fingers else None)
+        name: part.with_heads(slip) if name in fingers else part.without_heads("slip")
         for name, part in model.fingers.items()
     }
     return msgspec.structs.replace(model, fingers=parts)
@@ -306,12 +308,9 @@ class TestSlips:
         self, capsys, monkeypatch, sliding, grasp, want, tmp_path
     ):
         model, path = Model.load(sliding), tmp_path / "speed.json"
-        rule = SpeedRule((10.0,), (3.0,), (1.0,), (0.0,), 2.0, 50.0)
-        parts = {
-            name: msgspec.structs.replace(part, slip=msgspec.structs.replace(part.slip, speed=rule))
-            for name, part in model.fingers.items()
-        }
-        msgspec.structs.replace(model, fingers=parts).save(path)
+        rule = rule_of_sigma(1.0, 2.0)
+        speed = Head(name="slip_speed", link="square", features=SIGMA, rule=rule, highest=50.0)
+        model.changed(lambda part: part.with_heads(speed)).save(path)
         got, _ = lines(capsys, path, grasp)
         for line in got:
             assert (line["slip_speed"] is None) == (line["state"] == "UNKNOWN")

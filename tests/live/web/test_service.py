@@ -6,9 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
-from holdfast.classifiers.slip import SlipRule, SpeedRule
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import Linear
 from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
@@ -19,7 +18,7 @@ from holdfast.live.stream_detector import StreamDetector, compile_kernels
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
 from holdfast.metrics.masks import runs
-from holdfast.model import ThresholdPoint, Tuning
+from holdfast.model import Choice, Head, ThresholdPoint
 from holdfast.web.guard import Guard
 from live import build, estimates
 
@@ -98,18 +97,13 @@ def test_the_first_document_describes_model_and_source(tmp_path):
 def with_slip_rule(finger):
     """The model of the twin; one finger has a slip rule that looks at its first feature."""
     model = build.model()
-    part = msgspec.structs.replace(model.finger(finger), slip=None)
-    n = len(part.features)
-    classifier = LinearClassifier(
-        mean=(0.0,) * n, scale=(1.0,) * n, coefficients=(1.0, *(0.0,) * (n - 1)), intercept=-6.0,
-        threshold=0.7,
-    )  # fmt: skip
+    part = model.finger(finger).without_heads("slip", "slip_speed")
+    first = part.stable.features[:1]
+    odds, root = (Linear((0.0,), (1.0,), ((1.0,),), (intercept,)) for intercept in (-6.0, 0.5))
     fingers = dict.fromkeys(build.FINGERS, part)
-    speed = SpeedRule(
-        classifier.mean, classifier.scale, classifier.coefficients, (0.0,) * n, 0.5, 40.0
-    )
-    fingers[finger] = msgspec.structs.replace(
-        part, slip=SlipRule(classifier, hold=0.05, speed=speed)
+    fingers[finger] = part.with_heads(
+        Head(name="slip", link="logit", features=first, rule=odds, threshold=0.7, hold=0.05),
+        Head(name="slip_speed", link="square", features=first, rule=root, highest=40.0),
     )
     return msgspec.structs.replace(model, fingers=fingers)
 
@@ -171,8 +165,9 @@ def test_probabilities_and_threshold_of_slips_are_in_the_documents():
 
 def test_the_errors_of_a_tuned_model_are_in_the_first_document():
     points = (ThresholdPoint(0.5, 2.0, 10.0), ThresholdPoint(0.9, 0.5, None))
-    tuning = Tuning({}, 1.0, 0.9, 0.5, {"0.2": None}, None, 0, 1.0, points)
-    found = operating_points(msgspec.structs.replace(build.model(), tuning=tuning))
+    choice = Choice(1.0, 0.5, None, 0, 1.0, points=points)
+    tuned = build.model().changed(lambda part: part.with_heads(part.stable.at(0.9, choice)))
+    found = operating_points(tuned)
     assert [(one.threshold, one.false_alarms_per_minute, one.missed) for one in found] == [
         (0.5, 2.0, 10.0), (0.9, 0.5, None),
     ]  # fmt: skip

@@ -2,9 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from holdfast.classifiers.cause import ALL_CAUSES, SLIP_CODE
 
-from holdfast.contact import STABLE, UNSTABLE, Cause
+from holdfast.contact import CAUSES, SLIP_CODE, STABLE, UNSTABLE, Cause
 from holdfast_lab.study.evaluation import cause_counts
 from holdfast_lab.study.evaluation.cause_counts import (
     ESTIMATED,
@@ -14,7 +13,7 @@ from holdfast_lab.study.evaluation.cause_counts import (
 )
 from study.example_recordings import SLIPS, recording_with_truth
 
-DISTURBANCE = ALL_CAUSES.index(Cause.DISTURBANCE) + 1
+DISTURBANCE = CAUSES.index(Cause.DISTURBANCE) + 1
 
 
 class Trace:

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
-from holdfast.classifiers.slip import SlipRule, smooth
 
+from holdfast.classifiers.linear import smooth
 from holdfast.metrics.slip_thresholds import THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
+from holdfast.model import Head
 from holdfast.training.slips import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation.scores import probability_of
 from holdfast_lab.study.evaluation.slip_scores import (
@@ -84,7 +85,7 @@ def test_scores_are_smoothed_as_by_the_rule_of_a_model():
     times = np.arange(200) / RATE
     values = np.random.default_rng(0).normal(0, 3, 200)
     values[50:60] = np.nan
-    gain, state = SlipRule.gain(_Smoothing, RATE), np.nan
+    gain, state = Head.gain(_Smoothing, RATE), np.nan
     expected = []
     for value in values:
         state = np.nan if np.isnan(value) else smooth(state, value, gain)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.classifiers import LinearClassifier, Samples
+from holdfast.classifiers import Fitted, Linear, Samples
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.features import DEPLOYED_FEATURES
 from holdfast_lab.classifiers.threshold import best_cut
@@ -163,7 +163,7 @@ def test_results_can_be_sent(alone):
     assert msgspec.msgpack.decode(data, type=list[VariantResult]) == alone
 
 
-RULE = LinearClassifier((0.0,), (1.0,), (1.0,), intercept=0.0, threshold=0.5)
+RULE = Fitted(Linear((0.0,), (1.0,), ((1.0,),), (0.0,)), 0.5)
 """Stable where the feature is at least 0."""
 
 

@@ -1,0 +1,164 @@
+"""Heads of a finger: what is refused, and what a rule and its link make of the features."""
+
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from detector.build import (
+    SLIP_OWN,
+    TAXELS,
+    cause_head,
+    finger_model,
+    linear,
+    sensor,
+    slip_head,
+    speed_head,
+    squared_head,
+    stable_head,
+)
+from holdfast.classifiers import Linear, Onnx
+from holdfast.contact import Cause
+from holdfast.detector.head_arrays import rule_of
+from holdfast.errors import ModelError
+from holdfast.features import FeatureSpec
+from holdfast.model import ANY_FINGER, FingerModel, Model
+from holdfast.model.heads import Head
+
+STABLE, SLIP = stable_head(SLIP_OWN), squared_head(SLIP_OWN)
+SPEED, CAUSE = speed_head(SLIP), cause_head(SLIP_OWN)
+NETWORK = Onnx.of(b"not read", 3)
+SQUARES = ((0.0, 0.0, 0.0),)
+
+
+@pytest.mark.parametrize(
+    ("head", "changes", "message"),
+    [
+        (STABLE, {"link": "square"}, "stable: the link logit expected, square given"),
+        (SLIP, {"link": "softmax"}, "slip: the link logit expected, softmax given"),
+        (SPEED, {"link": "logit"}, "slip_speed: the link square expected, logit given"),
+        (CAUSE, {"link": "logit"}, "cause: the link softmax expected, logit given"),
+        (STABLE, {"features": SLIP_OWN[:2]}, "stable: 2 features given, the rule expects 3"),
+        (SLIP, {"features": SLIP_OWN[:2]}, "slip: 2 features given, the rule expects 3"),
+        (SPEED, {"features": SLIP_OWN[:2]}, "slip_speed: 2 features given, the rule expects 3"),
+        (CAUSE, {"rule": linear(2)}, "cause: 3 features given, the rule expects 2"),
+        (SLIP, {"features": (SLIP_OWN[0],) * 3}, "slip: a feature is given twice"),
+        (STABLE, {"features": (SLIP_OWN[0],) * 3}, "stable: a feature is given twice"),
+        (STABLE, {"rule": replace(STABLE.rule, squares=SQUARES)},
+         "stable: a rule without squares expected"),
+        (CAUSE, {"rule": replace(CAUSE.rule, squares=SQUARES * 2)},
+         "cause: a rule without squares expected"),
+        (SLIP, {"rule": NETWORK}, "slip: a linear rule expected, an ONNX file given"),
+        (SPEED, {"rule": NETWORK}, "slip_speed: a linear rule expected, an ONNX file given"),
+        (CAUSE, {"rule": NETWORK}, "cause: a linear rule expected, an ONNX file given"),
+        (STABLE, {"rule": CAUSE.rule}, "stable: a rule of 1 output expected, 2 given"),
+        (CAUSE, {"rule": linear(3)}, "cause: a rule of 2 outputs expected, 1 given"),
+        (CAUSE, {"classes": (Cause.SLIP,) * 2},
+         "cause: two or more different causes expected, slip, slip given"),
+        (CAUSE, {"classes": (Cause.SLIP,)},
+         "cause: two or more different causes expected, slip given"),
+        (CAUSE, {"classes": ()}, "cause: two or more different causes expected, none given"),
+        (STABLE, {"classes": (Cause.SLIP,)}, "stable: no classes expected, 1 given"),
+        (STABLE, {"threshold": 1.5}, "stable: a threshold from 0 to 1 expected, 1.5 given"),
+        (SLIP, {"threshold": math.nan}, "slip: a threshold from 0 to 1 expected, nan given"),
+        (SPEED, {"highest": 0.0},
+         "slip_speed: a finite highest value above 0 expected, 0.0 given"),
+        (SPEED, {"highest": math.nan},
+         "slip_speed: a finite highest value above 0 expected, nan given"),
+        (SPEED, {"highest": math.inf},
+         "slip_speed: a finite highest value above 0 expected, inf given"),
+        (SPEED, {"highest": None},
+         "slip_speed: a finite highest value above 0 expected, None given"),
+        (SLIP, {"highest": 3.0}, "slip: no highest value expected, 3.0 given"),
+        (SLIP, {"smoothing": -0.1}, "slip: a smoothing from 0 to 10 s expected, -0.1 given"),
+        (SLIP, {"hold": 10.5}, "slip: a hold from 0 to 10 s expected, 10.5 given"),
+        (SLIP, {"hold": math.nan}, "slip: a hold from 0 to 10 s expected, nan given"),
+        (STABLE, {"hold": 0.1}, "stable: a hold from 0 to 0 s expected, 0.1 given"),
+        (CAUSE, {"smoothing": 0.1}, "cause: a smoothing from 0 to 0 s expected, 0.1 given"),
+    ],
+)  # fmt: skip
+def test_fields_that_contradict_each_other_are_refused(head, changes, message):
+    with pytest.raises(ModelError) as raised:
+        replace(head, **changes)
+    assert str(raised.value) == message
+
+
+def test_a_head_of_onnx_is_not_linear():
+    head = replace(STABLE, rule=NETWORK)
+    with pytest.raises(ModelError) as raised:
+        head.linear  # noqa: B018
+    assert str(raised.value) == f"stable: a linear rule expected, {NETWORK.file} given"
+    assert STABLE.linear is STABLE.rule
+
+
+@pytest.mark.parametrize(
+    ("heads", "message"),
+    [
+        ((STABLE, SLIP, SLIP), "one head of each name expected, stable, slip, slip given"),
+        ((), "a head stable, and slip for slip_speed, expected;  given"),
+        ((SLIP, CAUSE), "a head stable, and slip for slip_speed, expected; slip, cause given"),
+        ((STABLE, SPEED),
+         "a head stable, and slip for slip_speed, expected; stable, slip_speed given"),
+        ((STABLE, slip_head((FeatureSpec("change", 1 << 17),))),
+         "at most 65536 samples in a window expected, 131072 given"),
+    ],
+)  # fmt: skip
+def test_heads_that_contradict_each_other_are_refused(heads, message):
+    with pytest.raises(ModelError) as raised:
+        FingerModel(heads=heads)
+    assert str(raised.value) == message
+
+
+def test_the_features_of_a_finger_are_those_of_its_heads_once():
+    part = finger_model()
+    own = part.stable.features
+    assert part.with_heads(slip_head(own), cause_head(own)).features == own
+    # In the order of the heads of a finger, whatever the order in the file.
+    part = FingerModel(heads=(SLIP, *part.heads))
+    assert part.features == (*own, SLIP_OWN[0], SLIP_OWN[2])
+    assert part.indices(part.slip).tolist() == [5, 1, 6]
+
+
+def test_heads_are_replaced_added_and_removed():
+    part = FingerModel(heads=(STABLE, SLIP, SPEED, CAUSE))
+    assert [part.head(head.name) for head in part.heads] == [STABLE, SLIP, SPEED, CAUSE]
+    other = SLIP.at(0.25)
+    assert part.with_heads(other).heads == (STABLE, other, SPEED, CAUSE)
+    assert FingerModel(heads=(STABLE,)).with_heads(CAUSE, SLIP).heads == (STABLE, CAUSE, SLIP)
+    assert part.without_heads("slip", "slip_speed").heads == (STABLE, CAUSE)
+    assert part.without_heads("slip", "slip_speed").slip is None
+
+
+def test_relative_features_of_a_head_need_a_rate_for_which_they_are_made():
+    part = finger_model().with_heads(squared_head(TAXELS))
+    with pytest.raises(ModelError, match="10 Hz given, the model expects 30 to 1000 Hz"):
+        Model(fingers={ANY_FINGER: part}).plan({"thumb": sensor()}, 10.0)
+
+
+def test_features_that_compare_taxels_need_two():
+    part = finger_model()
+    hand_model = Model(fingers={ANY_FINGER: part.with_heads(squared_head(TAXELS))})
+    assert hand_model.blind_features("thumb", sensor(2)) == ()
+    assert hand_model.blind_features("thumb", sensor(1)) == (
+        "second_shared", "second_own", "second_top",
+        "mean_second_shared", "mean_second_own", "mean_second_top",
+    )  # fmt: skip
+    assert Model(fingers={ANY_FINGER: part}).blind_features("thumb", sensor(1)) == ()
+
+
+@pytest.mark.parametrize("with_slip", [True, False])
+def test_a_cause_that_a_head_does_not_know_never_has_the_largest_score(with_slip):
+    """Nor has a slip, where a head of its own decides about slips."""
+    rule = Linear((0.0,), (2.0,), ((1.0,), (3.0,)), (0.25, -0.5))
+    features = (FeatureSpec("F_x"),)
+    classes = (Cause.SLIP, Cause.GLITCH)
+    cause = Head(name="cause", link="softmax", features=features, rule=rule, classes=classes)
+    part = finger_model(features, 0, cause)
+    part = part.with_heads(slip_head(features)) if with_slip else part
+    model = Model(fingers={ANY_FINGER: part})
+    (rows,) = rule_of(model, model.plan({"thumb": sensor()}, 100.0)).causes
+    known = dict(zip(Cause, rows.tolist(), strict=True))
+    assert known.pop(Cause.GLITCH) == [-0.5, 1.5]
+    if not with_slip:
+        assert known.pop(Cause.SLIP) == [0.25, 0.5]
+    assert [row[0] for row in known.values()] == [-math.inf] * len(known)

@@ -1,0 +1,103 @@
+"""Every way to change a model keeps what it does not change: all four heads."""
+
+import pytest
+from msgspec.structs import replace
+
+from holdfast.contact import Cause, ContactState
+from holdfast.model import ANY_FINGER, Head
+from holdfast.recordings import Label
+from holdfast.training import Setting, calibrate, train
+from holdfast.training.slips import tune_slips
+from holdfast.training.threshold import tune
+
+from .build import handling_recording, normalised_model, sliding_recording, tiny_recording
+
+NAMES = {"stable", "slip", "slip_speed", "cause"}
+
+
+def full_model():
+    """`builtin:any` with a head of the speed, too."""
+
+    def changed(part):
+        slip, cause = part.slip, part.head("cause")
+        assert Cause.GLITCH in cause.classes
+        speed = Head(
+            name="slip_speed", link="square", features=slip.features, rule=slip.rule, highest=40.0
+        )
+        return part.with_heads(speed)
+
+    return normalised_model().changed(changed)
+
+
+def handling_labelled(seed):
+    made = handling_recording(seed, slip=0.4)
+    labels = (
+        Label(1.8, 5.0, ContactState.UNSTABLE, Cause.SLIP),
+        Label(5.2, 9.0, ContactState.STABLE),
+    )
+    return made.with_labels(dict.fromkeys(made.modules, labels))
+
+
+def heads_of(model, *left_out):
+    return {
+        finger: {head.name: head for head in part.heads if head.name not in left_out}
+        for finger, part in model.fingers.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def model():
+    made = full_model()
+    assert set(heads_of(made)[ANY_FINGER]) == NAMES
+    return made
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_an_adapted_model_keeps_all_heads_but_that_of_stability(model, shared):
+    few = [tiny_recording(seed) for seed in (50, 51)]
+    adapted = train(few, Setting.adapting(model, trials=0, shared=shared)).model
+    expected = heads_of(model, "stable")[ANY_FINGER]
+    fingers = [ANY_FINGER] if shared else ["thumb", "index"]
+    assert heads_of(adapted, "stable") == dict.fromkeys(fingers, expected)
+    for part in adapted.fingers.values():
+        assert part.stable.features == model.fingers[ANY_FINGER].stable.features
+        assert part.stable != model.fingers[ANY_FINGER].stable
+
+
+def test_an_adapted_model_has_the_own_handling_in_all_heads(model):
+    own = calibrate(model, [handling_recording(k, held=12.0) for k in range(2)])
+    few = [handling_labelled(seed) for seed in (3, 4)]
+    sensor = few[0].modules["thumb"].sensor
+    adapted = train(few, Setting.adapting(own, trials=0, shared=True)).model
+    folded = own.with_handling_of({ANY_FINGER: sensor})
+    assert heads_of(folded, "stable") != heads_of(model, "stable")
+    assert heads_of(adapted, "stable") == heads_of(folded, "stable")
+
+
+def test_a_calibrated_model_keeps_all_heads(model):
+    calibrated = calibrate(model, [handling_recording(k, held=12.0) for k in range(2)])
+    assert heads_of(calibrated) == heads_of(model)
+    part = calibrated.fingers[ANY_FINGER]
+    own = part.for_sensor("pad")
+    assert {head.name for head in own.heads} == NAMES
+    for head in own.heads:
+        before = part.head(head.name)
+        assert head.rule.weights == before.rule.weights
+        assert head.rule.mean != before.rule.mean
+        assert head.features == before.features
+    assert own.stable.threshold == part.handling["pad"].thresholds["stable"]
+    assert own.slip.threshold == part.handling["pad"].thresholds["slip"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "seeds", "tuned"),
+    [("stable", (20, 21), lambda m, data: tune(m, data, 100.0).model),
+     ("slip", range(20, 24), lambda m, data: tune_slips(m, data, 20.0).model)],
+)  # fmt: skip
+def test_a_tuned_model_keeps_all_heads(model, changed, seeds, tuned):
+    data = [sliding_recording(seed) for seed in seeds]
+    found = tuned(model, data)
+    assert heads_of(found, changed) == heads_of(model, changed)
+    before, after = (m.fingers[ANY_FINGER].head(changed) for m in (model, found))
+    assert after.choice.recordings == {made.name: made.digest for made in data}
+    assert replace(after, threshold=before.threshold, choice=before.choice) == before
