@@ -105,6 +105,11 @@ def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
     assert "s held in 2 recordings (handling-0, handling-1); STABLE from" in text
     handling = Model.load(out).fingers["*"].handling["pad"]
     assert f"STABLE from {handling.threshold:.3g} on; slides from " in text
+    part = Model.load(out).fingers["*"].without_thresholds("threshold")
+    tuned = msgspec.structs.replace(Model.load(out), fingers={"*": part})
+    tuned.save(tmp_path / "tuned.json")
+    _, printed, _ = run(capsys, "info", tmp_path / "tuned.json")
+    assert f"; STABLE from {part.classifier.threshold:.3g} on; slides" in " ".join(printed.split())
     document = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["*"]
     assert document["normalised"] is True
     assert document["handling"]["pad"]["recordings"] == ["handling-0", "handling-1"]

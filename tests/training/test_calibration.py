@@ -287,7 +287,7 @@ def test_still_handling_does_not_shrink_the_scales(model):
     assert summary.still
     assert summary.after.raised <= summary.before.raised
     with pytest.raises(
-        TrainingError, match="^pad: the arm hardly moved; move the arm as it will move later$"
+        TrainingError, match=r"^pad: the arm hardly moved; move the arm as it will move later$"
     ):
         report.check()
 
