@@ -5,6 +5,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
+from holdfast.classifiers.cause import CauseClassifier
+from holdfast.contact import Cause
 from holdfast.errors import ModelError
 from holdfast.features import Tare, parse_features
 from holdfast.model import ANY_FINGER, Debounce
@@ -156,6 +158,21 @@ def test_a_model_for_any_sensor_needs_no_warning(known, few):
     part = msgspec.structs.replace(known.fingers[ANY_FINGER], sensor=None)
     init = msgspec.structs.replace(known, fingers={ANY_FINGER: part}, sensors={})
     assert train_with_warnings(few, Setting.adapting(init, trials=0))[1] == []
+
+
+def test_warn_that_the_causes_are_lost(known, few):
+    part = known.fingers[ANY_FINGER]
+    n, names = len(part.features), (Cause.SLIP, Cause.DISTURBANCE)
+    causes = CauseClassifier(
+        causes=names,
+        mean=(0.0,) * n, scale=(1.0,) * n, coefficients=((0.0,) * n,) * len(names),
+        intercepts=(0.0,) * len(names),
+    )  # fmt: skip
+    part = msgspec.structs.replace(part, causes=causes)
+    init = msgspec.structs.replace(known, fingers={ANY_FINGER: part})
+    adapted, warnings = train_with_warnings(few, Setting.adapting(init, trials=0))
+    assert all(part.causes is None for part in adapted.fingers.values())
+    assert warnings == ["the causes of mine are not kept: the new model names no cause"]
 
 
 def test_warn_of_recordings_that_the_model_was_trained_on(known, few):

@@ -174,11 +174,12 @@ def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
     if part["normalised"] and not part["handling"]:
         yield "features normalised by default handling (holdfast calibrate: by your own)"
     for sensor, handling in part["handling"].items():
-        names, texts = handling["recordings"], []
-        if handling["threshold"] is not None:
-            texts.append(f"; STABLE from {handling['threshold']:.3g} on")
-        if handling["slip_threshold"] is not None:
-            texts.append(f"; slides from {handling['slip_threshold']:.3g} on")
+        names = handling["recordings"]
+        stable, slips = handling["threshold"], handling["slip_threshold"]
+        texts = [f"; STABLE from {part['threshold'] if stable is None else stable:.3g} on"]
+        if part["slip"] is not None:
+            slips = part["slip"]["threshold"] if slips is None else slips
+            texts.append(f"; slides from {slips:.3g} on")
         yield (
             f"own handling of {sensor}: {handling['seconds']:.3g} s held in {len(names)} "
             f"recording{'s' * (len(names) != 1)} ({_few(names)}){''.join(texts)}"

@@ -139,6 +139,8 @@ def adaptation_warnings(init: Model, scan: DatasetScan, fingers: Collection[str]
     for finger in fingers:
         init.finger(finger)
     name = init.name or "the model to adapt"
+    if any(init.finger(finger).causes is not None for finger in fingers):
+        yield f"the causes of {name} are not kept: the new model names no cause"
     fingers_of: dict[tuple[str, ...], list[str]] = {}
     for finger, sensor in scan.sensors.items():
         trained_on = init.finger(finger).sensor
