@@ -1,4 +1,4 @@
-"""Attacks on the import of other formats: damaged CSV, HDF5 and bags of ROS."""
+"""Attacks on the import of other formats: damaged CSV, HDF5, bags of ROS and LeRobot."""
 
 import zipfile
 from collections.abc import Iterator
@@ -20,28 +20,36 @@ KIND = "xela_server_ros2/msg/SensStream"
 
 
 def attack_imports(n_tried: int) -> Iterator[CpuResult]:
-    """Import damaged files of each format; those without their package are left out."""
+    """Import damaged files of each format; those without their package are left out.
+
+    The files are read by a child process, whose time of the processor is not counted here.
+    """
     for name, make in (
         ("csv", _csv), ("gtac", _gtac), ("eflesh", _eflesh), ("arq-crisp", _hdf5),
         ("rosbag", _db3), ("rosbag", _bag),
+        ("lerobot", _lerobot_data), ("lerobot", _lerobot_episodes),
     ):  # fmt: skip
         with TemporaryDirectory() as folder:
             try:
                 original = make(Path(folder))
             except ImportError:
                 continue
-            yield _attack(name, original, n_tried)
+            data_set = Path(folder) / "set"
+            whole = data_set if data_set.is_dir() else original.with_stem("damaged")
+            yield _attack(name, original, whole, n_tried)
 
 
-def _attack(name: str, original: Path, n_tried: int) -> CpuResult:
-    result = CpuResult(f"import {name}, {original.suffix}")
+def _attack(name: str, original: Path, whole: Path, n_tried: int) -> CpuResult:
+    """Import damaged copies of a file; `whole` is the copy, or the folder with the file."""
+    of_folder = f" {original.parent.parent.name}" if whole.is_dir() else ""
+    result = CpuResult(f"import {name}{of_folder}, {original.suffix}")
     chance, data = Random(7), original.read_bytes()
-    if not list(import_recordings(original, name)):
+    if not list(import_recordings(whole if whole.is_dir() else original, name)):
         raise ValueError(f"{name}: the undamaged file has no recording")
-    path = original.with_stem("damaged")
+    path = original if whole.is_dir() else whole
     for k in range(n_tried):
         path.write_bytes(damaged(data, chance) if k % 4 else cut(data, chance))
-        result.timed(lambda: bool(list(import_recordings(path, name))), RecordingError)
+        result.timed(lambda: bool(list(import_recordings(whole, name))), RecordingError)
     return result
 
 
@@ -80,6 +88,22 @@ def _hdf5(folder: Path) -> Path:
         group["tactile_timestamps"] = 5.5 * np.arange(8)
         group["tactile_slips_label"] = np.array([0, 3, 4, 5, 4, 2, 0, 0])
     return path
+
+
+def _lerobot(folder: Path) -> Path:
+    from attack.recordings import make_recording
+    from holdfast.exporters.lerobot import export
+
+    export([make_recording()], folder / "set")
+    return folder / "set"
+
+
+def _lerobot_data(folder: Path) -> Path:
+    return _lerobot(folder) / "data/chunk-000/file-000.parquet"
+
+
+def _lerobot_episodes(folder: Path) -> Path:
+    return _lerobot(folder) / "meta/episodes/chunk-000/file-000.parquet"
 
 
 def _messages() -> list[bytes]:

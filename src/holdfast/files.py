@@ -5,10 +5,12 @@ import json
 import os
 import re
 import stat
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import blake2b
 from pathlib import Path
+from typing import Any
 
 from holdfast.errors import OutputError
 
@@ -19,6 +21,10 @@ _FORBIDDEN = frozenset('<>:"/\\|?*')
 """Characters that the name of a file must not have on some system."""
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE | re.ASCII)
 """Names that are devices on Windows."""
+MAX_TOML_SIZE = 1 << 16
+"""Size above which a TOML file is refused [bytes]; the tables of objects have 3 kB."""
+MAX_TOML_DOTS = 16
+"""Number of dots in a line of TOML, of keys and of numbers; the tables of objects have 10."""
 MAX_POINTER_SIZE = 1024
 """Size below which all pointers of Git LFS are [bytes]."""
 _LFS_BEGIN = b"version https://git-lfs.github.com/spec/"
@@ -171,6 +177,27 @@ def read_input(path: str | Path, max_size: int) -> bytes:
     if len(data) > max_size:
         raise OSError(errno.EFBIG, f"it has more than {max_size} bytes", str(path))
     return data
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Return the content of a small TOML file.
+
+    A key with n dots is n tables, and tomllib takes a time and a memory of n * n for it.
+
+    Raises:
+        OSError: as `read_input`, for a file of more than `MAX_TOML_SIZE`.
+        ValueError: it is not TOML, or a line has more than `MAX_TOML_DOTS` dots.
+    """
+    data = read_input(path, MAX_TOML_SIZE)
+    for number, line in enumerate(data.splitlines(), 1):
+        if (n_dots := line.count(b".")) > MAX_TOML_DOTS:
+            raise ValueError(
+                f"line {number}: at most {MAX_TOML_DOTS} dots in a line expected, {n_dots} given"
+            )
+    try:
+        return tomllib.loads(data.decode())
+    except RecursionError as cause:
+        raise ValueError(str(cause)) from cause
 
 
 def is_lfs_pointer(path: Path) -> bool:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from holdfast.cli import main
-from holdfast.cli import record as record_verb
 from holdfast.devices import sources
 from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import Source
@@ -89,7 +88,7 @@ def test_json(capsys, folder, tmp_path):
     (seen,) = report["sensors"]
     assert set(seen) == {
         "sensor", "fingers", "seconds", "load_change", "n_features", "n_changed", "activity",
-        "before", "after",
+        "still", "before", "after",
     }  # fmt: skip
     assert seen["after"]["alarms_per_minute"] <= 4
     handling = Model.load(out).fingers["*"].handling["pad"]
@@ -103,7 +102,14 @@ def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
     _, printed, _ = run(capsys, "info", out)
     text = " ".join(printed.split())
     assert "own handling of pad: 39." in text
-    assert "s held in 2 recordings (handling-0, handling-1); stable from" in text
+    assert "s held in 2 recordings (handling-0, handling-1); STABLE from" in text
+    handling = Model.load(out).fingers["*"].handling["pad"]
+    assert f"STABLE from {handling.thresholds['stable']:.3g} on; slides from " in text
+    part = Model.load(out).fingers["*"].without_thresholds("stable")
+    tuned = msgspec.structs.replace(Model.load(out), fingers={"*": part})
+    tuned.save(tmp_path / "tuned.json")
+    _, printed, _ = run(capsys, "info", tmp_path / "tuned.json")
+    assert f"; STABLE from {part.stable.threshold:.3g} on; slides" in " ".join(printed.split())
     document = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["*"]
     assert document["normalised"] is True
     assert document["handling"]["pad"]["recordings"] == ["handling-0", "handling-1"]
@@ -156,6 +162,9 @@ def test_a_live_source_is_recorded_for_a_time(capsys, folder, tmp_path, monkeypa
     )
     assert code == 0, err
     assert "pad: 11 s of holding; 30 s or more are better" in err
+    assert "\nheld 9 of 30 s\n" in err
+    assert "q stops" not in err
+    assert "handling.mcap" not in err
     assert Model.load(out).fingers["*"].handling["pad"].seconds == pytest.approx(10.8, abs=0.5)
     assert [path.name for path in tmp_path.iterdir()] == ["live.json"]
 
@@ -164,7 +173,6 @@ def test_a_live_source_that_sends_nothing(capsys, folder, tmp_path, monkeypatch)
     hand = Hand(handling_recording(3))
     hand._arrivals = []
     monkeypatch.setattr(sources, "open_source", lambda *_, **__: hand)
-    monkeypatch.setattr(record_verb, "READ_TIMEOUT", 0.01)
     words = ["calibrate", folder / "model.json", "xela://auto", "-o", tmp_path / "no.json"]
     code, out, err = run(capsys, *words)
     assert (code, out) == (2, "")
@@ -175,6 +183,7 @@ def test_a_live_source_that_sends_nothing(capsys, folder, tmp_path, monkeypatch)
 BAD = {
     "slip": ({"slip": 0.9}, "pad: most of this handling looks like slip"),
     "empty": ({"force": 0.0}, "nothing is held in 1 recording"),
+    "still": ({"held": 36.0, "sway": 0.0}, "pad: the arm hardly moved; move the arm as it will "),
     "short": ({"held": 2.5}, "s of holding given, at least 5 s expected"),
 }
 
@@ -241,3 +250,13 @@ def test_on_another_sensor_it_says_so_and_uses_the_default(capsys, folder, tmp_p
         usual = json.loads(run(capsys, verb, folder / "model.json", data, *words)[1])
         assert json.loads(printed)["fingers"] == usual["fingers"]
         assert notice not in run(capsys, verb, out, data, *words)[2]
+
+
+def test_still_handling_is_saved_only_by_force(capsys, folder, tmp_path):
+    save_recording(handling_recording(0, held=36.0, sway=0.0), tmp_path / "still.mcap")
+    out = tmp_path / "mine.json"
+    code, _, err = calibrated(capsys, folder, out, data=tmp_path / "still.mcap")
+    assert (code, out.exists()) == (2, False)
+    assert err.endswith("(--force saves all the same)\n")
+    assert calibrated(capsys, folder, out, "--force", data=tmp_path / "still.mcap")[0] == 0
+    assert out.exists()

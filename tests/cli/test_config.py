@@ -131,6 +131,9 @@ def test_files_are_beside_the_configuration(folder):
          "source, values"),
         ("host = 5", "Expected `str | null`, got `int` - at `$.host`"),
         ("host = ", "is not TOML: Invalid value"),
+        (f"{'a.' * 20_000}a = 1", "is not TOML: line 1: at most 16 dots in a line expected, 20000 "
+         "given"),
+        (f"# {'x' * 65_536}", "it has more than 65536 bytes"),
         ('host = "a"\nsource = "b"', "source or host expected, both given"),
         ('[fingers]\nthumb = "1"', "the number of a module, 'thumb' given"),
         ("ignore = {index = [-1]}", "ignore: taxels from 1 expected, -1 given for index"),

@@ -26,6 +26,17 @@ def test_versions(capsys):
     assert found["cpus"] >= 1
 
 
+def test_the_limits_of_imports(capsys, monkeypatch):
+    found = report(capsys)["limits"]
+    assert set(found) == {"time", "processor", "memory"}
+    assert found["time"] is True
+    monkeypatch.setattr(
+        "holdfast.io.foreign.limits", lambda: {"time": True, "processor": True, "memory": False}
+    )
+    assert main(["doctor"]) == 0
+    assert "time, processor (NOT memory)" in capsys.readouterr().out
+
+
 def test_the_kernels_work(capsys):
     assert report(capsys)["kernels"]["ok"] is True
 

@@ -258,7 +258,7 @@ def test_all_heads_of_a_model_are_shown(capsys):
     assert f" features {', '.join(stable['features'][:3])}, ..." in out
     for name in ("slip", "slip_speed"):
         assert re.search(
-            rf" {name}: linear, 39 features; [^:]* of them new relative\(second_all\[0.0067 s\]\), ",
+            rf" {name}: linear, 39 features; [^:]* of them new relative\(second_all\[0.0067 s\]\)",
             out,
         )
     assert f"STABLE from a probability of {stable['threshold']:.3g} on" in out

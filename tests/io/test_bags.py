@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import RecordingError
-from holdfast.io.bags import find_bags, open_bag, read_poses
+from holdfast.io.bags import find_bags, open_bag, poses_of, read_poses
 from ros.pose_bags import PoseBagWriter
 
 
@@ -58,11 +58,11 @@ def test_poses_of_topics_and_of_frames(bag):
 
 def test_nothing_from_a_bag_is_compiled_or_executed(bag):
     path = a_pose_and_a_frame(bag)
-    read_poses(path, {"object": "/marker"})  # modules are imported here
+    poses_of(path, {"object": "/marker"})  # modules are imported here
     _EVENTS.clear()
     _LISTENING.append(True)
     try:
-        read_poses(path, {"object": "/marker", "thumb": "thumb_tip"})
+        poses_of(path, {"object": "/marker", "thumb": "thumb_tip"})  # what the child runs
     finally:
         _LISTENING.clear()
     assert _EVENTS == []

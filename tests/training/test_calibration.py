@@ -14,6 +14,7 @@ from holdfast.model import Handling, Model
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training import Setting, calibrate, calibrate_with_report, train
 from holdfast.training.calibration import CALIBRATED_SUFFIX, activity, n_changed
+from holdfast.training.operating_point import HandlingFigures
 from holdfast.training.own_handling import MIN_SCALE, held_samples
 from holdfast.training.threshold import tune, with_threshold
 from training.build import (
@@ -269,3 +270,51 @@ def test_labels_are_learned_from_the_own_handling(calibrated):
     assert part.stable.rule.mean == handling_of(own, "tiny").location
     assert not part.handling
     assert not part.normalised
+
+
+def still_recordings(seed=21):
+    """White noise at rest: the force does not change, so no scale of motion is seen."""
+    return [handling_recording(seed + k, held=12.0, sway=0.0) for k in range(3)]
+
+
+def test_still_handling_does_not_shrink_the_scales(model):
+    report = calibrate_with_report(model, still_recordings())
+    part, handling = model.fingers["*"], handling_of(report.model)
+    location, scale = part.default_handling
+    assert np.median(np.log(np.divide(handling.scale, scale))) >= -1e-9
+    assert np.all(np.array(handling.location) >= location)
+    (summary,) = report.sensors
+    assert summary.still
+    assert summary.after.raised <= summary.before.raised
+    with pytest.raises(
+        TrainingError, match=r"^pad: the arm hardly moved; move the arm as it will move later$"
+    ):
+        report.check()
+
+
+FIGURES = HandlingFigures(0.4, 95.0, 2.0, 0.1, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "worse"),
+    [
+        ({}, False),
+        ({"stable": 94.6}, False),
+        ({"stable": 94.4}, True),
+        ({"raised": 1.4}, False),
+        ({"raised": 1.6}, True),
+        ({"alarms_per_minute": 3.0}, True),
+        ({"alarms_per_minute": 3.0, "stable": 97.0}, False),
+        ({"raised": None, "slip_threshold": None}, False),
+    ],
+)
+def test_figures_that_are_worse(calibrated, change, worse):
+    after = msgspec.structs.replace(FIGURES, **change)
+    assert after.worse_than(FIGURES) is worse
+    summary = msgspec.structs.replace(calibrated.sensors[0], before=FIGURES, after=after)
+    report = dataclasses.replace(calibrated, sensors=(summary,))
+    if not worse:
+        report.check()
+        return
+    with pytest.raises(TrainingError, match=r"^pad: worse on this handling than before \("):
+        report.check()

@@ -293,6 +293,7 @@ def test_a_file_that_is_not_a_table_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "t.toml"
     for text, message in (
         ("mug = ", f"{path} is no TOML table of objects: "),
+        ("\nmug" + 17 * ".a", f"{path} is no TOML table of objects: line 2: at most 16 dots in a "),
         ("", f"{path} has no objects"),
         ("mug = 3", f"{path}: mug: a line of fields expected ({COLUMNS})"),
     ):

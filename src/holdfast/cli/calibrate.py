@@ -1,9 +1,8 @@
 """`holdfast calibrate`: a model with the own handling of a hand, without labels."""
 
 import math
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+import time
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -19,7 +18,6 @@ from holdfast.cli.options import (
     check_speed,
     complete_source,
 )
-from holdfast.cli.record import capture
 from holdfast.cli.terminal.console import (
     format_number,
     print_json,
@@ -28,15 +26,18 @@ from holdfast.cli.terminal.console import (
     print_paragraph,
     print_table,
 )
+from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from holdfast.io import Dataset
+    from holdfast.model import Model
     from holdfast.recordings import Recording
     from holdfast.training.calibration import CalibratedModel, HandlingSummary
 
+PROGRESS_STEP = 3.0
+"""Held time between two lines of progress [s]."""
 HANDLING_SECONDS = 60.0
 """Time for which a live source is recorded, unless `--seconds` is given [s]."""
 MAX_FINGERS_SHOWN = 5
@@ -85,7 +86,8 @@ def calibrate(
     Write a copy of the model in which every feature is normalised by what it is on this sensor
     while it is used as usual: grasp, carry, turn, put down, without slip. The thresholds are set
     by the same handling. Begin with an open hand, or give --in-contact. A tenth of the handling
-    may be slip.
+    may be slip. If the arm hardly moves, or the decisions about this handling get worse, nothing
+    is written without --force.
 
     DATA are recordings, or a live source such as xela://HOST:PORT or twin:?object=can, which is
     recorded for --seconds and not kept. At least 5 s of holding are needed, 30 s are better.
@@ -110,15 +112,18 @@ def calibrate(
     if not live and (seconds is not None or speed != 1.0):
         raise ValueError(f"--seconds and --speed are for live sources; {data} is a recording")
     check_speed(data, speed)
-    read: AbstractContextManager[Dataset]
+    recordings: Sequence[Recording]
     if live:
-        read = _recorded(data, seconds or HANDLING_SECONDS, speed, in_contact=in_contact)
+        recordings = [
+            _recorded(loaded, data, seconds or HANDLING_SECONDS, speed, in_contact=in_contact)
+        ]
     else:
-        read = nullcontext(load_dataset(data, labels=False, in_contact=in_contact))
-    with read as recordings:
-        calibrated = calibrate_with_report(
-            loaded, recordings, false_alarms=false_alarms, progress=_with_progress
-        )
+        recordings = load_dataset(data, labels=False, in_contact=in_contact)
+    calibrated = calibrate_with_report(
+        loaded, recordings, false_alarms=false_alarms, progress=_with_progress
+    )
+    if not force:
+        _check(calibrated)
     calibrated.model.save(out, force=force)
     for warning in calibrated.warnings:
         print_message(warning)
@@ -132,14 +137,46 @@ def _with_progress(recordings: "Iterable[Recording]") -> "Iterator[Recording]":
     return progress(recordings, "reading")
 
 
-@contextmanager
-def _recorded(data: str, seconds: float, speed: float, *, in_contact: bool) -> "Iterator[Dataset]":
-    """Record a live source, and yield the recording; it is deleted afterwards."""
-    from holdfast.io import load_dataset
+def _check(calibrated: "CalibratedModel") -> None:
+    """Refuse a calibration that makes the model worse."""
+    from holdfast.errors import TrainingError
 
-    with TemporaryDirectory(prefix="holdfast-") as folder:
-        capture(data, Path(folder) / "handling.mcap", seconds=seconds, speed=speed)
-        yield load_dataset(folder, in_contact=in_contact)
+    try:
+        calibrated.check()
+    except TrainingError as refusal:
+        raise TrainingError(f"{refusal} (--force saves all the same)") from None
+
+
+def _recorded(
+    model: "Model", data: str, seconds: float, speed: float, *, in_contact: bool
+) -> "Recording":
+    """Return the handling of a live source, and print how much of it is held.
+
+    Raises:
+        SourceError: the source cannot be opened, or no samples arrived.
+    """
+    from holdfast.devices import sources
+    from holdfast.errors import SourceError
+    from holdfast.live.handling import HandlingBuffer
+    from holdfast.live.stream_detector import StreamDetector
+    from holdfast.training.own_handling import ENOUGH_HANDLING
+
+    with handle_stop_signals() as stop, sources.open_source(data, speed=speed) as source:
+        stop.graceful = True
+        print_message(f"recording {source.name} for {seconds:g} s; Ctrl-C stops")
+        stream = StreamDetector(model, source, in_contact=in_contact)
+        buffer, shown = HandlingBuffer(stream), 0.0
+        end = time.monotonic() + (seconds / speed + 1.0 if speed else math.inf)
+        while not (source.ended or stop.requested or time.monotonic() > end):
+            buffer.put(stream.read())
+            if buffer.seconds >= shown + PROGRESS_STEP:
+                shown = buffer.seconds
+                print_message(f"held {shown:.0f} of {ENOUGH_HANDLING:g} s")
+            if buffer.duration >= seconds:
+                break
+    if not buffer.has_samples:
+        raise SourceError(f"{source.name} sent no samples: nothing was recorded")
+    return buffer.recording()
 
 
 def _print(calibrated: "CalibratedModel", out: Path) -> None:

@@ -1,14 +1,13 @@
 """The configuration file `holdfast.toml`: one's own hand, so that URIs need no retyping."""
 
 import os
-import tomllib
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlencode
 
 import msgspec
 
 from holdfast.cli.app import CONFIGURED_VERBS
+from holdfast.files import read_toml
 
 CONFIG_NAME, CONFIG_VARIABLE = "holdfast.toml", "HOLDFAST_CONFIG"
 HAND = "hand"
@@ -96,8 +95,10 @@ def load_config(path: Path) -> Config:
         ValueError: it is not TOML, or has an unknown key or a value of another type.
     """
     try:
-        content: dict[str, Any] = tomllib.loads(path.read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as cause:
+        content = read_toml(path)
+    except OSError as cause:
+        raise ValueError(f"{path}: {cause.strerror}") from cause
+    except ValueError as cause:
         raise ValueError(f"{path} is not TOML: {cause}") from cause
     known = Config.__struct_fields__
     if unknown := sorted(set(content) - set(known)):

@@ -48,7 +48,8 @@ def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
     """Check the installation and the reachable sources.
 
     Report Python, the packages, the extras and how to install them, the compiled kernels, the
-    live sources that can be reached, the plug-ins of other packages, the configuration file of
+    live sources that can be reached, which limits hold for imports (time, time of the processor,
+    memory), the plug-ins of other packages, the configuration file of
     the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
 
     Example:
@@ -63,6 +64,8 @@ def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
 
 
 def _report(context: typer.Context) -> dict[str, Any]:
+    from holdfast.io.foreign import limits
+
     packages = _packages()
     return {
         "holdfast": metadata.version("holdfast"),
@@ -74,6 +77,7 @@ def _report(context: typer.Context) -> dict[str, Any]:
         "packages": packages.pop("", {}),
         "extras": {extra: _extra(extra, versions) for extra, versions in sorted(packages.items())},
         "kernels": _kernels(),
+        "limits": limits(),
         "data": _data(),
         "config": _config(context.obj),
         "sources": check_sources(),
@@ -182,6 +186,7 @@ def _print(report: dict[str, Any]) -> None:
     rows += [
         ("kernels", loaded if kernels["ok"] else kernels["error"]),
         ("kernel cache", kernels["cache"]),
+        ("limits of imports", _limits_text(report["limits"])),
         ("HOLDFAST_DATA", _data_text(data)),
         ("your hand", _config_text(report["config"])),
     ]
@@ -207,6 +212,12 @@ def _plugin_row(plugin: dict[str, str]) -> tuple[str, ...]:
     error = plugin["error"]
     state = f"SKIPPED: {error}" if error else "works"
     return plugin["name"], plugin["kind"], plugin["package"], state
+
+
+def _limits_text(limits: dict[str, bool]) -> str:
+    held = [name for name, holds in limits.items() if holds]
+    lacking = [name for name, holds in limits.items() if not holds]
+    return (", ".join(held) or "none") + (f" (NOT {', '.join(lacking)})" if lacking else "")
 
 
 def _data_text(data: dict[str, Any]) -> str:

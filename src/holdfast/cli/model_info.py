@@ -9,6 +9,8 @@ from holdfast.cli.terminal.console import print_json, print_table
 if TYPE_CHECKING:
     from holdfast.model import FingerModel, Handling, Head, Model
 
+ANSWERS = {"stable": "STABLE", "slip": "slides"}
+"""What a finger does from the threshold of a head on."""
 N_NAMES = 3
 """Number of names that are printed of a long list."""
 
@@ -129,8 +131,7 @@ def _head_lines(head: dict[str, Any], known: list[str]) -> Iterator[str]:
     """
     name, texts = head["name"], [head["rule"]]
     if "threshold" in head:
-        answer = "STABLE" if name == "stable" else "slides"
-        texts.append(f"{answer} from a probability of {head['threshold']:.3g} on")
+        texts.append(f"{ANSWERS[name]} from a probability of {head['threshold']:.3g} on")
     if name == "slip":
         texts.append(f"smoothing {head['smoothing']:g} s, hold {head['hold']:g} s")
     if head["highest"] is not None:
@@ -164,7 +165,11 @@ def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
         yield "features normalised by default handling (holdfast calibrate: by your own)"
     for sensor, handling in part["handling"].items():
         names = handling["recordings"]
-        texts = [f"; {head} from {limit:.3g} on" for head, limit in handling["thresholds"].items()]
+        texts = [
+            f"; {ANSWERS[name]} from {handling['thresholds'].get(name, head['threshold']):.3g} on"
+            for name, head in part["heads"].items()
+            if "threshold" in head
+        ]
         yield (
             f"own handling of {sensor}: {handling['seconds']:.3g} s held in {len(names)} "
             f"recording{'s' * (len(names) != 1)} ({_few(names)}){''.join(texts)}"

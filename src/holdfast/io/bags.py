@@ -18,6 +18,7 @@ from holdfast.io.bag_storage.folder import METADATA, open_folder
 from holdfast.io.bag_storage.mcap import open_mcap
 from holdfast.io.bag_storage.ros1 import open_ros1
 from holdfast.io.bag_storage.sqlite import open_sqlite
+from holdfast.io.foreign import read_foreign_arrays
 from holdfast.io.importers.table import natural_order
 from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.ros.definitions import Definition, parse_definition, short_name
@@ -171,9 +172,14 @@ def read_poses(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
             f"one bag of ROS expected at {path}, {len(bags)} found; a .bag, .db3 or .mcap file, "
             f"or a folder with {METADATA}"
         )
+    return read_foreign_arrays("poses", bags[0], dict(wanted))
+
+
+def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
+    """Return the poses in a bag, as `read_poses`, in the process that calls it."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     frames: dict[str, str] = {}
-    for name, frame, row in _poses(bags[0]):
+    for name, frame, row in _poses(path):
         rows.setdefault(name, []).append(row)
         frames[name] = frame
     if missing := [name for name in wanted.values() if name not in rows]:

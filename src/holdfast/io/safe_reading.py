@@ -58,7 +58,7 @@ def stored_size(path: Path) -> int:
     A sparse file has a size of any number of bytes, of which the disk has only some.
     """
     if path.is_dir():
-        return sum(stored_size(file) for file in path.iterdir() if file.is_file())
+        return sum(stored_size(file) for file in path.rglob("*") if file.is_file())
     stat = path.stat()
     if 512 * getattr(stat, "st_blocks", stat.st_size) >= stat.st_size or not stat.st_size:
         return stat.st_size
@@ -74,9 +74,18 @@ def size_limit(path: Path) -> int:
     Raises:
         RecordingError: the variable is not a whole number of at least 1.
     """
+    return given_limit() or max(MIN_SIZE_LIMIT, MAX_EXPANSION * stored_size(path))
+
+
+def given_limit() -> int | None:
+    """Return the limit in `HOLDFAST_MAX_BYTES` [bytes]; None without one.
+
+    Raises:
+        RecordingError: as `size_limit`.
+    """
     given = os.environ.get(LIMIT_VARIABLE)
     if not given:
-        return max(MIN_SIZE_LIMIT, MAX_EXPANSION * stored_size(path))
+        return None
     if not (given.isascii() and given.isdigit() and len(given) < 20 and int(given)):
         raise RecordingError(f"{LIMIT_VARIABLE}: a whole number of bytes expected, {given!r} given")
     return int(given)
@@ -90,8 +99,8 @@ def check_size(path: Path, n_bytes: int) -> None:
     """
     if n_bytes > (limit := size_limit(path)):
         raise RecordingError(
-            f"{path} takes {_megabytes(n_bytes)} in memory, {_megabytes(limit)} are allowed for a "
-            f"file of {_megabytes(stored_size(path))}; set {LIMIT_VARIABLE} to read it anyway"
+            f"{path} takes {megabytes(n_bytes)} in memory, {megabytes(limit)} are allowed for a "
+            f"file of {megabytes(stored_size(path))}; set {LIMIT_VARIABLE} to read it anyway"
         )
 
 
@@ -116,9 +125,9 @@ class ReadBudget:
         size = path.stat().st_size
         if not path.is_dir() and size > max(self._limit, stored_size(path)):
             raise RecordingError(
-                f"{path} is a sparse file: {_megabytes(size)} long, of which "
-                f"{_megabytes(stored_size(path))} are stored; at most "
-                f"{_megabytes(self._limit)} are read from it"
+                f"{path} is a sparse file: {megabytes(size)} long, of which "
+                f"{megabytes(stored_size(path))} are stored; at most "
+                f"{megabytes(self._limit)} are read from it"
             )
 
     @property
@@ -168,8 +177,8 @@ class ReadBudget:
         if self._work > MAX_WORK * self._limit:
             raise RecordingError(
                 f"{self._path} takes too long to read: a file of "
-                f"{_megabytes(stored_size(self._path))} has records of more than "
-                f"{_megabytes(MAX_WORK * self._limit)} when it is unpacked, where a short record "
+                f"{megabytes(stored_size(self._path))} has records of more than "
+                f"{megabytes(MAX_WORK * self._limit)} when it is unpacked, where a short record "
                 f"counts {STEP_WORK} bytes; set {LIMIT_VARIABLE} to read it anyway"
             )
 
@@ -192,5 +201,6 @@ def _size_of_extents(path: Path) -> int:
     return n_bytes
 
 
-def _megabytes(n_bytes: int) -> str:
+def megabytes(n_bytes: int) -> str:
+    """Return a number of bytes as a text in MB."""
     return f"{n_bytes / 1e6:.6g} MB"

@@ -63,11 +63,21 @@ class HandlingBuffer:
         return max(self._held.values())
 
     @property
+    def duration(self) -> float:
+        """Time from the first estimate to the last [s]; NaN without one."""
+        return self._end - self._start
+
+    @property
+    def has_samples(self) -> bool:
+        """Whether any sample arrived."""
+        return self._n_bytes > 0
+
+    @property
     def full(self) -> bool:
         """Whether nothing more is needed, or can be kept."""
         return (
             self.seconds >= HELD_SECONDS
-            or self._end - self._start >= MAX_WAITING
+            or self.duration >= MAX_WAITING
             or self._n_bytes >= MAX_HANDLING_BYTES
         )
 
@@ -290,14 +300,17 @@ def _fitted(model: Model, buffer: HandlingBuffer) -> CalibratedModel:
     """Return the model with the own handling of a buffer.
 
     Raises:
-        HoldfastError: nothing is held for long enough, or the handling is refused.
+        HoldfastError: nothing is held for long enough, the handling is refused, or the model got
+            worse.
     """
     if buffer.seconds < MIN_HANDLING:
         raise StreamError(
             f"{buffer.seconds:.1f} s held in {MAX_WAITING:.0f} s, at least {MIN_HANDLING:g} s "
             "expected"
         )
-    return calibrate_with_report(model, [buffer.recording()])
+    calibrated = calibrate_with_report(model, [buffer.recording()])
+    calibrated.check()
+    return calibrated
 
 
 def described(summary: HandlingSummary) -> str:

@@ -57,6 +57,8 @@ class HandlingSummary(msgspec.Struct, frozen=True):
         n_changed: number of them whose location or scale differs from the default.
         activity: how far the features of change are above their default location, in default
             scales.
+        still: whether most scales are below those of default handling, and the load hardly
+            changes: the scales are stretched to the default then.
         before: decisions about this handling, by the model that was given.
         after: the same, by the calibrated model.
     """
@@ -68,8 +70,21 @@ class HandlingSummary(msgspec.Struct, frozen=True):
     n_features: int
     n_changed: int
     activity: float
+    still: bool
     before: HandlingFigures
     after: HandlingFigures
+
+    @property
+    def change(self) -> str:
+        """The figures before and after, as a text."""
+        before, after = self.before, self.after
+        text = (
+            f"STABLE {before.stable:.1f} to {after.stable:.1f} %, "
+            f"{before.alarms_per_minute:.1f} to {after.alarms_per_minute:.1f} alarms a minute"
+        )
+        if before.raised is None or after.raised is None:
+            return text
+        return f"{text}, slip {before.raised:.1f} to {after.raised:.1f} %"
 
 
 @dataclass(frozen=True)
@@ -85,6 +100,23 @@ class CalibratedModel:
     model: Model
     sensors: tuple[HandlingSummary, ...]
     warnings: tuple[str, ...]
+
+    def check(self) -> None:
+        """Check that the arm moved, and that decisions about the handling are no worse than before.
+
+        Raises:
+            TrainingError: it hardly moved, or they are worse on a sensor.
+        """
+        for summary in self.sensors:
+            if summary.still and summary.load_change < STILL_CHANGE:  # not if it is unknown
+                raise TrainingError(
+                    f"{summary.sensor}: the arm hardly moved; move the arm as it will move later"
+                )
+            if summary.after.worse_than(summary.before):
+                raise TrainingError(
+                    f"{summary.sensor}: worse on this handling than before ({summary.change}); "
+                    "move the arm as it will move later"
+                )
 
 
 def calibrate(
@@ -180,6 +212,21 @@ def activity(part: FingerModel, features: Array) -> float:
     return float(np.median(((features - location) / scale)[:, columns].mean(axis=1)))
 
 
+def _stretch(part: FingerModel, scale: Array) -> float:
+    """Return the median of the scales of default handling, in scales of own handling."""
+    return float(np.exp(np.median(np.log(part.default_handling[1] / scale))))
+
+
+def _at_least_default(part: FingerModel, location: Array, scale: Array) -> tuple[Array, Array]:
+    """Return location and scale of still handling, at least those of default handling.
+
+    The default is the spread over all hands of the training: still handling does not show how far
+    motion takes the features of this one. It shows the noise of the skin, so the ratios of the
+    scales stay, and one factor stretches them until their median is that of the default.
+    """
+    return np.maximum(location, part.default_handling[0]), _stretch(part, scale) * scale
+
+
 def n_changed(part: FingerModel, handling: Handling) -> int:
     """Return the number of features whose location or scale differs from the default."""
     location, scale = part.default_handling
@@ -233,19 +280,28 @@ class _Calibration:
             TrainingError: most of the handling seems to be slip.
         """
         features = self.seen.features(key)
-        measured = activity(self.model.finger(key.finger), features)
+        part = self.model.finger(key.finger)
+        measured = activity(part, features)
         if measured > MAX_ACTIVITY:
             raise TrainingError(
                 f"{key}: most of this handling looks like slip (activity {measured:.2f}, at most "
                 f"{MAX_ACTIVITY:g} expected); ordinary handling without slip expected"
             )
         location, scale = location_and_scale(features)
+        if self._still(key):
+            location, scale = _at_least_default(part, location, scale)
         return Handling(
             location=tuple(location.tolist()),
             scale=tuple(scale.tolist()),
             seconds=self.seen.seconds(key),
             recordings=self.seen.digests,
         )
+
+    def _still(self, key: HandlingKey) -> bool:
+        """Return whether most scales are below the default, and no known motion is the reason."""
+        _, scale = location_and_scale(self.seen.features(key))
+        moves = self.seen.load_change(key) >= STILL_CHANGE  # not where it is unknown
+        return not moves and _stretch(self.model.finger(key.finger), scale) > 1
 
     def _decide(self, model: Model) -> dict[HandlingKey, HeldFingers]:
         """Return the decisions of a model about the own handling, for any threshold."""
@@ -272,6 +328,7 @@ class _Calibration:
             n_features=len(handling.location),
             n_changed=n_changed(part, handling),
             activity=activity(part, self.seen.features(key)),
+            still=self._still(key),
             before=before.figures(part.for_sensor(key.sensor)),
             after=after.figures(part.with_handling(handling)),
         )

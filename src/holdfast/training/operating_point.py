@@ -22,6 +22,8 @@ STABLE_SHARE = 0.95
 """Share of the held samples of own handling that is STABLE."""
 RAISED_SHARE = 0.05
 """Share of the held samples of own handling in which a slip may be reported."""
+WORSE = 0.5
+"""Change of a share of the held samples from which a calibration made it worse [% points]."""
 MAX_DISTANCE = 3.0
 """A threshold is at most this many scales of the log odds from their location: what is further
 away is taken for slip, and the share is not reached then."""
@@ -51,6 +53,17 @@ class HandlingFigures(msgspec.Struct, frozen=True):
     alarms_per_minute: float
     slip_threshold: float | None = None
     raised: float | None = None
+
+    def worse_than(self, other: "HandlingFigures") -> bool:
+        """Return whether STABLE is rarer, slip is reported more, or alarms are more frequent.
+
+        An alarm begins and ends with STABLE, so more of them are no worse where more samples are
+        STABLE: a finger that is never STABLE has no alarm.
+        """
+        stable = self.stable - other.stable
+        raised = (self.raised or 0.0) - (other.raised or 0.0)
+        more_alarms = self.alarms_per_minute > other.alarms_per_minute
+        return stable < -WORSE or raised > WORSE or (stable <= 0 and more_alarms)
 
 
 @dataclass(frozen=True, eq=False)

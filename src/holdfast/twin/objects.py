@@ -1,7 +1,6 @@
 """Objects that the twin grasps: tables of objects, their shape, mass and inertia."""
 
 import math
-import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.files import read_input
+from holdfast.files import read_toml
 from holdfast.sensors.types import Array, rebuilt
 from holdfast.twin.shapes import (
     AROUND_2,
@@ -36,8 +35,6 @@ BUILT_IN_OBJECTS = Path(__file__).with_name("tables") / "objects.toml"
 OTHER_OBJECTS = Path(__file__).with_name("tables") / "other_objects.toml"
 """Table of other objects, for tests with objects that no model has seen."""
 
-MAX_TABLE_SIZE = 1 << 20
-"""Maximum size of a table of objects [bytes]."""
 
 SHAPES = {
     "sphere": ("radius",),
@@ -153,8 +150,8 @@ def load_objects(path: str | Path | None = None) -> dict[str, GraspObject]:
     if path is None:
         return dict(_built_in())
     try:
-        table = tomllib.loads(read_input(path, MAX_TABLE_SIZE).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as cause:
+        table = read_toml(path)
+    except ValueError as cause:
         raise ValueError(f"{path} is no TOML table of objects: {cause}") from cause
     if not table:
         raise ValueError(f"{path} has no objects")

@@ -5,6 +5,7 @@ Formats of plug-ins have such a module too, in another package.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -12,6 +13,7 @@ from typing import Any
 
 from holdfast.errors import RecordingError, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
+from holdfast.io.foreign import read_foreign
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
@@ -84,12 +86,14 @@ def import_recordings(
     """
     place, given = Path(path), _columns(columns)
     name = _format_of(place, format, sensors, given)
+    recordings: Iterator[Recording]
     with recording_errors(place):
-        source = _importer(name)
-        if name in EXTRAS:
+        source = importer(name)
+        if name in EXTRAS:  # another library reads it
             require_extras(EXTRAS[name])
-        if name == "csv":
-            recordings: Iterator[Recording] = source.read(place, sensors, given, report)
+            recordings = _named_apart(source.parts(place), partial(read_foreign, name=name))
+        elif name == "csv":
+            recordings = source.read(place, sensors, given, report)
         else:
             recordings = _named_apart(source.parts(place), source.read)
     return _guarded(place, recordings, labels=labels)
@@ -120,7 +124,7 @@ def import_parts(
     place, given = Path(path), _columns(columns)
     name = _format_of(place, format, sensors, given)
     with recording_errors(place):
-        source = _importer(name)
+        source = importer(name)
         more = (given, sensors) if name == "csv" else ()
         parts: list[Path] = source.parts(place, *more)
     return name, parts
@@ -131,6 +135,8 @@ def _named_apart(
 ) -> Iterator[Recording]:
     """Read the parts one by one; see `name_prefixes`."""
     for part, prefix in name_prefixes(parts).items():
+        if not part.is_dir():
+            check_regular(part)
         for recording in read(part):
             yield replace(recording, name=f"{prefix}{recording.name}")
 
@@ -156,7 +162,7 @@ def _format_of(
             f"unknown format {name!r}; there are {', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
         )
     if name is not None and name not in FORMATS:
-        _importer(name)
+        importer(name)
     if name not in (None, "csv") and (sensors or columns):
         raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
     if not path.exists():
@@ -189,11 +195,11 @@ def import_hint(name: str) -> str | None:
     """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
     if name in FORMATS:
         return HINTS.get(name)
-    hint: str | None = getattr(_importer(name), "HINT", None)
+    hint: str | None = getattr(importer(name), "HINT", None)
     return hint
 
 
-def _importer(name: str) -> ModuleType:
+def importer(name: str) -> ModuleType:
     """Return the module of a format.
 
     Raises:
@@ -210,13 +216,13 @@ def _importer(name: str) -> ModuleType:
 
 def _detected_format(path: Path) -> str:
     for name in FORMATS:
-        if _importer(name).can_read(path):
+        if importer(name).can_read(path):
             return name
     for name in IMPORTER_PLUGINS.names():
         plugin = IMPORTER_PLUGINS.load(name)
         if plugin is not None and plugin.can_read(path):
             return name
-    if _importer("csv").can_guess(path):
+    if importer("csv").can_guess(path):
         return "csv"
     names = f"{', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
     raise RecordingError(

@@ -5,10 +5,8 @@ held, or held with the arm at rest; 1 slip with the arm at rest; 2 release; 3 gr
 the arm in motion; 5 slip with the arm in motion; 6 anything else.
 """
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import replace
-from math import prod
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -18,7 +16,7 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.io.importers.table import errors_named, natural_order, with_integer_type
-from holdfast.io.safe_reading import ReadBudget, one_line
+from holdfast.io.safe_reading import one_line
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
@@ -34,10 +32,6 @@ RAW_DATA, TIMES_NAME, LABELS_NAME = (
 MILLISECOND = 1e-3
 MAX_GROUP_DEPTH = 16
 """Maximum depth of groups inside groups; the data sets have four."""
-MAX_DEFLATE = 1032
-"""Largest number of bytes that one byte of a deflated chunk can become."""
-N_COPIES = 3
-"""Number of arrays of the size of a data set in memory while it is converted."""
 PATCH_PITCH = (7.24e-3, 7.17e-3)
 """Distances between the taxels of the 4 x 6 patch [m]; those of the 3 x 6 patch are unknown, and
 the same are assumed."""
@@ -95,13 +89,12 @@ def read(path: Path) -> Iterator[Recording]:
         raise RecordingError(f"{path} is not an HDF5 file")
     try:
         with h5py.File(path, "r") as file:
-            budget = ReadBudget(path)
-            names = _names_of_recordings(file, h5py, budget)
+            names = _names_of_recordings(path, file, h5py)
             seen: set[int] = set()
             if not names:
                 raise RecordingError(f"{path}: no group with {RAW_DATA} in it")
             for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
-                arrays = _Arrays(path, file[name], h5py, budget, seen)
+                arrays = _Arrays(path, file[name], h5py, seen)
                 yield _recording(f"{path}: {name}", name.split("/"), arrays)
     except RecordingError:
         raise
@@ -111,7 +104,7 @@ def read(path: Path) -> Iterator[Recording]:
         ) from cause
 
 
-def _names_of_recordings(file: Any, h5py: ModuleType, budget: ReadBudget) -> list[str]:  # noqa: ANN401
+def _names_of_recordings(path: Path, file: Any, h5py: ModuleType) -> list[str]:  # noqa: ANN401
     """Return the names of the groups with data; a group with many names is visited once.
 
     Raises:
@@ -128,15 +121,16 @@ def _names_of_recordings(file: Any, h5py: ModuleType, budget: ReadBudget) -> lis
         seen.add(address)
         if name.count("/") >= MAX_GROUP_DEPTH:
             raise RecordingError(
-                f"{budget.path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
+                f"{path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
             )
         if name and RAW_DATA in group:
             names.append(name)
             continue
-        for key in group:
-            budget.keep(len(name) + len(key), 1)
-            if _is_group(group, key, h5py):
-                waiting.append((f"{name}/{key}".lstrip("/"), group[key]))
+        waiting += [
+            (f"{name}/{key}".lstrip("/"), group[key])
+            for key in group
+            if _is_group(group, key, h5py)
+        ]
     return names
 
 
@@ -156,7 +150,6 @@ class _Arrays:
         path: path of the file.
         group: the group.
         h5py: the module.
-        budget: of the file.
         seen: addresses of the arrays that were read.
     """
 
@@ -165,13 +158,11 @@ class _Arrays:
         path: Path,
         group: Any,  # noqa: ANN401 (h5py.Group)
         h5py: ModuleType,
-        budget: ReadBudget,
         seen: set[int],
     ) -> None:
         self._path = path
         self._group = group
         self._h5py = h5py
-        self._budget = budget
         self._seen = seen
 
     def __contains__(self, name: str) -> bool:
@@ -203,20 +194,15 @@ class _Arrays:
                 "group is a recording and has arrays of its own"
             )
         self._seen.add(address)
-        self._check_size(name, item)
+        self._check_filters(name, item)
         return np.asarray(item[()], dtype=np.float64)
 
-    def _check_size(self, name: str, item: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
-        """Check the size of an array and of its chunks, which can be packed and can be larger.
+    def _check_filters(self, name: str, item: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
+        """Check that an array is packed by deflate only; other filters are loaded as plug-ins.
 
         Raises:
-            RecordingError: they are too large, or packed in another way than by deflate.
+            RecordingError: it is packed in another way.
         """
-        self._budget.unpack(N_COPIES * 8 * item.size)
-        if item.chunks is None:
-            return
-        n_bytes = prod(item.chunks) * item.dtype.itemsize
-        self._budget.unpack(n_bytes)
         filters = item.id.get_create_plist()
         kinds = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
         h5z = self._h5py.h5z
@@ -226,26 +212,6 @@ class _Arrays:
                 f"{self._path}: {name} is packed by the filters {kinds}; gzip, shuffle and "
                 "fletcher32 expected, each once"
             )
-        if h5z.FILTER_DEFLATE in kinds:
-            self._check_chunks(name, item, n_bytes)
-
-    def _check_chunks(self, name: str, item: Any, n_bytes: int) -> None:  # noqa: ANN401
-        """Check that no deflated chunk becomes larger than a chunk is.
-
-        HDF5 unpacks a chunk to the end, whatever its size should be.
-        """
-        for k in range(item.id.get_num_chunks()):
-            self._budget.step()
-            chunk = item.id.get_chunk_info(k)
-            if chunk.size * MAX_DEFLATE <= self._budget.free:
-                self._budget.unpack(n_bytes)
-                continue
-            _, packed = item.id.read_direct_chunk(chunk.chunk_offset)
-            self._budget.unpack(n_bytes)
-            if len(zlib.decompressobj().decompress(packed, n_bytes + 1)) > n_bytes:
-                raise RecordingError(
-                    f"{self._path} is damaged: a chunk of {name} has more than {n_bytes} bytes"
-                )
 
 
 def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
-from holdfast.files import read_input
+from holdfast.files import check_regular, read_input
 from holdfast.io.header import Header, decode_header
 from holdfast.io.lerobot import (
     DATA_PATH,
@@ -27,7 +27,6 @@ from holdfast.io.lerobot import (
     track_name,
     value_specs,
 )
-from holdfast.io.safe_reading import ReadBudget
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -41,8 +40,6 @@ MAX_INFO_SIZE = 1 << 24
 """Maximum size of the description of a data set [bytes]."""
 EPISODES_AT_ONCE = 64
 """Number of headers of recordings that are in memory at a time."""
-VALUE_SIZE = 8
-"""Maximum size of a value in memory [bytes]."""
 
 _EPISODE_COLUMNS = (
     "episode_index", "length", "data/chunk_index", "data/file_index", HEADER_COLUMN, TEXTS_COLUMN
@@ -117,13 +114,13 @@ def _episodes(path: Path, info: _Info) -> Iterator[_Episode]:
     n_episodes = 0
     pattern = EPISODES_PATH.replace("{chunk_index:03d}", "*").replace("{file_index:03d}", "*")
     for file in sorted(path.glob(pattern)):
+        check_regular(file)
         parquet = pq.ParquetFile(file)
         if missing := [name for name in _EPISODE_COLUMNS if name not in parquet.schema_arrow.names]:
             raise RecordingError(
                 f"{path}: its episodes have no column {missing[0]!r}, which holdfast export "
                 "writes; a data set of another program has no sensors and times of samples"
             )
-        _check_memory(ReadBudget(file), parquet)
         for batch in parquet.iter_batches(EPISODES_AT_ONCE, columns=list(_EPISODE_COLUMNS)):
             for row in batch.to_pylist():
                 yield _episode(path, row)
@@ -179,12 +176,11 @@ class _EpisodeTable:
         tracks = dict.fromkeys(map(track_name, array_specs(episode.header)))
         names = [feature_name(spec) for spec in specs]
         names += [name(track) for track in tracks for name in (time_name, count_name)]
+        check_regular(episode.path)
         file = pq.ParquetFile(episode.path)
         if missing := [name for name in names if name not in file.schema_arrow.names]:
             raise RecordingError(f"{episode.path}: column {missing[0]!r} is missing")
-        _check_memory(ReadBudget(episode.path), file)
-        of_episode = [("episode_index", "=", episode.number)]
-        self._table = pq.read_table(episode.path, columns=names, filters=of_episode)
+        self._table = _rows_of(file, episode.number, names)
         if len(self._table) != episode.length:
             raise RecordingError(
                 f"{episode.path} is damaged: {len(self._table)} frames of episode "
@@ -231,17 +227,22 @@ class _EpisodeTable:
         return values
 
 
+def _rows_of(file: Any, episode: int, names: list[str]) -> Any:  # noqa: ANN401 (of pyarrow)
+    """Return the rows of an episode.
+
+    Filters of pyarrow use the statistics in the footer; if these are damaged, they abort.
+    """
+    import pyarrow.compute as pc
+
+    column = "episode_index"
+    groups = [
+        number
+        for number in range(file.num_row_groups)
+        if pc.index(file.read_row_group(number, columns=[column])[column], episode).as_py() >= 0
+    ]
+    table = file.read_row_groups(groups, columns=[*names, column])
+    return table.filter(pc.equal(table[column], episode))
+
+
 def _memory_type(spec: ArraySpec) -> str:
     return "U1" if spec.number == "str" else spec.number or "float64"
-
-
-def _check_memory(budget: ReadBudget, file: Any) -> None:  # noqa: ANN401 (a ParquetFile)
-    """Count the largest row group of a file.
-
-    Raises:
-        RecordingError: it takes more memory than a file of this size may.
-    """
-    for number in range(file.metadata.num_row_groups):
-        group = file.metadata.row_group(number)
-        n_values = sum(group.column(k).num_values for k in range(group.num_columns))
-        budget.unpack(max(n_values * VALUE_SIZE, group.total_byte_size))

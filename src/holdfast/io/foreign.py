@@ -1,0 +1,389 @@
+"""Files of other programs, read in a child process with limits of time and memory.
+
+A library that reads a container (rosbags, h5py, pyarrow) can abort, hang, or take all memory for
+a file that is damaged or made by an attacker. The child ends then, and this process has one line.
+One child reads all files of an import, one at a time: while nothing is read, it waits.
+
+Requests and answers are lines of JSON on its pipes. Values come in a file of a private folder:
+arrays of NumPy one after the other, of which the first is a document in JSON; never a pickle.
+"""
+
+import atexit
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from queue import SimpleQueue
+from shutil import rmtree
+from tempfile import mkdtemp
+from threading import Thread, Timer
+from typing import Any, BinaryIO, Literal
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.children import python_command
+from holdfast.errors import EXTRA_MODULES, RecordingError
+from holdfast.io.header import decode_header, encode_header, header_of
+from holdfast.io.safe_reading import (
+    LIMIT_VARIABLE,
+    ReadBudget,
+    given_limit,
+    megabytes,
+    recording_errors,
+    size_limit,
+    stored_size,
+)
+from holdfast.io.timed_arrays import array_specs, arrays_of, recording_from
+from holdfast.recordings import Recording
+
+FREE_MEMORY = 200_000_000
+MEMORY_PER_BYTE = 10
+MAX_MEMORY = 1 << 30
+"""Memory that reading may take: 200 MB and ten times the size of the file, at most 1 GiB [bytes].
+`HOLDFAST_MAX_BYTES` replaces it."""
+FREE_SECONDS = 20.0
+"""Time of the processor that a file may take, however small it is [s]."""
+SECONDS_PER_BYTE = 4e-6
+"""Time of the processor for each byte of the file: a tenth of the speed of the slowest format,
+so that a slow computer imports it too [s]."""
+SECONDS_PER_VALUE = 1.0
+"""Time of the processor for each recording that came of the file [s]."""
+WAIT_FACTOR = 3
+"""Time until the next answer, as a multiple of that of the processor: disks are waited for."""
+START_TIMEOUT = 60.0
+"""Time in which the child must be ready; it takes 0.3 s if its modules are in memory [s]."""
+MAX_TEXT = 2000
+"""Maximum length of the text of an error [characters]."""
+
+_PROGRAM = "from holdfast.io.foreign import serve; serve(sys.argv[1])"
+_ONE_THREAD = dict.fromkeys(
+    ("ARROW_IO_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+) | {"ARROW_DEFAULT_MEMORY_POOL": "system"}
+"""Environment of the child: stacks of threads and pools of memory would count as its memory."""
+_VALUE_FILE = "value"
+_NEXT = b"next\n"
+Arrays = list[npt.NDArray[Any]]
+
+
+class _Request(msgspec.Struct, frozen=True):
+    """What the child shall read, with its limits; paths are relative to `folder`."""
+
+    task: str
+    path: bytes
+    options: dict[str, Any]
+    folder: bytes
+    memory: int
+    written: int
+    seconds: float
+
+
+class _Answer(msgspec.Struct, frozen=True):
+    """What came of it: a value in the file, the end of the values, or an error and its text."""
+
+    kind: Literal["ready", "value", "end", "memory", "error"]
+    text: str = ""
+
+
+def read_foreign(path: Path, name: str) -> Iterator[Recording]:
+    """Yield the recordings in a file or folder of a format, which a child process reads.
+
+    Args:
+        path: path of the part.
+        name: name of the format, one of `importers.EXTRAS`.
+
+    Raises:
+        RecordingError: the child refuses it, ends, or takes more time or memory than it may.
+    """
+    for document, arrays in _values("import", path, {"format": name}):
+        header = decode_header(document, path)
+        pairs = zip(arrays[::2], arrays[1::2], strict=True)
+        topics = (spec.topic for spec in array_specs(header))
+        recording = recording_from(header, dict(zip(topics, pairs, strict=True)), path)
+        if recording.digest != header.digest:
+            raise RecordingError(f"{path}: the recording is another one than the child has read")
+        yield recording
+
+
+def read_foreign_arrays(
+    task: str, path: Path, options: dict[str, Any]
+) -> dict[str, npt.NDArray[Any]]:
+    """Return arrays by name, which a child process reads.
+
+    Raises:
+        RecordingError: as `read_foreign`.
+    """
+    ((document, arrays),) = _values(task, path, options)
+    return dict(zip(msgspec.json.decode(document, type=list[str]), arrays, strict=True))
+
+
+def limits() -> dict[str, bool]:
+    """Return which limits hold on this system, by name; that of memory is tried."""
+    with suppress(RecordingError):
+        found = read_foreign_arrays("limits", Path(__file__), {})
+        return {"time": True, **{name: bool(value) for name, value in found.items()}}
+    return {"time": False}
+
+
+def _values(task: str, path: Path, options: dict[str, Any]) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the document and the arrays of each value that a child reads.
+
+    What is left of an iterator costs a child: it is ended with whatever it reads.
+    """
+    size = stored_size(path)
+    given = given_limit()
+    memory = given or min(FREE_MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY)
+    seconds = FREE_SECONDS + SECONDS_PER_BYTE * max(size, given or 0)
+    names = os.fsencode(path), os.fsencode(Path.cwd())
+    request = _Request(task, names[0], options, names[1], memory, size_limit(path), seconds)
+    budget = ReadBudget(path)
+    child = _idle.pop() if _idle else _Child()
+    try:
+        answer = child.ask(msgspec.json.encode(request) + b"\n", path, request)
+        while answer.kind == "value":
+            yield child.value(budget)
+            answer = child.ask(_NEXT, path, request)
+    except BaseException:  # also Ctrl-C, and an iterator that is left
+        child.end()
+        raise
+    if answer.kind == "memory":
+        child.end()  # what it could not use may be in pieces
+        raise RecordingError(
+            f"{path} needs more memory than the {megabytes(memory)} that a file of "
+            f"{megabytes(size)} may take; set {LIMIT_VARIABLE} to read it anyway"
+        )
+    _idle.append(child)
+    if answer.kind == "error":
+        raise RecordingError(answer.text)
+
+
+class _Child:
+    """A process that reads files of other programs; see `serve`.
+
+    Raises:
+        RecordingError: it cannot be started.
+    """
+
+    def __init__(self) -> None:
+        self._folder = mkdtemp(prefix="holdfast-")
+        self._is_late = False
+        try:
+            self._process = subprocess.Popen(
+                python_command(_PROGRAM, self._folder),
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                env={**os.environ, **_ONE_THREAD},
+            )  # fmt: skip
+        except OSError as cause:
+            rmtree(self._folder, ignore_errors=True)
+            raise RecordingError(f"no process for reading can be started: {cause}") from cause
+        if self._answer(START_TIMEOUT) is None:
+            self.end()
+            raise RecordingError("the process for reading does not start")
+
+    def ask(self, line: bytes, path: Path, request: _Request) -> _Answer:
+        """Return the answer to a line.
+
+        Raises:
+            RecordingError: the child ends, or does not answer in time.
+        """
+        with suppress(OSError):  # it has ended: there is no answer
+            _pipe(self._process.stdin).write(line)
+            _pipe(self._process.stdin).flush()
+        timeout = WAIT_FACTOR * request.seconds
+        if answer := self._answer(timeout):
+            return answer
+        code = self._process.wait()
+        if self._is_late or code == -getattr(signal, "SIGXCPU", 0):
+            raise RecordingError(
+                f"{path} takes too long to read: {request.seconds:.0f} s of the processor, and "
+                f"{timeout:.0f} s until the next recording, are allowed for a file of its size"
+            )
+        name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        raise RecordingError(f"{path} is damaged: it ended the process that read it ({name})")
+
+    def value(self, budget: ReadBudget) -> tuple[bytes, Arrays]:
+        """Return the document and the arrays that the child wrote, which count in a budget."""
+        path = Path(self._folder, _VALUE_FILE)
+        budget.keep(path.stat().st_size)
+        arrays: Arrays = []
+        with path.open("rb") as file:
+            while file.peek(1):
+                arrays.append(np.lib.format.read_array(file, allow_pickle=False))
+        path.unlink()
+        return arrays[0].tobytes(), arrays[1:]
+
+    def end(self) -> None:
+        """End the process, and delete its files."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):  # the rest of a request
+                _pipe(pipe).close()
+        rmtree(self._folder, ignore_errors=True)
+
+    def _answer(self, timeout: float) -> _Answer | None:
+        """Return the next answer; None if there is none in time, and the process has ended."""
+        timer = Timer(timeout, self._give_up)
+        timer.daemon = True
+        timer.start()
+        try:
+            return msgspec.json.decode(_pipe(self._process.stdout).readline(), type=_Answer)
+        except msgspec.DecodeError:
+            return None
+        finally:
+            timer.cancel()
+
+    def _give_up(self) -> None:
+        self._is_late = True
+        self._process.kill()
+
+
+_idle: list[_Child] = []
+"""Children that wait. A fork of this process does not share them."""
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_idle.clear)
+
+
+@atexit.register
+def end_children() -> None:
+    """End the children that wait."""
+    while _idle:
+        _idle.pop().end()
+
+
+def _pipe(pipe: Any) -> BinaryIO:  # noqa: ANN401 (subprocess declares it as optional)
+    found: BinaryIO = pipe
+    return found
+
+
+# What follows runs in the child.
+
+
+def serve(folder: str) -> None:
+    """Answer requests until the parent ends; the main program of the child.
+
+    Args:
+        folder: folder for values.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the parent, which ends the child
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no answer
+    lines: SimpleQueue[bytes] = SimpleQueue()
+    Thread(target=_receive, args=(lines, folder), daemon=True).start()
+    answer = _Answer("ready")
+    values: Iterator[tuple[bytes, Arrays]] = iter(())
+    while True:
+        answers.write(msgspec.json.encode(answer) + b"\n")
+        answers.flush()
+        if (line := lines.get()) != _NEXT:
+            values = _read(msgspec.json.decode(line, type=_Request))
+        answer = _next_answer(values, Path(folder, _VALUE_FILE))
+
+
+def _receive(lines: "SimpleQueue[bytes]", folder: str) -> None:
+    """Pass on the lines of the parent; end this process with it, also while it reads a file."""
+    for line in sys.stdin.buffer:
+        lines.put(line)
+    rmtree(folder, ignore_errors=True)
+    os._exit(0)
+
+
+def _next_answer(values: Iterator[tuple[bytes, Arrays]], path: Path) -> _Answer:
+    """Write the next value into a file; return the answer to the parent."""
+    try:
+        for document, arrays in values:
+            with path.open("wb") as file:
+                for array in (np.frombuffer(document, np.uint8), *arrays):
+                    np.lib.format.write_array(file, array, allow_pickle=False)
+            return _Answer("value")
+    except Exception as cause:
+        text = str(cause)[:MAX_TEXT].encode(errors="backslashreplace").decode()
+        return _Answer("memory" if _is_of_memory(cause) else "error", text)
+    return _Answer("end")
+
+
+def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the values of a request; the time that it may take grows with each of them."""
+    os.chdir(os.fsdecode(request.folder))
+    end = sum(os.times()[:2]) + request.seconds
+    _limit("CPU", int(end) + 1)
+    path = Path(os.fsdecode(request.path))
+    with recording_errors(path):
+        for value in _TASKS[request.task](path, request):
+            yield value
+            end += SECONDS_PER_VALUE
+            _limit("CPU", int(end) + 1)
+
+
+def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    from holdfast.io.importers import EXTRAS, importer
+
+    name = str(request.options["format"])
+    source = importer(name)
+    for module in EXTRA_MODULES[EXTRAS[name]]:  # of an idle process
+        import_module(module)
+    _limit_memory(request)
+    for recording in source.read(path):
+        header = header_of(recording, path.stem)
+        pairs = arrays_of(recording).values()
+        yield encode_header(header), [array for pair in pairs for array in pair]
+
+
+def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    from holdfast.io.bags import poses_of
+
+    _limit_memory(request)
+    poses = poses_of(path, request.options)
+    yield msgspec.json.encode(list(poses)), list(poses.values())
+
+
+def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    _limit_memory(request)
+    try:
+        np.ones(2 * request.memory, np.uint8)
+        has_memory = False
+    except MemoryError:
+        has_memory = True
+    has_time = hasattr(signal, "SIGXCPU")
+    yield b'["processor","memory"]', [np.array(has_time), np.array(has_memory)]
+
+
+_TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
+    "import": _import,
+    "poses": _poses,
+    "limits": _try_limits,
+}
+
+
+def _limit_memory(request: _Request) -> None:
+    """Limit the memory of this process to what it has and that of the request, and its files."""
+    _limit("CORE", 0)
+    _limit("FSIZE", request.written)
+    with suppress(OSError):  # there is no such file: only Linux has this limit
+        status = Path("/proc/self/status").read_text()
+        (used,) = re.findall(r"^VmData:\s+(\d+) kB", status, re.MULTILINE)
+        _limit("DATA", 1024 * int(used) + request.memory)  # addresses without memory are free
+
+
+def _limit(name: str, value: int) -> None:
+    """Set a limit of this process where the system has it; the next request can raise it."""
+    if os.name == "posix":
+        import resource
+
+        kind = getattr(resource, f"RLIMIT_{name}")
+        hard = resource.getrlimit(kind)[1]
+        value = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        resource.setrlimit(kind, (value, hard))
+
+
+def _is_of_memory(cause: BaseException | None) -> bool:
+    """Return whether an error, or what caused it, is that no memory is left."""
+    while cause is not None and not isinstance(cause, MemoryError):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None

@@ -1,0 +1,174 @@
+"""Files of other programs are read in a child process, whose end is one line."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holdfast.children import python_command
+from holdfast.errors import RecordingError
+from holdfast.exporters.lerobot import export
+from holdfast.io import FORMATS, foreign, import_recordings
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs signals and pipes")
+
+CRASHES = {
+    "abort": ("os.abort()", r"is damaged: it ended the process that read it \(SIGABRT\)"),
+    "exit": ("os._exit(3)", r"is damaged: it ended the process that read it \(exit code 3\)"),
+    "hang": ("time.sleep(600)", r"takes too long to read: 1 s of the processor, and 3 s until"),
+    "loop": ("exec('while True: pass')", r"takes too long to read: 1 s of the processor"),
+    "bomb": (
+        "numpy.ones(10**9)",
+        r"needs more memory than the 200\S* MB that a file of \S* MB may take; set HOLDFAST_MAX_B",
+    ),
+    "error": ("[][1]", r"a\.h5 is damaged: list index out of range"),
+    "print": ("print('{}') or [][1]", r"a\.h5 is damaged: list index out of range"),
+    "interrupt": ("os.kill(os.getpid(), 2) or [][1]", r"is damaged: list index out of range"),
+}
+"""What a library does in the child, and the message."""
+
+
+@pytest.fixture
+def file(tmp_path):
+    """A file in HDF5, and a child of its own."""
+    foreign.end_children()
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"\x89HDF\r\n\x1a\n")
+    yield path
+    foreign.end_children()
+
+
+@pytest.mark.parametrize(("code", "message"), CRASHES.values(), ids=CRASHES)
+def test_whatever_a_library_does_is_one_line(file, monkeypatch, code, message):
+    if "1 s of the processor" in message:
+        monkeypatch.setattr(foreign, "FREE_SECONDS", 1.0)
+    program = (
+        "import os, time, numpy; from holdfast.io.importers import arq_crisp\n"
+        f"def read(path):\n    {code}\n    yield\n"
+        "arq_crisp.read = read\n"
+    )
+    monkeypatch.setattr(foreign, "_PROGRAM", program + foreign._PROGRAM)
+    with pytest.raises(RecordingError, match=message) as refused:
+        list(import_recordings(file, "arq-crisp"))
+    assert str(file) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_one_child_reads_all_files(make_recording, assert_same, tmp_path, file):
+    recordings = [make_recording(name=name) for name in ("a", "b")]
+    export(recordings, tmp_path / "set")
+    for _ in range(2):
+        for got, want in zip(import_recordings(tmp_path / "set"), recordings, strict=True):
+            assert_same(got, want)
+        with pytest.raises(RecordingError, match="is damaged or not a data set of ARQ-CRISP"):
+            list(import_recordings(file))
+        (child,) = foreign._idle
+        number = child._process.pid
+    assert number == child._process.pid
+    folder = Path(child._folder)
+    assert not list(folder.iterdir())
+    foreign.end_children()
+    assert not folder.exists()
+
+
+def test_an_iterator_that_is_left_ends_its_child(make_recording, tmp_path, file):
+    export([make_recording(name=name) for name in ("a", "b")], tmp_path / "set")
+    recordings = import_recordings(tmp_path / "set")
+    next(recordings)
+    recordings.close()
+    assert foreign._idle == []
+
+
+@pytest.mark.parametrize("kind", [signal.SIGKILL, signal.SIGINT])
+def test_a_child_ends_with_its_parent(tmp_path, kind):
+    """Also while it waits for a pipe that nobody writes to."""
+    os.mkfifo(tmp_path / "pipe")
+    hanging = "from holdfast.io import bags; bags.poses_of = lambda *_: open('pipe'); "
+    program = (
+        "from pathlib import Path; from holdfast.io import foreign\n"
+        f"foreign._PROGRAM = {hanging!r} + foreign._PROGRAM\n"
+        "child = foreign._Child(); foreign._idle.append(child)\n"
+        "print(child._process.pid, child._folder, flush=True)\n"
+        "foreign.read_foreign_arrays('poses', Path('.'), {})\n"
+    )
+    parent = subprocess.Popen(
+        python_command(program), cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    with parent:
+        number, folder = parent.stdout.readline().split()
+        time.sleep(0.5)
+        parent.send_signal(kind)
+    with suppress(ProcessLookupError):
+        while True:  # the time limit of the test ends it
+            os.kill(int(number), 0)
+            if b") Z " in Path(f"/proc/{int(number)}/stat").read_bytes():
+                break
+            time.sleep(0.01)
+    while Path(os.fsdecode(folder)).exists():
+        time.sleep(0.01)
+
+
+def test_a_fork_has_a_child_of_its_own(make_recording, tmp_path, file):
+    export([make_recording()], tmp_path / "set")
+    list(import_recordings(tmp_path / "set"))
+    number = os.fork()
+    if not number:
+        list(import_recordings(tmp_path / "set"))
+        foreign.end_children()
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(number, 0)[1]) == 0
+    assert len(list(import_recordings(tmp_path / "set"))) == 1
+
+
+def test_the_answer_is_no_pickle(file):
+    child = foreign._Child()
+    value = Path(child._folder, "value")
+    with value.open("wb") as file_of_value:
+        np.save(file_of_value, np.array([{}], object), allow_pickle=True)
+    with pytest.raises(ValueError, match="Object arrays cannot be loaded"):
+        child.value(foreign.ReadBudget(file))
+    child.end()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have fewer limits")
+def test_all_limits_hold_on_linux():
+    assert foreign.limits() == {"time": True, "processor": True, "memory": True}
+
+
+PARTS = {
+    "uskin-pick-move": ["data_sample_1/xela_sensor1.csv", "data_sample_1/robot_state.csv"],
+    "eflesh": ["seq_1.pt"],
+    "xela-log": ["a.csv"],
+    "gtac": ["a.csv"],
+    "anyskin-slip": ["a.csv"],
+    "arq-crisp": ["a.h5"],
+    "rosbag": ["a.bag", "a.mcap", "a.db3", "metadata.yaml"],
+    "lerobot": ["meta/info.json"],
+    "csv": ["a.csv"],
+}
+"""Names of files that an importer would open in a folder."""
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_no_importer_opens_a_pipe_in_a_folder(tmp_path, name):
+    for part in PARTS[name]:
+        (tmp_path / part).parent.mkdir(parents=True, exist_ok=True)
+        os.mkfifo(tmp_path / part)
+    with pytest.raises(RecordingError, match=r"a pipe or a device; a reg|expected"):
+        list(import_recordings(tmp_path, name))
+
+
+@pytest.mark.parametrize("part", ["meta/episodes", "data"])
+def test_a_pipe_in_a_data_set_is_refused_at_once(make_recording, tmp_path, part, file):
+    export([make_recording()], tmp_path / "set")
+    path = tmp_path / "set" / part / "chunk-000/file-000.parquet"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
+        list(import_recordings(tmp_path / "set", "lerobot"))
