@@ -21,8 +21,8 @@ def ignore_settings_of_folder() -> None:
     """Ignore the settings in the working folder in all later imports of this process."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Finder())
-    config = sys.modules.get("numba.core.config")
-    if config is not None and getattr(config, "_config_fname", ""):  # imported by the caller
+    config: Any = sys.modules.get("numba.core.config")
+    if getattr(config, "_config_fname", ""):  # imported by the caller
         _forget_file(config)
         config.reload_config()  # without the file: its settings become those of the environment
 
