@@ -18,6 +18,7 @@ from holdfast.errors import ModelError, StreamError
 from holdfast.features import FeatureSpec
 from holdfast.features.arrays import NOISE
 from holdfast.model import ANY_FINGER, Debounce, Model
+from holdfast.sensors import sensor as built_in
 
 from .build import (
     RATE,
@@ -526,3 +527,13 @@ def test_the_plain_way_gives_the_same_estimates(monkeypatch):
     )
     assert [repr(estimate) for estimate in feed(plain, values)] == [repr(e) for e in fast]
     assert len(stored) == len(values)
+
+
+@pytest.mark.parametrize(
+    "sample", [np.full((16, 3), "x", dtype=object), np.full((16, 3), 10**400, dtype=object),
+               np.full((16, 3), {}, dtype=object), [[1, 2], [3]]],
+)  # fmt: skip
+def test_what_is_no_number_is_an_error_of_the_stream(sample):
+    detector = Detector(Model.load("builtin:noise-floor"), {"index": built_in("uskin-4x4")})
+    with pytest.raises(StreamError, match=r"^index: \(16, 3\) numbers expected; "):
+        detector.update({"index": sample}, 0.0)

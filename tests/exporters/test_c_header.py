@@ -510,3 +510,13 @@ def test_what_cannot_be_exported_is_named():
     with pytest.raises(ModelError, match=r"tare is the interval 1:2 s.*'first' or 'none'"):
         header_of(paper(tare="1:2"), HAND, 150.0)
     assert sys.version_info >= (3, 11)
+
+
+def test_fast_math_is_an_error(tmp_path):
+    (tmp_path / "model.h").write_text(header_of(paper(), *made("paper")[1:]).text)
+    command = ["cc", "-std=c99", "-fsyntax-only", "-x", "c", tmp_path / "model.h"]
+    subprocess.run(command, check=True)
+    for flag in ("-ffast-math", "-ffinite-math-only"):
+        shown = subprocess.run([*command, flag], check=False, capture_output=True, text=True)
+        assert shown.returncode
+        assert "compile without -ffast-math or /fp:fast" in shown.stderr

@@ -236,6 +236,14 @@ def test_only_a_data_set_is_replaced(recordings, tmp_path):
     export(recordings[1:], out, fps=10, force=True)
     assert json.loads((out / "meta/info.json").read_text())["fps"] == 10
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+    (out / "data" / "video.mp4").write_text("of a camera")
+    with pytest.raises(OutputError, match="is not such an export"):
+        export(recordings[1:], out, force=True)
+    assert (out / "data" / "video.mp4").read_text() == "of a camera"
+    (tmp_path / "other" / "meta").mkdir(parents=True)
+    (tmp_path / "other" / "meta" / "info.json").write_text("{}")
+    with pytest.raises(OutputError, match="is not such an export"):
+        export(recordings[1:], tmp_path / "other", force=True)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("all of it")
     with pytest.raises(OutputError, match="is not such an export"):

@@ -264,8 +264,8 @@ class Detector:
             until the time since its last sample is a gap.
 
         Raises:
-            StreamError: an unknown finger, another number of taxels or axes, or a time that
-                does not increase. The detector has not changed then.
+            StreamError: an unknown finger, another number of taxels or axes, what is no number,
+                or a time that does not increase. The detector has not changed then.
         """
         time = float(time)
         if not self._last_time < time < inf:
@@ -367,10 +367,17 @@ class Detector:
             if finger not in slots:
                 raise StreamError(f"finger {finger!r} given; the model is for {', '.join(slots)}")
             place, slot, shape = slots[finger]
-            values = sample if isinstance(sample, ndarray) else np.asarray(sample)
-            if values.shape != shape:
-                self._check_shape(finger, values.shape)
-            slot[...] = values
+            try:
+                values = sample if isinstance(sample, ndarray) else np.asarray(sample)
+                if values.shape != shape:
+                    self._check_shape(finger, values.shape)
+                slot[...] = values
+            except (
+                ValueError,
+                TypeError,
+                OverflowError,
+            ) as cause:  # of objects, or rows of lengths
+                raise StreamError(f"{finger}: {shape} numbers expected; {cause}") from cause
             flags[place] = 1
 
     def _estimate(self, time: float, code: int) -> HandEstimate:

@@ -26,6 +26,12 @@
 #define HOLDFAST_MODEL "@MODEL@"
 #define HOLDFAST_MODEL_DIGEST "@MODEL_DIGEST@"
 
+/* Such arithmetic has no NaN, which marks a finger without a sample: other states, no warning.
+ * No macro shows -fassociative-math alone: do not use it either. */
+#if defined(__FAST_MATH__) || __FINITE_MATH_ONLY__ + 0 || defined(_M_FP_FAST)
+#error "the holdfast header needs arithmetic with NaN: compile without -ffast-math or /fp:fast"
+#endif
+
 /* Define HOLDFAST_EXPECTED_ID before the include, to compile with this header only. */
 #if defined(HOLDFAST_EXPECTED_ID) && HOLDFAST_EXPECTED_ID != HOLDFAST_HEADER_ID
 #error "the holdfast header is not the one that this program was written for"

@@ -1,6 +1,7 @@
 """Export of recordings as a LeRobot data set (v3.0), by pyarrow alone."""
 
 import json
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -37,6 +38,13 @@ MAX_VIDEO_SIZE = 200
 """LeRobot's limit for files of videos, of which there are none [MB]."""
 MAX_GROUP_FRAMES = 4096
 """Maximum number of frames in a row group; shorter episodes are one row group."""
+MARKER_PATH = "meta/holdfast.json"
+"""File that marks a data set of holdfast: `--force` deletes no folder without it."""
+OWN_FILES = re.compile(
+    r"README\.md|meta/(info|stats|holdfast)\.json|meta/tasks\.parquet"
+    r"|(data|meta/episodes)/chunk-\d{3,}/file-\d{3,}\.parquet"
+)
+"""Paths of all files of a data set."""
 UNKNOWN_TASK = "tactile recording"
 
 _CARD = """---
@@ -97,7 +105,15 @@ def export(
 
 
 def _is_data_set(folder: Path) -> bool:
-    return (folder / INFO_PATH).is_file()
+    """Return whether a folder has the marker, and no file that this export does not write."""
+    marker = folder / MARKER_PATH
+    if marker.is_symlink() or not marker.is_file():
+        return False
+    return all(
+        path.is_dir() or OWN_FILES.fullmatch(path.relative_to(folder).as_posix())
+        for path in folder.rglob("*")
+        if not path.is_symlink()
+    ) and not any(path.is_symlink() for path in folder.rglob("*"))
 
 
 class _Writer(ExitStack):
@@ -183,6 +199,7 @@ class _Writer(ExitStack):
             "episodes": len(self._episodes), "frames": self._n_frames, "tasks": len(self._tasks)
         }  # fmt: skip
         _write_json(self._folder / INFO_PATH, _info(self._layout.fps, self._features, totals))
+        _write_json(self._folder / MARKER_PATH, {"writer": "holdfast"})
         stats = {name: stats.result() for name, stats in self._stats.items()}
         _write_json(self._folder / STATS_PATH, stats)
         (self._folder / "README.md").write_text(_CARD.format(version=VERSION), "utf-8")

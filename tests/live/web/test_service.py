@@ -571,6 +571,20 @@ def test_too_many_websockets_are_refused(monkeypatch):
     assert run(work()) == (503, "2 WebSockets are open; close one of them")
 
 
+def test_one_address_leaves_room_for_others(monkeypatch):
+    monkeypatch.setattr("holdfast.live.web.service.MAX_WEBSOCKETS_PER_ADDRESS", 1)
+
+    async def work():
+        async with (
+            served(patient(10)) as (client, _),
+            client.ws_connect("/api/v1/live"),
+            client.get("/api/v1/estimates") as answer,
+        ):
+            return answer.status, (await answer.json())["error"]
+
+    assert run(work()) == (503, "1 WebSockets of 127.0.0.1 are open; close one of them")
+
+
 def test_the_page_loads_nothing_from_other_servers():
     async def work():
         async with served(patient(10)) as (client, _), client.get("/") as answer:

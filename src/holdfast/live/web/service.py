@@ -34,6 +34,8 @@ HEARTBEAT_INTERVAL = 6.0
 """Time between two pings; a client that does not answer within half of it is disconnected [s]."""
 MAX_WEBSOCKETS = 64
 """Maximum number of WebSockets at a time."""
+MAX_WEBSOCKETS_PER_ADDRESS = 32
+"""Limit for one address, so that one client leaves room for the others."""
 MAX_BODY_BYTES = 1 << 16
 """Largest body of a request: a name or the text of a marker [bytes]."""
 
@@ -53,10 +55,14 @@ class WebSocketClient:
     Args:
         socket: that is connected.
         max_queued: maximum number of documents in the queue.
+        address: of the client.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, max_queued: int) -> None:
+    def __init__(
+        self, socket: web.WebSocketResponse, max_queued: int, address: str | None = None
+    ) -> None:
         self._socket = socket
+        self.address = address
         self._queue: asyncio.Queue[str] = asyncio.Queue(max_queued)
 
     def put(self, text: str) -> None:
@@ -204,11 +210,17 @@ class LiveService:
         if sum(map(len, self._clients.values())) >= MAX_WEBSOCKETS:
             text = f"{MAX_WEBSOCKETS} WebSockets are open; close one of them"
             raise json_error(web.HTTPServiceUnavailable, text)
+        n_own = sum(
+            client.address == request.remote for each in self._clients.values() for client in each
+        )
+        if n_own >= MAX_WEBSOCKETS_PER_ADDRESS:
+            text = f"{n_own} WebSockets of {request.remote} are open; close one of them"
+            raise json_error(web.HTTPServiceUnavailable, text)
         socket = web.WebSocketResponse(
             heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
         )
         await socket.prepare(request)
-        client = WebSocketClient(socket, MAX_QUEUED_DOCUMENTS[kind])
+        client = WebSocketClient(socket, MAX_QUEUED_DOCUMENTS[kind], request.remote)
         client.put(_encode(self._hello()).decode())
         clients = self._clients[kind]
         clients.add(client)
