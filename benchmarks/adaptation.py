@@ -34,7 +34,7 @@ from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.model_fit import TrainingData, fit_model
 from holdfast.training.setting import Split
 from holdfast.training.splits import split_data
-from holdfast.training.training_samples import gather_samples
+from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 START = Model.load("builtin:any")
 SETTINGS = {
@@ -95,9 +95,9 @@ def models_of(
         scan = scan_dataset(recordings, relative=True)
         split: Split = "recording" if len(recordings) > 1 else "time"
         data_split = split_data(scan.recordings, split, 0)
-        fingers = gather_samples(recordings, scan, setting, data_split)
-        data = TrainingData(scan, data_split, fingers)
-        own = fingers["*"]
+        plan = SamplesPlan(scan, setting, data_split, only_stable=True)
+        data = TrainingData(scan, data_split, gather_samples(recordings, plan))
+        own = data.fingers["*"]
         for size in sizes:
             held = set(range(size, len(recordings)))
             if own.without(held).one_class:

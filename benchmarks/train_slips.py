@@ -40,17 +40,18 @@ from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
 from holdfast.model import Head, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
-from holdfast.training.dataset_scan import scan_dataset, show_nothing
+from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.setting import Setting
+from holdfast.training.slip_samples import SlipSamples
 from holdfast.training.slips import (
-    SlipSamples,
     choose_slip_threshold,
-    gather_slip_samples,
+    fit_slips,
+    fit_speed,
     with_slip_threshold,
 )
 from holdfast.training.splits import split_data
-from holdfast.training.training_samples import SamplesPlan
+from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 N_FOLDS = 5
 
@@ -66,7 +67,7 @@ def main(options: argparse.Namespace) -> None:
         features = tuple(x for x in SLIP_FEATURES if not any(text in str(x) for text in left_out))
     recordings = [recording for folder in options.folders for recording in named(folder)]
     plan = plan_of(model, recordings, features)
-    samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
+    samples = gather_samples(recordings, plan, engine).slip["*"]
     if model.finger("*").normalised:
         samples = normalised_samples(model, samples, recordings, options.normalised_by)
     print(f"{len(recordings)} recordings, {samples.own.samples.stable.sum()} sliding samples")
@@ -97,8 +98,8 @@ def add_speed(model: Model, options: argparse.Namespace, engine: Engine) -> None
         raise SystemExit(f"{options.model} has no slip rule; one expected, whose features it uses")
     recordings = [recording for folder in options.folders for recording in named(folder)]
     plan = plan_of(model, recordings, part.slip.features)
-    samples = gather_slip_samples(recordings, plan, engine, show_nothing)["*"]
-    heads = samples.fit_speed([], part.slip.features)
+    samples = gather_samples(recordings, plan, engine).slip["*"]
+    heads = fit_speed(samples, [], part.slip.features)
     if samples.speeds is None or not heads:
         raise SystemExit(
             f"too few samples whose true speed is known in {len(recordings)} recordings"
@@ -125,7 +126,8 @@ def plan_of(
         split="recording" if relative else "object", hold=model.debounce.hold,
     )  # fmt: skip
     scan = scan_dataset(recordings, model.rate, relative=relative)
-    return SamplesPlan(scan, setting, split_data(scan.recordings, setting.split, 0))
+    data_split = split_data(scan.recordings, setting.split, 0)
+    return SamplesPlan(scan, setting, data_split, setting.features)
 
 
 def folds_of_recordings(plan: SamplesPlan, recordings: Sequence[Recording]) -> np.ndarray:
@@ -160,7 +162,7 @@ def fitted(
 
     Of a model of normalised features, mean and scale of the rule of slips are default handling.
     """
-    heads, part = samples.fit(held, features, squares=squares), model.finger("*")
+    heads, part = fit_slips(samples, held, features, squares=squares), model.finger("*")
     if not heads or not part.normalised:
         return heads
     slip, *others = heads

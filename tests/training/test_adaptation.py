@@ -7,7 +7,7 @@ import pytest
 from holdfast.classifiers import Linear, Samples
 from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
 from holdfast.training.adaptation import Adaptation, choose_adaptation, choose_nearest
-from holdfast.training.training_samples import FingerSamples
+from holdfast.training.finger_samples import FingerSamples
 
 RIGHT = Linear((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), ((2.0, -1.0, 0.0),), (0.5,))
 

@@ -11,7 +11,7 @@ from holdfast.parallel import Engine
 from holdfast.training import Setting, evaluate, train, trainer
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.splits import split_data
-from holdfast.training.training_samples import gather_samples
+from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 from .build import tiny_recording
 
@@ -65,9 +65,9 @@ def test_samples_do_not_depend_on_the_engine(folder, cluster, max_samples):
     recordings = load_dataset(folder)
     setting = replace(QUICK, max_samples=max_samples)
     scan = scan_dataset(recordings)
-    split = split_data(scan.recordings, "recording", 0)
-    alone = gather_samples(recordings, scan, setting, split)
-    assert_same(alone, gather_samples(recordings, scan, setting, split, cluster))
+    plan = SamplesPlan(scan, setting, split_data(scan.recordings, "recording", 0))
+    alone = gather_samples(recordings, plan).stable
+    assert_same(alone, gather_samples(recordings, plan, cluster).stable)
     kept = {len(own.units) for own in alone.values()}
     assert all(n <= max_samples for n in kept)
     used = np.unique(alone["thumb"].recordings)

@@ -99,5 +99,5 @@ def test_a_tuned_model_keeps_all_heads(model, changed, seeds, tuned):
     found = tuned(model, data)
     assert heads_of(found, changed) == heads_of(model, changed)
     before, after = (m.fingers[ANY_FINGER].head(changed) for m in (model, found))
-    assert after.choice.recordings == {made.name: made.digest for made in data}
+    assert after.choice.recordings == {made.name: made.readings_digest for made in data}
     assert replace(after, threshold=before.threshold, choice=before.choice) == before

@@ -14,7 +14,7 @@ from holdfast.training import Setting, train
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.model_fit import fit_recordings
 from holdfast.training.splits import split_data
-from holdfast.training.training_samples import gather_samples
+from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 from .build import TINY, tiny_module, tiny_recording
 
@@ -36,7 +36,8 @@ def mixed():
 
 def samples_of(recordings, setting=SETTING):
     scan = scan_dataset(recordings, relative=True)
-    return gather_samples(recordings, scan, setting, split_data(scan.recordings, "time", 0))
+    plan = SamplesPlan(scan, setting, split_data(scan.recordings, "time", 0))
+    return gather_samples(recordings, plan).stable
 
 
 def test_the_model_is_for_any_sensor_rate_and_finger(mixed):

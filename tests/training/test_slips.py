@@ -19,17 +19,18 @@ from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTrut
 from holdfast.model import Model
 from holdfast.training import Setting, compute_decisions, train
 from holdfast.training.evaluation import combine_decisions
+from holdfast.training.finger_samples import FingerSamples
+from holdfast.training.slip_samples import SlipSamples
 from holdfast.training.slips import (
     MIN_SLIDING_SAMPLES,
     SLIP_FALSE_ALARMS,
     SLIP_HOLD,
     SLIP_SMOOTHING,
-    SlipSamples,
     choose_slip_threshold,
+    fit_slips,
     tune_slips,
     with_slip_threshold,
 )
-from holdfast.training.training_samples import FingerSamples
 
 from .build import TINY, sliding_recording, tiny_recording
 
@@ -140,8 +141,7 @@ class TestTraining:
         features[0, 1] = 40.0  # more than five standard deviations
         slides = rng.random(4000) < 1 / (1 + np.exp(3 - np.abs(features[:, 0] - 3.0)))
         own = finger_samples(features, slides)
-        gathered = SlipSamples(own, int(np.count_nonzero(~slides)))
-        (head,) = gathered.fit((), FEATURES[:2], squares=True)
+        (head,) = fit_slips(SlipSamples(own), (), FEATURES[:2], squares=True)
         deviation = (features - features.mean(axis=0)) / features.std(axis=0)
         squares = np.minimum(np.abs(deviation), 5.0) ** 2
         rows = Samples(np.hstack([deviation, squares]), slides, np.zeros(4000, dtype=np.int64))

@@ -224,9 +224,8 @@ def test_the_contact_threshold_of_a_fold_leaves_out_its_recordings(grasps):
     calm = [tiny_recording(seed, ("thumb",)) for seed in range(1, 4)]
     found = scan_dataset([noisy, *calm])
     data_split = split_data(found.recordings, "recording", 0)
-    data = trainer.TrainingData(
-        found, data_split, trainer.gather_samples([noisy, *calm], found, SETTING, data_split)
-    )
+    plan = trainer.SamplesPlan(found, SETTING, data_split)
+    data = trainer.TrainingData(found, data_split, trainer.gather_samples([noisy, *calm], plan))
     parameters = {"thumb": recipe("logreg").reference}
     thresholds = [
         fit_model(data, SETTING, parameters, {unit}).fingers["thumb"].contact_threshold

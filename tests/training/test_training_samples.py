@@ -15,8 +15,9 @@ from holdfast.model import ANY_FINGER
 from holdfast.recordings import Recording
 from holdfast.training import Setting
 from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.splits import split_data
-from holdfast.training.training_samples import gather_samples, thin, thinning_step
+from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 from .build import TINY, tiny_module, tiny_recording
 
@@ -25,9 +26,8 @@ SETTING = Setting(window=6, features=parse_features("F_a,F_x,F_y,F_z,m,sigma", 6
 
 def finger_samples(recordings, setting=SETTING, split="recording"):
     found = scan_dataset(recordings)
-    return gather_samples(
-        recordings, found, setting, split_data(found.recordings, split, setting.seed)
-    )
+    plan = SamplesPlan(found, setting, split_data(found.recordings, split, setting.seed))
+    return gather_samples(recordings, plan).stable
 
 
 def test_rows_are_the_features_of_the_labelled_samples(grasps):
