@@ -118,12 +118,20 @@ def test_a_false_alarm_has_the_label_at_its_time():
     found = match(labels, states)
     assert [alarm.label for alarm in found.false_alarms] == [
         *[ContactState.STABLE] * 2,
-        *[ContactState.UNKNOWN] * 2,
         *[ContactState.NO_CONTACT] * 2,
     ]
     metrics = pool_events([found])
-    assert metrics.false_alarms == {"UNKNOWN": 2, "NO_CONTACT": 2, "UNSTABLE": 0, "STABLE": 2}
-    assert metrics.false_alarms_per_minute == pytest.approx(6 / (0.1 / 60))
+    assert metrics.false_alarms == {"NO_CONTACT": 2, "UNSTABLE": 0, "STABLE": 2}
+    assert metrics.unlabelled_alarms == found.n_unlabelled == 2
+    assert metrics.false_alarms_per_minute == pytest.approx(4 / (0.1 / 60))
+
+
+def test_what_is_not_labelled_has_no_false_alarm():
+    """The release of a hand whose quiet hold alone is labelled."""
+    labels, states = codes((S, 100), (U, 100)), codes((S, 120), (N, 30), (S, 30), (N, 20))
+    metrics = event_metrics(np.arange(200) / 100, labels, states)
+    assert metrics.false_alarms_per_minute == 0
+    assert metrics.unlabelled_alarms == 2
 
 
 def test_an_alarm_in_two_windows_belongs_to_the_later_event():

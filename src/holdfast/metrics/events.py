@@ -13,7 +13,15 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE, ContactState
+from holdfast.contact import (
+    LABEL_STATES,
+    NO_CONTACT,
+    STABLE,
+    TIME_TOLERANCE,
+    UNKNOWN,
+    UNSTABLE,
+    ContactState,
+)
 from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
@@ -59,11 +67,11 @@ class InstabilityEvent(NamedTuple):
 
 
 class FalseAlarm(NamedTuple):
-    """An alarm that belongs to no event.
+    """An alarm in labelled time that belongs to no event.
 
     Attributes:
         time: of the alarm [s].
-        label: labelled state at that time; UNKNOWN without a label.
+        label: labelled state at that time.
     """
 
     time: float
@@ -79,12 +87,14 @@ class AlarmMatch:
         false_alarms: in order of time.
         stable_seconds: duration of stable labels [s].
         onsets: where the labels come from in which the events were found.
+        n_unlabelled: number of other alarms, where nothing is labelled: neither true nor false.
     """
 
     events: tuple[InstabilityEvent, ...]
     false_alarms: tuple[FalseAlarm, ...]
     stable_seconds: float
     onsets: Onsets = "labels"
+    n_unlabelled: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +106,14 @@ class EventCounts:
         false_alarms: number of false alarms by labelled state.
         stable_seconds: duration of stable labels [s].
         onsets: where the onsets come from; empty without recordings.
+        n_unlabelled: number of alarms where nothing is labelled.
     """
 
     delays: Array
     false_alarms: Mapping[ContactState, int]
     stable_seconds: float
     onsets: frozenset[Onsets]
+    n_unlabelled: int
 
     @classmethod
     def of(cls, match: AlarmMatch) -> Self:
@@ -109,9 +121,10 @@ class EventCounts:
         labels = [alarm.label for alarm in match.false_alarms]
         return cls(
             event_delays([match]),
-            {state: labels.count(state) for state in ContactState},
+            {state: labels.count(state) for state in LABEL_STATES},
             match.stable_seconds,
             frozenset({match.onsets}),
+            match.n_unlabelled,
         )
 
     @classmethod
@@ -119,9 +132,10 @@ class EventCounts:
         """Return the counts of all parts together."""
         return cls(
             np.sort(np.concatenate([np.empty(0), *(part.delays for part in parts)])),
-            {state: sum(part.false_alarms[state] for part in parts) for state in ContactState},
+            {state: sum(part.false_alarms[state] for part in parts) for state in LABEL_STATES},
             sum(part.stable_seconds for part in parts),
             frozenset[Onsets]().union(*(part.onsets for part in parts)),
+            sum(part.n_unlabelled for part in parts),
         )
 
     @property
@@ -146,9 +160,10 @@ class EventMetrics(msgspec.Struct, frozen=True):
             infinite [s]. None if it is infinite, or without events.
         delay_p95: 95th percentile of the same.
         false_alarms_per_minute: per minute of stable label; None without stable labels.
-        false_alarms: number of false alarms by labelled state; UNKNOWN without a label.
+        false_alarms: number of false alarms by labelled state.
         onsets: `truth` where the recordings have it, else `labels`; `mixed` if some have it;
             `rule` if a rule made labels of one.
+        unlabelled_alarms: number of alarms where nothing is labelled: neither true nor false.
     """
 
     n_events: int
@@ -159,6 +174,7 @@ class EventMetrics(msgspec.Struct, frozen=True):
     false_alarms_per_minute: float | None
     false_alarms: dict[str, int]
     onsets: Onsets = "labels"
+    unlabelled_alarms: int = 0
 
 
 def event_metrics(
@@ -198,7 +214,8 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
         onset - 0.02 s <= alarm <= end + 0.25 s
 
     If there are two, it belongs to the one with the later onset. The first alarm of an event
-    counts; its other alarms are ignored. An alarm that belongs to no event is a false alarm.
+    counts; its other alarms are ignored. An alarm that belongs to no event is a false alarm; where
+    nothing is labelled it is neither true nor false, and counted apart.
 
     Args:
         times: (n,) strictly increasing [s].
@@ -224,11 +241,13 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     onsets, ends = _events(_spans(_not_stable(label), time), stable)
     alarms = alarm_places(state)
     event_of = _event_of_alarms(time[alarms], onsets, ends)
-    false = alarms[event_of < 0]
+    others = alarms[event_of < 0]
+    false = others[label[others] != UNKNOWN]
     return AlarmMatch(
         _with_alarms(onsets, ends, time[alarms], event_of),
         tuple(FalseAlarm(float(time[k]), _STATES[label[k]]) for k in false),
         float((stable[:, 1] - stable[:, 0]).sum()),
+        n_unlabelled=len(others) - len(false),
     )
 
 
@@ -281,6 +300,7 @@ def event_metrics_of(counts: EventCounts) -> EventMetrics:
         false_alarms_per_minute=counts.n_false / minutes if minutes else None,
         false_alarms={str(state): n for state, n in counts.false_alarms.items()},
         onsets=common_onsets(counts.onsets),
+        unlabelled_alarms=counts.n_unlabelled,
     )
 
 
