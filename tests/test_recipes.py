@@ -192,8 +192,8 @@ def test_add_a_classifier(copy_of, tmp_path, name, kind, text):
         *VERB, "train", data, "-o", model, "--classifier", name, "--trials", "0",
         "--shared", "--jobs", "1",
     )  # fmt: skip
-    written = json.loads(model.read_text())["fingers"]["*"]["classifier"]
-    assert written["type"] == ("onnx" if kind == "Sphere" else "linear")
+    written = json.loads(model.read_text())["fingers"]["*"]["heads"][0]
+    assert written["rule"]["type"] == ("onnx" if kind == "Sphere" else "linear")
     program = (
         "import sys; from holdfast import Model, detect, load_recording\n"
         "print(len(detect(Model.load(sys.argv[1]), load_recording(sys.argv[2])).times))"

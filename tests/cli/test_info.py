@@ -256,11 +256,9 @@ def test_all_heads_of_a_model_are_shown(capsys):
         assert len(head["features"]) == n
         assert f"{head['name']}: linear, {n} features; " in out
     assert f" features {', '.join(stable['features'][:3])}, ..." in out
+    own = r"of them new relative\(second_all\[0\.0067 s\]\), "
     for name in ("slip", "slip_speed"):
-        assert re.search(
-            rf" {name}: linear, 39 features; [^:]* of them new relative\(second_all\[0.0067 s\]\)",
-            out,
-        )
+        assert re.search(f" {name}: linear, 39 features; [^:]* {own}", out)
     assert f"STABLE from a probability of {stable['threshold']:.3g} on" in out
     assert f"slides from a probability of {slip['threshold']:.3g} on; smoothing 0.02 s, hold" in out
     assert f"speed and distance of slips, up to {speed['highest']:.3g} mm/s" in out

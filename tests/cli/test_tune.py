@@ -1,4 +1,5 @@
 import json
+import re
 
 import pytest
 
@@ -122,7 +123,8 @@ def test_info_of_built_in_models(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     code, printed, _ = run(capsys, "info", "builtin:any")
     assert code == 0
-    assert "sensor any; linear, " in printed
+    assert "sensor any; contact from " in printed
+    assert " stable: linear, 31 features; STABLE from " in printed
     assert "tuned on    nothing" in printed
     assert all(len(line) <= 80 for line in printed.splitlines())
     code, printed, _ = run(capsys, "info", "builtin:noise-floor")
@@ -188,15 +190,15 @@ def test_json_and_info_of_slips(capsys, sliding, tmp_path):
     assert report["chosen"]["false_alarms_per_minute"]["held"] <= 5
     chosen = next(p for p in report["around"] if p["threshold"] == report["threshold"])
     assert chosen == {"threshold": report["threshold"], **report["chosen"]}
-    rule = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["thumb"]["slip"]
+    rule = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["thumb"]["heads"]["slip"]
     assert rule["threshold"] == report["threshold"]
-    assert rule["chosen_on"]["recordings"] == [f"slips-{seed}" for seed in range(20, 24)]
+    assert rule["choice"]["recordings"] == [f"slips-{seed}" for seed in range(20, 24)]
     text = " ".join(run(capsys, "info", out)[1].split())
     assert f"slides from a probability of {rule['threshold']:.3g} on" in text
-    assert "threshold of slips from 4 recordings (slips-20, " in text
-    assert "tuned on 4 recordings (slips-20, slips-21, slips-22, ...) for slips, see above" in text
+    assert "threshold from 4 recordings (slips-20, " in text
+    assert "tuned on 4 recordings (slips-20, slips-21, slips-22, ...) for slip, see above" in text
     text = " ".join(run(capsys, "info", sliding / "model.json")[1].split())
-    assert "threshold of slips from the training, out of fold: " in text
+    assert "threshold from the training, out of fold: " in text
     assert text.endswith("tuned on nothing")
     assert "no slip rule" in run(capsys, "info", "builtin:noise-floor")[1]
 
@@ -209,8 +211,15 @@ def test_info_of_a_model_that_is_tuned_for_both(capsys, sliding, tmp_path):
     place = next(k for k, line in enumerate(lines) if line.startswith("tuned on "))
     text = " ".join(" ".join(lines[place:]).split())
     assert text.startswith("tuned on 4 recordings (slips-20, ")
-    assert "false alarms a minute" in text
-    assert text.endswith(") for slips, see above")
+    assert ") for stable, see above 4 recordings (slips-20, " in text
+    assert text.endswith(") for slip, see above")
+    above = " ".join(" ".join(lines[:place]).split())
+    for head, wanted in (("stable", "1000 wanted"), ("slip", "5 wanted")):
+        assert re.search(
+            rf" {head}: [^:]* threshold from 4 recordings \(slips-20, [^:]*: \S+ false alarms a "
+            rf"minute \(at most {wanted}\)",
+            above,
+        )
 
 
 def refused(capsys, model, data, out, rate="1"):

@@ -165,7 +165,7 @@ def test_states_continue_without_a_new_warm_up():
     assert found == pytest.approx([expected[e.time] for e in after], abs=1e-3)
     known = [e for e in hand.estimates if 3.0 < e.time < 40.0]
     assert all(e.fingers["thumb"].state is not ContactState.UNKNOWN for e in known)
-    thresholds = {hand.stream.model.fingers["*"].handling["pad"].threshold}
+    thresholds = {hand.stream.model.fingers["*"].handling["pad"].thresholds["stable"]}
     assert set(hand.stream.thresholds.values()) == thresholds != {0.95}
 
 

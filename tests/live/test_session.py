@@ -130,7 +130,7 @@ def test_the_threshold_is_changed_in_the_session(start):
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, 0.9)
     wait_for(lambda: session.n_packets >= 200)
     session.set_threshold(None)
-    own = build.model().finger("thumb").classifier.threshold
+    own = build.model().finger("thumb").stable.threshold
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
     with pytest.raises(ValueError, match=r"^a threshold from 0 to 1 expected, 2 given$"):
         session.set_threshold(2)

@@ -34,6 +34,9 @@ SQUARES = ((0.0, 0.0, 0.0),)
 @pytest.mark.parametrize(
     ("head", "changes", "message"),
     [
+        (STABLE, {"name": "rolls"},
+         "a head of stable, slip, slip_speed, cause expected, rolls given"),
+        (STABLE, {"link": "probit"}, "stable: the link logit expected, probit given"),
         (STABLE, {"link": "square"}, "stable: the link logit expected, square given"),
         (SLIP, {"link": "softmax"}, "slip: the link logit expected, softmax given"),
         (SPEED, {"link": "logit"}, "slip_speed: the link square expected, logit given"),

@@ -107,9 +107,19 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield finger, f"sensor {sensor}; {_contact(part)}"
         known = part["heads"]["stable"]["features"]
         heads = (line for head in part["heads"].values() for line in _head_lines(head, known))
-        yield from (("", line) for line in (*heads, *_handling_lines(part)))
+        yield from (("", line) for line in heads)
+        if "slip" not in part["heads"]:
+            yield "", "no slip rule"
+        yield from (("", line) for line in _handling_lines(part))
     training = document["training"]
     yield "trained on", "nothing" if training is None else _trained(training)
+    tuned = dict.fromkeys(
+        f"{len(names)} recordings ({_few(names)}) for {head['name']}, see above"
+        for part in document["fingers"].values()
+        for head in part["heads"].values()
+        if head["choice"] is not None and (names := head["choice"]["recordings"])
+    )
+    yield from zip(("tuned on", *[""] * len(tuned)), tuned or ["nothing"], strict=False)
 
 
 def _contact(part: dict[str, Any]) -> str:

@@ -106,6 +106,8 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     choice: Choice | None = None
 
     def __post_init__(self) -> None:
+        if self.name not in LINKS:
+            raise ModelError(f"a head of {', '.join(LINKS)} expected, {self.name} given")
         if self.link != LINKS[self.name]:
             raise ModelError(
                 f"{self.name}: the link {LINKS[self.name]} expected, {self.link} given"

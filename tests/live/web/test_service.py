@@ -452,7 +452,7 @@ def test_an_invalid_threshold_is_refused(body):
     status, answer, thresholds = run(work())
     assert status == 400
     assert answer["error"].startswith("/api/v1/threshold: ")
-    assert set(thresholds.values()) == {build.model().finger("thumb").classifier.threshold}
+    assert set(thresholds.values()) == {build.model().finger("thumb").stable.threshold}
 
 
 def test_a_fault_that_lasts_is_a_problem_and_a_notice():
