@@ -260,5 +260,5 @@ def _without(which, taxel):
     return type(which)(
         which.name, np.delete(which.positions, taxel, axis=0),
         np.delete(which.rotations, taxel, axis=0), which.normal, which.rate, which.unit,
-        which.limits,
+        which.range,
     )  # fmt: skip
