@@ -178,7 +178,8 @@ def test_the_range_of_a_sensor_is_kept(make_recording, tmp_path, monkeypatch, su
 
     recording, path = make_recording(), tmp_path / f"a.{suffix}"
     if older:
-        monkeypatch.setattr(f"holdfast.io.{WRITER_OF[suffix]}.encode_header", encode)
+        module = "parquet" if suffix == "parquet" else "mcap_writer"
+        monkeypatch.setattr(f"holdfast.io.{module}.encode_header", encode)
     save_recording(recording, path)
     again = load_recording(path)
     ranges = [{n: m.sensor.range for n, m in x.modules.items()} for x in (recording, again)]
