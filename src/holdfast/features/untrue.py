@@ -136,8 +136,7 @@ def follow_ring(
     if period > 0:
         if sums[f, np.uint64((n - period) & LAST_SUM)] == total:
             return _has_repeated(counts, sums, rings, readings, f, first, last)
-        counts[f, at.RING_PERIOD] = 0
-        return False
+        counts[f, at.RING_PERIOD] = 0  # equal by chance, or at an end
     for lag in range(MIN_PERIOD + n % 3, MAX_PERIOD + 1, 3):
         if sums[f, np.uint64((n - lag) & LAST_SUM)] == total:
             _begin_ring(counts, sums, rings, readings, f, first, last, lag)
