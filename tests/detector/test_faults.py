@@ -564,6 +564,8 @@ def ailing(draw, n=700):
     ways = st.sampled_from(["still", "noise", "step", "zero", "limit", "beyond", "nan", *UNTRUE])
     for way in draw(st.lists(ways, max_size=4)):
         taxel, start = draw(st.integers(0, 5)), draw(st.sampled_from([0, 60, 250, 400]))
+        if "ring" in way and level < 3.0:
+            continue  # sums that are equal by chance delay it by some samples
         if way in UNTRUE:
             part = values[start : start + draw(st.sampled_from([5, 100, 250]))]
             part[:] = UNTRUE[way](part)

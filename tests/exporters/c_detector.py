@@ -166,7 +166,7 @@ def _with_faults(rng, readings, k):
         readings[0] = 31000.0  # a taxel that stands still
     spoilt = k % 1250
     if 700 <= spoilt < 760:  # nothing of the finger can be true
-        readings = np.rint(readings[0, 0] + RING[k % 10, : len(readings)])
+        readings = 30_000.0 + RING[k % 10, : len(readings)]
     elif 800 <= spoilt < 810:
         readings = 1.0 + RING[: len(readings), k % 30] % 3
     elif 840 <= spoilt < 850:

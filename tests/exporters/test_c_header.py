@@ -279,6 +279,7 @@ def uses_of(names, monkeypatch):
     header_of(*made("rich"), in_contact=True)
     header_of(*made("any-two-sensors"), in_contact=True)
     header_of(*made("noise-floor"), ignore={"pad": [3]})
+    header_of(paper(tare="none"), HAND, 150.0)
     header_of(rich(slips=("thumb",), speeds=("thumb",)), *made("rich")[1:])  # fingers differ
     monkeypatch.setattr(Program, "use", plain)
     return uses

@@ -29,8 +29,8 @@ than 23 %."""
 OFFSET_SHARE = 0.25
 """Share of the range by which the mean of all readings cannot change. A uSkin that is pressed with
 the full range of every taxel changes by 7 %; real recordings had 0.5 %."""
-MIN_PERIOD, MAX_PERIOD = 3, 64
-"""Periods of a ring [samples]."""
+MIN_PERIOD, LONG_PERIOD, MAX_PERIOD = 3, 12, 64
+"""Periods of a ring: the shortest, the first of the long ones, the longest [samples]."""
 MIN_VARYING = 12
 """Number of readings of a finger that change in a ring: few may repeat by chance."""
 N_SUMS = 128
@@ -128,8 +128,8 @@ def follow_ring(
         last: one past its last taxel.
         total: weighted sum of its readings.
     """
-    # S(k) = S(k - p) for the last 2 p samples k. Each sample tries a third of the periods: so the
-    # ring is found within 3 samples, and then followed for a period before 2 p samples have passed.
+    # S(k) = S(k - p) for the last 2 p samples k. Each sample tries a third of the short periods and
+    # a ninth of the others: a ring is found so early that it is followed for a period by then.
     n, period = counts[f, at.N_FRAMES], counts[f, at.RING_PERIOD]
     counts[f, at.N_FRAMES] = n + 1
     sums[f, np.uint64(n & LAST_SUM)] = total
@@ -137,11 +137,21 @@ def follow_ring(
         if sums[f, np.uint64((n - period) & LAST_SUM)] == total:
             return _has_repeated(counts, sums, rings, readings, f, first, last)
         counts[f, at.RING_PERIOD] = 0  # equal by chance, or at an end
-    for lag in range(MIN_PERIOD + n % 3, MAX_PERIOD + 1, 3):
-        if sums[f, np.uint64((n - lag) & LAST_SUM)] == total:
-            _begin_ring(counts, sums, rings, readings, f, first, last, lag)
-            break
+    found = _equal_lag(sums, f, n, total, MIN_PERIOD + n % 3, LONG_PERIOD, 3)
+    if found == 0:
+        found = _equal_lag(sums, f, n, total, LONG_PERIOD + n % 9, MAX_PERIOD + 1, 9)
+    if found > 0:
+        _begin_ring(counts, sums, rings, readings, f, first, last, found)
     return False
+
+
+@joined_step
+def _equal_lag(sums: Array, f: int, n: int, total: float, begin: int, end: int, step: int) -> int:
+    """Return the first lag of a range at which the sum of the readings was the same; else 0."""
+    for lag in range(begin, end, step):
+        if sums[f, np.uint64((n - lag) & LAST_SUM)] == total:
+            return lag
+    return 0
 
 
 @compiled_step
