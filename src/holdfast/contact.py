@@ -68,8 +68,8 @@ class Reason(_Coded):
 class Fault(_Coded):
     """Fault of a finger. Bit i of a fault mask is position i in this list: `Fault(i)`.
 
-    The detector finds the faults up to TARE_DRIFT in the readings. A source reports the others,
-    which concern the arrival of samples.
+    The detector finds the faults up to TARE_DRIFT, and those from OFFSET on, in the readings. A
+    source reports the others, which concern the arrival of samples.
     """
 
     NOT_FINITE = "not_finite"
@@ -85,10 +85,8 @@ class Fault(_Coded):
     LATE = "late"
     CLOCK_JUMP = "clock_jump"
     RATE = "rate"
-
-
-SIGNAL_FAULTS = tuple(Fault)[:8]
-"""Faults that the detector finds in the readings."""
+    OFFSET = "offset"
+    REPEATED = "repeated"
 
 
 class Cause(_Coded):

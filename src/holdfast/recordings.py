@@ -106,8 +106,8 @@ class Tactile:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
         unit = self.unit or self.sensor.unit
-        if unit != self.sensor.unit:  # calibrated: the limits are those of raw readings
-            object.__setattr__(self, "sensor", replace(self.sensor, unit=unit, limits=None))
+        if unit != self.sensor.unit:  # calibrated: the range is that of raw readings
+            object.__setattr__(self, "sensor", replace(self.sensor, unit=unit, range=None))
         object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "labels", labels)
         if labels:

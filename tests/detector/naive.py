@@ -11,7 +11,7 @@ NAN = math.nan
 
 ORDER = (
     "not_finite", "stuck", "saturated", "tare_loaded", "dead", "noisy", "out_of_range",
-    "tare_drift",
+    "tare_drift", "offset", "repeated",
 )  # fmt: skip
 
 
@@ -106,7 +106,7 @@ class Mask:
 
     def note_saturated(self, readings):
         samples, sensor = self.finger.samples, self.finger.sensor
-        low, high = sensor.limits or (-math.inf, math.inf)
+        low, high = sensor.range or (-math.inf, math.inf)
         for i in set(self.finger.used) - self.taxels:
             at_limit = ((readings[i] <= low) | (readings[i] >= high)).any()
             if at_limit and len(readings) <= 63:
@@ -180,6 +180,7 @@ class Finger:
         self.kind, self.seconds = tare.kind, tare.seconds
         self.longest = max([window, *(spec.window for spec in part.features)])
         self.samples = []  # every finite sample: (time, readings)
+        self.frames, self.rest_readings = [], None
         self.stretch = []  # forces since the last interruption
         self.last = None
         self.gapped = False
@@ -216,7 +217,7 @@ class Finger:
         fresh = self.last is not None and time - self.last > 3.0003 * self.period
         self.last = time
         self.force, self.sigma = (NAN, NAN, NAN), NAN
-        low, high = self.sensor.limits or (-math.inf, math.inf)
+        low, high = self.sensor.range or (-math.inf, math.inf)
         faults, invalid = set(self.lost_faults), set(self.lost)
         for i in self.lost:
             readings[i] = 0.0 if low < 0 < high else (low + high) / 2
@@ -241,6 +242,8 @@ class Finger:
                     self.mask.unweighed |= masked
             if not enough:
                 return self.refuse(faults, invalid)
+        if untrue := self.untrue(readings):
+            return self.refuse(faults | untrue, invalid)
         self.n_refused = self.n_refused * (self.baseline is not None)
         if self.samples:
             changed = (self.samples[-1][1] != readings).any()
@@ -259,6 +262,42 @@ class Finger:
             self.faults = tuple(fault for fault in ORDER if fault in faults)
             return None
         return self.process_force(readings, faults, invalid, time, was_tared)
+
+    def untrue(self, readings):
+        """Faults of a finger whose readings are valid and cannot be true."""
+        low, high = self.sensor.range or (-math.inf, math.inf)
+        used, size, faults = readings[self.used], high - low, set()
+        self.frames = [*self.frames[-191:], used]
+        if any(self.is_ring(self.frames[-3 * p :], p) for p in range(3, 65)):
+            faults.add("repeated")
+        if math.isfinite(size):
+            near = (used < low + 0.01 * size) | (used > high - 0.01 * size)
+            if 2 * near.any(axis=1).sum() > len(used):
+                faults.add("saturated")
+        if self.baseline is not None:
+            if self.rest_readings is None:
+                self.rest_readings = used if self.kind == "none" else self.baseline[self.used]
+            weights = np.array([1, math.sqrt(2) / 1.5, math.sqrt(3) / 1.6])
+            left = ((used - self.rest_readings) * weights).sum() / (len(used) * weights.sum())
+            if abs(left) > 0.25 * size:
+                faults.add("offset")
+        if 0 < np.abs(used).max() < 1e-37:
+            faults.add("out_of_range")
+        return faults
+
+    @staticmethod
+    def is_ring(frames, p):
+        """Whether frames are three times the same p, of which three and 12 numbers differ.
+
+        Sums of whole counts are exact; those of different frames are rarely the same.
+        """
+        if len(frames) < 3 * p or (frames[-1] != frames[-1 - p]).any():
+            return False
+        sums = [tuple(frame.sum(axis=0)) for frame in frames]
+        same = sums[:-p] == sums[p:]
+        ring = np.array(frames[-p:])
+        n_varying = (ring != ring[0]).any(axis=0).sum()
+        return same and n_varying >= 12 and len({frame.tobytes() for frame in ring}) >= 3
 
     def lose(self, faults, taxels):
         """Leave out taxels for good that have no valid reading in the tare for half a second."""
@@ -304,7 +343,7 @@ class Finger:
         self.n_news += 1
         for i, taxel in self.taxels.items():
             taxel.watch(before[i], now[i], self.n_news, fresh, len(self.samples), 0.5 / self.period)
-        low, high = self.sensor.limits or (-math.inf, math.inf)
+        low, high = self.sensor.range or (-math.inf, math.inf)
         suspects = {
             i for i, taxel in self.taxels.items() if taxel.suspect(self.n_news, self.period)
         }
@@ -368,7 +407,7 @@ class Finger:
 
     def find_faults(self, readings):
         faults, taxels = set(self.wrong), set(self.wrong_taxels)
-        low, high = self.sensor.limits or (-math.inf, math.inf)
+        low, high = self.sensor.range or (-math.inf, math.inf)
         at_limit = {i for i in self.used if ((readings[i] <= low) | (readings[i] >= high)).any()}
         if at_limit:
             faults.add("saturated")

@@ -198,7 +198,7 @@ class TestDebounce:
 
     def test_a_fault_is_reported_when_it_has_lasted(self):
         hand_model = by_force(debounce=Debounce(min_duration=0.03))
-        detector = Detector(hand_model, {"finger1": replace(FLAT, limits=(-500.0, 500.0))}, RATE)
+        detector = Detector(hand_model, {"finger1": replace(FLAT, range=(-500.0, 500.0))}, RATE)
         readings = np.zeros((30, 1, 3))
         readings[:, 0, 0] = 150.0 + np.arange(30) % 2
         readings[[10, 11], 0, 1] = 500.0

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.contact import ContactState, Fault, Reason
+from holdfast.contact import STABLE, ContactState, Fault, Reason
 from holdfast.detector import Detector, detect
 from holdfast.features import Tare
 from holdfast.model import ANY_FINGER, Model
-from holdfast.recordings import Tactile
+from holdfast.recordings import Recording, Tactile
+from holdfast.synthetic import synthetic_recording
 
 from . import naive
 from .build import RATE, feed, finger_model, lively, model, recording, runs, sensor, tactile
@@ -144,6 +145,103 @@ def estimates_of(values, which=TIP, **options):
 
 def told_faults(values, which=TIP, **options):
     return runs(estimates_of(values, which, **options), lambda e: (e.faults, e.faulty_taxels))
+
+
+def ring(period):
+    """Return a function that repeats the first samples."""
+    return lambda values: values[np.arange(len(values)) % period]
+
+
+UNTRUE = {
+    "1 to 3 counts": lambda values: 1.0 + np.arange(values.size).reshape(values.shape) % 3,
+    "near the upper end": lambda values: 65_535.0 - 300.0 - np.abs(values) % 7,
+    "left together": lambda values: values - 20_000.0,
+    "denormal": lambda values: 1e-318 * (1 + np.arange(values.size).reshape(values.shape) % 3),
+    **{f"ring of {period}": ring(period) for period in (3, 10, 64)},
+}
+"""Functions that spoil all samples of a finger."""
+FOUND = {
+    "1 to 3 counts": {Fault.SATURATED, Fault.OFFSET},
+    "near the upper end": {Fault.SATURATED, Fault.OFFSET},
+    "left together": {Fault.OFFSET},
+    "denormal": {Fault.SATURATED, Fault.OUT_OF_RANGE, Fault.OFFSET},
+}
+
+
+class TestUntrue:
+    """Readings that are valid and cannot be true."""
+
+    @pytest.mark.parametrize("tare", ["0.2", "first", "none"])
+    @pytest.mark.parametrize("way", UNTRUE)
+    def test_all_readings_of_a_finger_are_a_fault_until_they_are_true_again(self, way, tare):
+        values, start, end = white(900), 300, 600
+        values[start:end] = UNTRUE[way](values[start:end])
+        estimates = estimates_of(values, tare=tare)
+        delay = 3 * int(way.split()[-1]) - 1 if "ring" in way else 0
+        expected = FOUND.get(way, {Fault.REPEATED})
+        bad = [(e.state, e.reason, set(e.faults)) for e in estimates[start + delay : end]]
+        assert all(x == (UNKNOWN, Reason.FAULT, expected) for x in bad)
+        good = estimates[: start + delay] + estimates[end + 1 :]
+        assert {e.faults for e in good} == {()}
+
+    @pytest.mark.parametrize("name", ["any", "twin", "noise-floor"])
+    @pytest.mark.parametrize("way", UNTRUE)
+    def test_a_held_finger_is_never_stable(self, way, name):
+        made = synthetic_recording("made", 0, ("thumb",))
+        module = made.modules["thumb"]
+        values = np.array(module.readings, dtype=np.float64)
+        start = int(np.argmax(module.times > 4.0))
+        values[start:] = UNTRUE[way](values[start:])
+        spoilt = Recording("made", {"thumb": Tactile(module.sensor, module.times, values)})
+        trace = detect(Model.load(f"builtin:{name}"), spoilt).fingers["thumb"]
+        found = start + 3 * 64 if way == "ring of 64" else start + 30
+        assert (trace.state[start - 50 : start] == STABLE).any()
+        assert set(trace.state[found:]) == {0}
+
+    def test_a_dead_finger_takes_no_tare(self):
+        values = white(900)
+        values[:300] = UNTRUE["1 to 3 counts"](values[:300])
+        detector = Detector(model(("thumb",), which=TIP))
+        estimates = feed(detector, values)
+        assert {e.reason for e in estimates[:300]} == {Reason.FAULT}
+        assert detector.baselines()["thumb"] == pytest.approx(30_000.0, abs=5)
+        assert estimates[-1].faults == ()
+
+    @pytest.mark.parametrize(
+        ("n_varying", "period", "expected"),
+        [(12, 10, True), (11, 10, False), (18, 2, False), (18, 3, True), (18, 64, True),
+         (18, 65, False)],
+    )  # fmt: skip
+    def test_a_ring_has_a_short_period_and_enough_that_changes(self, n_varying, period, expected):
+        values = np.full((400, 18), 30_000.0)
+        values[:, :n_varying] = white(400).reshape(400, 18)[:, :n_varying]
+        values[150:] = ring(period)(values[150:])
+        found = [Fault.REPEATED in e.faults for e in estimates_of(values.reshape(-1, 6, 3))]
+        assert any(found) == expected
+        if expected:
+            assert found.index(True) == 150 + 3 * period - 1
+
+    def test_two_samples_in_turn_in_a_longer_period_are_no_ring(self):
+        values = white(400)
+        values[150:] = values[150]
+        values[150::4] = values[149]
+        assert Fault.REPEATED not in {f for e in estimates_of(values) for f in e.faults}
+
+    def test_samples_that_differ_in_one_number_of_a_period_are_no_ring(self):
+        values = ring(10)(white(400))
+        values[:, 0, 0] += np.arange(400) % 11
+        assert Fault.REPEATED not in {f for e in estimates_of(values) for f in e.faults}
+
+    def test_half_of_the_taxels_near_an_end_are_no_fault_of_the_finger(self):
+        values = white()
+        values[300:, :3, 2] = 65_400.0
+        assert told_faults(values) == [(((), ()), 900)]
+
+    def test_without_a_range_no_reading_is_near_an_end(self):
+        values = white(which=FLAT)
+        values[300:] = UNTRUE["left together"](values[300:])
+        found = {fault for e in estimates_of(values, FLAT) for fault in e.faults}
+        assert found == {Fault.TARE_LOADED}  # as before: all normal readings fall
 
 
 class TestDead:
@@ -463,9 +561,15 @@ def ailing(draw, n=700):
     values += np.rint(rng.normal(scale=30, size=(n, 1, 3)).cumsum(axis=0) * draw(st.booleans()))
     creep = draw(st.sampled_from([0.0, 0.05, 0.2, 1.0]))
     values[:, :, 2] += np.rint(creep * np.arange(n))[:, None]
-    ways = st.sampled_from(["still", "noise", "step", "zero", "limit", "beyond", "nan"])
+    ways = st.sampled_from(["still", "noise", "step", "zero", "limit", "beyond", "nan", *UNTRUE])
     for way in draw(st.lists(ways, max_size=4)):
         taxel, start = draw(st.integers(0, 5)), draw(st.sampled_from([0, 60, 250, 400]))
+        if "ring" in way and level < 3.0:
+            continue  # sums that are equal by chance delay it by some samples
+        if way in UNTRUE:
+            part = values[start : start + draw(st.sampled_from([5, 100, 250]))]
+            part[:] = UNTRUE[way](part)
+            continue
         part = values[start : start + draw(st.sampled_from([1, 5, 100, 700])), taxel]
         if way == "still":
             part[:] = part[0]

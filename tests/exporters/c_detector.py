@@ -15,6 +15,8 @@ from holdfast.exporters.c_header import header_of
 
 WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
 STATES, REASONS, CAUSES = tuple(ContactState), tuple(Reason), (None, *KNOWN_CAUSES)
+RING = np.random.default_rng(1).integers(0, 9, size=(30, 30, 3))
+"""Readings of samples that come again and again."""
 EXACT, SINGLE = 1e-9, 2e-3
 """Tolerance of probabilities of a header of double precision; and of single precision."""
 
@@ -162,6 +164,15 @@ def _with_faults(rng, readings, k):
         readings[taxel, axis] = rng.choice([np.nan, np.inf, -np.inf, 1e9, -1e9, 65535, 0])
     if k % 3000 > 2000:
         readings[0] = 31000.0  # a taxel that stands still
+    spoilt = k % 1250
+    if 700 <= spoilt < 760:  # nothing of the finger can be true
+        readings = 30_000.0 + RING[k % 10, : len(readings)]
+    elif 800 <= spoilt < 810:
+        readings = 1.0 + RING[: len(readings), k % 30] % 3
+    elif 840 <= spoilt < 850:
+        readings = 0.3 * readings
+    elif 880 <= spoilt < 890:
+        readings = 1e-318 * np.ones_like(readings)
     if k % 5000 > 4500:
         readings[-1] += 3000.0 * rng.normal()  # a noisy taxel
     return readings

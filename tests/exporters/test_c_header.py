@@ -25,7 +25,7 @@ from exporters.c_detector import (
 )
 from exporters.models import HAND, MODELS, TIP, built_in, made, paper, rich
 from holdfast.compiled import sums_in_any_order
-from holdfast.contact import ContactState
+from holdfast.contact import ContactState, Fault
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
 from holdfast.exporters import c_functions, header_of
@@ -117,7 +117,8 @@ def test_random_samples_give_the_same(name, tmp_path):
         if hand is not None:
             seen.update(x.state for x in hand.fingers.values())
             seen.update(fault for x in hand.fingers.values() for fault in x.faults)
-    assert {ContactState.UNKNOWN, ContactState.UNSTABLE} <= set(seen) and len(seen) > 5
+    assert {ContactState.UNKNOWN, ContactState.UNSTABLE, Fault.REPEATED} <= set(seen)
+    assert len(seen) > 5 and (Fault.OFFSET in seen) == counts
 
 
 @pytest.mark.parametrize("name", ["paper", "twin", "any"])
@@ -278,6 +279,7 @@ def uses_of(names, monkeypatch):
     header_of(*made("rich"), in_contact=True)
     header_of(*made("any-two-sensors"), in_contact=True)
     header_of(*made("noise-floor"), ignore={"pad": [3]})
+    header_of(paper(tare="none"), HAND, 150.0)
     header_of(rich(slips=("thumb",), speeds=("thumb",)), *made("rich")[1:])  # fingers differ
     monkeypatch.setattr(Program, "use", plain)
     return uses

@@ -190,7 +190,7 @@ def test_do_not_depend_on_the_order_of_the_taxels():
     order = np.random.default_rng(0).permutation(16)
     turned = Sensor(
         "other", given.positions[order], given.rotations[order], given.normal, 100.0,
-        limits=given.limits,
+        range=given.range,
     )  # fmt: skip
     np.testing.assert_allclose(
         features_of(readings[:, order], turned), features_of(readings, given), atol=1e-9

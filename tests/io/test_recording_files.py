@@ -159,12 +159,32 @@ LIES = {
     "n_rows": lambda head: head["truth"].update(n_rows=1 << 62),
     "positions": lambda head: head["modules"]["thumb"]["sensor"].update(positions=[[]]),
     "rate": lambda head: head["modules"]["thumb"]["sensor"].update(rate=10**400),
-    "limits": lambda head: head["modules"]["thumb"]["sensor"].update(limits={"a": 1}),
+    "range": lambda head: head["modules"]["thumb"]["sensor"].update(range={"a": 1}),
     "deep": lambda head: head["metadata"].update(object="DEEP"),
     "deep sensor": lambda head: head["modules"]["thumb"]["sensor"].update(name="DEEP"),
     "label": lambda head: head["modules"]["thumb"]["labels"][0].update(start=5.0),
     "markers": lambda head: head.update(markers=[["a", 1.0]]),
 }
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+@pytest.mark.parametrize("older", [True, False])
+def test_the_range_of_a_sensor_is_kept(make_recording, tmp_path, monkeypatch, suffix, older):
+    def encode(header):
+        head = msgspec.json.decode(encode_header(header))
+        for module in head["modules"].values():
+            module["sensor"]["limits"] = module["sensor"].pop("range")
+        return msgspec.json.encode(head)
+
+    recording, path = make_recording(), tmp_path / f"a.{suffix}"
+    if older:
+        module = "parquet" if suffix == "parquet" else "mcap_writer"
+        monkeypatch.setattr(f"holdfast.io.{module}.encode_header", encode)
+    save_recording(recording, path)
+    again = load_recording(path)
+    ranges = [{n: m.sensor.range for n, m in x.modules.items()} for x in (recording, again)]
+    assert ranges[0] == ranges[1] and any(ranges[0].values())
+    assert again.digest == recording.digest
 
 
 @pytest.mark.parametrize("suffix", ["parquet", "mcap"])

@@ -441,3 +441,11 @@ def test_a_large_file_and_a_pipe_are_refused_at_once(tmp_path):
         file.truncate(1 << 30)
     with pytest.raises(ModelError, match="large: it has more than 16777216 bytes"):
         Model.load(tmp_path / "large")
+
+
+def test_the_ranges_of_an_older_model_are_called_limits(tmp_path):
+    text = encode(Model.load("builtin:twin")).replace(b'"range":[', b'"limits":[')
+    assert b'"limits":[' in text
+    (tmp_path / "older.json").write_bytes(text)
+    older = Model.load(tmp_path / "older.json")
+    assert older.sensors == Model.load("builtin:twin").sensors

@@ -67,8 +67,8 @@ def one_module(indices):
         ({"rate": 0}, "pair: a rate above 0 Hz expected, 0 given"),
         ({"rate": float("inf")}, "pair: a rate above 0 Hz expected, inf given"),
         ({"unit": "V"}, "pair: unit 'count' or 'N' expected, 'V' given"),
-        ({"limits": (1, 0)}, "limits of pair: smallest, largest expected, 1.0, 0.0 given"),
-        ({"limits": (1, 2, 3)}, "limits of pair: shape (2,) expected, (3,) given"),
+        ({"range": (1, 0)}, "range of pair: smallest, largest expected, 1.0, 0.0 given"),
+        ({"range": (1, 2, 3)}, "range of pair: shape (2,) expected, (3,) given"),
     ],
 )
 def test_invalid_fields(fields, message):
@@ -133,7 +133,7 @@ class TestFromJson:
             ({"rate": None}, "float() argument must be"),
             ({"rate": "fast"}, "could not convert string to float"),
             ({"unit": "kg"}, "unit 'count' or 'N' expected, 'kg' given"),
-            ({"limits": [0]}, "limits of pair: shape (2,) expected, (1,) given"),
+            ({"range": [0]}, "range of pair: shape (2,) expected, (1,) given"),
             ({"rotations": [[[1, 0, 0]] * 3] * 2}, "away from a proper rotation"),
         ],
     )
@@ -155,9 +155,17 @@ class TestFromJson:
         with pytest.raises(FileNotFoundError):
             Sensor.from_json(tmp_path / "none.json")
 
-    def test_unit_and_limits_may_be_left_out(self, tmp_path):
-        one = Sensor.from_json(written(tmp_path, unit="absent", limits="absent"))
-        assert (one.unit, one.limits) == ("count", None)
+    def test_the_range_of_an_older_file_is_called_limits(self, tmp_path):
+        one = Sensor.from_json(written(tmp_path, range="absent", limits=[0, 4095]))
+        assert one.range == (0.0, 4095.0)
+
+    def test_a_range_under_both_names_is_refused(self, tmp_path):
+        with pytest.raises(ValueError, match=r"unknown fields \['limits'\] in a sensor"):
+            Sensor.from_json(written(tmp_path, range=[0, 1], limits=[0, 4095]))
+
+    def test_unit_and_range_may_be_left_out(self, tmp_path):
+        one = Sensor.from_json(written(tmp_path, unit="absent", range="absent"))
+        assert (one.unit, one.range) == ("count", None)
 
     def test_infinity_in_disguise(self, tmp_path):
         path = written(tmp_path)
@@ -215,8 +223,8 @@ def test_sensors_are_equal_but_for_the_last_digits():
     [
         {"name": "other"},
         {"unit": "N"},
-        {"limits": None},
-        {"limits": (0.0, 4095.0)},
+        {"range": None},
+        {"range": (0.0, 4095.0)},
         {"rate": 151.0},
         {"positions": np.zeros((30, 3))},
         {"rotations": np.tile(np.eye(3), (30, 1, 1))},

@@ -51,7 +51,7 @@ def test_an_unknown_model_is_a_flat_grid_of_its_name(model, n_taxels, name):
 )
 def test_flat_grids_are_complete(n, n_rows, n_columns):
     flat = flat_grid("x", n)
-    assert (flat.name, flat.n_taxels, flat.limits) == ("x", n, (0.0, 65535.0))
+    assert (flat.name, flat.n_taxels, flat.range) == ("x", n, (0.0, 65535.0))
     assert len(np.unique(flat.positions, axis=0)) == n
     places = flat.positions
     assert (len(set(places[:, 1])), len(set(places[:, 0]))) == (n_rows, n_columns)

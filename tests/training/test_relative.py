@@ -26,7 +26,7 @@ NEWTONS = replace(TINY, name="other", unit="N", rate=60.0)
 @pytest.fixture(scope="module")
 def mixed():
     """A slow sensor in newtons, a fast one, and a flat patch of 16 taxels in counts."""
-    patch = replace(sensor("uskin-4x4"), limits=None)
+    patch = replace(sensor("uskin-4x4"), range=None)
     return [
         tiny_recording(1, sensor=NEWTONS, rate=60.0, n=600),
         tiny_recording(2, rate=300.0, n=3000),

@@ -187,14 +187,14 @@ def _faults(
     """Return the number of samples with each fault that a detector finds."""
     import msgspec
 
-    from holdfast.contact import SIGNAL_FAULTS
+    from holdfast.contact import Fault
     from holdfast.detector import Detector
     from holdfast.model import Model
 
     model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
     alone = replace(recording, modules={name: module}, truth=None)
     masks = Detector.for_recording(model, alone).run(alone).fingers[name].faults
-    counts = {fault: int((masks >> bit & 1).sum()) for bit, fault in enumerate(SIGNAL_FAULTS)}
+    counts = {fault: int((masks >> bit & 1).sum()) for bit, fault in enumerate(Fault)}
     return {fault.value: n for fault, n in counts.items() if n}
 
 

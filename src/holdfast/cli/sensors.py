@@ -42,7 +42,7 @@ def sensors(
 ) -> None:
     """List the known sensors and hands, or show one of them.
 
-    For a sensor: its taxels, unit, rate, limits and normal. For a hand: its modules and their
+    For a sensor: its taxels, unit, rate, range and normal. For a hand: its modules and their
     indices in the flat packet, from 0. The figure shows the taxels with their numbers, from 1.
 
     --template prints the file of a sensor of your own: a flat grid, row by row from the top left,
@@ -192,7 +192,7 @@ def _sensor_summary(sensor: "Sensor") -> dict[str, Any]:
         "n_taxels": sensor.n_taxels,
         "unit": sensor.unit,
         "rate": sensor.rate,
-        "limits": sensor.limits,
+        "range": sensor.range,
         "normal": sensor.normal,
     }
 
@@ -213,7 +213,7 @@ def _hand_summary(hand: "Hand") -> dict[str, Any]:
 def _print_sensor(sensor: "Sensor") -> None:
     from holdfast.sensors import taxel_number
 
-    limits = "unknown" if sensor.limits is None else "{:g} to {:g}".format(*sensor.limits)
+    ends = "unknown" if sensor.range is None else "{:g} to {:g}".format(*sensor.range)
     normal = ", ".join(f"{value:.3g}" for value in sensor.normal)
     print_table(
         ("sensor", sensor.name),
@@ -221,7 +221,7 @@ def _print_sensor(sensor: "Sensor") -> None:
             ("taxels", sensor.n_taxels),
             ("unit", sensor.unit),
             ("rate", f"{sensor.rate:g} Hz"),
-            ("limits", limits),
+            ("range", ends),
             ("normal", f"({normal}) in the fingertip frame"),
         ],
     )

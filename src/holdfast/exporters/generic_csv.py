@@ -121,7 +121,7 @@ def _is_built_in(item: Sensor) -> bool:
     if item.name not in built_in_sensors():
         return False
     known = sensor(item.name)
-    calibrated = replace(known, unit=item.unit, limits=None)  # as `Tactile` makes it
+    calibrated = replace(known, unit=item.unit, range=None)  # as `Tactile` makes it
     return item in (known, calibrated)
 
 

@@ -68,8 +68,13 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     N_REFUSED,  # successive samples of the tare with a reading that is not valid
     LOST,  # bits of the taxels that have no tare
     LOST_FAULTS,  # their faults
+    N_FRAMES,  # samples without an invalid reading, see holdfast.features.untrue
+    RING_PERIOD,  # of the ring of samples that is followed [samples]; 0 without one
+    RING_LENGTH,  # successive samples with the sum of the sample a period before
+    RING_AGE,  # samples since the ring is followed
+    RING_VARIES,  # 1 if enough readings and samples of the ring differ
     COUNTS_WIDTH,
-) = range(22)
+) = range(27)
 
 # Memory.levels.
 (
@@ -81,8 +86,9 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     MAX_AMPLITUDE,  # largest F_a so far, of samples without a serious fault
     FILL_SQUARES,  # sum of the squares of Memory.masks LAST_HEALTHY, of the healthy taxels
     FILL_RATIO,  # load of the healthy taxels, beside that when the mask last changed
+    REST_SUM,  # weighted sum of the readings at rest, see `scan_readings`; NaN while unknown
     LEVELS_WIDTH,
-) = range(9)
+) = range(10)
 
 # Memory.taxels.
 (
@@ -104,16 +110,26 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_INTERVAL = range(4)
     MASKS_WIDTH,
 ) = range(9)  # fmt: skip
 
+# Memory.rings.
+(
+    ANCHOR, _, _,  # reading of the sample from which on a ring is followed
+    VARIES, _, _,  # 1 if the reading differed from it in the period after it
+    RINGS_WIDTH,
+) = range(7)  # fmt: skip
+
 # Layout.constants.
 (
     LOW_LIMIT,  # smallest reading that the sensor can send
     HIGH_LIMIT,  # largest reading that the sensor can send
+    LOW_END,  # readings below this are near the end of the range
+    HIGH_END,  # readings above this are near the end of the range
+    MAX_OFFSET,  # largest change of the weighted sum of the readings, see `scan_readings`
     MIN_NOISE,  # noise of a force component by the step of the readings alone
     ROUNDING_NOISE,  # noise of a reading by its step; NaN where the step is not known
     N_USED,  # taxels that are not ignored
     MAX_STEP,  # a longer step in time is a gap of the finger [s]
     CONSTANTS_WIDTH,
-) = range(7)
+) = range(10)
 
 # Layout.specs.
 KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS, SPECS_WIDTH = range(6)
@@ -245,6 +261,8 @@ class Memory(NamedTuple):
     pressed: Taxels1  # (n_taxels,) |h . n| of the last sample
     averages: Floats3  # (n_fingers, N_SECONDS, n_lags) smoothed squares of second differences
     blocks: Floats3  # (n_fingers, longest, n_channels * n_levels * 3) sums of blocks, a ring
+    sums: Floats2  # (n_fingers, N_SUMS of holdfast.features.untrue) of the readings, a ring
+    rings: Taxels2  # (n_taxels, RINGS_WIDTH)
 
 
 class Output(NamedTuple):

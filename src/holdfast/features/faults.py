@@ -19,6 +19,7 @@ from holdfast.sensors.types import Array, Flags, Integers
 # Bits of holdfast.contact.Fault.
 NOT_FINITE, STUCK, SATURATED, TARE_LOADED = 1, 2, 4, 8
 DEAD, NOISY, OUT_OF_RANGE, TARE_DRIFT = 16, 32, 64, 128
+OFFSET, REPEATED = 8192, 16384
 SERIOUS = STUCK | NOISY
 """Faults of a finger whose samples no window may hold, though they have a force."""
 
@@ -50,6 +51,9 @@ MIN_TAXELS = 4
 """Number of taxels from which one may count as noisy; of fewer, one may be touched alone."""
 N_MASK_BITS = 63
 """Number of taxels that a mask can hold."""
+WEIGHT_Y, WEIGHT_Z = math.sqrt(2.0) / 1.5, math.sqrt(3.0) / 1.6
+"""Weights of the axes in the sum of the readings, about 1. Whole counts have the same sum only if
+the sum of each axis is the same."""
 LOADED_SECONDS = 0.25
 """A pull for this long means that the tare was taken under load: nothing pulls a skin [s]."""
 
@@ -58,9 +62,9 @@ LOADED_SECONDS = 0.25
 def scan_readings(
     readings: Array, ignored: Flags, first: int, last: int
 ) -> tuple[float, float, float]:
-    """Return a sum that is finite if all readings are, their minimum and their maximum.
+    """Return the weighted sum of the readings, their minimum and their maximum.
 
-    The readings of ignored taxels are set to zero.
+    The sum is finite if all readings are. The readings of ignored taxels are set to zero.
     """
     sum_x = sum_y = sum_z = 0.0
     least, most = math.inf, -math.inf
@@ -80,7 +84,7 @@ def scan_readings(
         high = z if z > high else high
         least = low if low < least else least
         most = high if high > most else most
-    return sum_x + sum_y + sum_z, least, most
+    return sum_x + WEIGHT_Y * sum_y + WEIGHT_Z * sum_z, least, most
 
 
 @joined_step

@@ -37,6 +37,7 @@ from holdfast.features.masks import (
 from holdfast.features.motion import GAP_LIMIT_PERIODS, append_taxels, update_motion
 from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
+from holdfast.features.untrue import find_untrue
 from holdfast.sensors.types import Array, Flags, Integers
 
 # Codes of features: positions in the lists of holdfast.features.specs.
@@ -123,6 +124,10 @@ def _process(
             counts[f, at.N_STRETCH] = 0
             return at.FAULT, faults, bits
         total, least, most = scan_readings(readings, ignored, first, last)
+    untrue = find_untrue(layout, memory, readings, f, total, least, most)
+    if untrue:
+        counts[f, at.N_STRETCH] = 0
+        return at.FAULT, faults | untrue, bits
     track_changes(layout, memory, readings, f, time, after_gap)
     # Half a period of tolerance: the rounding of times moves no sample.
     elapsed = time - levels[f, at.FIRST_TIME] + 0.5 * layout.period

@@ -10,8 +10,9 @@ import numpy as np
 
 from holdfast.compiled import compiled_step
 from holdfast.features import arrays as at
-from holdfast.features import kernel
+from holdfast.features import kernel, untrue
 from holdfast.features.arrays import Layout, Memory, Output
+from holdfast.features.faults import WEIGHT_Y, WEIGHT_Z
 from holdfast.features.haar import N_SUMS, n_levels
 from holdfast.features.loaded_start import begins_in_contact, declared_baselines, loaded_tare
 from holdfast.features.motion import (
@@ -31,6 +32,7 @@ from holdfast.features.specs import (
     spec_codes,
 )
 from holdfast.features.tare import Tare, baseline_of
+from holdfast.features.untrue import END_SHARE, OFFSET_SHARE
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags, Integers
@@ -375,17 +377,20 @@ def _ignored(plan: StreamPlan, finger: str) -> Flags:
 
 def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
     """Return the first columns of `Layout.constants`; each used taxel rounds its readings."""
-    low, high = sensor.limits or (-np.inf, np.inf)
+    low, high = sensor.range or (-np.inf, np.inf)
+    end, offset = END_SHARE * (high - low), OFFSET_SHARE * (high - low)
+    max_offset = offset * n_used * (1.0 + WEIGHT_Y + WEIGHT_Z)
     noise = COUNT_NOISE if sensor.unit == "count" else NEWTON_NOISE
     rounding = noise if sensor.unit == "count" else np.nan
-    return low, high, float(noise * np.sqrt(n_used)), rounding, n_used
+    ends = (low + end, high - end) if sensor.range else (low, high)
+    return low, high, *ends, max_offset, float(noise * np.sqrt(n_used)), rounding, n_used
 
 
 def _memory(layout: Layout) -> Memory:
     n_fingers, n_taxels = len(layout.windows), len(layout.rotations)
     longest = int(layout.windows[:, at.LONGEST_WINDOW].max())
     levels = np.zeros((n_fingers, at.LEVELS_WIDTH))
-    levels[:, [at.FIRST_TIME, at.LAST_TIME, at.NOISE]] = np.nan
+    levels[:, [at.FIRST_TIME, at.LAST_TIME, at.NOISE, at.REST_SUM]] = np.nan
     # A second difference looks back by two lags.
     reaches = layout.lags * (1 + layout.families[:, at.SECONDS])
     length = RING_SPARE * int(reaches.max()) + 1 if len(reaches) else 1
@@ -415,6 +420,8 @@ def _memory(layout: Layout) -> Memory:
         pressed=np.zeros(n_taxels),
         averages=np.full((n_fingers, at.N_SECONDS, len(layout.lags)), np.nan),
         blocks=np.zeros((n_fingers, longest, n_channels * layout.n_levels * N_SUMS)),
+        sums=np.full((n_fingers, untrue.N_SUMS), np.nan),
+        rings=np.zeros((n_taxels, at.RINGS_WIDTH)),
     )
 
 

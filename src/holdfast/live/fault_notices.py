@@ -33,7 +33,8 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
         "stuck", "readings do not change any more: check the cable, then restart the device"
     ),
     Fault.SATURATED: FaultText(
-        "saturated", "readings are at the end of the sensor's range: reduce the force"
+        "saturated",
+        "readings are at the end of the sensor's range: reduce the force, or check the cable",
     ),
     Fault.TARE_LOADED: FaultText(
         "loaded at tare",
@@ -65,6 +66,12 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     ),
     Fault.RATE: FaultText(
         "rate changed", "the device has changed its rate: start this command again"
+    ),
+    Fault.OFFSET: FaultText(
+        "offset", "all readings have jumped together: check the cable and the supply of the sensor"
+    ),
+    Fault.REPEATED: FaultText(
+        "repeated", "the same few samples come again and again: restart the device or its server"
     ),
 }
 """Texts of every fault, for pages and terminals."""

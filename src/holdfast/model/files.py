@@ -16,6 +16,7 @@ from holdfast.files import check_keys, read_input, whole_file, write_whole
 from holdfast.model.first_schema import upgraded
 from holdfast.model.parts import FingerModel
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import with_range
 
 if TYPE_CHECKING:
     from holdfast.model.model import Model
@@ -43,8 +44,7 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
     try:
         check_keys(data)
-        _check_sensors(data)
-        model = decode(data, kind)
+        model = decode(_with_ranges(data), kind)
         if any(rule.content for rule in _onnx_rules(model.fingers)):
             raise ModelError("a model file names its ONNX file; it does not hold the content")
         folder = Path(path).parent
@@ -149,12 +149,19 @@ def _delete_unused(names: set[str], path: Path) -> None:
             path.with_name(name).unlink(missing_ok=True)
 
 
-def _check_sensors(data: bytes) -> None:
-    """Refuse fields that no sensor has, which msgspec ignores in a dataclass."""
+def _with_ranges(data: bytes) -> bytes:
+    """Return the JSON of a model, the ranges of its sensors under their present name.
+
+    Fields that no sensor has are refused, which msgspec ignores in a dataclass.
+    """
     found = msgspec.json.decode(data)
     sensors = found.get("sensors") if isinstance(found, dict) else None
-    for fields in sensors.values() if isinstance(sensors, dict) else ():
-        Sensor.from_dict(fields if isinstance(fields, dict) else {})
+    if not isinstance(sensors, dict):
+        return data
+    for name, fields in sensors.items():
+        sensors[name] = with_range(fields if isinstance(fields, dict) else {})
+        Sensor.from_dict(sensors[name])
+    return msgspec.json.encode(found)
 
 
 def _decode_array(kind: type, data: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)

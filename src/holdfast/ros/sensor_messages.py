@@ -296,7 +296,7 @@ def sensors_of(sample: DeviceSample, unit: Unit) -> dict[str, Sensor]:
     sensors = module_sensors(sample.model, len(readings))
     if unit == "count":
         return sensors
-    return {name: replace(one, unit=unit, limits=None) for name, one in sensors.items()}
+    return {name: replace(one, unit=unit, range=None) for name, one in sensors.items()}
 
 
 def readings_of(sample: DeviceSample, unit: Unit) -> npt.NDArray[Any]:

@@ -107,18 +107,18 @@ def _uskin_curved() -> Sensor:
         MODULE_TO_FINGERTIP @ rotations,
         np.array([1.0, 0.0, 0.0]),
         rate=150.0,
-        limits=UINT16,
+        range=UINT16,
     )
 
 
 @cache
 def _uskin_4x4() -> Sensor:
-    return _flat("uskin-4x4", _grid(4, 4, 4.667e-3, 4.667e-3), 100.0, limits=UINT16)
+    return _flat("uskin-4x4", _grid(4, 4, 4.667e-3, 4.667e-3), 100.0, UINT16)
 
 
 @cache
 def _uskin_4x6() -> Sensor:
-    return _flat("uskin-4x6", _grid(4, 6, 7.24e-3, 7.17e-3), 100.0, limits=UINT16)
+    return _flat("uskin-4x6", _grid(4, 6, 7.24e-3, 7.17e-3), 100.0, UINT16)
 
 
 @cache
@@ -225,7 +225,7 @@ def _grid(n_rows: int, n_columns: int, pitch_x: float, pitch_y: float) -> Array:
 
 
 def _flat(
-    name: str, positions: Array, rate: float, limits: tuple[float, float] | None = None
+    name: str, positions: Array, rate: float, ends: tuple[float, float] | None = None
 ) -> Sensor:
     rotations = np.tile(np.eye(3), (len(positions), 1, 1))
-    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, limits=limits)
+    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, range=ends)

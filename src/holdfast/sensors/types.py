@@ -50,7 +50,8 @@ class Sensor:
         normal: (3,) unit vector of the sensor's normal in the fingertip frame.
         rate: nominal sample rate [Hz].
         unit: unit of raw readings, `count` or `N`.
-        limits: smallest and largest reading that the device can send; None if unknown.
+        range: smallest and largest reading that the device can send; None if unknown. Readings
+            of most taxels near an end of it are a fault.
 
     Raises:
         ValueError: a shape is wrong, a number is not finite, or a rotation is not valid.
@@ -62,7 +63,7 @@ class Sensor:
     normal: Array
     rate: float
     unit: Unit = "count"
-    limits: tuple[float, float] | None = None
+    range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -82,7 +83,7 @@ class Sensor:
             )
         if self.unit not in ("count", "N"):
             raise ValueError(f"{self.name}: unit 'count' or 'N' expected, {self.unit!r} given")
-        object.__setattr__(self, "limits", _checked_limits(self.limits, self.name))
+        object.__setattr__(self, "range", _checked_range(self.range, self.name))
         object.__setattr__(self, "positions", _locked(positions))
         object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
         object.__setattr__(self, "normal", _locked(_unit_vector(normal)))
@@ -99,7 +100,7 @@ class Sensor:
         """Return whether two sensors are the same, but for the last digits of numbers."""
         if self is other or not isinstance(other, Sensor):
             return self is other
-        own, given = ((x.name, x.n_taxels, x.unit, x.limits) for x in (self, other))
+        own, given = ((x.name, x.n_taxels, x.unit, x.range) for x in (self, other))
         return (
             own == given
             and abs(self.rate - other.rate) <= EQUAL_TOLERANCE * self.rate
@@ -125,18 +126,21 @@ class Sensor:
             "normal": self.normal.tolist(),
             "rate": self.rate,
             "unit": self.unit,
-            "limits": None if self.limits is None else list(self.limits),
+            "range": None if self.range is None else list(self.range),
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Make a sensor of the data that `to_dict` returns.
 
+        Up to version 0.2 the range was called `limits`.
+
         Raises:
             ValueError: a field is missing, unknown, or not valid for `Sensor`.
         """
-        known = {"name", "positions", "rotations", "normal", "rate", "unit", "limits"}
-        needed = known - {"unit", "limits"}
+        data = with_range(data)
+        known = {"name", "positions", "rotations", "normal", "rate", "unit", "range"}
+        needed = known - {"unit", "range"}
         if unknown := sorted(set(data) - known):
             raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
         if missing := sorted(needed - set(data)):
@@ -148,7 +152,7 @@ class Sensor:
             normal=data["normal"],
             rate=float(data["rate"]),
             unit=data.get("unit", "count"),
-            limits=data.get("limits"),
+            range=data.get("range"),
         )
 
     @classmethod
@@ -353,12 +357,19 @@ def _unit_vector(vector: Array) -> Array:
     return unit
 
 
-def _checked_limits(given: object, name: str) -> tuple[float, float] | None:
+def with_range(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a sensor with the range under its present name."""
+    if "limits" not in fields or "range" in fields:
+        return dict(fields)
+    return {"range" if key == "limits" else key: value for key, value in fields.items()}
+
+
+def _checked_range(given: object, name: str) -> tuple[float, float] | None:
     if given is None:
         return None
-    low, high = _array(given, f"limits of {name}", (2,)).tolist()  # type: ignore[arg-type]
+    low, high = _array(given, f"range of {name}", (2,)).tolist()  # type: ignore[arg-type]
     if low >= high:
-        raise ValueError(f"limits of {name}: smallest, largest expected, {low}, {high} given")
+        raise ValueError(f"range of {name}: smallest, largest expected, {low}, {high} given")
     return low, high
 
 

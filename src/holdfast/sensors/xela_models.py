@@ -99,7 +99,7 @@ def flat_grid(name: str, n_taxels: int) -> Sensor:
     positions = DEFAULT_PITCH * np.column_stack([x, y, np.zeros(n_taxels)])
     rotations = np.tile(np.eye(3), (n_taxels, 1, 1))
     normal = np.array([0.0, 0.0, 1.0])
-    return Sensor(name, positions, rotations, normal, DEFAULT_RATE, limits=UINT16)
+    return Sensor(name, positions, rotations, normal, DEFAULT_RATE, range=UINT16)
 
 
 def _check(model: str, n_given: int, n_expected: int, name: str) -> None:

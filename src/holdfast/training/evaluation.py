@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import SIGNAL_FAULTS, SLIP_CODE, STABLE, UNKNOWN, Fault
+from holdfast.contact import SLIP_CODE, STABLE, UNKNOWN, Fault
 from holdfast.detector import FingerTrace, detect
 from holdfast.metrics import (
     Decisions,
@@ -37,7 +37,7 @@ from holdfast.training.dataset_scan import (
 )
 from holdfast.training.verdict import LoadedTares, verdict
 
-TARE_LOADED_BIT = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
+TARE_LOADED_BIT = 1 << tuple(Fault).index(Fault.TARE_LOADED)
 """Bit of the fault of a tare that was taken under load."""
 
 

@@ -208,7 +208,7 @@ def test_every_kind_of_sensor_can_be_drawn(kind):
     drawn = draw_sensor(np.random.default_rng(0), kind)
     assert drawn.sensor.n_taxels >= 5
     assert 30.0 <= drawn.sensor.rate <= 500.0
-    assert drawn.sensor.limits is None or drawn.sensor.unit == "count"
+    assert drawn.sensor.range is None or drawn.sensor.unit == "count"
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -249,7 +249,7 @@ def _sensor(n_taxels: int) -> Sensor:
     ]
     rotations = np.tile(np.eye(3), (18, 1, 1))
     normal = np.array([0.0, 0.0, 1.0])
-    return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, limits=(0.0, 65535.0))
+    return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, range=(0.0, 65535.0))
 
 
 def _labels(codes: Array, module: Tactile) -> tuple[Label, ...]:

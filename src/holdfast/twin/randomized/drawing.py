@@ -111,8 +111,8 @@ def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
         thermal_counts=_scaled(base.thermal_counts, drift * scale),
         noise_counts=log_uniform(generator, span["noise"]) * base.noise_counts,
     )
-    limits = None if newtons else known.limits
-    made = replace(known, rate=rate, unit="N" if newtons else "count", limits=limits)
+    ends = None if newtons else known.range
+    made = replace(known, rate=rate, unit="N" if newtons else "count", range=ends)
     return SensorDraw(made, parameters)
 
 

@@ -70,7 +70,7 @@ class TestModules:
         first = uskin(3, forces=16)
         assembler = identified(first, unit="N")
         (module,) = assembler.sensors.values()
-        assert (module.unit, module.limits) == ("N", None)
+        assert (module.unit, module.range) == ("N", None)
         (arrival,) = assembler.assemble([first], 50.0)
         np.testing.assert_array_equal(arrival.samples["finger1"], np.full((16, 3), 1.5))
 

@@ -75,7 +75,7 @@ def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
 
 def _in_newtons(device: Device) -> Device:
     modules = {
-        name: replace(module, unit="N", limits=None) for name, module in device.modules.items()
+        name: replace(module, unit="N", range=None) for name, module in device.modules.items()
     }
     return replace(device, modules=modules)
 
