@@ -1,5 +1,6 @@
 import ast
 import functools
+import logging
 import math
 import os
 import re
@@ -59,6 +60,12 @@ def data_folder():
 def collected(pytestconfig):
     """What this run collected, before any selection: file of each test, whether it is quick."""
     return pytestconfig.stash[COLLECTED]
+
+
+@pytest.fixture(autouse=True)
+def no_line_about_compiling(monkeypatch):
+    """Leave out the line that says that kernels compile: it depends on what ran before."""
+    monkeypatch.setattr(logging.getLogger("holdfast.compiled"), "disabled", True)
 
 
 @pytest.fixture

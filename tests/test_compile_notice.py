@@ -18,6 +18,11 @@ def {name}(x):
 """
 
 
+@pytest.fixture(autouse=True)
+def line_about_compiling(no_line_about_compiling, monkeypatch):
+    monkeypatch.setattr(LOGGER, "disabled", False)
+
+
 @pytest.fixture
 def kernels(tmp_path):
     """Write two tiny kernels into a module, which the verb `info` calls."""

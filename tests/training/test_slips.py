@@ -262,7 +262,7 @@ class TestTuning:
         assert tuned.model.name == "mine, tuned"
         assert rule.threshold == tuned.threshold
         assert rule.choice.requested == 5.0
-        assert rule.choice.recordings == {made.name: made.digest for made in others}
+        assert rule.choice.recordings == {made.name: made.readings_digest for made in others}
         assert rule.choice.found == tuned.chosen.incipient["0.1"]
         (before,), (after,) = (m.fingers.values() for m in (model, tuned.model))
         assert after.stable == before.stable

@@ -159,7 +159,7 @@ def _some():
 def test_the_model_has_its_provenance(grasps):
     trained = train(grasps, QUICK)
     provenance = trained.model.training
-    assert provenance.recordings == {each.name: each.digest for each in grasps}
+    assert provenance.recordings == {each.name: each.readings_digest for each in grasps}
     assert (provenance.split, provenance.seed) == ("recording", 0)
     assert set(provenance.parameters) == {"thumb", "index"}
     assert provenance.figures["auc"] == trained.cross_validation.pooled.auc
@@ -367,7 +367,6 @@ def test_long_steps_report_progress(grasps):
     assert steps == [
         ("reading", 6),
         ("features", 6),
-        ("slips", 6),
         ("searching", 12),
         ("fitting", 6),
         ("evaluating", 6),

@@ -164,8 +164,7 @@ def print_metrics(metrics: "Metrics") -> None:
     print_line(f"by event (onset of instability in a held contact, {_onsets(metrics)})")
     events = [*metrics.events.fingers.items(), ("hand", metrics.events.hand)]
     print_table(
-        ("", "events", "missed in 0.05 s %", "0.1 s %", "0.2 s %", "median delay s", "p95 s",
-         "false alarms/min"),
+        ("", "events", "missed 0.05 s", "0.1 s", "0.2 s %", "delay s", "p95 s", "alarms/min"),
         [*(_event_row(name, finger) for name, finger in events), _never_an_alarm(metrics)],
     )  # fmt: skip
     if metrics.intervals is not None:
