@@ -105,6 +105,7 @@ def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
     assert "s held in 2 recordings (handling-0, handling-1); STABLE from" in text
     handling = Model.load(out).fingers["*"].handling["pad"]
     assert f"STABLE from {handling.thresholds['stable']:.3g} on; slides from " in text
+    assert text.count("STABLE from") == text.count("slides from") == 1
     part = Model.load(out).fingers["*"].without_thresholds("stable")
     tuned = msgspec.structs.replace(Model.load(out), fingers={"*": part})
     tuned.save(tmp_path / "tuned.json")

@@ -106,7 +106,8 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         sensor = f"{part['sensor']} ({part['unit']})" if part["sensor"] else "any"
         yield finger, f"sensor {sensor}; {_contact(part)}"
         known = part["heads"]["stable"]["features"]
-        heads = (line for head in part["heads"].values() for line in _head_lines(head, known))
+        is_own = bool(part["handling"])
+        heads = (line for x in part["heads"].values() for line in _head_lines(x, known, is_own))
         yield from (("", line) for line in heads)
         if "slip" not in part["heads"]:
             yield "", "no slip rule"
@@ -134,13 +135,14 @@ def _contact(part: dict[str, Any]) -> str:
     return "no threshold of contact"
 
 
-def _head_lines(head: dict[str, Any], known: list[str]) -> Iterator[str]:
+def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterator[str]:
     """Yield what a head answers, from which features, and on what its threshold was chosen.
 
-    Of features that `stable` has not, the first are named.
+    Of features that `stable` has not, the first are named. Of a calibrated model, the lines of own
+    handling have the one threshold that is used.
     """
     name, texts = head["name"], [head["rule"]]
-    if "threshold" in head:
+    if "threshold" in head and not is_own:
         texts.append(f"{ANSWERS[name]} from a probability of {head['threshold']:.3g} on")
     if name == "slip":
         texts.append(f"smoothing {head['smoothing']:g} s, hold {head['hold']:g} s")
