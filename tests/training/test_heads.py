@@ -1,17 +1,22 @@
 """Every way to change a model keeps what it does not change: all four heads."""
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from holdfast.classifiers.causes import fit_causes
 from holdfast.contact import Cause, ContactState
+from holdfast.features import fingertip_force, haar_features, parse_features
 from holdfast.model import ANY_FINGER, Head
 from holdfast.recordings import Label
 from holdfast.training import Setting, calibrate, train
+from holdfast.training.cause_samples import CAUSE_PENALTY
 from holdfast.training.slips import tune_slips
 from holdfast.training.threshold import tune
 
-from .build import handling_recording, normalised_model, sliding_recording, tiny_recording
+from .build import TINY, handling_recording, normalised_model, sliding_recording, tiny_recording
 
+FEATURES = parse_features("F_a,F_x,F_y,F_z,m,sigma", 6)
 NAMES = {"stable", "slip", "slip_speed", "cause"}
 
 
@@ -101,3 +106,59 @@ def test_a_tuned_model_keeps_all_heads(model, changed, seeds, tuned):
     before, after = (m.fingers[ANY_FINGER].head(changed) for m in (model, found))
     assert after.choice.recordings == {made.name: made.readings_digest for made in data}
     assert replace(after, threshold=before.threshold, choice=before.choice) == before
+
+
+def caused_recording(seed, *causes):
+    """Return a recording whose unstable second half has the causes, one after the other."""
+    made = tiny_recording(seed)
+    bounds = np.linspace(2.0, 4.0, len(causes) + 1)
+    labels = (
+        Label(0.0, 2.0, ContactState.STABLE),
+        *(Label(a, b, ContactState.UNSTABLE, cause)
+          for a, b, cause in zip(bounds[:-1], bounds[1:], causes, strict=True)),
+    )  # fmt: skip
+    return made.with_labels(dict.fromkeys(made.modules, labels))
+
+
+CAUSES_OF = {
+    "two": (Cause.DISTURBANCE, Cause.GLITCH),
+    "alike": (Cause.DISTURBANCE, Cause.LOST, Cause.RELEASED),  # lost and released are one
+    "slip": (Cause.DISTURBANCE, Cause.GLITCH, Cause.SLIP),  # a slip is no cause here
+}
+
+
+@pytest.mark.parametrize(
+    ("causes", "classes"),
+    [("two", {"disturbance", "glitch"}), ("alike", {"disturbance", "lost"}),
+     ("slip", {"disturbance", "glitch"})],
+)  # fmt: skip
+def test_causes_are_trained_from_labels(causes, classes):
+    recordings = [caused_recording(seed, *CAUSES_OF[causes]) for seed in (60, 61, 62)]
+    trained = train(recordings, Setting(trials=0, window=6, features=FEATURES))
+    for finger, part in trained.model.fingers.items():
+        head = part.head("cause")
+        assert set(head.classes) == classes
+        rows, names = [], []
+        for made in recordings:
+            module = made.modules[finger]
+            features = haar_features(fingertip_force(module.readings, TINY, 0.5, module.times), 6)
+            for label in module.labels:
+                cause = Cause.LOST if label.cause is Cause.RELEASED else label.cause
+                if cause not in (None, Cause.SLIP):
+                    first, last = np.searchsorted(module.times, (label.start, label.end))
+                    rows.append(features[first:last])
+                    names += [str(cause)] * (last - first)
+        rule, _ = fit_causes(np.concatenate(rows), np.array(names), CAUSE_PENALTY)
+        np.testing.assert_allclose(head.rule.weights, rule.weights, atol=1e-6)
+
+
+def test_too_few_causes_are_a_warning():
+    recordings = [caused_recording(seed, Cause.DISTURBANCE) for seed in (60, 61, 62)]
+    warnings = []
+    setting = Setting(trials=0, window=6, features=FEATURES, shared=True)
+    model = train(recordings, setting, warn=warnings.append).model
+    assert model.fingers[ANY_FINGER].head("cause") is None
+    assert warnings == [
+        "all fingers: unstable samples 1200 of disturbance given, at least 50 of each of two "
+        "causes expected; the model names no cause there"
+    ]

@@ -1,6 +1,6 @@
 """Samples of one finger that train the head of causes, and its fit."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,7 +11,7 @@ from holdfast.contact import CAUSES, Cause, ContactState
 from holdfast.features import FeatureSpec
 from holdfast.metrics.slip_truth import SLIDING, SlipTruth
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
-from holdfast.model import Head
+from holdfast.model import ANY_FINGER, Head, Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
 
@@ -61,6 +61,19 @@ class CauseSamples:
         names = np.array([str(cause) for cause in CAUSES])[self.codes[kept] - 1]
         rule, classes = fit_causes(self.features[kept], names, CAUSE_PENALTY)
         return [Head(name="cause", link="softmax", features=features, rule=rule, classes=classes)]
+
+
+def missing_causes(model: Model, samples: Mapping[str, CauseSamples]) -> Iterator[str]:
+    """Yield a warning for each finger whose causes are known, but too few to tell them apart."""
+    for finger, own in samples.items():
+        if model.finger(finger).head("cause") is None:
+            counts = np.bincount(own.codes, minlength=len(CAUSES) + 1)[1:]
+            given = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
+            yield (
+                f"{'all fingers' if finger == ANY_FINGER else finger}: unstable samples "
+                f"{', '.join(given)} given, at least {MIN_CAUSE_SAMPLES} of each of two causes "
+                "expected; the model names no cause there"
+            )
 
 
 def cause_samples(

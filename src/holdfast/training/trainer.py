@@ -25,6 +25,7 @@ from holdfast.training.adaptation import (
     choose_adaptation,
     known_recordings,
 )
+from holdfast.training.cause_samples import missing_causes
 from holdfast.training.dataset_scan import (
     OneRecording,
     Progress,
@@ -136,6 +137,8 @@ def train(
     model = fit_full_model(trainer.data, trainer.setting, final)
     metrics = trainer.cross_validate(held_out or [final])
     _warn_of_undecided(metrics, warn)
+    for warning in missing_causes(model, trainer.data.samples.cause):
+        warn(warning)
     model, metrics = trainer.choose_slip_threshold(model, metrics)
     provenance = training_record(
         trainer.setting,
