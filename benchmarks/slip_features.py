@@ -40,7 +40,7 @@ from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.slips import EARLY_DURATION, SLIP_HOLD, SLIP_SMOOTHING
+from holdfast.training.slips import EARLY_DURATION, SLIP_HOLD_TIME, SLIP_SMOOTHING
 
 LAG_SECONDS = (0.0067, 0.0267, 0.0533, 0.107, 0.213)
 """Lags of first differences [s]."""
@@ -280,7 +280,7 @@ class Fitted:
         """Return the counts of slips at all thresholds."""
         probability = 1 / (1 + np.exp(-self.scores(rows)))
         none = np.zeros(len(probability), bool)
-        return slip_curve(SlipDecisions(rows.times, probability, none, SLIP_HOLD, rows.truth))
+        return slip_curve(SlipDecisions(rows.times, probability, none, SLIP_HOLD_TIME, rows.truth))
 
 
 def _expand(raw: Array, mean: Array, scale: Array) -> Array:

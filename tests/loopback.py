@@ -1,7 +1,8 @@
 """A server of files on loopback that can do what servers on the internet do wrong."""
 
 import re
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
@@ -17,12 +18,15 @@ class FileServer:
         ranges: whether parts of files are sent.
         status: of all answers, in place of a file.
         replaced: content by path, in place of that of the folder.
+        headers: that replace those of all answers; one without a value is left out.
+        slow: `headers` or `body` arrive a byte in 0.05 s, for at most 3 s.
     """
 
     def __init__(self, folder):
         self.folder = folder
         self.requests, self.cut_after, self.ranges = [], [], True
         self.status, self.replaced, self.url = None, {}, ""
+        self.headers, self.slow = {}, ""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -43,13 +47,30 @@ class _Handler(BaseHTTPRequestHandler):
         if start > len(data):
             self.send_error(416)
             return
-        self.send_response(206 if start else 200)
+        if state.slow == "headers":
+            self._drip(b"HTTP/1.0 200 OK\r\nX: " + b"x" * 60)
+            return
+        headers = {"Content-Length": str(len(data) - start)}
         if start:
-            self.send_header("Content-Range", f"bytes {start}-{len(data) - 1}/{len(data)}")
-        self.send_header("Content-Length", str(len(data) - start))
+            headers["Content-Range"] = f"bytes {start}-{len(data) - 1}/{len(data)}"
+        headers |= state.headers
+        status = 302 if "Location" in headers else 206 if start else 200
+        self.send_response(status)
+        for name, value in headers.items():
+            if value is not None:
+                self.send_header(name, value)
         self.end_headers()
+        if state.slow == "body":
+            self._drip(data)
+            return
         end = state.cut_after.pop(0) if state.cut_after else len(data)
         self.wfile.write(data[start : start + end])
+
+    def _drip(self, data):
+        with suppress(OSError):
+            for byte in data[:60]:
+                self.wfile.write(bytes([byte]))
+                time.sleep(0.05)
 
     def log_message(self, *given):
         """Print nothing."""

@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from holdfast.compile_notice import COMPILING, LOGGER, compiling_shown, is_waiting
+from holdfast.compile_notice import COMPILE_LOGGER, COMPILING, compiling_shown, is_waiting
 from holdfast.parallel import Engine
 
 pytestmark = pytest.mark.slow
@@ -20,7 +20,7 @@ def {name}(x):
 
 @pytest.fixture(autouse=True)
 def line_about_compiling(no_line_about_compiling, monkeypatch):
-    monkeypatch.setattr(LOGGER, "disabled", False)
+    monkeypatch.setattr(COMPILE_LOGGER, "disabled", False)
 
 
 @pytest.fixture
@@ -79,9 +79,9 @@ def test_a_process_of_the_command_line_announces_it(capfd):
 
 
 def test_the_logger_is_as_before(capfd):
-    before = list(LOGGER.handlers), LOGGER.level
+    before = list(COMPILE_LOGGER.handlers), COMPILE_LOGGER.level
     with compiling_shown():
         assert compile_a_kernel(0) == 2
         assert not is_waiting()
-    assert (list(LOGGER.handlers), LOGGER.level) == before
+    assert (list(COMPILE_LOGGER.handlers), COMPILE_LOGGER.level) == before
     assert capfd.readouterr().err == f"{COMPILING}\n"

@@ -4,9 +4,9 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-LOGGER = logging.getLogger("holdfast.compiled")
+COMPILE_LOGGER = logging.getLogger("holdfast.compiled")
 """`compiled.py` logs here that a kernel is not in the cache. Without a handler nothing appears."""
-LOGGER.addHandler(logging.NullHandler())
+COMPILE_LOGGER.addHandler(logging.NullHandler())
 COMPILING = "compiling, once on this machine, about two minutes"
 
 
@@ -24,16 +24,16 @@ class _FirstOnly(logging.StreamHandler):  # type: ignore[type-arg]
 @contextmanager
 def compiling_shown() -> Iterator[None]:
     """Print the line at the first compilation; afterwards the logger is as before."""
-    handler, level = _FirstOnly(), LOGGER.level
-    LOGGER.addHandler(handler)
-    LOGGER.setLevel(logging.INFO)
+    handler, level = _FirstOnly(), COMPILE_LOGGER.level
+    COMPILE_LOGGER.addHandler(handler)
+    COMPILE_LOGGER.setLevel(logging.INFO)
     try:
         yield
     finally:
-        LOGGER.removeHandler(handler)
-        LOGGER.setLevel(level)
+        COMPILE_LOGGER.removeHandler(handler)
+        COMPILE_LOGGER.setLevel(level)
 
 
 def is_waiting() -> bool:
     """Return whether this process would print the line at its next compilation."""
-    return any(isinstance(one, _FirstOnly) and not one.done for one in LOGGER.handlers)
+    return any(isinstance(one, _FirstOnly) and not one.done for one in COMPILE_LOGGER.handlers)

@@ -11,7 +11,7 @@ import numba
 from numba.core import event
 from numba.core.cpu import CPUTargetOptions
 
-from holdfast.compile_notice import COMPILING, LOGGER
+from holdfast.compile_notice import COMPILE_LOGGER, COMPILING
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -20,7 +20,7 @@ class _CompilationLog(event.Listener):
     """Listener that logs each compilation; a kernel from the cache is none."""
 
     def on_start(self, _: event.Event) -> None:
-        LOGGER.info(COMPILING)
+        COMPILE_LOGGER.info(COMPILING)
 
     def on_end(self, _: event.Event) -> None:
         """Do nothing."""

@@ -4,6 +4,7 @@ from collections import namedtuple
 from hashlib import sha256
 from pathlib import Path
 
+import msgspec
 import pytest
 
 pytest.importorskip("pooch", reason="pooch is not installed")
@@ -160,10 +161,12 @@ def test_nobody_listens(server, tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
-def test_a_full_disk_leaves_nothing(server, tmp_path):
+def test_a_full_disk_leaves_nothing(server, tmp_path, monkeypatch):
     part = tmp_path / "got" / "here" / ".a.bin.part"
     part.parent.mkdir(parents=True)
-    part.symlink_to("/dev/full")
+    part.touch()
+    full = lambda path, continues: open("/dev/full", "ab")  # noqa: E731, PTH123, SIM115
+    monkeypatch.setattr("holdfast.datasets.download._open_part", full)
     with pytest.raises(OutputError, match=r"cannot write .*a.bin: No space left on device$"):
         get(public_set(server), tmp_path / "got")
     assert list(part.parent.iterdir()) == []
@@ -198,3 +201,70 @@ def test_the_log_of_pooch_is_as_before(server, tmp_path):
     get(public_set(server), tmp_path / "got")
     assert pooch.get_logger().level == before
     assert before < logging.ERROR
+
+
+def unchecked(server, size=10):
+    """A set with one file whose checksum is not known."""
+    return msgspec.structs.replace(public_set(server), files=(PublicFile("b.bin", size=size),))
+
+
+@pytest.mark.parametrize(
+    ("size", "headers", "message"),
+    [
+        (11, {}, "sends 10 bytes, 11 expected; it was thrown away"),
+        (11, {"Content-Length": None}, "sends 10 bytes, 11 expected; it was thrown away"),
+        (None, {"Content-Length": None}, "sends 10 bytes, no length is known; it was thrown away"),
+        (10, {"Content-Encoding": "gzip"}, "sends a body packed by 'gzip'; a plain one expected"),
+    ],
+)
+def test_an_answer_that_is_not_the_plain_whole_file_is_not_kept(
+    server, tmp_path, size, headers, message
+):
+    server.headers = headers
+    with pytest.raises(SourceError) as raised:
+        get(unchecked(server, size), tmp_path / "got")
+    assert str(raised.value) == f"{server.url}/b.bin {message}"
+    assert content(tmp_path / "got") == {}
+
+
+def test_a_short_file_that_was_kept_is_loaded_again(server, tmp_path):
+    (tmp_path / "got").mkdir()
+    (tmp_path / "got" / "b.bin").write_bytes(b"short")
+    get(unchecked(server), tmp_path / "got")
+    assert content(tmp_path / "got") == {"b.bin": b"b" * 10}
+
+
+def test_a_length_that_is_stated_is_enough(server, tmp_path):
+    get(unchecked(server, size=None), tmp_path / "got")
+    assert content(tmp_path / "got") == {"b.bin": b"b" * 10}
+
+
+@pytest.mark.parametrize("link", ["symlink_to", "hardlink_to"])
+def test_an_incomplete_file_that_is_a_link_is_not_followed(server, tmp_path, link):
+    other, part = tmp_path / "other", tmp_path / "got" / ".b.bin.part"
+    other.write_bytes(b"b" * 5)
+    part.parent.mkdir()
+    getattr(part, link)(other)
+    get(unchecked(server), tmp_path / "got")
+    assert other.read_bytes() == b"b" * 5
+    assert content(tmp_path / "got") == {"b.bin": b"b" * 10}
+    assert not (tmp_path / "got" / "b.bin").is_symlink()
+
+
+@pytest.mark.parametrize("slow", ["headers", "body"])
+def test_a_server_that_sends_a_byte_at_a_time_is_given_up(server, tmp_path, monkeypatch, slow):
+    monkeypatch.setattr("holdfast.datasets.download.ANSWER_LIMIT", 0.3, raising=False)
+    server.slow = slow
+    with pytest.raises(SourceError) as raised:
+        get(public_set(server), tmp_path / "got")
+    assert str(raised.value) == (
+        f"made-up: {server.url}/deep/a.bin cannot be reached (Timeout); what was loaded is kept, "
+        "and the same command continues"
+    )
+
+
+def test_the_bodies_of_redirections_are_not_read(server, tmp_path):
+    server.headers = {"Location": "/deep/a.bin", "Content-Encoding": "gzip"}
+    with pytest.raises(SourceError, match=r"b\.bin cannot be reached \(TooManyRedirects\)"):
+        get(unchecked(server), tmp_path / "got")
+    assert len(server.requests) == 11

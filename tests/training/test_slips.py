@@ -24,7 +24,7 @@ from holdfast.training.slip_samples import SlipSamples
 from holdfast.training.slips import (
     MIN_SLIDING_SAMPLES,
     SLIP_FALSE_ALARMS,
-    SLIP_HOLD,
+    SLIP_HOLD_TIME,
     SLIP_SMOOTHING,
     choose_slip_threshold,
     fit_slips,
@@ -89,7 +89,7 @@ class TestTraining:
     def test_the_rule_finds_slips_of_other_recordings(self, trained, others):
         model, warnings = trained[0].model, trained[1]
         rule = rule_of(model)
-        assert (rule.smoothing, rule.hold) == (SLIP_SMOOTHING, SLIP_HOLD)
+        assert (rule.smoothing, rule.hold) == (SLIP_SMOOTHING, SLIP_HOLD_TIME)
         metrics = slips_of(model, others)
         assert metrics.n == 6 * 2 * 4
         assert metrics.incipient["0.1"] > 50

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.linear import feature_rows
+from holdfast.classifiers.onnx_check import ROW_LIMIT, checked, line, run_rows
 from holdfast.errors import MissingExtra, ModelError
 from holdfast.files import file_stem
 from holdfast.sensors.types import Array
@@ -80,11 +81,8 @@ class Onnx(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_default
         return probabilities
 
     def _run(self, rows: Array) -> Array:
-        session, name, dtype = _session(self.content)
-        try:
-            output = np.asarray(session.run(None, {name: rows.astype(dtype)})[0], dtype=np.float64)
-        except Exception as cause:  # the classes of onnxruntime derive from Exception alone
-            raise ModelError(f"{self.file} cannot be run: {_line(cause)}") from cause
+        session, name, dtype = _session(self.content, self.n_features)
+        output = run_rows(session, name, rows.astype(dtype)).astype(np.float64)
         if output.shape not in ((len(rows),), (len(rows), 1)):
             raise ModelError(f"{self.file}: {len(rows)} probabilities expected, {output.shape}")
         if not ((output >= 0) & (output <= 1)).all():
@@ -93,12 +91,13 @@ class Onnx(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_default
 
 
 @lru_cache(maxsize=8)
-def _session(content: bytes) -> tuple[Any, str, type[np.floating[Any]]]:
-    """Return the session of an ONNX content, with name and type of its input."""
+def _session(content: bytes, n_features: int) -> tuple[Any, str, type[np.floating[Any]]]:
+    """Return the session of an ONNX content, which is checked first, with its input's facts."""
     try:
         onnxruntime = import_module("onnxruntime")
     except ImportError as cause:
         raise MissingExtra("onnxruntime", "onnx") from cause
+    content = checked(content, n_features)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # rows are few
     options.log_severity_level = 4
@@ -106,13 +105,11 @@ def _session(content: bytes) -> tuple[Any, str, type[np.floating[Any]]]:
         session = onnxruntime.InferenceSession(
             content, sess_options=options, providers=["CPUExecutionProvider"]
         )
-    except Exception as cause:  # as above
-        raise ModelError(f"the ONNX file of the model is invalid: {_line(cause)}") from cause
+    except Exception as cause:  # the classes of onnxruntime derive from Exception alone
+        raise ModelError(f"the ONNX file of the model is invalid: {line(cause)}") from cause
     inputs = session.get_inputs()
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES or len(session.get_outputs()) != 1:
         raise ModelError("an ONNX file with one input of floating-point numbers, and one output")
-    return session, inputs[0].name, INPUT_TYPES[inputs[0].type]
-
-
-def _line(cause: Exception) -> str:
-    return " ".join(str(cause).split())[:200]
+    name, dtype = inputs[0].name, INPUT_TYPES[inputs[0].type]
+    run_rows(session, name, np.zeros((1, n_features), dtype), ROW_LIMIT)
+    return session, name, dtype

@@ -58,7 +58,7 @@ STATES = {
     "STABLE": "the hand holds the object",
 }
 """Words for a state that no true event explains."""
-CAUSES = {
+CAUSE_WORDS = {
     "closing": "the hand closes on the object",
     "disturbance": "pulled or pushed",
     "slip": "pulled or pushed, and slips",
@@ -258,7 +258,7 @@ class TrueEvents(NamedTuple):
 
         labels = labels_by_truth(recording, LabelRule(margin=0.0))
         causes = sorted(
-            (label.start, label.end, CAUSES[label.cause])
+            (label.start, label.end, CAUSE_WORDS[label.cause])
             for finger_labels in labels.values()
             for label in finger_labels
             if label.cause is not None

@@ -1,17 +1,22 @@
 """Download of public sets: with checksums by pooch, and continued where it was interrupted.
 
 A file has its name only when it is whole and its checksum is right. Until then its bytes are in
-`.NAME.part` beside it, from which the next download continues.
+`.NAME.part` beside it, from which the next download continues. A server is not trusted: an answer
+is a plain body of the expected length, and none is waited for without an end.
 """
 
 import errno
 import os
 import shutil
+import stat
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
-from urllib.parse import quote
+from threading import Thread
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from urllib.parse import quote, urljoin
 
 from holdfast.datasets.registry import PublicFile, PublicSet, other_sets
 from holdfast.errors import OutputError, SourceError
@@ -29,8 +34,13 @@ DOWNLOAD_CHUNK = 1 << 16
 """Number of bytes that are written at once."""
 SERVER_TIMEOUTS = (10.0, 60.0)
 """Times after which a server that does not connect, or is silent, is given up [s]."""
+ANSWER_LIMIT = 60.0
+"""Maximum time of an answer's headers and of each `DOWNLOAD_CHUNK` [s]: at least 1 kB/s."""
+MAX_REDIRECTS = 10
+"""Number of times that a server may name another address."""
 MAX_DOWNLOAD_TRIES = 3
 """Number of times that a file is continued after the connection was lost."""
+_T = TypeVar("_T")
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -124,6 +134,8 @@ def _fetch(
     part = target.with_name(f".{target.name}.part")
     url = storage.get_url(file.path)
     try:
+        if file.size is not None and target.exists() and target.stat().st_size != file.size:
+            target.unlink()
         return Path(storage.fetch(file.path, downloader=_Download(part, file, report)))
     except requests.RequestException as cause:
         if cause.response is not None:
@@ -165,6 +177,7 @@ class _Download:
     def __init__(self, part: Path, file: PublicFile, report: Callable[[int], object]) -> None:
         self._part, self._file, self._report = part, file, report
         self._max_size = MAX_UNKNOWN_SIZE if file.size is None else file.size
+        self._size = file.size
 
     def __call__(self, url: str, output_file: str, _: object) -> None:
         """Load a file from a URL into `output_file`."""
@@ -183,6 +196,10 @@ class _Download:
             text = refusal_of_lfs_pointer(self._part).partition(" is ")[2]
             self._part.unlink()
             raise SourceError(f"{url} is {text}")
+        if self._file.sha256 is None and (n_bytes := self._part.stat().st_size) != self._size:
+            self._part.unlink()
+            expected = "no length is known" if self._size is None else f"{self._size} expected"
+            raise SourceError(f"{url} sends {n_bytes} bytes, {expected}; it was thrown away")
         self._part.replace(output_file)
 
     def _load(self, url: str) -> None:
@@ -194,25 +211,34 @@ class _Download:
         """
         import requests
 
-        n_done = self._part.stat().st_size if self._part.exists() else 0
+        n_done = _incomplete_size(self._part)
         if n_done and n_done == self._file.size:
             return
         headers = {"Accept-Encoding": "identity"}
         if n_done:
             headers["Range"] = f"bytes={n_done}-"
-        with requests.get(url, headers=headers, stream=True, timeout=SERVER_TIMEOUTS) as answer:
+        answer = _answer(url, headers)
+        try:
             if n_done and answer.status_code == requests.codes.requested_range_not_satisfiable:
                 self._part.unlink()
                 raise requests.ConnectionError("the incomplete file does not fit; begin again")
             answer.raise_for_status()
+            if (packed := answer.headers.get("Content-Encoding", "identity")) != "identity":
+                raise SourceError(f"{url} sends a body packed by {packed!r}; a plain one expected")
             self._write(answer, n_done)
+        finally:  # closing waits for a thread that was given up
+            Thread(target=answer.close, daemon=True).start()
 
     def _write(self, answer: "Response", n_done: int) -> None:
         """Write the body of an answer; a server without ranges sends the file from its begin."""
         continues = answer.headers.get("Content-Range", "").startswith(f"bytes {n_done}-")
         n_bytes = n_done if continues else 0
-        with self._part.open("ab" if continues else "wb") as file:
-            for chunk in answer.iter_content(DOWNLOAD_CHUNK):
+        stated = answer.headers.get("Content-Length", "")
+        if self._file.size is None:
+            self._size = n_bytes + int(stated) if stated.isdecimal() else None
+        chunks = answer.iter_content(DOWNLOAD_CHUNK)
+        with _open_part(self._part, continues=continues) as file:
+            while chunk := _in_time(partial(next, chunks, b"")):
                 n_bytes += len(chunk)
                 if n_bytes > self._max_size:
                     break
@@ -223,6 +249,79 @@ class _Download:
             raise SourceError(
                 f"{answer.url} sends more than {self._max_size} bytes; it was thrown away"
             )
+
+
+def _incomplete_size(part: Path) -> int:
+    """Return the size of an incomplete file [bytes]; a link to another file is removed."""
+    try:
+        state = part.lstat()
+    except FileNotFoundError:
+        return 0
+    if stat.S_ISREG(state.st_mode) and state.st_nlink == 1:
+        return state.st_size
+    part.unlink()
+    return 0
+
+
+def _open_part(part: Path, *, continues: bool) -> BinaryIO:
+    """Open an incomplete file at its end, or a new one; never what a link points to."""
+    if not continues:
+        part.unlink(missing_ok=True)
+    mode = os.O_APPEND if continues else os.O_CREAT | os.O_EXCL
+    others = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+    return os.fdopen(os.open(part, os.O_WRONLY | mode | others, 0o666), "ab")
+
+
+def _answer(url: str, headers: dict[str, str]) -> "Response":
+    """Return the answer to a request after redirections, whose bodies requests would read whole.
+
+    Raises:
+        requests.RequestException: there is none in time.
+    """
+    import requests
+
+    for _ in range(MAX_REDIRECTS + 1):
+        session = requests.Session()
+        find_target = session.get_redirect_target
+        session.get_redirect_target = lambda _: None  # type: ignore[assignment,method-assign]
+        answer = _in_time(
+            partial(session.get, url, headers=headers, stream=True, timeout=SERVER_TIMEOUTS)
+        )
+        if (location := find_target(answer)) is None:
+            return answer
+        url = urljoin(url, location)
+        answer.close()
+    raise requests.TooManyRedirects(f"more than {MAX_REDIRECTS} redirections")
+
+
+def _in_time(call: Callable[[], _T]) -> _T:
+    """Return what a call returns, or give up its thread: each byte renews a socket's timeout.
+
+    Raises:
+        requests.Timeout: it takes longer than `ANSWER_LIMIT`.
+    """
+    import requests
+
+    result: Future[_T] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(call())
+        except BaseException as cause:  # raised in the thread that waits
+            result.set_exception(cause)
+
+    Thread(target=run, daemon=True).start()
+    try:
+        return result.result(ANSWER_LIMIT)
+    except TimeoutError as cause:
+        result.add_done_callback(_close_late)
+        raise requests.Timeout(f"less than {DOWNLOAD_CHUNK} bytes in time") from cause
+
+
+def _close_late(result: "Future[Any]") -> None:
+    """Close an answer that came when nobody waited for it."""
+    if result.exception() is None and hasattr(answer := result.result(), "close"):
+        answer.close()
 
 
 @contextmanager

@@ -261,7 +261,7 @@ class Memory(NamedTuple):
     pressed: Taxels1  # (n_taxels,) |h . n| of the last sample
     averages: Floats3  # (n_fingers, N_SECONDS, n_lags) smoothed squares of second differences
     blocks: Floats3  # (n_fingers, longest, n_channels * n_levels * 3) sums of blocks, a ring
-    sums: Floats2  # (n_fingers, N_SUMS of holdfast.features.untrue) of the readings, a ring
+    sums: Floats2  # (n_fingers, N_RING_SUMS of holdfast.features.untrue) of the readings, a ring
     rings: Taxels2  # (n_taxels, RINGS_WIDTH)
 
 

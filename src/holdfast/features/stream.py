@@ -420,7 +420,7 @@ def _memory(layout: Layout) -> Memory:
         pressed=np.zeros(n_taxels),
         averages=np.full((n_fingers, at.N_SECONDS, len(layout.lags)), np.nan),
         blocks=np.zeros((n_fingers, longest, n_channels * layout.n_levels * N_SUMS)),
-        sums=np.full((n_fingers, untrue.N_SUMS), np.nan),
+        sums=np.full((n_fingers, untrue.N_RING_SUMS), np.nan),
         rings=np.zeros((n_taxels, at.RINGS_WIDTH)),
     )
 

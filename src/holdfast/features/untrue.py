@@ -33,9 +33,9 @@ MIN_PERIOD, LONG_PERIOD, MAX_PERIOD = 3, 12, 64
 """Periods of a ring: the shortest, the first of the long ones, the longest [samples]."""
 MIN_VARYING = 12
 """Number of readings of a finger that change in a ring: few may repeat by chance."""
-N_SUMS = 128
+N_RING_SUMS = 128
 """Sums that are kept: a power of two of at least twice `MAX_PERIOD`."""
-LAST_SUM = N_SUMS - 1
+LAST_SUM = N_RING_SUMS - 1
 
 
 @inlined
@@ -168,7 +168,7 @@ def _begin_ring(
     """Follow a ring, and count how many samples it has lasted, as far as the sums reach."""
     n, length = counts[f, at.N_FRAMES] - 1, 1
     while (
-        length + period < N_SUMS
+        length + period < N_RING_SUMS
         and sums[f, (n - length) & LAST_SUM] == sums[f, (n - length - period) & LAST_SUM]
     ):
         length += 1

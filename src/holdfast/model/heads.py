@@ -21,7 +21,7 @@ LINKS: dict[HeadName, Link] = {
 }
 """Link of each head, in the order of the heads of a finger."""
 HEAD_NAMES = tuple(LINKS)
-MAX_DURATION = 10.0
+MAX_HEAD_DURATION = 10.0
 """Maximum smoothing and hold time of a head [s]."""
 
 
@@ -159,7 +159,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             )
         for field in ("smoothing", "hold"):
             seconds = getattr(self, field)
-            most = MAX_DURATION if self.name == "slip" else 0.0
+            most = MAX_HEAD_DURATION if self.name == "slip" else 0.0
             if not 0 <= seconds <= most:
                 raise ModelError(
                     f"{self.name}: a {field} from 0 to {most:g} s expected, {seconds} given"

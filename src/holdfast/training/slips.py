@@ -30,7 +30,7 @@ from holdfast.training.evaluation import compute_decisions
 from holdfast.training.slip_samples import SlipSamples
 from holdfast.training.threshold import with_head_threshold
 
-SLIP_SMOOTHING, SLIP_HOLD = 0.02, 0.05
+SLIP_SMOOTHING, SLIP_HOLD_TIME = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
 SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
@@ -79,7 +79,7 @@ def fit_slips(
     rule = msgspec.structs.replace(rule, offset=rule.offset - float(thinning))
     slip = Head(
         name="slip", link="logit", features=features, rule=rule,
-        smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD,
+        smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD_TIME,
     )  # fmt: skip
     return [slip, *fit_speed(slips, held, features)] if squares else [slip]
 

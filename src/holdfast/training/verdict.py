@@ -13,7 +13,7 @@ from holdfast.metrics.statistics import Interval
 
 CHANCE_AUC = 0.55
 """An AUC up to this is no better than chance, for the few recordings that users have."""
-MIN_EVENTS, MIN_MINUTES, MIN_RECORDINGS = 20, 10.0, 5
+MIN_EVENTS, MIN_MINUTES, MIN_JUDGED_RECORDINGS = 20, 10.0, 5
 """Evidence that a positive verdict needs: events, held time [min] and recordings.
 
 With 20 of 20 events found, the true share may be 86 % (95 % confidence). Recordings are what the
@@ -89,7 +89,7 @@ class Support(NamedTuple):
         parts = [
             (self.n_events, MIN_EVENTS, self.what),
             (math.floor(10 * self.minutes) / 10, MIN_MINUTES, "held minutes"),
-            (self.n_recordings, MIN_RECORDINGS, "recordings"),
+            (self.n_recordings, MIN_JUDGED_RECORDINGS, "recordings"),
         ]
         return ", ".join(f"{n:g} of {least:g} {name}" for n, least, name in parts if n < least)
 

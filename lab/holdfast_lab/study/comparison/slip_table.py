@@ -13,7 +13,7 @@ from holdfast.metrics.slips import (
     LATEST_ALARM,
 )
 from holdfast.metrics.statistics import Interval
-from holdfast.training.slips import SLIP_HOLD, SLIP_SMOOTHING
+from holdfast.training.slips import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
@@ -64,7 +64,7 @@ SLIP_NOTE = (
     "time (where the budget says so, of quiet hold alone) and at most 2 % of quiet hold raised; "
     "the intervals repeat the choice. All methods are scored on the "
     f"same samples, their log odds smoothed over {SLIP_SMOOTHING:g} s and decisions held for "
-    f"{SLIP_HOLD:g} s, as in the slip rule of a model. 'Stability' is our rule of stability "
+    f"{SLIP_HOLD_TIME:g} s, as in the slip rule of a model. 'Stability' is our rule of stability "
     "used as a decision about slip. A global method decides alike for all fingers."
 )
 

@@ -27,7 +27,7 @@ from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
 from holdfast.training.finger_samples import thinning_step, usable_rows
-from holdfast.training.slips import SLIP_HOLD, SLIP_SMOOTHING
+from holdfast.training.slips import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.study.evaluation.fitted_method import (
     ChosenRows,
     FittedMethod,
@@ -179,7 +179,9 @@ class SlipScores:
             self.score == -np.inf, 0.0, probability_of(log_odds_of(self.score, ranks))
         )
         raised = np.zeros(len(self.times), dtype=np.bool_)
-        return slip_curve(SlipDecisions(self.times, probability, raised, SLIP_HOLD, self.truth))
+        return slip_curve(
+            SlipDecisions(self.times, probability, raised, SLIP_HOLD_TIME, self.truth)
+        )
 
 
 def score_slips(fitted: FittedMethod, recording: SlipRecording) -> dict[str, SlipScores]:
