@@ -47,7 +47,7 @@ CORE = [
     ["record", "grasp.mcap", "again.mcap", "--speed", "0"],
     ["import", "log.csv", "imported", "--sensor", "anyskin"],
     ["detect", "builtin:any", "imported/log.mcap"],
-    ["calibrate", "normalised.json", "grasp.mcap", "-o", "mine.json"],
+    ["calibrate", "normalised.json", "grasp.mcap", "-o", "mine.json", "--force"],
     ["detect", "mine.json", "grasp.mcap"],
     ["hold", "builtin:any", "grasp.mcap", "--hand", "log:commands.jsonl", "--speed", "0"],
     ["bench", "--samples", "1000", "--updates", "1000"],

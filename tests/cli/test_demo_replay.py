@@ -74,7 +74,7 @@ def test_words_of_a_change():
 
 
 def test_every_line_fits_80_columns():
-    longest = max(map(len, demo.CAUSES.values())) + len("; detected after 250 ms")
+    longest = max(map(len, demo.CAUSE_WORDS.values())) + len("; detected after 250 ms")
     other = max(map(len, demo.STATES.values()))
     assert len(f"     {0:6.2f} s   {'':10}  ") + max(longest, other) <= 80
 
