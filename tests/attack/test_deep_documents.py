@@ -11,6 +11,8 @@ from holdfast.twin.objects import load_objects
 
 DEPTH = 100_000
 LISTS = "[" * DEPTH + "]" * DEPTH
+TOML_LISTS = "[" * (DEPTH // 4) + "]" * (DEPTH // 4)
+"""A TOML file has at most 64 kB."""
 LINKS = "<link>" * DEPTH + "</link>" * DEPTH
 
 
@@ -20,8 +22,8 @@ LINKS = "<link>" * DEPTH + "</link>" * DEPTH
         (Model.load, f'{{"name": {LISTS}}}', ModelError),
         (load_labels, f'{{"name": {LISTS}}}', RecordingError),
         (Sensor.from_json, f'{{"name": {LISTS}}}', ValueError),
-        (load_objects, f"mug = {LISTS}", ValueError),
-        (load_config, f"hand = {LISTS}", ValueError),
+        (load_objects, f"mug = {TOML_LISTS}", ValueError),
+        (load_config, f"hand = {TOML_LISTS}", ValueError),
         (lambda path: Sensor.from_urdf(path, "tip"), f"<robot>{LINKS}</robot>", ValueError),
     ],
     ids=["model", "labels", "sensor", "objects", "configuration", "URDF"],

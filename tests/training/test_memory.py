@@ -92,7 +92,7 @@ def test_a_dataset_larger_than_a_limit_on_memory_trains(tmp_path):
 
 
 def _write_large(folder, n_recordings, n_samples):
-    """Recordings of 29 MB each, that compress well: all taxels repeat seven values."""
+    """Recordings of 29 MB each, that compress well: all taxels have the same value."""
     import numpy as np
 
     from holdfast.contact import ContactState
@@ -105,7 +105,7 @@ def _write_large(folder, n_recordings, n_samples):
     half = n_samples // 2
     for k in range(n_recordings):
         readings = np.full((n_samples, tip.n_taxels, 3), 30_000.0)
-        readings += (np.arange(n_samples) % 7)[:, None, None]
+        readings += np.random.default_rng(k).integers(0, 40, n_samples)[:, None, None]
         readings[half:, 0, 2] += 500.0 + k
         labels = (
             Label(0.0, times[half], ContactState.NO_CONTACT),

@@ -66,7 +66,7 @@ def warm_up(method: str, rate: float) -> float:
 def _probe(rate: float) -> Recording:
     generator = np.random.default_rng(0)
     times = np.arange(math.ceil(PROBE_DURATION * rate)) / rate
-    kind = replace(sensor("uskin-4x4"), rate=rate)
+    kind = replace(sensor("uskin-4x4"), rate=rate, range=None)  # of small readings
     modules = {
         name: Tactile(kind, times, generator.normal(100.0, 10.0, (len(times), kind.n_taxels, 3)))
         for name in PROBE_FINGERS
