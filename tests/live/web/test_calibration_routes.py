@@ -48,7 +48,7 @@ def test_a_calibration_is_applied_saved_and_undone(tmp_path):
         assert (document["least"], document["enough"], document["most"]) == (5.5, 30.0, 60.0)
         _, info = await call(client, "GET", "info")
         assert info["model"] == "builtin:any, calibrated"
-        limit = session.stream.model.fingers["*"].handling["pad"].threshold
+        limit = session.stream.model.fingers["*"].handling["pad"].thresholds["stable"]
         assert info["fingers"]["thumb"]["probability_threshold"] == limit
         status, saved = await call(client, "POST", "calibration/model", {"name": "mine"})
         assert (status, saved) == (200, {"path": str(tmp_path / "mine.json")})

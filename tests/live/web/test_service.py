@@ -477,8 +477,9 @@ def test_a_fault_that_lasts_is_a_problem_and_a_notice():
             return hello, document, notices
 
     hello, document, notices = run(work())
-    text = f"thumb: {hello['faults']['late']['advice']} (0 ms)"
-    assert document["problems"] == [{"fault": "late", "fingers": ["thumb"], "text": text}]
+    text = f"thumb: {hello['faults']['late']['advice']}"
+    problem = {"fault": "late", "fingers": ["thumb"], "text": f"{text} (0 ms)"}
+    assert document["problems"] == [problem]
     assert [notice["text"] for notice in notices] == [text]
     assert set(hello["faults"]) == set(map(str, Fault))
     assert hello["debounce"] == {"min_duration": 0.0, "hysteresis": 0.1, "hold": 0.1}
