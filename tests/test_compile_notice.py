@@ -4,6 +4,7 @@ import sys
 from functools import partial
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 from holdfast.compile_notice import COMPILE_LOGGER, COMPILING, compiling_shown, is_waiting
 from holdfast.parallel import Engine
@@ -72,6 +73,7 @@ def test_a_library_prints_nothing(capfd):
 
 
 def test_a_process_of_the_command_line_announces_it(capfd):
+    get_reusable_executor().shutdown(wait=True)  # workers write to the stderr that they began with
     with compiling_shown():
         assert list(Engine(2).map_ordered(compile_a_kernel, [(0,)])) == [2]
         assert is_waiting()

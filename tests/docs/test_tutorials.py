@@ -46,7 +46,7 @@ def test_your_hand(folder, hand):
 
 
 def test_from_python(folder, short_grasps, capsys):
-    assert blocks.run_page(DOCS / "tutorials" / "from-python.md", short_grasps) == 9
+    assert blocks.run_page(DOCS / "tutorials" / "from-python.md", short_grasps) == 10
     out = capsys.readouterr().out
     assert "STABLE" in out
     assert "{'window': " in out

@@ -50,7 +50,7 @@ def match(labels, states):
     for alarm in alarms:
         owners = [(on, end) for on, end in events(labels) if on - 2 <= alarm <= end + 25]
         if not owners:
-            false += [alarm] * (labels[alarm] != UNKNOWN)
+            false += [alarm] * int(labels[alarm] != UNKNOWN)
         elif max(owners) not in matched:
             matched[max(owners)] = alarm
     return [(on, end, matched.get((on, end))) for on, end in events(labels)], false

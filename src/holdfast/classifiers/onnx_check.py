@@ -23,9 +23,9 @@ OPERATORS = frozenset({
     "Abs", "Add", "BatchNormalization", "Cast", "Clip", "Concat", "Constant", "Conv", "Div",
     "Elu", "Erf", "Exp", "Flatten", "Gather", "Gemm", "Identity", "LayerNormalization",
     "LeakyRelu", "Log", "MatMul", "Max", "Min", "Mul", "Neg", "Pad", "Pow", "ReduceMean",
-    "ReduceSum", "Relu", "Reshape", "Selu", "Sigmoid", "Slice", "Softmax", "Softplus", "Sqrt",
-    "Squeeze", "Sub", "Tanh", "Transpose", "TreeEnsembleClassifier", "TreeEnsembleRegressor",
-    "Unsqueeze",
+    "ReduceSum", "ReduceSumSquare", "Relu", "Reshape", "Selu", "Sigmoid", "Slice", "Softmax",
+    "Softplus", "Sqrt", "Squeeze", "Sub", "Tanh", "Transpose", "TreeEnsembleClassifier",
+    "TreeEnsembleRegressor", "Unsqueeze",
 })  # fmt: skip
 """Names of the operators that are allowed."""
 MAX_ROWS = 128

@@ -19,6 +19,7 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.terminal.console import message_if_slow, print_json, print_message
 from holdfast.cli.terminal.control import handle_stop_signals
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source
@@ -80,6 +81,8 @@ def play(
     check_speed(source, speed)
     if not speed:
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
+    if source.startswith("twin:"):
+        require_extras("twin", "parquet")
     once = once or bool(hand)
     with ExitStack() as stack:
         with message_if_slow(awaited(source)):

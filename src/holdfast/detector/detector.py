@@ -76,7 +76,7 @@ class Detector:
     Example:
         >>> from holdfast.sensors import sensor
         >>> detector = Detector(Model.load("builtin:noise-floor"), {"index": sensor("uskin-4x4")})
-        >>> estimate = detector.update({"index": np.zeros((16, 3))}, time=0.0)
+        >>> estimate = detector.update({"index": np.full((16, 3), 32000)}, time=0.0)
         >>> estimate.fingers["index"].state, estimate.fingers["index"].reason
         (<ContactState.UNKNOWN: 'UNKNOWN'>, <Reason.TARE: 'tare'>)
     """

@@ -57,7 +57,7 @@ def test_names():
 def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
     device = xela_devices({1: (model, 15)}, {})[1]
     (flat,) = device.modules.values()
-    assert (flat.name, flat.n_taxels, flat.limits) == (model.lower(), 15, (0.0, 65535.0))
+    assert (flat.name, flat.n_taxels, flat.range) == (model.lower(), 15, (0.0, 65535.0))
     assert device.notices == (
         f"finger1: the layout of a {model} with 15 taxels is not known; a flat grid is assumed "
         "(sensor=FILE.json in the URI gives another)",
@@ -99,7 +99,7 @@ def test_a_given_sensor_is_taken_where_it_fits():
 @pytest.mark.parametrize("found", [{1: TIP}, {1: ("XR23AHRCPP", 368)}, {1: ("odd", 3)}])
 def test_calibrated_readings_are_newtons(found):
     modules = xela_devices(found, {}, calibrated=True)[1].modules
-    assert {(module.unit, module.limits) for module in modules.values()} == {("N", None)}
+    assert {(module.unit, module.range) for module in modules.values()} == {("N", None)}
 
 
 def test_two_hands_have_names_of_their_own():

@@ -26,7 +26,7 @@ WHOLE = {name: module.sensor for name, module in hand("allegro-uskin").modules.i
 
 
 def newtons(name="uskin-4x4"):
-    return replace(sensor(name), unit="N", limits=None)
+    return replace(sensor(name), unit="N", range=None)
 
 
 def samples_of(sensors, k=0):
