@@ -62,8 +62,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         >>> model = Model.load("builtin:twin")
         >>> model.rate, list(model.fingers), [str(x) for x in model.finger("thumb").features[:2]]
         (150.0, ['*'], ['log(F_a)', 'log(sigma_xyz[4])'])
-        >>> [head.name for head in model.finger("thumb").heads]
-        ['stable', 'slip', 'slip_speed', 'cause']
+        >>> ", ".join(head.name for head in model.finger("thumb").heads)
+        'stable, slip, slip_speed, cause'
     """
 
     fingers: dict[str, FingerModel]
