@@ -58,6 +58,15 @@ def joined(*parts):
     return parts
 
 
+CLUSTER = f"""
+import time
+from distributed import LocalCluster
+
+cluster = LocalCluster(n_workers=1, processes=False, protocol="tcp://", **{PRIVATE})
+print(cluster.scheduler_address, flush=True)
+time.sleep(1000)
+"""
+
 ENDLESS = """
 import os, sys, time
 from holdfast.parallel import Engine
@@ -293,6 +302,26 @@ class TestCluster:
             engine = Engine.parse("dask:{}:{}".format(*silent.getsockname()))
             with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):
                 list(engine.map_ordered(power, [(1, 1)]))
+
+    def test_a_scheduler_that_is_killed(self):
+        pytest.importorskip("distributed")
+        config = pytest.importorskip("dask.config")
+        process = subprocess.Popen(
+            [sys.executable, "-c", CLUSTER], stdout=subprocess.PIPE, text=True
+        )
+        with process, config.set({"distributed.comm.timeouts.connect": "1s"}):
+            try:
+                address = process.stdout.readline().strip()
+                results = Engine.parse(f"dask:{address}").map_ordered(
+                    abs, [(k,) for k in range(99)]
+                )
+                next(results)
+                process.kill()
+                process.wait()
+                with pytest.raises(EngineError, match=r"^the Dask scheduler is gone$"):
+                    list(results)
+            finally:
+                process.kill()
 
     def test_without_dask(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "distributed", None)

@@ -48,8 +48,8 @@ def call_on_cluster(
         The name of a call and its result, as soon as it exists.
 
     Raises:
-        EngineError: the scheduler does not answer, there are no workers, a worker has no holdfast
-            or another version, or the worker of one call died each time.
+        EngineError: the scheduler does not answer or ends, there are no workers, a worker has no
+            holdfast or another version, or the worker of one call died each time.
         MissingExtra: dask is not installed.
     """
     with _client(scheduler) as client:
@@ -110,6 +110,7 @@ def _call(source: str, function: Callable[..., T], *arguments: object) -> T:
 
 
 _OTHER_VERSION = "{} has another version of holdfast: install the same version on all machines"
+_GONE = "the Dask scheduler is gone"
 _NO_HOLDFAST = "{} cannot import this holdfast: install the same version for it and for its workers"
 
 
@@ -145,11 +146,17 @@ def _client(scheduler: str) -> Iterator["Client"]:
     try:
         import distributed  # noqa: F401 (fills dask's configuration, so it must be first)
         from dask import config
+        from distributed.comm import CommClosedError
     except ImportError as missing:
         raise MissingExtra("distributed", "cluster") from missing
     large = {"distributed.admin.large-graph-warning-threshold": "1GB"}
     with config.set(large), _silent_log(), _connect(scheduler) as client:
-        yield client
+        try:
+            yield client
+        except OSError as cause:  # of the connection, or of a function while it is there
+            if client.status == "running" and not isinstance(cause, CommClosedError):
+                raise
+            raise EngineError(_GONE) from cause
 
 
 @contextmanager
@@ -228,7 +235,7 @@ def _result(future: "Future") -> Any:  # noqa: ANN401 (any function's)
     try:
         return future.result()
     except FutureCancelledError as cause:
-        raise EngineError("the Dask scheduler is gone") from cause
+        raise EngineError(_GONE) from cause
     except ModuleNotFoundError as cause:
         if cause.name is None or cause.name.split(".")[0] != "holdfast":
             raise
