@@ -44,6 +44,15 @@ class Hand(LogFile):
     def __init__(self, uri):
         super().__init__(uri, "commands")
 
+class Mute(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+def __getattr__(name):
+    if name == "mute":
+        raise Mute
+    raise AttributeError(name)
+
 def not_a_hand(uri):
     return Path(uri)
 '''
@@ -52,7 +61,11 @@ POINTS = {
     "holdfast.classifiers": {"same": "parts:same", "none": "parts:pad"},
     "holdfast.laws": {"twice": "parts:Twice", "wrong": "parts:pad"},
     "holdfast.hands": {"grab": "parts:Hand", "hollow": "parts:not_a_hand"},
-    "holdfast.sources": {"gone": "no_such_module:source", "number": "parts:__name__"},
+    "holdfast.sources": {
+        "gone": "no_such_module:source",
+        "number": "parts:__name__",
+        "mute": "parts:mute",
+    },
     "holdfast.importers": {"broken": "broken", "half": "parts"},
 }
 
@@ -115,6 +128,7 @@ def test_nothing_is_imported_before_it_is_used(parts):
          "ModuleNotFoundError: No module named 'no_such_module'"),
         (lambda: open_source("number:"), "number (sources of acme 1.2) is skipped: TypeError: a "
          "function source(address) expected for number:, 'parts' given"),
+        (lambda: open_source("mute:"), "mute (sources of acme 1.2) is skipped: Mute"),
     ],
 )  # fmt: skip
 def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason):

@@ -135,6 +135,9 @@ def _package(point: "EntryPoint") -> str:
 
 def _reason(cause: BaseException) -> str:
     """Return an error as one line of printable characters."""
-    text = " ".join(str(cause).split())
+    try:
+        text = " ".join(str(cause).split())
+    except Exception:  # its text is code of the plug-in too
+        text = ""
     printable = "".join(character for character in text if character.isprintable())
     return f"{type(cause).__name__}: {printable}" if printable else type(cause).__name__
