@@ -133,6 +133,7 @@ def test_a_restart_does_not_wait_long_for_the_next_grasp(quick, monkeypatch):
     monkeypatch.setattr(replay, "RESTART_WAIT", 0.01)
     with open_source("twin:?repeat=4", speed=1000.0, loop=True) as source:
         list(itertools.islice(source, 5))
+        source._simulator.close()  # of the process that simulates the next grasp
         source._simulator._process = subprocess.Popen(["sleep", "60"])
         source.restart()
         arrivals = list(itertools.islice(source, 10))
@@ -160,6 +161,7 @@ def test_it_waits_for_the_next_grasp(quick, monkeypatch):
     with open_source("twin:", speed=0, loop=True) as source:
         list(itertools.islice(source, 10))
         source._simulator._process.wait()
+        source._simulator.close()  # of the process that simulates the next grasp
         source._simulator._process = subprocess.Popen(["sleep", "60"])
         began = time.monotonic()
         assert source.read(0.05) is None
