@@ -53,6 +53,7 @@ export class HealthLine {
     this.rate = part("rate", "rate");
     this.latencies = { p50: part("latency", "latency p50"), p99: part("late", "p99"), max: part("worst", "max") };
     this.delay = part("delay", "late by");
+    this.delay.parentElement.hidden = true;
     this.packets = part("packets", "packets");
     this.counts = ["lost", "refused", "dropped"].map((key) => part(key, key));
     this.footer = footer;
@@ -68,6 +69,8 @@ export class HealthLine {
     setText(this.rate, health.rate === null || health.rate === undefined ? NO_VALUE : `${health.rate.toFixed(1)} Hz`);
     for (const [key, element] of Object.entries(this.latencies)) setText(element, latency(health.latency?.[key]));
     setText(this.delay, delay(health.delay));
+    // Shown while it matters alone: the foot has one line on a tablet.
+    this.delay.parentElement.hidden = !isLate(health.delay);
     this.delay.parentElement.classList.toggle("bad", isLate(health.delay));
     setText(this.packets, whole(health.n_packets));
     [health.n_lost, health.n_refused, health.n_dropped].forEach((n, k) => {
