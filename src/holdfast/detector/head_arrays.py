@@ -4,7 +4,7 @@ What a model does not have is an empty array or NaN in them, nowhere else.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -31,6 +31,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         for part in parts
     ]
     has_causes = any(part.head("cause") for part in parts)
+    has_squares = any(part.slip is not None and part.slip.linear.squares for part in parts)
     has_speeds = any(part.head("slip_speed") for part in parts)
     no_squares = np.zeros((len(parts), 3, 0))
     return DecisionRule(
@@ -45,7 +46,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         causes=_cause_rows(parts, width) if has_causes else np.zeros((len(parts), 0, width + 1)),
         slips=slips,
         n_slip_weights=np.array(all_features) + 1,
-        squares=squares if _any(parts, "slip", lambda rule: bool(rule.squares)) else no_squares,
+        squares=squares if has_squares else no_squares,
         speeds=speeds if has_speeds else np.zeros((len(parts), 0)),
         speed_squares=speed_squares if has_speeds else no_squares,
         slip_limits=np.array([_slip_limits(part, plan.rate) for part in parts]),
@@ -62,11 +63,6 @@ def _n_used(part: FingerModel, name: HeadName) -> int:
     """Return how many of the features of a finger come up to the last that a head uses."""
     head = part.head(name)
     return 0 if head is None else int(part.indices(head).max(initial=-1)) + 1
-
-
-def _any(parts: Sequence[FingerModel], name: HeadName, check: Callable[[Linear], bool]) -> bool:
-    heads = [head for part in parts if (head := part.head(name)) is not None]
-    return any(check(head.linear) for head in heads)
 
 
 def _rows(parts: Sequence[FingerModel], name: HeadName, width: int) -> tuple[Array, Array]:
