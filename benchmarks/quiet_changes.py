@@ -37,7 +37,7 @@ from holdfast.errors import HoldfastError
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
 from holdfast.metrics import pool_events
-from holdfast.metrics.events import alarm_places
+from holdfast.metrics.events import alarm_indices
 from holdfast.metrics.masks import runs
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.model import Model
@@ -151,7 +151,7 @@ def count(trace: FingerTrace, quiet: np.ndarray) -> Counts:
     for first, end in runs(quiet):
         part = trace.state[first:end]
         changes += int(np.count_nonzero(np.diff(part)))
-        n_alarms += len(alarm_places(part))
+        n_alarms += len(alarm_indices(part))
         states += np.bincount(part, minlength=4)
         seconds += float(trace.times[end - 1] - trace.times[first])
     return Counts(changes, n_alarms, states, seconds)

@@ -11,7 +11,6 @@ from holdfast.metrics import (
     match_alarms,
     pool_events,
 )
-from holdfast.metrics.events import _event_of_alarms
 
 from . import naive
 
@@ -132,12 +131,6 @@ def test_what_is_not_labelled_has_no_false_alarm():
     metrics = event_metrics(np.arange(200) / 100, labels, states)
     assert metrics.false_alarms_per_minute == 0
     assert metrics.unlabelled_alarms == 2
-
-
-def test_an_alarm_in_two_windows_belongs_to_the_later_event():
-    onsets, ends = np.array([1.0, 1.2]), np.array([1.1, 1.3])
-    alarms = np.array([0.5, 1.0, 1.17, 1.18, 1.55, 1.6])
-    assert _event_of_alarms(alarms, onsets, ends).tolist() == [-1, 0, 0, 1, 1, -1]
 
 
 def test_event_metrics_computed_by_hand():

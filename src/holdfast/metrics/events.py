@@ -22,6 +22,7 @@ from holdfast.contact import (
     UNSTABLE,
     ContactState,
 )
+from holdfast.metrics.alarms import first_alarms, outside
 from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
@@ -213,9 +214,9 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
 
         onset - 0.02 s <= alarm <= end + 0.25 s
 
-    If there are two, it belongs to the one with the later onset. The first alarm of an event
-    counts; its other alarms are ignored. An alarm that belongs to no event is a false alarm; where
-    nothing is labelled it is neither true nor false, and counted apart.
+    The first alarm of an event counts; its other alarms are ignored. An alarm that belongs to no
+    event is a false alarm; where nothing is labelled it is neither true nor false, and counted
+    apart.
 
     Args:
         times: (n,) strictly increasing [s].
@@ -238,17 +239,33 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     check_lengths(times=time, labels=label, states=state)
     check_times(time)
     stable = _spans(label == STABLE, time)
-    onsets, ends = _events(_spans(_not_stable(label), time), stable)
-    alarms = alarm_places(state)
-    event_of = _event_of_alarms(time[alarms], onsets, ends)
-    others = alarms[event_of < 0]
+    events = _events(_spans(_not_stable(label), time), stable)
+    windows = alarm_windows(events)
+    alarms = alarm_indices(state)
+    first = first_alarms(time, alarms, windows)[0]
+    others = alarms[outside(time, windows)[alarms]]
     false = others[label[others] != UNKNOWN]
     return AlarmMatch(
-        _with_alarms(onsets, ends, time[alarms], event_of),
+        tuple(
+            InstabilityEvent(onset, end, alarm if math.isfinite(alarm) else None)
+            for (onset, end), alarm in zip(events.tolist(), first.tolist(), strict=True)
+        ),
         tuple(FalseAlarm(float(time[k]), _STATES[label[k]]) for k in false),
         float((stable[:, 1] - stable[:, 0]).sum()),
         n_unlabelled=len(others) - len(false),
     )
+
+
+def alarm_windows(events: Array) -> Array:
+    """Return the first and the last time of an alarm that belongs to each event [s].
+
+    Windows do not overlap: at least 0.5 s of stable labels are between two events.
+
+    Args:
+        events: (n_events, 2) onset and end [s].
+    """
+    early, late = EARLY_TOLERANCE + TIME_TOLERANCE, LATE_TOLERANCE + TIME_TOLERANCE
+    return np.asarray(events + np.array([-early, late]))
 
 
 def match_decisions(finger: FingerDecisions) -> AlarmMatch:
@@ -260,11 +277,11 @@ def match_decisions(finger: FingerDecisions) -> AlarmMatch:
     )
 
 
-def alarm_places(states: Codes) -> npt.NDArray[np.intp]:
+def alarm_indices(states: Codes) -> npt.NDArray[np.intp]:
     """Return the samples at which alarms come: not stable, right after a stable sample.
 
     Example:
-        >>> alarm_places(np.array([STABLE, UNSTABLE, UNSTABLE, STABLE, NO_CONTACT])).tolist()
+        >>> alarm_indices(np.array([STABLE, UNSTABLE, UNSTABLE, STABLE, NO_CONTACT])).tolist()
         [1, 4]
     """
     return np.flatnonzero((states[:-1] == STABLE) & _not_stable(states[1:])) + 1
@@ -323,8 +340,8 @@ def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
     return instants[runs(mask)]
 
 
-def _events(unstable: Array, stable: Array) -> tuple[Array, Array]:
-    """Return the onsets and ends [s] of the not-stable runs that are events."""
+def _events(unstable: Array, stable: Array) -> Array:
+    """Return (n_events, 2) onset and end of the not-stable runs that are events [s]."""
     wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
     first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
     onsets, ends = unstable[first, 0], unstable[last, 1]
@@ -332,21 +349,4 @@ def _events(unstable: Array, stable: Array) -> tuple[Array, Array]:
     chosen = (ends - onsets >= MIN_EVENT_DURATION - TIME_TOLERANCE) & np.isin(
         onsets, long_stable[:, 1]
     )
-    return onsets[chosen], ends[chosen]
-
-
-def _event_of_alarms(alarms: Array, onsets: Array, ends: Array) -> npt.NDArray[np.intp]:
-    """Return the index of the event that each alarm belongs to; -1 for a false alarm."""
-    latest = np.searchsorted(onsets - EARLY_TOLERANCE - TIME_TOLERANCE, alarms, side="right") - 1
-    limits = np.append(ends, -np.inf) + LATE_TOLERANCE + TIME_TOLERANCE
-    return np.where(alarms <= limits[latest], latest, -1)
-
-
-def _with_alarms(
-    onsets: Array, ends: Array, alarms: Array, event_of: npt.NDArray[np.intp]
-) -> tuple[InstabilityEvent, ...]:
-    first: dict[int, float] = {}
-    for index, alarm in zip(event_of.tolist(), alarms.tolist(), strict=True):
-        first.setdefault(index, alarm)
-    spans = zip(onsets.tolist(), ends.tolist(), strict=True)
-    return tuple(InstabilityEvent(*span, first.get(k)) for k, span in enumerate(spans))
+    return np.asarray(np.column_stack([onsets, ends])[chosen])

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import TIME_TOLERANCE
+from holdfast.metrics.alarms import first_alarms, outside
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.samples import N_BINS, bins_of
 from holdfast.metrics.slip_truth import (
@@ -222,18 +223,19 @@ class SlipCounter:
         times, slips = decisions.times, truth.slips
         steps = sample_durations(times)
         steps = np.minimum(steps, GAP_PERIODS * np.median(steps)) if len(steps) else steps
-        away = _outside(slips, times)
-        outside = away & (truth.codes == STILL)
-        quiet = outside & truth.quiet
+        windows = _slip_times(slips)
+        away = outside(times, windows[:, :2])
+        counted = away & (truth.codes == STILL)
+        quiet = counted & truth.quiet
         return cls(
             times,
-            _slip_times(slips),
+            windows,
             away,
             np.array([slip.reached for slip in slips]).reshape(-1, len(DISTANCES)),
             _elapsed(steps, quiet),
-            _elapsed(steps, outside),
+            _elapsed(steps, counted),
             _without_alarms(
-                decisions, truth, float(steps[quiet].sum()), float(steps[outside].sum())
+                decisions, truth, float(steps[quiet].sum()), float(steps[counted].sum())
             ),
         )
 
@@ -243,7 +245,9 @@ class SlipCounter:
         Args:
             raised: (n_thresholds, n) True where the decision is raised.
         """
-        first = self._first_alarms(raised)
+        rows, starts, _ = _runs_of_rows(raised)
+        alarms = rows * len(self.times) + starts
+        first = first_alarms(self.times, alarms, self.slips[:, :2], len(raised))
         _, _, onset, gross = self.slips.T
         rows, starts, ends = _runs_of_rows(raised & self.away)
         quiet, outside = (spent[ends] - spent[starts] for spent in (self.quiet, self.outside))
@@ -260,17 +264,6 @@ class SlipCounter:
             false_held=by_row(_n_false(outside)).astype(np.int64),
             raised_seconds=by_row(quiet),
         )
-
-    def _first_alarms(self, raised: Mask) -> Array:
-        """Return the time of the first alarm of each slip, (n_thresholds, n_slips) [s]."""
-        n, row = len(self.times), np.arange(len(raised))[:, None]
-        rows, starts, _ = _runs_of_rows(raised)
-        earliest, latest = self.slips.T[:2]
-        # Alarms of all rows in one sorted array: the place of each is its row and its sample.
-        place = np.searchsorted(rows * n + starts, row * n + np.searchsorted(self.times, earliest))
-        times, rows = np.append(self.times[starts], np.inf), np.append(rows, -1)
-        is_in_time = (rows[place] == row) & (times[place] <= latest)
-        return np.where(is_in_time, times[place], np.inf)
 
 
 def _runs_of_rows(masks: Mask) -> tuple[Integers, Integers, Integers]:
@@ -309,23 +302,16 @@ def _without_alarms(
 
 def _slip_times(slips: Sequence[Slip]) -> Array:
     """Return (n_slips, 4) first and last time of the alarms, onset and gross onset [s]."""
-    rows = [(*_alarm_times(slip), slip.onset, slip.gross) for slip in slips]
+    rows = [
+        (
+            slip.onset - EARLIEST_ALARM - TIME_TOLERANCE,
+            slip.end + LATEST_ALARM + TIME_TOLERANCE,
+            slip.onset,
+            slip.gross,
+        )
+        for slip in slips
+    ]
     return np.array(rows).reshape(-1, 4)
-
-
-def _alarm_times(slip: Slip) -> tuple[float, float]:
-    """Return the first and the last time of an alarm that belongs to a slip [s]."""
-    first, last = slip.onset - EARLIEST_ALARM, slip.end + LATEST_ALARM
-    return first - TIME_TOLERANCE, last + TIME_TOLERANCE
-
-
-def _outside(slips: Sequence[Slip], times: Array) -> Mask:
-    """Return (n,) True outside the time of every slip and its alarms."""
-    outside = np.ones(len(times), dtype=bool)
-    for slip in slips:
-        first, last = _alarm_times(slip)
-        outside[np.searchsorted(times, first) : np.searchsorted(times, last, side="right")] = False
-    return outside
 
 
 def _elapsed(steps: Array, counted: Mask) -> Array:
