@@ -31,7 +31,7 @@ from holdfast.contact import STABLE, Cause, ContactState
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.io import load_dataset
 from holdfast.metrics.slip_thresholds import (
-    THRESHOLDS,
+    SLIP_THRESHOLDS,
     choose_threshold,
     slip_curve,
 )
@@ -319,7 +319,7 @@ def simulated(
         tested += [model.curve(rows) for rows in test if fold_of.get(rows.unit) == fold]
     place = choose_threshold(SlipCurve.total(chosen), FALSE_ALARMS)
     curve = SlipCurve.total(tested or chosen)
-    return slip_metrics(curve[len(THRESHOLDS) - 1 if place is None else place])
+    return slip_metrics(curve[len(SLIP_THRESHOLDS) - 1 if place is None else place])
 
 
 @dataclass(frozen=True)

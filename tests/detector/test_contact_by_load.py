@@ -9,7 +9,7 @@ from holdfast.detector import detect
 from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.training.threshold import ThresholdReplay, with_threshold
+from holdfast.training.replay import ThresholdReplay
 
 RATE = 100.0
 SENSOR = sensor("papillarray")
@@ -116,7 +116,7 @@ def test_a_finger_that_touches_is_unstable_at_first():
 def test_a_force_that_leaves_keeps_its_probability():
     """It is UNSTABLE by its force: the probability is that of the features."""
     model = Model.load("builtin:any")
-    raw = msgspec.structs.replace(with_threshold(model, 0.0), debounce=Debounce())
+    raw = msgspec.structs.replace(model.with_threshold("stable", 0.0), debounce=Debounce())
     trace = detect(raw, recording_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (2, 0)))).fingers[
         "a"
     ]
@@ -131,7 +131,7 @@ def test_a_replay_of_the_threshold_has_the_states_of_the_detector(threshold):
         steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (1, 0), (1, 0.06), (1, 0.06))
     )
     replay = ThresholdReplay.of(model, recording)
-    trace = detect(with_threshold(model, threshold), recording).fingers["a"]
+    trace = detect(model.with_threshold("stable", threshold), recording).fingers["a"]
     assert {NO_CONTACT, UNSTABLE} <= set(trace.state.tolist())
     np.testing.assert_array_equal(replay.states(replay.raw.fingers["a"], threshold), trace.state)
 
@@ -148,7 +148,7 @@ def test_a_force_of_which_a_large_share_comes_or_goes_at_once_is_unstable(share,
 def test_a_force_that_swings_slowly_is_not_unsteady():
     sway = 1 + 0.3 * np.sin(2 * np.pi * 0.4 * np.arange(400) / RATE)
     raw = msgspec.structs.replace(
-        with_threshold(Model.load("builtin:any"), 0.0), debounce=Debounce()
+        Model.load("builtin:any").with_threshold("stable", 0.0), debounce=Debounce()
     )
     recording = recording_of(
         np.concatenate([steps((1, 0), (0.3, 1), (2, 1)), sway[:, None] * LOADED])

@@ -13,7 +13,7 @@ from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import fingertip_force
 from holdfast.metrics.masks import runs
-from holdfast.metrics.slip_thresholds import raised_at
+from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
@@ -285,8 +285,9 @@ class TestSlip:
         n_raised = 0
         for name, trace in detect(hand_model, made).fingers.items():
             head = hand_model.finger(name).slip
-            expected = raised_at(trace.times, trace.slip_probability, head.threshold, head.hold)
             found = trace.cause == SLIP_CODE
+            made = SlipDecisions(trace.times, trace.slip_probability, found, head.hold, None)
+            (expected,) = made.raised_at(np.array([head.threshold]))
             assert np.array_equal(found, expected)
             n_raised += found.sum()
         assert n_raised

@@ -13,7 +13,7 @@ from holdfast.errors import ModelError
 from holdfast.model import Debounce, Model
 from holdfast.model.files import decode, encode
 from holdfast.synthetic import synthetic_recording
-from holdfast.training.threshold import ThresholdReplay, with_threshold
+from holdfast.training.replay import ThresholdReplay
 
 STAY_60 = -30 * math.log(0.6)
 """Rate of switching at which a state stays for 1/60 s with a probability of 0.8 [1/s]."""
@@ -125,5 +125,5 @@ def test_live_equals_offline(steady):
 def test_tuning_replays_it(steady, threshold):
     recording = synthetic_recording("grasp", 2, ("index",))
     replayed = ThresholdReplay.of(steady, recording).hand(threshold)
-    trace = detect(with_threshold(steady, threshold), recording)
+    trace = detect(steady.with_threshold("stable", threshold), recording)
     np.testing.assert_array_equal(replayed.states, trace.hand)

@@ -9,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.metrics.slip_thresholds import (
-    THRESHOLDS,
+    SLIP_THRESHOLDS,
     ThresholdChoice,
     choose_threshold,
     held_out_places,
-    raised_at,
     slip_curve,
     slip_intervals,
     slip_summary,
@@ -219,12 +218,14 @@ class TestRaised:
     def test_hold_and_end(self):
         times = np.arange(8) / RATE
         probability = np.array([0.1, 0.9, 0.1, 0.1, 0.1, 0.9, 0.0, 0.1])
-        raised = raised_at(times, probability, 0.5, hold=0.03)
+        made = SlipDecisions(times, probability, times > 0, 0.03, None)
+        (raised,) = made.raised_at(np.array([0.5]))
         assert raised.tolist() == [False, True, True, True, False, True, False, False]
 
     def test_without_an_estimate_nothing_is_raised(self):
         times = np.arange(3) / RATE
-        assert not raised_at(times, np.full(3, np.nan), 0.5, hold=1.0).any()
+        made = SlipDecisions(times, np.full(3, np.nan), times > 0, 1.0, None)
+        assert not made.raised_at(np.array([0.5])).any()
 
 
 def random_recording(seed, n_false):
@@ -267,7 +268,7 @@ class TestThresholds:
             hold=0.2,
         )
         for place in (40, 60, 80, 90):
-            raised = raised_at(made.times, made.probability, THRESHOLDS[place], made.hold)
+            (raised,) = made.raised_at(SLIP_THRESHOLDS[[place]])
             expected = vars(count_slips(replace(made, raised=raised)))
             counts = vars(slip_curve(made)[place])
             assert raised.any()
@@ -304,7 +305,7 @@ class TestThresholds:
 
     def test_a_single_group_gets_the_highest_threshold(self):
         places = held_out_places(self.curves[:2], (0, 0), ThresholdChoice(1.0))
-        assert places.tolist() == [len(THRESHOLDS) - 1] * 2
+        assert places.tolist() == [len(SLIP_THRESHOLDS) - 1] * 2
 
     def test_no_threshold_where_nothing_is_held(self):
         codes = np.full(1000, NOT_HELD, dtype=np.int8)
@@ -334,6 +335,6 @@ class TestThresholds:
         assert slip_summary([{}, {}]) is None
 
     def test_thresholds_are_probabilities_in_order(self):
-        assert (np.diff(THRESHOLDS) > 0).all()
-        assert 0 < THRESHOLDS[0] < 0.02  # log odds of -4
-        assert 0.999 < THRESHOLDS[-1] < 1  # log odds of 8
+        assert (np.diff(SLIP_THRESHOLDS) > 0).all()
+        assert 0 < SLIP_THRESHOLDS[0] < 0.02  # log odds of -4
+        assert 0.999 < SLIP_THRESHOLDS[-1] < 1  # log odds of 8

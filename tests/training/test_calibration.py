@@ -16,7 +16,7 @@ from holdfast.training import Setting, calibrate, calibrate_with_report, train
 from holdfast.training.calibration import CALIBRATED_SUFFIX, activity, n_changed
 from holdfast.training.operating_point import HandlingFigures
 from holdfast.training.own_handling import MIN_SCALE, held_samples
-from holdfast.training.threshold import tune, with_threshold
+from holdfast.training.tune import tune
 from training.build import (
     PAD,
     TINY,
@@ -240,7 +240,7 @@ def test_no_recordings(model):
 
 
 def test_a_threshold_that_is_tuned_later_wins(calibrated):
-    moved = with_threshold(calibrated.model, 0.125).finger("*", PAD)
+    moved = calibrated.model.with_threshold("stable", 0.125).finger("*", PAD)
     assert moved.stable.threshold == 0.125
     assert moved.stable.rule.mean == handling_of(calibrated.model).location
     assert moved.slip == calibrated.model.finger("*", PAD).slip

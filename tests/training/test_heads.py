@@ -11,8 +11,7 @@ from holdfast.model import ANY_FINGER, Head
 from holdfast.recordings import Label
 from holdfast.training import Setting, calibrate, train
 from holdfast.training.cause_samples import CAUSE_PENALTY
-from holdfast.training.slips import tune_slips
-from holdfast.training.threshold import tune
+from holdfast.training.tune import tune
 
 from .build import TINY, handling_recording, normalised_model, sliding_recording, tiny_recording
 
@@ -97,7 +96,7 @@ def test_a_calibrated_model_keeps_all_heads(model):
 @pytest.mark.parametrize(
     ("changed", "seeds", "tuned"),
     [("stable", (20, 21), lambda m, data: tune(m, data, 100.0).model),
-     ("slip", range(20, 24), lambda m, data: tune_slips(m, data, 20.0).model)],
+     ("slip", range(20, 24), lambda m, data: tune(m, data, 20.0, "slip").model)],
 )  # fmt: skip
 def test_a_tuned_model_keeps_all_heads(model, changed, seeds, tuned):
     data = [sliding_recording(seed) for seed in seeds]

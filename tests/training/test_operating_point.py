@@ -15,7 +15,7 @@ from holdfast.training.operating_point import (
     HeldFingers,
     choose_operating_point,
 )
-from holdfast.training.threshold import ThresholdReplay
+from holdfast.training.replay import ThresholdReplay
 
 RATE = 100.0
 

@@ -4,10 +4,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from holdfast.contact import STABLE
 from holdfast.features import parse_features
+from holdfast.metrics import match_decisions
 from holdfast.model import Debounce
 from holdfast.training import Setting, compute_decisions, train
-from holdfast.training.threshold import ThresholdReplay, alarms, stable_counts, with_threshold
+from holdfast.training.replay import ThresholdReplay
 
 from .build import tiny_recording
 
@@ -25,24 +27,23 @@ def model(grasps):
 def test_it_gives_the_states_of_the_detector(model, debounce, threshold):
     own = msgspec.structs.replace(model, debounce=debounce)
     recording = tiny_recording(20)
-    expected = compute_decisions(with_threshold(own, threshold), recording).hand
+    expected = compute_decisions(own.with_threshold("stable", threshold), recording).hand
     found = ThresholdReplay.of(own, recording).hand(threshold)
     np.testing.assert_array_equal(found.times, expected.times)
     np.testing.assert_array_equal(found.labels, expected.labels)
     np.testing.assert_array_equal(found.states, expected.states)
     assert len(set(found.states.tolist())) > 1
-    assert alarms(found) == alarms(expected)
+    assert match_decisions(found) == match_decisions(expected)
 
 
 def test_a_lower_threshold_is_stable_more_often(model):
     replay = ThresholdReplay.of(model, tiny_recording(21))
-    counts = [stable_counts(replay.hand(p)) for p in (0.999, 0.5, 0.001)]
-    decided = [each["decided"] for each in counts]
-    assert decided == sorted(decided)
-    assert decided[0] < decided[-1] <= counts[0]["labelled"]
+    stable = [(replay.hand(p).states == STABLE).sum() for p in (0.999, 0.5, 0.001)]
+    assert stable == sorted(stable)
+    assert stable[0] < stable[-1]
 
 
 def test_the_threshold_is_that_of_all_fingers(model):
-    changed = with_threshold(model, 0.25)
+    changed = model.with_threshold("stable", 0.25)
     assert {part.stable.threshold for part in changed.fingers.values()} == {0.25}
-    assert with_threshold(changed, 0.5).fingers.keys() == model.fingers.keys()
+    assert changed.with_threshold("stable", 0.5).fingers.keys() == model.fingers.keys()

@@ -28,9 +28,9 @@ from holdfast.training.slips import (
     SLIP_SMOOTHING,
     choose_slip_threshold,
     fit_slips,
-    tune_slips,
     with_slip_threshold,
 )
+from holdfast.training.tune import tune
 
 from .build import TINY, sliding_recording, tiny_recording
 
@@ -237,45 +237,45 @@ def labels_of(recording):
 class TestTuning:
     @pytest.mark.parametrize("rate", [1.0, 20.0])
     def test_the_detector_keeps_to_the_rate(self, model, others, rate):
-        tuned = tune_slips(model, others, rate)
+        tuned = tune(model, others, rate, "slip")
         metrics = slips_of(tuned.model, others)
         assert metrics.false_alarms_per_minute["held"] <= rate
         assert metrics.raised_quiet <= MAX_RAISED_QUIET
-        assert metrics == tuned.chosen
-        assert slips_of(model, others) == tuned.before
+        assert metrics == tuned.chosen.slips
+        assert slips_of(model, others) == tuned.before.slips
 
     def test_a_higher_rate_never_finds_less(self, model, others):
-        strict, loose = (tune_slips(model, others, rate) for rate in (1.0, 20.0))
-        assert loose.threshold <= strict.threshold
-        assert loose.chosen.incipient["0.1"] >= strict.chosen.incipient["0.1"]
+        strict, loose = (tune(model, others, rate, "slip") for rate in (1.0, 20.0))
+        assert loose.chosen.threshold <= strict.chosen.threshold
+        assert loose.chosen.missed <= strict.chosen.missed
 
     def test_points_around_it_are_in_order(self, model, others):
-        tuned = tune_slips(model, others, 5.0)
-        thresholds = [threshold for threshold, _ in tuned.points]
+        tuned = tune(model, others, 5.0, "slip")
+        thresholds = [point.threshold for point in tuned.points]
         assert thresholds == sorted(thresholds)
-        assert dict(tuned.points)[tuned.threshold] == tuned.chosen
+        assert tuned.chosen in tuned.points
 
     def test_the_model_keeps_how_it_was_tuned(self, model, others):
         named = msgspec.structs.replace(model, name="mine")
-        tuned = tune_slips(named, others, 5.0)
+        tuned = tune(named, others, 5.0, "slip")
         rule = rule_of(tuned.model)
         assert tuned.model.name == "mine, tuned"
-        assert rule.threshold == tuned.threshold
+        assert rule.threshold == tuned.chosen.threshold
         assert rule.choice.requested == 5.0
         assert rule.choice.recordings == {made.name: made.readings_digest for made in others}
-        assert rule.choice.found == tuned.chosen.incipient["0.1"]
+        assert rule.choice.found == tuned.chosen.slips.incipient["0.1"]
         (before,), (after,) = (m.fingers.values() for m in (model, tuned.model))
         assert after.stable == before.stable
 
     @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
     def test_a_rate_that_is_none(self, model, others, rate):
         with pytest.raises(ValueError) as refusal:
-            tune_slips(model, others, rate)
+            tune(model, others, rate, "slip")
         assert str(refusal.value) == f"false alarms per minute above 0 expected, {rate:g} given"
 
     def test_a_model_without_a_rule(self, others):
         with pytest.raises(ModelError) as refusal:
-            tune_slips(Model.load("builtin:noise-floor"), others, 1.0)
+            tune(Model.load("builtin:noise-floor"), others, 1.0, "slip")
         assert str(refusal.value).endswith(
             "has no slip rule; train one on recordings whose slips are known"
         )
@@ -283,18 +283,18 @@ class TestTuning:
     def test_recordings_without_labels_or_truth(self, model):
         bare = tiny_recording(1, states=(None,) * 4)
         with pytest.raises(TrainingError) as refusal:
-            tune_slips(model, [bare], 1.0)
+            tune(model, [bare], 1.0, "slip")
         assert str(refusal.value) == "1 recordings without slips that are known"
 
     def test_labels_without_slips_have_false_alarms_only(self, model):
         quiet = tiny_recording(1, states=(ContactState.NO_CONTACT, *[ContactState.STABLE] * 3))
-        tuned = tune_slips(model, [quiet], 60.0)
-        assert tuned.chosen.n == 0
+        tuned = tune(model, [quiet], 60.0, "slip")
+        assert tuned.chosen.slips.n == 0
         assert rule_of(tuned.model).choice.found is None
 
     def test_a_held_time_that_is_too_short(self, model, others):
         with pytest.raises(TrainingError) as refusal:
-            tune_slips(model, others[:1], 1.0)
+            tune(model, others[:1], 1.0, "slip")
         assert str(refusal.value) == (
             "0.28 min of held time given; 1 false alarms a minute need at least 1 min"
         )

@@ -136,7 +136,6 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
         return score(decisions, **options)
 
     monkeypatch.setattr(trainer, "score_recording", keep)
-    monkeypatch.setattr(trainer, "summarise_results", lambda each, seed: list(each) and _some())
     train(grasps, replace(SETTING, split="random"))
     for place, decisions in enumerate(given_decisions):
         units = split_data(scan_dataset(grasps).recordings, "random", 0).units_of(place, 400)
@@ -147,10 +146,6 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
             assert known.sum() > 250
             np.testing.assert_allclose(finger.stable_probability[known], expected[known])
     assert [n / calls[0] for n in calls[2:]] == pytest.approx([0.8] * 10, abs=0.04)
-
-
-def _some():
-    return summarise([])
 
 
 # --- what comes out --------------------------------------------------------------------------

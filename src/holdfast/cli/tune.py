@@ -21,13 +21,10 @@ from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from holdfast.metrics.slips import SlipMetrics
-    from holdfast.model import Model
     from holdfast.recordings import Recording
-    from holdfast.training import ThresholdMetrics, Tuned
-    from holdfast.training.slips import TunedSlips
+    from holdfast.training import CurvePoint, Tuned
 
 
 class TunedQuestion(StrEnum):
@@ -64,9 +61,9 @@ def tune(
     events. Tare, contact, hysteresis and hold time stay, and count. Use recordings that the model
     was not trained on: the rate is a promise for similar grasps only.
 
-    With --for slip, it has the lowest threshold of the slip rule that gives at most so many false
-    alarms of a finger, and reports a slip in at most 2 % of quiet hold. The recordings need a
-    truth, or labels with the cause slip.
+    With --for slip, it is the threshold of the slip rule, by the false alarms and slips of single
+    fingers; a slip is reported in at most 2 % of quiet hold. The recordings need a truth, or
+    labels with the cause slip.
 
     Example:
       holdfast tune model.json recordings/ -o tuned.json --false-alarms 1
@@ -77,10 +74,8 @@ def tune(
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.model import Model
-    from holdfast.training import Tuned
     from holdfast.training import tune as choose
     from holdfast.training.evaluation import evaluate_recordings
-    from holdfast.training.slips import TunedSlips, tune_slips
     from holdfast.training.verdict import no_verdict
 
     refuse_overwrite(out, force=force)
@@ -92,88 +87,68 @@ def tune(
     def deciding(items: "Iterable[Recording]") -> "Iterator[Recording]":
         return progress(items, "deciding", n)
 
-    tuned: Tuned | TunedSlips
-    if question is TunedQuestion.SLIP:
-        tuned = tune_slips(loaded, recordings, false_alarms, progress=deciding)
-    else:
-        tuned = choose(loaded, recordings, false_alarms, progress=deciding)
+    tuned = choose(loaded, recordings, false_alarms, question.value, progress=deciding)
     evaluation = evaluate_recordings(tuned.model, recordings, progress=progress)
     warn_about_recordings(evaluation, n)
     tuned.model.save(out, force=force)
     if as_json:
-        document = _slip_document(tuned) if isinstance(tuned, TunedSlips) else _document(tuned)
         known = evaluation.trained_on
+        document = _slip_document(tuned) if tuned.chosen.slips else _document(tuned)
         print_json({"model": out, "verdict": evaluation.verdict, **document, "trained_on": known})
         return
     print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), n))
-    if isinstance(tuned, TunedSlips):
-        _print_slips(loaded, tuned, recordings[0], out)
-    else:
-        _print_stable(tuned, out)
-
-
-def _print_stable(tuned: "Tuned", out: Path) -> None:
-    _print_points(tuned)
+    chosen, before = tuned.chosen, tuned.before
+    points = {point.threshold: point for point in (*tuned.points, before)}
+    notes = {before.threshold: "before", chosen.threshold: "chosen"}
+    _print_points([points[t] for t in sorted(points)], notes)
     print_line()
+    answer = "STABLE" if chosen.slips is None else "a slip"
     print_line(
-        f"{out}: STABLE from a probability of {tuned.chosen.threshold:.3g} on, was "
-        f"{tuned.before.threshold:.3g}"
+        f"{out}: {answer} from a probability of {chosen.threshold:.3g} on, was "
+        f"{before.threshold:.3g}"
     )
 
 
-def _print_slips(model: "Model", tuned: "TunedSlips", first: "Recording", out: Path) -> None:
-    sensors = {name: module.sensor for name, module in first.modules.items()}
-    parts = [model.finger(*finger) for finger in model.fingers_of(sensors).items()]
-    thresholds = sorted({part.slip.threshold for part in parts if part.slip})
-    points = dict(tuned.points)
-    if len(thresholds) == 1:
-        points.setdefault(thresholds[0], tuned.before)
-    notes = dict.fromkeys(thresholds, "before") | {tuned.threshold: "chosen"}
-    print_slip_points(sorted(points.items()), notes, slips_origin(tuned.chosen))
-    print_line()
-    before = ", ".join(f"{threshold:.3g}" for threshold in thresholds)
-    print_line(f"{out}: a slip from a probability of {tuned.threshold:.3g} on, was {before}")
-
-
-def _slip_document(tuned: "TunedSlips") -> dict[str, object]:
-    return {
-        "for": TunedQuestion.SLIP.value,
-        "threshold": tuned.threshold,
-        "chosen": tuned.chosen,
-        "before": tuned.before,
-        "around": [_slip_point(threshold, metrics) for threshold, metrics in tuned.points],
-    }
-
-
-def _slip_point(threshold: float, metrics: "SlipMetrics") -> dict[str, object]:
-    from msgspec import to_builtins
-
-    return {"threshold": threshold, **to_builtins(metrics)}
-
-
 def _document(tuned: "Tuned") -> dict[str, object]:
+    def document(point: "CurvePoint") -> dict[str, object]:
+        return {"threshold": point.threshold, "stable": point.stable, "events": point.events}
+
     return {
         "threshold": tuned.chosen.threshold,
-        "chosen": tuned.chosen,
-        "before": tuned.before,
-        "around": tuned.points,
+        "chosen": document(tuned.chosen),
+        "before": document(tuned.before),
+        "around": [document(point) for point in tuned.points],
     }
 
 
-def _print_points(tuned: "Tuned") -> None:
+def _slip_document(tuned: "Tuned") -> dict[str, object]:
+    from msgspec import to_builtins
+
+    return {
+        "for": TunedQuestion.SLIP.value,
+        "threshold": tuned.chosen.threshold,
+        "chosen": tuned.chosen.slips,
+        "before": tuned.before.slips,
+        "around": [{"threshold": p.threshold, **to_builtins(p.slips)} for p in tuned.points],
+    }
+
+
+def _print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> None:
+    slips = {point.threshold: point.slips for point in points if point.slips is not None}
+    if slips:
+        origin = slips_origin(next(iter(slips.values())))
+        print_slip_points(slips.items(), notes, origin)
+        return
     print_line("of the hand; missed events within 0.05, 0.1 and 0.2 s of their onset")
     header = ("threshold", "STABLE %", "false/min", "0.05 s %", "0.1 s %", "0.2 s %",
               "delay s", "")  # fmt: skip
-    points = [*tuned.points]
-    if tuned.before.threshold not in {point.threshold for point in points}:
-        points.append(tuned.before)
-    notes = {tuned.before.threshold: "before", tuned.chosen.threshold: "chosen"}
-    points.sort(key=lambda point: point.threshold)
     print_table(header, [(*_cells(p), notes.get(p.threshold, "")) for p in points])
 
 
-def _cells(point: "ThresholdMetrics") -> tuple[str, ...]:
+def _cells(point: "CurvePoint") -> tuple[str, ...]:
     events = point.events
+    if events is None:
+        return ()
     missed = (format_number(share, 1) for share in events.missed.values())
     never = events.delay_median is None and events.n_events
     delay = "never" if never else format_number(events.delay_median, 3)

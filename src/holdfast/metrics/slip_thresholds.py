@@ -25,10 +25,12 @@ from holdfast.metrics.statistics import (
 )
 from holdfast.sensors.types import Array, Flags, Integers
 
-THRESHOLD_LOG_ODDS = np.arange(-80, 161) * 0.05
-"""Log odds of the thresholds that are tried."""
-THRESHOLDS = 1.0 / (1.0 + np.exp(-THRESHOLD_LOG_ODDS))
-"""Thresholds of the probability of a slip that are tried, lowest first."""
+LOG_ODDS = np.arange(-160, 161) * 0.05
+"""Log odds of the thresholds that are tried, for every head."""
+THRESHOLDS = 1.0 / (1.0 + np.exp(-LOG_ODDS))
+"""Thresholds of a probability that are tried, lowest first."""
+SLIP_LOG_ODDS, SLIP_THRESHOLDS = LOG_ODDS[80:], THRESHOLDS[80:]
+"""Those of a slip, which are not below a probability of 0.018."""
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
 
@@ -65,45 +67,15 @@ class SlipSummary(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def slip_curve(decisions: SlipDecisions) -> SlipCurve:
-    """Return the counts of decisions about one finger at each of `THRESHOLDS`.
+    """Return the counts of decisions about one finger at each of `SLIP_THRESHOLDS`.
 
     Args:
         decisions: with a truth; where it is raised is not used.
     """
-    times, probability, hold = decisions.times, decisions.probability, decisions.hold
     counter = SlipCounter.of(decisions)
-    n = max(1, MAX_FLAGS // max(len(times), 1))
-    blocks = [THRESHOLDS[first : first + n] for first in range(0, len(THRESHOLDS), n)]
-    return SlipCurve.joined(
-        [counter.count(raised_at_each(times, probability, block, hold)) for block in blocks]
-    )
-
-
-def raised_at(times: Array, probability: Array, threshold: float, hold: float) -> Flags:
-    """Return where a slip is reported, from its probability: the rule of the detector.
-
-    Args:
-        times: (n,) [s].
-        probability: (n,) smoothed; NaN and 0 end a slip at once.
-        threshold: from which the finger slides.
-        hold: time for which it is still reported [s].
-
-    Returns:
-        (n,) True where the finger is reported to slide.
-    """
-    return np.asarray(raised_at_each(times, probability, np.array([threshold]), hold)[0])
-
-
-def raised_at_each(times: Array, probability: Array, thresholds: Array, hold: float) -> Flags:
-    """Return where a slip is reported at each threshold, (n_thresholds, n), as `raised_at`."""
-    with np.errstate(invalid="ignore"):
-        ended = ~(probability > 0)
-        over = probability >= thresholds[:, None]
-    end = np.maximum.accumulate(np.where(ended, times, -np.inf))
-    last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
-    period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    held = (times - last + 0.5 * period < hold) & (last > end)
-    return np.asarray((over | held) & ~ended)
+    n = max(1, MAX_FLAGS // max(len(decisions.times), 1))
+    blocks = [SLIP_THRESHOLDS[first : first + n] for first in range(0, len(SLIP_THRESHOLDS), n)]
+    return SlipCurve.joined([counter.count(decisions.raised_at(block)) for block in blocks])
 
 
 def choose_threshold(
@@ -120,7 +92,7 @@ def choose_threshold(
         counted_in: all held time, or quiet hold alone.
 
     Returns:
-        The place in `THRESHOLDS`; None if no threshold fits, or nothing is held.
+        The place in `SLIP_THRESHOLDS`; None if no threshold fits, or nothing is held.
     """
     choice = ThresholdChoice(false_alarms, counted_in)
     place = int(_places(_limited([_ratios(curve)], choice), choice, np.ones((1, 1)))[0])
@@ -208,7 +180,7 @@ def slip_intervals(
     """Compute the intervals of the pooled metrics of slips.
 
     Args:
-        curves: of each recording, at `THRESHOLDS`; of one threshold each without a choice.
+        curves: of each recording, at `SLIP_THRESHOLDS`; of one threshold each without a choice.
         choice: that is made again in each resample; None for a threshold that is given.
         groups: of each recording: the threshold of a recording is chosen from the recordings of
             the other groups in the resample; by default each recording is one.

@@ -103,6 +103,25 @@ class SlipDecisions:
     hold: float
     truth: SlipTruth | None
 
+    def raised_at(self, thresholds: Array) -> Mask:
+        """Return where a slip is reported at each threshold, by the rule of the detector.
+
+        Args:
+            thresholds: (n_thresholds,) of the probability; NaN and 0 end a slip at once.
+
+        Returns:
+            (n_thresholds, n).
+        """
+        times, probability = self.times, self.probability
+        with np.errstate(invalid="ignore"):
+            ended = ~(probability > 0)
+            over = probability >= np.asarray(thresholds)[:, None]
+        end = np.maximum.accumulate(np.where(ended, times, -np.inf))
+        last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
+        period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        held = (times - last + 0.5 * period < self.hold) & (last > end)
+        return np.asarray((over | held) & ~ended)
+
 
 def finger_slips(truth: Truth, finger: str) -> tuple[Slip, ...]:
     """Return the slips of one finger by the truth.

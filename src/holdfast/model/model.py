@@ -17,7 +17,7 @@ from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.model.files import decode, encode, read_model, write_model
-from holdfast.model.heads import Head
+from holdfast.model.heads import Choice, Head, HeadName
 from holdfast.model.parts import (
     MAX_FINGERS,
     MAX_TAXELS,
@@ -134,6 +134,18 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Return the model with each of its fingers changed by a function."""
         fingers = {name: change(part) for name, part in self.fingers.items()}
         return msgspec.structs.replace(self, fingers=fingers)
+
+    def with_threshold(
+        self, name: HeadName, threshold: float, choice: Choice | None = None
+    ) -> Self:
+        """Return the model with another threshold of a head, for all fingers and sensors."""
+
+        def changed(part: FingerModel) -> FingerModel:
+            head = part.head(name)
+            part = part.without_thresholds(name)
+            return part if head is None else part.with_heads(head.at(threshold, choice))
+
+        return self.changed(changed)
 
     def finger(self, name: str, sensor: Sensor | None = None) -> FingerModel:
         """Return the model of a finger.

@@ -5,17 +5,17 @@ from typing import TYPE_CHECKING
 from holdfast.training.calibration import CalibratedModel, calibrate, calibrate_with_report
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import Setting
-from holdfast.training.threshold import ThresholdMetrics, Tuned, tune
 from holdfast.training.trainer import Trained, train
+from holdfast.training.tune import CurvePoint, Tuned, tune
 
 if TYPE_CHECKING:
     from holdfast.training.estimator import StabilityClassifier
 
 __all__ = [
     "CalibratedModel",
+    "CurvePoint",
     "Setting",
     "StabilityClassifier",
-    "ThresholdMetrics",
     "Trained",
     "Tuned",
     "calibrate",

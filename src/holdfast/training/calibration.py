@@ -27,7 +27,7 @@ from holdfast.training.own_handling import (
     held_samples,
     location_and_scale,
 )
-from holdfast.training.threshold import ThresholdReplay
+from holdfast.training.replay import ThresholdReplay
 
 STILL_CHANGE = 0.03
 """Median change of the load below which the arm hardly moved, as a share of it."""

@@ -1,7 +1,7 @@
 """Thresholds of a model on its user's own handling, which has no labels."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
@@ -12,11 +12,11 @@ from holdfast.contact import STABLE, UNSTABLE
 from holdfast.errors import TrainingError
 from holdfast.metrics import FingerDecisions
 from holdfast.metrics.masks import runs
-from holdfast.metrics.slip_thresholds import THRESHOLDS, raised_at
+from holdfast.metrics.slip_thresholds import THRESHOLDS
 from holdfast.model import FingerModel, HeadName
 from holdfast.sensors.types import Array, Flags
 from holdfast.training.own_handling import held_durations, location_and_scale
-from holdfast.training.threshold import ThresholdReplay
+from holdfast.training.replay import ThresholdReplay
 
 STABLE_SHARE = 0.95
 """Share of the held samples of own handling that is STABLE."""
@@ -29,8 +29,6 @@ MAX_DISTANCE = 3.0
 away is taken for slip, and the share is not reached then."""
 HIGHEST_THRESHOLD = 0.9
 """Highest threshold of stability that own handling sets."""
-STABLE_THRESHOLDS = 1.0 / (1.0 + np.exp(0.02 * np.arange(300, -301, -1)))
-"""Thresholds of the probability of stability that are tried, lowest first."""
 
 
 Thresholds = dict[HeadName, float]
@@ -109,7 +107,7 @@ class HeldFinger:
         slip = self.decisions.slip
         if slip is None:
             return np.zeros_like(self.held)
-        return raised_at(slip.times, slip.probability, threshold, slip.hold)
+        return np.asarray(slip.raised_at(np.array([threshold]))[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +179,11 @@ def choose_operating_point(
     """Choose the thresholds of a model on own handling.
 
     The threshold of stability is at most that of the model, the threshold of slips at least:
-    handling that is still tells nothing about motion, so it is no reason to alarm more. Handling
+    handling that is still says nothing about motion, so it is no reason to alarm more. Handling
     in which the arm moves may raise the threshold of stability to `HIGHEST_THRESHOLD`. Up to there
-    it is the highest (of slips the lowest) at which enough held samples are quiet: `STABLE_SHARE`
-    of them STABLE, a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`;
-    or at which there are at most so many alarms of either kind.
+    it is the most sensitive at which enough held samples are quiet: `STABLE_SHARE` of them STABLE,
+    a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which
+    there are at most so many alarms of either kind.
 
     Args:
         handling: decided with its own location and scale.
@@ -196,54 +194,68 @@ def choose_operating_point(
     Raises:
         TrainingError: no threshold gives so few alarms of a kind.
     """
-    usual = max(part.stable.threshold, HIGHEST_THRESHOLD if moves else 0.0)
-    tried = [*(t for t in STABLE_THRESHOLDS.tolist() if t < usual), usual]
-    slips = []
-    if part.slip is not None:
-        usual = part.slip.threshold
-        slips = [usual, *(t for t in THRESHOLDS.tolist() if t > usual)]
-    if false_alarms is None:
-        return _by_share(handling, tried, slips)
-    return _by_alarms(handling, tried, slips, false_alarms)
-
-
-def _by_share(handling: HeldFingers, tried: Sequence[float], slips: Sequence[float]) -> Thresholds:
-    """Return the thresholds by the shares, of those that are tried: the usual one is the last.
-
-    Of slips, the usual one is the first.
-    """
+    default = max(part.stable.threshold, HIGHEST_THRESHOLD if moves else 0.0)
     lowest = _probability_at(handling.stable_log_odds(), -MAX_DISTANCE)
-    near = [t for t in tried if t >= lowest] or [tried[-1]]
-    calm = list(takewhile(lambda t: handling.stable_share(t) >= STABLE_SHARE, near))
-    threshold = calm[-1] if calm else near[0]
-    if not slips:
-        return {"stable": threshold}
-    highest = _probability_at(handling.slip_log_odds(), MAX_DISTANCE)
-    near = [t for t in slips if t <= highest] or [slips[0]]
-    silent = (t for t in near if handling.raised_share(t) <= RAISED_SHARE)
-    return {"stable": threshold, "slip": next(silent, near[-1])}
-
-
-def _by_alarms(
-    handling: HeldFingers, tried: Sequence[float], slips: Sequence[float], most: float
-) -> Thresholds:
-    """Return the thresholds by the number of alarms a minute, of those that are tried."""
-    calm = list(takewhile(lambda t: handling.alarms_per_minute(t) <= most, tried))
-    silent = (t for t in slips if handling.slips_per_minute(t) <= most)
-    slip_threshold = next(silent, None)
-    if not calm:
-        raise _too_many(most, "alarms", map(handling.alarms_per_minute, tried))
-    if slips and slip_threshold is None:
-        raise _too_many(most, "reported slips", map(handling.slips_per_minute, slips))
-    chosen: Thresholds = {"stable": calm[-1]}
-    return chosen if slip_threshold is None else {**chosen, "slip": slip_threshold}
-
-
-def _too_many(most: float, what: str, rates: Iterable[float]) -> TrainingError:
-    return TrainingError(
-        f"no threshold gives at most {most:g} {what} a minute of this handling; the least is "
-        f"{min(rates):.2g}"
+    stable = HandlingCurve(
+        [*THRESHOLDS[default > THRESHOLDS].tolist(), default],
+        is_near=lambda t: t >= lowest,
+        is_quiet=lambda t: handling.stable_share(t) >= STABLE_SHARE,
+        alarms=handling.alarms_per_minute,
+        kind="alarms",
     )
+    chosen: Thresholds = {"stable": stable.choose(false_alarms)}
+    if part.slip is not None:
+        default = part.slip.threshold
+        highest = _probability_at(handling.slip_log_odds(), MAX_DISTANCE)
+        slip = HandlingCurve(
+            [*THRESHOLDS[default < THRESHOLDS][::-1].tolist(), default],
+            is_near=lambda t: t <= highest,
+            is_quiet=lambda t: handling.raised_share(t) <= RAISED_SHARE,
+            alarms=handling.slips_per_minute,
+            kind="reported slips",
+        )
+        chosen["slip"] = slip.choose(false_alarms)
+    return chosen
+
+
+@dataclass(frozen=True)
+class HandlingCurve:
+    """What a head answers about own handling, at thresholds.
+
+    Attributes:
+        thresholds: from the quietest to the most sensitive.
+        is_near: whether a threshold is near the probabilities of this handling.
+        is_quiet: whether enough held samples are quiet at a threshold.
+        alarms: number of alarms a minute at a threshold.
+        kind: of the alarms.
+    """
+
+    thresholds: Sequence[float]
+    is_near: Callable[[float], bool]
+    is_quiet: Callable[[float], bool]
+    alarms: Callable[[float], float]
+    kind: str
+
+    def choose(self, false_alarms: float | None) -> float:
+        """Return the most sensitive threshold that is quiet, as all quieter ones are.
+
+        Args:
+            false_alarms: maximum number a minute; None for the share of quiet samples, of which
+                the quietest near threshold falls short where none has it.
+
+        Raises:
+            TrainingError: no threshold gives so few alarms.
+        """
+        if false_alarms is None:
+            near = [t for t in self.thresholds if self.is_near(t)] or [self.thresholds[-1]]
+            return [near[0], *takewhile(self.is_quiet, near)][-1]
+        quiet = list(takewhile(lambda t: self.alarms(t) <= false_alarms, self.thresholds))
+        if not quiet:
+            raise TrainingError(
+                f"no threshold gives at most {false_alarms:g} {self.kind} a minute of this "
+                f"handling; the least is {min(map(self.alarms, self.thresholds)):.2g}"
+            )
+        return quiet[-1]
 
 
 def _log_odds(probabilities: Sequence[Array]) -> Array:

@@ -1,7 +1,6 @@
 """Training of slip rules: samples that slide or hold still, and the threshold of the decision."""
 
-import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -10,12 +9,9 @@ import numpy as np
 from holdfast.classifiers.fitting import Samples, standardise
 from holdfast.classifiers.linear import MAX_DEVIATION, Linear
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.errors import ModelError, TrainingError
 from holdfast.features import FeatureSpec
-from holdfast.metrics import RecordingResults, score_recording
 from holdfast.metrics.slip_thresholds import (
-    MAX_RAISED_QUIET,
-    THRESHOLDS,
+    SLIP_THRESHOLDS,
     SlipSummary,
     ThresholdChoice,
     choose_threshold,
@@ -23,12 +19,10 @@ from holdfast.metrics.slip_thresholds import (
     slip_intervals,
     slip_summary,
 )
-from holdfast.metrics.slips import SlipCounts, SlipCurve, SlipMetrics, found_shares, slip_metrics
-from holdfast.model import ANY_FINGER, Choice, Head, Model
-from holdfast.recordings import Recording
-from holdfast.training.evaluation import compute_decisions
+from holdfast.metrics.slips import SlipCounts, SlipCurve, slip_metrics
+from holdfast.model import ANY_FINGER, Head, Model
 from holdfast.training.slip_samples import SlipSamples
-from holdfast.training.threshold import with_head_threshold
+from holdfast.training.tune import CurvePoint
 
 SLIP_SMOOTHING, SLIP_HOLD_TIME = 0.02, 0.05
 """Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
@@ -36,15 +30,11 @@ SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
 MIN_SLIDING_SAMPLES = 50
 """Fewer sliding samples train no slip rule."""
-N_SHOWN = 3
-"""Thresholds that are shown on either side of the chosen one."""
 
 NO_SLIP_DECISIONS = (
     "no decision about a slip out of fold, from which a threshold could be chosen; the model gets "
     "no slip rule"
 )
-
-Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
 def fit_slips(
@@ -135,7 +125,7 @@ class ChosenThreshold:
     """Threshold of the slip rules of a model, and the metrics out of fold.
 
     Attributes:
-        place: of the threshold in `THRESHOLDS`; None if no threshold has few enough false alarms.
+        place: of the threshold in `SLIP_THRESHOLDS`; None if none has few enough false alarms.
         counts: of all recordings at this threshold; at the highest if there is none.
         metrics: out of fold, each recording by the threshold of the others.
     """
@@ -180,7 +170,7 @@ def choose_slip_threshold(
         return None
     by_recording = [SlipCurve.total(list(fingers.values())) for fingers, _ in used]
     own = [group for _, group in used]
-    pooled, highest = SlipCurve.total(by_recording), len(THRESHOLDS) - 1
+    pooled, highest = SlipCurve.total(by_recording), len(SLIP_THRESHOLDS) - 1
     place = choose_threshold(pooled, SLIP_FALSE_ALARMS)
     places, intervals = [highest if place is None else place] * len(used), None
     if has_others := len(set(own)) > 1:
@@ -210,115 +200,6 @@ def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
         return model.changed(
             lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
         )
-    threshold = float(THRESHOLDS[chosen.place])
-    return with_head_threshold(model, "slip", threshold, slip_choice(chosen.counts))
-
-
-def slip_choice(
-    counts: SlipCounts,
-    requested: float = SLIP_FALSE_ALARMS,
-    recordings: Mapping[str, str] | None = None,
-) -> Choice:
-    """Return how a threshold was chosen, for the model file."""
-    minutes = counts.held_seconds / 60
-    return Choice(
-        requested=requested,
-        false_alarms_per_minute=counts.false_held / minutes,
-        found=found_shares(counts.delays)["0.1"],
-        n=len(counts.delays),
-        minutes=minutes,
-        recordings=dict(recordings or {}),
-    )
-
-
-@dataclass(frozen=True)
-class TunedSlips:
-    """Result of tuning the slip rules of a model.
-
-    Attributes:
-        model: with the chosen threshold.
-        threshold: that was chosen.
-        chosen: metrics at this threshold, on the recordings from which it was chosen.
-        before: metrics of the model that was given.
-        points: thresholds around it and their metrics, lowest first.
-    """
-
-    model: Model
-    threshold: float
-    chosen: SlipMetrics
-    before: SlipMetrics
-    points: tuple[tuple[float, SlipMetrics], ...]
-
-
-def tune_slips(
-    model: Model,
-    recordings: Sequence[Recording],
-    false_alarms: float,
-    *,
-    progress: Steps = lambda recordings: recordings,
-) -> TunedSlips:
-    """Choose the threshold of the slip rules for a rate of false alarms in held time.
-
-    Args:
-        model: with slip rules.
-        recordings: with a truth, or labels of slips.
-        false_alarms: maximum number per minute of held time, of one finger.
-        progress: iterates over the recordings.
-
-    Raises:
-        ValueError: the rate is not above 0.
-        ModelError: the model has no slip rule; or a recording has other fingers or sensors.
-        TrainingError: no slips are known, the held time is too short for the rate, or no
-            threshold gives so few false alarms.
-    """
-    if not (math.isfinite(false_alarms) and false_alarms > 0):
-        raise ValueError(f"false alarms per minute above 0 expected, {false_alarms:g} given")
-    if not model.has_slip_rule:
-        raise ModelError(
-            f"{model.name or 'the model'} has no slip rule; train one on recordings whose slips "
-            "are known"
-        )
-    digests: dict[str, str] = {}
-    results: list[RecordingResults] = []
-    for recording in progress(recordings):
-        digests[recording.name] = recording.readings_digest
-        results.append(score_recording(compute_decisions(model, recording), slip_curves=True))
-    curve = SlipCurve.total([curve for result in results for curve in result.slip_curves.values()])
-    if not curve:
-        raise TrainingError(f"{len(results)} recordings without slips that are known")
-    place = _supported(curve, false_alarms)
-    before = SlipCounts.total(counts for result in results for counts in result.slips.values())
-    threshold = float(THRESHOLDS[place])
-    choice = slip_choice(curve[place], false_alarms, digests)
-    tuned = with_head_threshold(model, "slip", threshold, choice)
-    around = range(max(place - N_SHOWN, 0), min(place + N_SHOWN + 1, len(curve)))
-    return TunedSlips(
-        msgspec.structs.replace(tuned, name=f"{model.name}, tuned" if model.name else ""),
-        threshold,
-        slip_metrics(curve[place]),
-        slip_metrics(before),
-        tuple((float(THRESHOLDS[k]), slip_metrics(curve[k])) for k in around),
-    )
-
-
-def _supported(curve: SlipCurve, false_alarms: float) -> int:
-    """Return the place of the threshold.
-
-    Raises:
-        TrainingError: the data do not support the rate, or no threshold has it.
-    """
-    minutes = curve[0].held_seconds / 60
-    if not _supports(curve[0], false_alarms):
-        raise TrainingError(
-            f"{minutes:.2g} min of held time given; {false_alarms:g} false alarms a minute need "
-            f"at least {1 / false_alarms:.2g} min"
-        )
-    place = choose_threshold(curve, false_alarms)
-    if place is None:
-        least = float(curve.false_held.min()) / minutes
-        raise TrainingError(
-            f"no threshold gives at most {false_alarms:g} false alarms a minute of held time "
-            f"with a slip reported in at most {MAX_RAISED_QUIET:g} % of quiet hold; the least is "
-            f"{least:.2g}"
-        )
-    return place
+    threshold = float(SLIP_THRESHOLDS[chosen.place])
+    point = CurvePoint(threshold, slips=slip_metrics(chosen.counts))
+    return model.with_threshold("slip", threshold, point.choice(SLIP_FALSE_ALARMS))

@@ -1,8 +1,9 @@
 """Training: fit a model to all recordings, and cross-validate it with the detector itself."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple, Self
 
 import msgspec
 
@@ -13,13 +14,14 @@ from holdfast.metrics import (
     Decisions,
     Metrics,
     RecordingResults,
+    ResultTotal,
     score_recording,
-    summarise_results,
 )
 from holdfast.metrics.slips import SlipCurve
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
 from holdfast.training.adaptation import (
     adaptation_warnings,
     choose_adaptation,
@@ -27,6 +29,7 @@ from holdfast.training.adaptation import (
 )
 from holdfast.training.cause_samples import missing_causes
 from holdfast.training.dataset_scan import (
+    DatasetScan,
     OneRecording,
     Progress,
     RecordingScan,
@@ -35,7 +38,7 @@ from holdfast.training.dataset_scan import (
     show_nothing,
 )
 from holdfast.training.evaluation import combine_decisions, judge
-from holdfast.training.finger_samples import thin, thinning_step
+from holdfast.training.finger_samples import FingerSamples, thin, thinning_step
 from holdfast.training.model_fit import (
     TrainingData,
     fit_full_model,
@@ -131,15 +134,15 @@ def train(
         EngineError: the engine cannot be used.
     """
     setting, engine = setting or Setting(), engine or Engine(n_jobs)
-    trainer = _Trainer(recordings, setting, journal, warn, progress, engine)
+    trainer = _Trainer.read(recordings, setting, journal, warn, progress, engine)
     trainer.check()
     final, *held_out = trainer.search([set(), *trainer.search_units()])
     model = fit_full_model(trainer.data, trainer.setting, final)
-    metrics = trainer.cross_validate(held_out or [final])
-    _warn_of_undecided(metrics, warn)
+    scored = trainer.cross_validate(held_out or [final])
+    _warn_of_undecided(scored.metrics, warn)
     for warning in missing_causes(model, trainer.data.samples.cause):
         warn(warning)
-    model, metrics = trainer.choose_slip_threshold(model, metrics)
+    model, metrics = trainer.choose_slip_threshold(model, scored)
     provenance = training_record(
         trainer.setting,
         trainer.scan,
@@ -151,81 +154,92 @@ def train(
     model = msgspec.structs.replace(model, training=provenance)
     init = trainer.setting.init
     known = () if init is None else tuple(known_recordings(init, trainer.scan))
-    return Trained(model, metrics, trainer.setting.split, trainer.tares, known)
+    tares = LoadedTares(scored.n_loaded, len(recordings))
+    return Trained(model, metrics, trainer.setting.split, tares, known)
 
 
+class OutOfFold(NamedTuple):
+    """Results of models about recordings that they were not fitted to.
+
+    Attributes:
+        metrics: of all recordings.
+        slip_curves: counts of slips of each finger at each threshold, of each recording.
+        n_loaded: number of recordings whose tare was taken under load.
+    """
+
+    metrics: Metrics
+    slip_curves: list[Mapping[str, SlipCurve]]
+    n_loaded: int
+
+
+@dataclass(frozen=True)
 class _Trainer:
-    def __init__(
-        self,
+    """A dataset that is read, and what it is trained with.
+
+    Attributes:
+        recordings: of the dataset.
+        setting: of the training, with what follows from the dataset.
+        data: training samples of every head.
+        journal: file that keeps the trials of the search.
+        warn: is called with the text of every warning.
+        progress: iterates over recordings, searches and fits.
+        engine: that reads the recordings, searches and fits.
+    """
+
+    recordings: Sequence[Recording]
+    setting: Setting
+    data: TrainingData
+    journal: Path | None
+    warn: Warn
+    progress: Progress
+    engine: Engine
+
+    @classmethod
+    def read(
+        cls,
         recordings: Sequence[Recording],
         setting: Setting,
         journal: Path | None,
         warn: Warn,
         progress: Progress,
         engine: Engine,
-    ) -> None:
-        self.recordings = recordings
-        self.journal = journal if engine.scheduler is None else None
-        self.n_loaded = 0
-        self.warn, self.progress, self.engine = warn, progress, engine
-        parts = ((OneRecording(recordings, place),) for place in range(len(recordings)))
+    ) -> Self:
+        """Scan the recordings, and gather the samples of every head from them."""
+        parts = ((OneRecording(recordings, index),) for index in range(len(recordings)))
         scans = engine.map_ordered(_scan_part, parts, shared=(setting.relative,))
         read = progress(scans, "reading", len(recordings))
-        self.scan = combine_scans(read, setting.rate, relative=setting.relative)
+        scan = combine_scans(read, setting.rate, relative=setting.relative)
         if setting.init is None:
-            setting = replace(setting, features=self._that_fit(setting.features))
-        self.setting = setting = self._with_split(self._with_handling(setting))
-        self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
-        own = setting.slip_features and self._that_fit(setting.slip_features)
+            features = _that_fit(setting.features, scan.smallest, warn)
+            setting = replace(setting, features=features)
+        setting = _with_split(_with_handling(setting, scan), scan, warn)
+        data_split = split_data(scan.recordings, setting.split, setting.seed)
+        own = setting.slip_features and _that_fit(setting.slip_features, scan.smallest, warn)
         plan = SamplesPlan(
-            self.scan, setting, self.data_split, own or setting.features,
+            scan, setting, data_split, own or setting.features,
             only_stable=setting.init is not None,
         )  # fmt: skip
         samples = gather_samples(recordings, plan, engine, progress)
         if own and not samples.slip:
             warn("no slips are known in the recordings: the model gets no slip rule")
-        self.fingers = samples.stable
-        self.data = TrainingData(
-            self.scan, self.data_split, samples, plan.slip_features, slip_squares=bool(own)
-        )
-        self.slip_curves: list[tuple[Mapping[str, SlipCurve], int]] = []
-
-    def _with_handling(self, setting: Setting) -> Setting:
-        """Return the setting; own handling of the sensors is in the classifiers to adapt."""
-        init = setting.init
-        if init is None or not any(part.handling for part in init.fingers.values()):
-            return setting
-        return replace(setting, init=init.with_handling_of(self.scan.sensors))
-
-    def _with_split(self, setting: Setting) -> Setting:
-        """Return the setting; a model is adapted to one recording with the split by time."""
-        alone = len(self.scan.recordings) == 1 and setting.init is not None
-        if setting.split != "recording" or not alone:
-            return setting
-        self.warn(
-            "one recording given: the metrics are by blocks of time within it (--split time), "
-            "and too good; the next grasp is another"
-        )
-        return replace(setting, split="time")
-
-    def _that_fit(self, features: tuple[FeatureSpec, ...]) -> tuple[FeatureSpec, ...]:
-        """Return the features that all sensors have, and warn of those that are left out."""
-        smallest, n_taxels = self.scan.smallest, self.scan.smallest.n_taxels
-        left_out = [spec for spec in features if spec.min_taxels > n_taxels]
-        if not left_out:
-            return features
-        kinds = ", ".join(dict.fromkeys(spec.kind for spec in left_out))
-        least = max(spec.min_taxels for spec in left_out)
-        self.warn(
-            f"{kinds} left out: {smallest.name} has {n_taxels} taxel{'s' * (n_taxels > 1)}, they "
-            f"need at least {least}"
-        )
-        return tuple(spec for spec in features if spec.min_taxels <= n_taxels)
+        data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
+        journal = journal if engine.scheduler is None else None
+        return cls(recordings, setting, data, journal, warn, progress, engine)
 
     @property
-    def tares(self) -> LoadedTares:
-        """Recordings whose tare was taken under load, after the cross-validation."""
-        return LoadedTares(self.n_loaded, len(self.scan.recordings))
+    def scan(self) -> DatasetScan:
+        """What was read of the recordings."""
+        return self.data.scan
+
+    @property
+    def data_split(self) -> DataSplit:
+        """Units that are held out together."""
+        return self.data.data_split
+
+    @property
+    def fingers(self) -> Mapping[str, FingerSamples]:
+        """Training samples of the heads of stability."""
+        return self.data.fingers
 
     def check(self) -> None:
         """Check the samples, and warn of metrics that are missing or may be wrong.
@@ -290,8 +304,8 @@ class _Trainer:
                 self.warn(adaptation.describe(init.name or "the model to adapt", finger))
         return parameters
 
-    def cross_validate(self, searched: Sequence[Mapping[str, Parameters]]) -> Metrics:
-        """Compute the metrics of predictions out of fold.
+    def cross_validate(self, searched: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
+        """Score predictions out of fold.
 
         Args:
             searched: parameters of every finger from each search. Unit k uses those of search k
@@ -310,7 +324,12 @@ class _Trainer:
         context = (self.data_split, len(self.fingers))
         calls = (self._call(place, models) for place in range(len(self.recordings)))
         evaluated = self.engine.map_ordered(_score_out_of_fold, calls, shared=context)
-        return summarise_results(self._results(evaluated), seed=self.setting.seed)
+        total, slip_curves, n_loaded = ResultTotal(), [], 0
+        for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
+            total.add(results)
+            slip_curves.append(results.slip_curves)
+            n_loaded += loaded
+        return OutOfFold(total.metrics(seed=self.setting.seed), slip_curves, n_loaded)
 
     def _call(
         self, place: int, models: Sequence[Model | None]
@@ -322,13 +341,12 @@ class _Trainer:
             used = [models[self.data_split.group_of[place] % len(models)]]
         return place, scanned.name, OneRecording(self.recordings, place), used
 
-    def choose_slip_threshold(self, model: Model, metrics: Metrics) -> tuple[Model, Metrics]:
-        """Return the model with the threshold of its slip rules, and the metrics of slips.
+    def choose_slip_threshold(self, model: Model, scored: OutOfFold) -> tuple[Model, Metrics]:
+        """Return the model with the threshold of its slip rules, and the metrics with slips.
 
-        Call it after the cross-validation. A model that is adapted keeps its slip rules. Warn of
-        each rule that is not made.
+        A model that is adapted keeps its slip rules. Warn of each rule that is not made.
         """
-        replace_fields, init = msgspec.structs.replace, self.setting.init
+        replace_fields, init, metrics = msgspec.structs.replace, self.setting.init, scored.metrics
         if init is not None:
             fingers = {
                 name: part.with_heads(
@@ -339,26 +357,52 @@ class _Trainer:
             return replace_fields(model, fingers=fingers), metrics
         for warning in missing_slip_rules(model, self.data.samples.slip):
             self.warn(warning)
-        curves = [curve for curve, _ in self.slip_curves]
-        groups = [group for _, group in self.slip_curves]
         chosen = None
         if model.has_slip_rule:
-            chosen = choose_slip_threshold(curves, groups, self.setting.seed)
+            groups = self.data_split.group_of.tolist()
+            chosen = choose_slip_threshold(scored.slip_curves, groups, self.setting.seed)
             if chosen is None or chosen.reason:
                 self.warn(NO_SLIP_DECISIONS if chosen is None else chosen.reason)
         model = with_slip_threshold(model, chosen)
         slips = chosen.metrics if chosen is not None and model.has_slip_rule else None
         return model, replace_fields(metrics, slips=slips)
 
-    def _results(
-        self, evaluated: Iterator[tuple[RecordingResults, bool]]
-    ) -> Iterator[RecordingResults]:
-        groups = self.data_split.group_of
-        done = self.progress(evaluated, "evaluating", len(self.recordings))
-        for place, (results, loaded) in enumerate(done):
-            self.n_loaded += loaded
-            self.slip_curves.append((results.slip_curves, int(groups[place])))
-            yield results
+
+def _with_handling(setting: Setting, scan: DatasetScan) -> Setting:
+    """Return the setting; own handling of the sensors is in the classifiers to adapt."""
+    init = setting.init
+    if init is None or not any(part.handling for part in init.fingers.values()):
+        return setting
+    return replace(setting, init=init.with_handling_of(scan.sensors))
+
+
+def _with_split(setting: Setting, scan: DatasetScan, warn: Warn) -> Setting:
+    """Return the setting; a model is adapted to one recording with the split by time."""
+    alone = len(scan.recordings) == 1 and setting.init is not None
+    if setting.split != "recording" or not alone:
+        return setting
+    warn(
+        "one recording given: the metrics are by blocks of time within it (--split time), "
+        "and too good; the next grasp is another"
+    )
+    return replace(setting, split="time")
+
+
+def _that_fit(
+    features: tuple[FeatureSpec, ...], smallest: Sensor, warn: Warn
+) -> tuple[FeatureSpec, ...]:
+    """Return the features that all sensors have, and warn of those that are left out."""
+    n_taxels = smallest.n_taxels
+    left_out = [spec for spec in features if spec.min_taxels > n_taxels]
+    if not left_out:
+        return features
+    kinds = ", ".join(dict.fromkeys(spec.kind for spec in left_out))
+    least = max(spec.min_taxels for spec in left_out)
+    warn(
+        f"{kinds} left out: {smallest.name} has {n_taxels} taxel{'s' * (n_taxels > 1)}, they "
+        f"need at least {least}"
+    )
+    return tuple(spec for spec in features if spec.min_taxels <= n_taxels)
 
 
 def _scan_part(relative: bool, part: Sequence[Recording]) -> RecordingScan:

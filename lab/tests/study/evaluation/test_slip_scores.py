@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers.linear import smooth
-from holdfast.metrics.slip_thresholds import THRESHOLDS
+from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
 from holdfast.model import Head
 from holdfast.training.slips import SLIP_SMOOTHING
@@ -106,10 +106,10 @@ class TestRanks:
 
     def test_the_thresholds_reach_from_every_still_sample_to_none(self):
         probability = probability_of(log_odds_of(self.ranks, self.ranks))
-        assert (probability >= THRESHOLDS[0]).all()
-        assert not (probability >= THRESHOLDS[-1]).any()
+        assert (probability >= SLIP_THRESHOLDS[0]).all()
+        assert not (probability >= SLIP_THRESHOLDS[-1]).any()
         above = probability_of(log_odds_of(self.ranks[-1:] + 0.1, self.ranks))
-        assert above >= THRESHOLDS[-1]
+        assert above >= SLIP_THRESHOLDS[-1]
 
     def test_the_scale_of_the_scores_does_not_matter(self):
         scores = np.linspace(-3, 3, 100)
