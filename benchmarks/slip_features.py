@@ -40,7 +40,8 @@ from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.slips import EARLY_DURATION, SLIP_HOLD_TIME, SLIP_SMOOTHING
+from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
+from holdfast.training.targets import EARLY_DURATION
 
 LAG_SECONDS = (0.0067, 0.0267, 0.0533, 0.107, 0.213)
 """Lags of first differences [s]."""

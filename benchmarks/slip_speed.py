@@ -34,7 +34,7 @@ from holdfast.metrics.statistics import bootstrap_interval, ratio_of_sums
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.slip_speed import MILLIMETRES, in_long_slips, true_speed
+from holdfast.training.targets import MILLIMETRES, in_long_slips, true_speed
 
 BANDS = (1.0, 5.0, 20.0, 100.0, math.inf)
 """Limits of the bands of the true speed [mm/s]."""

@@ -42,15 +42,11 @@ from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.evaluation import compute_decisions
+from holdfast.training.head_fits import fit_slip, fit_speed
 from holdfast.training.setting import Setting
-from holdfast.training.slip_samples import SlipSamples
-from holdfast.training.slips import (
-    choose_slip_threshold,
-    fit_slips,
-    fit_speed,
-    with_slip_threshold,
-)
+from holdfast.training.slip_threshold import choose_slip_threshold, with_slip_threshold
 from holdfast.training.splits import split_data
+from holdfast.training.targets import TargetSamples
 from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 N_FOLDS = 5
@@ -67,15 +63,19 @@ def main(options: argparse.Namespace) -> None:
         features = tuple(x for x in SLIP_FEATURES if not any(text in str(x) for text in left_out))
     recordings = [recording for folder in options.folders for recording in named(folder)]
     plan = plan_of(model, recordings, features)
-    samples = gather_samples(recordings, plan, engine).slip["*"]
+    gathered = gather_samples(recordings, plan, engine)
+    samples = gathered.of("slip")["*"]
+    speeds = gathered.of("slip_speed").get("*")
     if model.finger("*").normalised:
         samples = normalised_samples(model, samples, recordings, options.normalised_by)
-    print(f"{len(recordings)} recordings, {samples.own.samples.stable.sum()} sliding samples")
+    print(f"{len(recordings)} recordings, {samples.n_positive} sliding samples")
     folds = folds_of_recordings(plan, recordings)
     units = plan.data_split.group_of
     held = [units[folds == fold].tolist() for fold in range(N_FOLDS)]
     squares = options.own_features
-    models = [replaced(model, fitted(model, samples, left, features, squares)) for left in held]
+    models = [
+        replaced(model, fitted(model, samples, speeds, left, features, squares)) for left in held
+    ]
     calls = ((models[fold], item) for fold, item in zip(folds, recordings, strict=True))
     curves = list(engine.map_ordered(curves_of, calls))
     chosen = choose_slip_threshold(curves, folds.tolist(), seed=0)
@@ -84,7 +84,7 @@ def main(options: argparse.Namespace) -> None:
     print_metrics(chosen.metrics.pooled)
     for folder in options.folders:
         print_folder(folder.name, recordings, curves, chosen.place)
-    complete = replaced(model, fitted(model, samples, [], features, squares))
+    complete = replaced(model, fitted(model, samples, speeds, [], features, squares))
     complete = with_slip_threshold(complete, chosen)
     print(msgspec.json.encode(complete.finger("*").slip.choice).decode())
     if out is not None:
@@ -98,15 +98,15 @@ def add_speed(model: Model, options: argparse.Namespace, engine: Engine) -> None
         raise SystemExit(f"{options.model} has no slip rule; one expected, whose features it uses")
     recordings = [recording for folder in options.folders for recording in named(folder)]
     plan = plan_of(model, recordings, part.slip.features)
-    samples = gather_samples(recordings, plan, engine).slip["*"]
-    heads = fit_speed(samples, [], part.slip.features)
-    if samples.speeds is None or not heads:
+    samples = gather_samples(recordings, plan, engine).of("slip_speed").get("*")
+    head = samples and fit_speed(samples, [], part.slip.features)
+    if not samples or not head:
         raise SystemExit(
             f"too few samples whose true speed is known in {len(recordings)} recordings"
         )
-    print(f"{samples.speeds.n_sliding} sliding samples of slips over 1 mm")
+    print(f"{samples.n_positive} sliding samples of slips over 1 mm")
     if options.out is not None:
-        complete = model.changed(lambda own: own.with_heads(*heads))
+        complete = model.changed(lambda own: own.with_heads(head))
         msgspec.structs.replace(complete, name=options.out.stem).save(options.out, force=True)
         print(f"{options.out} written")
 
@@ -140,20 +140,22 @@ def folds_of_recordings(plan: SamplesPlan, recordings: Sequence[Recording]) -> n
 
 
 def normalised_samples(
-    model: Model, samples: SlipSamples, recordings: Sequence[Recording], name: str
-) -> SlipSamples:
+    model: Model, samples: TargetSamples, recordings: Sequence[Recording], name: str
+) -> TargetSamples:
     """Return the samples normalised by own handling, by its name; by default handling without."""
     grasps = [read_grasp(model, recording) for recording in recordings]
-    default, own = model.finger("*").default_handling, samples.own
+    default = model.finger("*").default_handling
     moments = [moments or default for moments in moments_by(name, grasps)]
-    locations, scales = (np.array(values)[own.recordings] for values in zip(*moments, strict=True))
-    features = (own.samples.features - locations) / scales
-    return replace(samples, own=replace(own, samples=own.samples._replace(features=features)))
+    locations, scales = (
+        np.array(values)[samples.recordings] for values in zip(*moments, strict=True)
+    )
+    return replace(samples, features=(samples.features - locations) / scales)
 
 
 def fitted(
     model: Model,
-    samples: SlipSamples,
+    samples: TargetSamples,
+    speeds: TargetSamples | None,
     held: Collection[int],
     features: tuple[FeatureSpec, ...],
     squares: bool,
@@ -162,10 +164,14 @@ def fitted(
 
     Of a model of normalised features, mean and scale of the rule of slips are default handling.
     """
-    heads, part = fit_slips(samples, held, features, squares=squares), model.finger("*")
-    if not heads or not part.normalised:
-        return heads
-    slip, *others = heads
+    part, is_any = model.finger("*"), all(spec.seconds for spec in features)
+    slip = fit_slip(samples, held, features, is_any=is_any, squares=squares)
+    if slip is None:
+        return []
+    speed = fit_speed(speeds, held, features) if speeds and squares else None
+    others = [] if speed is None else [speed]
+    if not part.normalised:
+        return [slip, *others]
     rule, columns = slip.linear, part.indices(part.stable)
     location, scale = (values[columns] for values in part.default_handling)
     weights = np.array(rule.weights[0]) / np.array(rule.scale)

@@ -10,7 +10,7 @@ from holdfast.features import fingertip_force, haar_features, parse_features
 from holdfast.model import ANY_FINGER, Head
 from holdfast.recordings import Label
 from holdfast.training import Setting, calibrate, train
-from holdfast.training.cause_samples import CAUSE_PENALTY
+from holdfast.training.head_fits import CAUSE_PENALTY
 from holdfast.training.tune import tune
 
 from .build import TINY, handling_recording, normalised_model, sliding_recording, tiny_recording

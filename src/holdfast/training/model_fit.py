@@ -1,6 +1,6 @@
 """Fit of a model to training samples, with or without some units, and its provenance."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Self
@@ -16,8 +16,8 @@ from holdfast.model import FingerModel, Head, Model, Training
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import DatasetScan, scan_dataset
 from holdfast.training.finger_samples import FingerSamples
+from holdfast.training.head_fits import fit_cause, fit_slip, fit_speed
 from holdfast.training.setting import Setting
-from holdfast.training.slips import fit_slips
 from holdfast.training.splits import DataSplit, split_data
 from holdfast.training.training_samples import HeadSamples, SamplesPlan, gather_samples
 
@@ -128,14 +128,8 @@ def fit_model(
         stable = Head(
             name="stable", link="logit", features=setting.features, rule=rule, threshold=limit
         )
-        others: list[Head] = []
-        if finger in data.samples.slip:
-            slips = data.samples.slip[finger]
-            others += fit_slips(slips, held, data.slip_features, squares=data.slip_squares)
-        if finger in data.samples.cause and not held:  # no metric out of fold counts causes
-            others += data.samples.cause[finger].fit(held, setting.features)
         fingers[finger] = FingerModel(
-            heads=(stable, *others),
+            heads=(stable, *_other_heads(data, setting, finger, held)),
             sensor=None if pool.sensor is None else pool.sensor.name,
             contact_threshold=(
                 pool.contact_threshold(recordings) if threshold is None else threshold
@@ -152,6 +146,25 @@ def fit_model(
         tare=str(setting.used_tare),
         debounce=setting.debounce,
     )
+
+
+def _other_heads(
+    data: TrainingData, setting: Setting, finger: str, held: Collection[int]
+) -> Iterator[Head]:
+    """Yield the heads of a finger beside `stable` that its samples can train."""
+    slips, speeds, causes = (
+        data.samples.of(head).get(finger) for head in ("slip", "slip_speed", "cause")
+    )
+    slip = slips and fit_slip(
+        slips, held, data.slip_features, is_any=setting.relative, squares=data.slip_squares
+    )
+    if slip:
+        yield slip
+        if speeds and data.slip_squares and (head := fit_speed(speeds, held, data.slip_features)):
+            yield head
+    # No metric out of fold counts causes.
+    if causes and not held and (head := fit_cause(causes, held, setting.features)):
+        yield head
 
 
 def fit_full_model(

@@ -27,7 +27,6 @@ from holdfast.training.adaptation import (
     choose_adaptation,
     known_recordings,
 )
-from holdfast.training.cause_samples import missing_causes
 from holdfast.training.dataset_scan import (
     DatasetScan,
     OneRecording,
@@ -39,6 +38,7 @@ from holdfast.training.dataset_scan import (
 )
 from holdfast.training.evaluation import combine_decisions, judge
 from holdfast.training.finger_samples import FingerSamples, thin, thinning_step
+from holdfast.training.head_fits import missing_heads
 from holdfast.training.model_fit import (
     TrainingData,
     fit_full_model,
@@ -46,11 +46,9 @@ from holdfast.training.model_fit import (
     training_record,
 )
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
-from holdfast.training.slips import (
+from holdfast.training.slip_threshold import (
     NO_SLIP_DECISIONS,
     choose_slip_threshold,
-    missing_slip_rules,
-    sliding_samples,
     with_slip_threshold,
 )
 from holdfast.training.splits import DataSplit, inner_folds, split_data
@@ -140,8 +138,10 @@ def train(
     model = fit_full_model(trainer.data, trainer.setting, final)
     scored = trainer.cross_validate(held_out or [final])
     _warn_of_undecided(scored.metrics, warn)
-    for warning in missing_causes(model, trainer.data.samples.cause):
-        warn(warning)
+    if setting.init is None:
+        samples = trainer.data.samples
+        for warning in missing_heads(model, samples.of("slip"), samples.of("cause")):
+            warn(warning)
     model, metrics = trainer.choose_slip_threshold(model, scored)
     provenance = training_record(
         trainer.setting,
@@ -149,7 +149,11 @@ def train(
         final,
         metrics.pooled,
         trainer.data.thinned,
-        sliding_samples(model, trainer.data.samples.slip),
+        {
+            finger: samples.n_positive
+            for finger, samples in trainer.data.samples.of("slip").items()
+            if model.finger(finger).slip is not None
+        },
     )
     model = msgspec.structs.replace(model, training=provenance)
     init = trainer.setting.init
@@ -220,7 +224,7 @@ class _Trainer:
             only_stable=setting.init is not None,
         )  # fmt: skip
         samples = gather_samples(recordings, plan, engine, progress)
-        if own and not samples.slip:
+        if own and not samples.of("slip"):
             warn("no slips are known in the recordings: the model gets no slip rule")
         data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
         journal = journal if engine.scheduler is None else None
@@ -355,8 +359,6 @@ class _Trainer:
                 for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics
-        for warning in missing_slip_rules(model, self.data.samples.slip):
-            self.warn(warning)
         chosen = None
         if model.has_slip_rule:
             groups = self.data_split.group_of.tolist()

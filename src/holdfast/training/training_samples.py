@@ -14,13 +14,12 @@ from holdfast.features.force import rest_amplitude
 from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.metrics.slip_truth import slip_truth
-from holdfast.model import ANY_FINGER, RATE_TOLERANCE
+from holdfast.model import ANY_FINGER, RATE_TOLERANCE, HeadName
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample, true_updates
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
-from holdfast.training.cause_samples import CauseSamples, cause_samples
 from holdfast.training.dataset_scan import DatasetScan, OneRecording, Progress, show_nothing
 from holdfast.training.finger_samples import (
     FingerSamples,
@@ -31,8 +30,8 @@ from holdfast.training.finger_samples import (
     usable_rows,
 )
 from holdfast.training.setting import Setting
-from holdfast.training.slip_samples import SlipSamples, slip_samples
 from holdfast.training.splits import DataSplit
+from holdfast.training.targets import TARGETS, TargetInput, TargetSamples
 
 
 @dataclass(frozen=True)
@@ -66,11 +65,10 @@ class SamplesPlan:
 
 
 class PartSamples(NamedTuple):
-    """Training samples of one finger in one recording, for each head; None without any."""
+    """Training samples of one finger in one recording: of stability, and of the other heads."""
 
     stable: FingerSamples
-    slip: SlipSamples | None
-    cause: CauseSamples | None
+    others: Mapping[HeadName, TargetSamples]
 
 
 @dataclass(frozen=True)
@@ -79,13 +77,16 @@ class HeadSamples:
 
     Attributes:
         stable: of every finger that has labels.
-        slip: of the fingers of which a truth or labels name slips.
-        cause: of the fingers of which a truth or labels name causes.
+        others: of the other heads, by head: of the fingers of which a truth or labels name slips,
+            true speeds or causes.
     """
 
     stable: Mapping[str, FingerSamples]
-    slip: Mapping[str, SlipSamples] = field(default_factory=dict)
-    cause: Mapping[str, CauseSamples] = field(default_factory=dict)
+    others: Mapping[HeadName, Mapping[str, TargetSamples]] = field(default_factory=dict)
+
+    def of(self, head: HeadName) -> Mapping[str, TargetSamples]:
+        """Return the samples of a head beside `stable`, by finger."""
+        return self.others.get(head, {})
 
 
 def gather_samples(
@@ -125,14 +126,13 @@ def gather_samples(
     if plan.setting.is_shared:
         stable = {ANY_FINGER: pool_fingers(stable)}
         parts = {ANY_FINGER: [part for own in parts.values() for part in own]}
-    slips = {f: [part.slip for part in own if part.slip] for f, own in parts.items()}
-    causes = {f: [part.cause for part in own if part.cause] for f, own in parts.items()}
-    slip = {finger: SlipSamples.joined(own) for finger, own in slips.items() if own}
-    return HeadSamples(
-        stable,
-        {finger: own for finger, own in slip.items() if own.n_sliding},
-        {finger: CauseSamples.joined(own) for finger, own in causes.items() if own},
-    )
+    others: dict[HeadName, dict[str, TargetSamples]] = {}
+    for finger, own in parts.items():
+        for head in TARGETS:
+            known = [part.others[head] for part in own if head in part.others]
+            if known and (joined := TargetSamples.joined(known)).n_positive:
+                others.setdefault(head, {})[finger] = joined
+    return HeadSamples(stable, others)
 
 
 def _read(
@@ -214,15 +214,18 @@ def _samples_of_part(
             np.array([rest_moments(module, tare, rate) if has_rest else (0.0, 0.0, 0.0)]),
             len(usable),
         )
+        others: dict[HeadName, TargetSamples] = {}
         truth = slip_truth(recording, finger, module.times) if with_others else None
-        slip = cause = None
         if truth is not None:
-            slip = slip_samples(
-                recording, finger, slip_rows[finger], truth, units, (group, index),
-                step=recording_step * step, is_any=scan.relative,
-            )  # fmt: skip
-            cause = cause_samples(recording, finger, rows, units, truth, recording_step * step)
-        fingers[finger] = PartSamples(stable, slip, cause)
+            step_of_rows = recording_step * step
+            given = TargetInput(
+                recording, finger, truth, units, index, step_of_rows, is_any=scan.relative
+            )
+            for head, target in TARGETS.items():
+                columns = rows if head == "cause" else slip_rows[finger]
+                if (made := target(given, columns)) is not None:
+                    others[head] = made
+        fingers[finger] = PartSamples(stable, others)
     return fingers
 
 

@@ -13,7 +13,7 @@ from holdfast.metrics.slips import (
     LATEST_ALARM,
 )
 from holdfast.metrics.statistics import Interval
-from holdfast.training.slips import SLIP_HOLD_TIME, SLIP_SMOOTHING
+from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort

@@ -27,7 +27,7 @@ from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
 from holdfast.training.finger_samples import thinning_step, usable_rows
-from holdfast.training.slips import SLIP_HOLD_TIME, SLIP_SMOOTHING
+from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.study.evaluation.fitted_method import (
     ChosenRows,
     FittedMethod,

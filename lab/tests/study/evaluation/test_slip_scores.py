@@ -5,7 +5,7 @@ from holdfast.classifiers.linear import smooth
 from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
 from holdfast.model import Head
-from holdfast.training.slips import SLIP_SMOOTHING
+from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation.scores import probability_of
 from holdfast_lab.study.evaluation.slip_scores import (
     SlipRecording,

@@ -19,20 +19,21 @@ from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTrut
 from holdfast.model import Model
 from holdfast.training import Setting, compute_decisions, train
 from holdfast.training.evaluation import combine_decisions
-from holdfast.training.finger_samples import FingerSamples
-from holdfast.training.slip_samples import SlipSamples
-from holdfast.training.slips import (
+from holdfast.training.head_fits import (
     MIN_SLIDING_SAMPLES,
-    SLIP_FALSE_ALARMS,
     SLIP_HOLD_TIME,
     SLIP_SMOOTHING,
+    fit_slip,
+)
+from holdfast.training.slip_threshold import (
+    SLIP_FALSE_ALARMS,
     choose_slip_threshold,
-    fit_slips,
     with_slip_threshold,
 )
+from holdfast.training.targets import TargetSamples
 from holdfast.training.tune import tune
 
-from .build import TINY, sliding_recording, tiny_recording
+from .build import sliding_recording, tiny_recording
 
 pytestmark = pytest.mark.slow
 
@@ -59,14 +60,6 @@ def model(trained):
 @pytest.fixture(scope="module")
 def others():
     return [sliding_recording(seed) for seed in range(20, 26)]
-
-
-def finger_samples(features, slides):
-    """Samples of a finger, all of one group and one unit."""
-    n = len(slides)
-    zeros = np.zeros(n, dtype=np.int64)
-    samples = Samples(features, slides, zeros)
-    return FingerSamples(TINY, samples, zeros, zeros, np.arange(n) / 100, np.zeros((1, 3)), n)
 
 
 def rule_of(model):
@@ -140,8 +133,9 @@ class TestTraining:
         features = 3.0 + 2.0 * rng.normal(size=(4000, 2))
         features[0, 1] = 40.0  # more than five standard deviations
         slides = rng.random(4000) < 1 / (1 + np.exp(3 - np.abs(features[:, 0] - 3.0)))
-        own = finger_samples(features, slides)
-        (head,) = fit_slips(SlipSamples(own), (), FEATURES[:2], squares=True)
+        zeros = np.zeros(4000, dtype=np.int64)
+        samples = TargetSamples(features, slides, zeros, zeros, 4000)
+        head = fit_slip(samples, (), FEATURES[:2], is_any=False, squares=True)
         deviation = (features - features.mean(axis=0)) / features.std(axis=0)
         squares = np.minimum(np.abs(deviation), 5.0) ** 2
         rows = Samples(np.hstack([deviation, squares]), slides, np.zeros(4000, dtype=np.int64))

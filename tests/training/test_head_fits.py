@@ -1,4 +1,4 @@
-"""Speed rules: their samples, their fit, and models with them."""
+"""Fits of heads: the speed of a slip, and models with it."""
 
 from dataclasses import replace
 
@@ -9,15 +9,9 @@ from holdfast.classifiers.linear import add_squares, speed_of
 from holdfast.detector import detect
 from holdfast.features import parse_features
 from holdfast.features.specs import OF_TWO_TAXELS, SLIP_FEATURES
-from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.training import Setting, train
-from holdfast.training.slip_speed import (
-    MIN_SPEED_SAMPLES,
-    STILL_STEP,
-    SpeedSamples,
-    speed_samples,
-    true_speed,
-)
+from holdfast.training.head_fits import MIN_SPEED_SAMPLES, fit_speed
+from holdfast.training.targets import TargetSamples, true_speed
 
 from .build import sliding_recording
 
@@ -45,55 +39,44 @@ def samples():
     speed = np.maximum(2.0 + features[:, 0] + 0.5 * features[:, 1] ** 2, 0.01) ** 2
     still = np.zeros((800, 2)) + [-2.0, 0.0] + 0.01 * rng.normal(size=(800, 2))
     units = np.arange(4800) % 4
-    return SpeedSamples(np.vstack([features, still]), np.concatenate([speed, np.zeros(800)]), units)
+    speed = np.concatenate([speed, np.zeros(800)])
+    return TargetSamples(np.vstack([features, still]), speed, units, units, 4800)
+
+
+FEATURES = parse_features("F_x,F_y", 6)
+
+
+def fit(samples, held):
+    head = fit_speed(samples, held, FEATURES)
+    return None if head is None else (head.rule, head.highest)
 
 
 class TestFit:
     def test_it_finds_the_speed(self, samples):
-        rule, highest = samples.fit(())
-        slides = samples.speed > 0
-        error = np.abs(speeds_of(rule, highest, samples.features) - samples.speed)
+        rule, highest = fit(samples, ())
+        slides = samples.values > 0
+        error = np.abs(speeds_of(rule, highest, samples.features) - samples.values)
         assert error[slides].mean() < 0.1
         assert error[~slides].max() < 0.1
-        assert highest == samples.speed.max()
+        assert highest == samples.values.max()
 
     def test_mean_and_scale_are_those_of_the_samples_that_slide(self, samples):
-        (rule, _), features = samples.fit(()), samples.features[samples.speed > 0]
+        (rule, _), features = fit(samples, ()), samples.features[samples.values > 0]
         np.testing.assert_allclose(rule.mean, features.mean(axis=0))
         np.testing.assert_allclose(rule.scale, features.std(axis=0))
 
     def test_held_units_are_left_out(self, samples):
-        strange = replace(samples, speed=np.where(samples.units == 1, 50.0, samples.speed))
-        assert strange.fit({1}) == samples.fit({1})
-        assert strange.fit(()) != samples.fit(())
+        strange = replace(samples, values=np.where(samples.units == 1, 50.0, samples.values))
+        assert fit(strange, {1}) == fit(samples, {1})
+        assert fit(strange, ()) != fit(samples, ())
 
     def test_too_few_samples_that_slide(self, samples):
-        places = np.flatnonzero(samples.speed > 0)[: MIN_SPEED_SAMPLES - 1]
-        rows = np.concatenate([places, np.flatnonzero(samples.speed == 0)])
-        few = SpeedSamples(samples.features[rows], samples.speed[rows], samples.units[rows])
-        assert few.n_sliding == MIN_SPEED_SAMPLES - 1
-        assert few.fit(()) is None
-
-
-def test_samples_are_those_of_long_slips_and_some_that_hold_still():
-    made = sliding_recording(0, ("thumb",), slips=(400, 700))
-    arrays = made.truth.fingers["thumb"]
-    speed = arrays["slip_speed"].copy()
-    speed[700:740] /= 5  # 0.8 mm
-    fingers = {"thumb": arrays | {"slip_speed": speed}}
-    made = replace(made, truth=replace(made.truth, fingers=fingers))
-    times = made.modules["thumb"].times
-    truth = slip_truth(made, "thumb", times)
-    features = np.arange(len(times), dtype=float)[:, None]
-    features[405] = np.nan
-    found = speed_samples(made, "thumb", features, truth, np.zeros(len(times), dtype=int))
-    rows = found.features[:, 0].astype(int)
-    slides = found.speed > 0
-    assert rows[slides].tolist() == [*range(400, 405), *range(406, 440)]
-    np.testing.assert_allclose(found.speed[slides], 10.0)
-    assert rows[~slides].tolist() == np.flatnonzero(truth.codes == STILL)[::STILL_STEP].tolist()
-    assert (true_speed(made, "thumb", times)[truth.codes == SLIDING] >= 2.0 - 1e-9).all()
-    assert speed_samples(replace(made, truth=None), "thumb", features, truth, rows) is None
+        places = np.flatnonzero(samples.values > 0)[: MIN_SPEED_SAMPLES - 1]
+        rows = np.concatenate([places, np.flatnonzero(samples.values == 0)])
+        columns = (samples.features, samples.values, samples.units, samples.units)
+        few = TargetSamples(*(column[rows] for column in columns), len(rows))
+        assert few.n_positive == MIN_SPEED_SAMPLES - 1
+        assert fit(few, ()) is None
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,190 @@
+"""Fits of the heads beside stability to the samples of their targets."""
+
+from collections.abc import Collection, Iterator, Mapping
+
+import msgspec
+import numpy as np
+
+from holdfast.classifiers.causes import fit_causes
+from holdfast.classifiers.fitting import Samples, standardise
+from holdfast.classifiers.linear import MAX_DEVIATION, Linear
+from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.contact import CAUSES
+from holdfast.features import FeatureSpec
+from holdfast.model import ANY_FINGER, Head, Model
+from holdfast.sensors.types import Array, Flags
+from holdfast.training.targets import TargetSamples
+
+SLIP_SMOOTHING, SLIP_HOLD_TIME = 0.02, 0.05
+"""Smoothing and hold time of the slip rules that `holdfast train` writes [s]."""
+MIN_SLIDING_SAMPLES = 50
+"""Fewer sliding samples train no slip rule."""
+MIN_SPEED_SAMPLES = 500
+"""Fewer sliding samples train no speed rule."""
+SPEED_PENALTY = 10.0
+"""Weight of the squared coefficients, beside the sum of squared errors over the samples."""
+STILL_WEIGHT = 0.3
+"""Weight of all samples that hold still, as a share of that of those that slide.
+
+Without them the speed rises less with that of the marker on the real recordings, and a false alarm
+slides further."""
+MIN_CAUSE_SAMPLES = 50
+"""A cause with fewer samples is left out."""
+CAUSE_PENALTY = 1e-3
+"""C of the fit: the weight of a sample against the penalty on the weights."""
+
+Features = tuple[FeatureSpec, ...]
+
+
+def fit_slip(
+    samples: TargetSamples,
+    held: Collection[int],
+    features: Features,
+    *,
+    is_any: bool,
+    squares: bool = False,
+) -> Head | None:
+    """Fit the head `slip` to the samples that are not in held units.
+
+    For a model of one hand all samples weigh alike: balanced classes fit the middle, and the
+    threshold lies far in the tail. On real recordings that made a model of any hand worse.
+
+    Args:
+        samples: of the target.
+        held: units whose samples are left out.
+        features: of the samples.
+        is_any: whether the model is for any hand.
+        squares: whether the head has squares of the features.
+
+    Returns:
+        The head, with a threshold of 0.5; None with too few samples that slide, or none that hold
+        still.
+    """
+    kept = samples.kept(held)
+    slides = np.asarray(samples.values[kept], dtype=bool)
+    if slides.all() or slides.sum() < MIN_SLIDING_SAMPLES:
+        return None
+    classes = Samples(samples.features[kept], slides, samples.units[kept])
+    rule = _fitted_rule(classes, "balanced" if is_any else None, squares)
+    # The odds of sliding fall by the still samples that were left out.
+    n_still = samples.n_usable - samples.n_positive
+    thinning = np.log(n_still / (len(samples.values) - samples.n_positive))
+    rule = msgspec.structs.replace(rule, offset=rule.offset - float(thinning))
+    return Head(
+        name="slip", link="logit", features=features, rule=rule,
+        smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD_TIME,
+    )  # fmt: skip
+
+
+def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> Linear:
+    """Return a rule fitted to samples, which class 1 of slides."""
+    recipe = LogisticRegression()
+    parameters = {**recipe.reference, "class_weight": class_weight}
+    if not squares:
+        return recipe.fit(samples, parameters, 0).linear
+    # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
+    mean, scale, standard = standardise(samples.features)
+    wide = np.hstack([standard, np.minimum(np.abs(standard), MAX_DEVIATION) ** 2])
+    fitted = recipe.fit(samples._replace(features=wide), parameters, 0).linear
+    weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
+    intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
+    return Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
+
+
+def fit_speed(samples: TargetSamples, held: Collection[int], features: Features) -> Head | None:
+    """Fit the head `slip_speed` to the samples that are not in held units.
+
+    The root of the speed is fitted by least squares with a small penalty. So fast slides count
+    more than with the logarithm, and less than with the speed itself.
+
+    Args:
+        samples: of the target.
+        held: units whose samples are left out.
+        features: of the samples.
+
+    Returns:
+        The head; None with too few samples that slide.
+    """
+    kept = samples.kept(held)
+    values, speed = samples.features[kept], np.asarray(samples.values[kept], dtype=np.float64)
+    slides = speed > 0
+    if np.count_nonzero(slides) < MIN_SPEED_SAMPLES:
+        return None
+    mean, scale, _ = standardise(values[slides])
+    standard = (values - mean) / scale
+    squares = np.minimum(np.abs(standard), MAX_DEVIATION) ** 2
+    columns = np.hstack([np.ones((len(standard), 1)), standard, squares])
+    weights = _solve(columns, np.sqrt(speed), _sample_weights(slides))
+    n = len(mean)
+    rule = Linear.of(mean, scale, weights[1 : n + 1], weights[0], weights[n + 1 :])
+    highest = float(speed.max())
+    return Head(name="slip_speed", link="square", features=features, rule=rule, highest=highest)
+
+
+def _sample_weights(slides: Flags) -> Array:
+    """Return (n,) 1 for samples that slide, and what `STILL_WEIGHT` leaves for each other one."""
+    n_sliding = int(np.count_nonzero(slides))
+    n_still = max(len(slides) - n_sliding, 1)
+    return np.where(slides, 1.0, STILL_WEIGHT * n_sliding / n_still)
+
+
+def _solve(columns: Array, target: Array, weights: Array) -> Array:
+    """Return the coefficients of the columns, of which the first has no penalty."""
+    # (A^T W A + penalty) c = A^T W y.
+    weighted = (columns * weights[:, None]).T
+    penalty = np.diag([0.0, *[SPEED_PENALTY] * (columns.shape[1] - 1)])
+    return np.asarray(np.linalg.solve(weighted @ columns + penalty, weighted @ target))
+
+
+def fit_cause(samples: TargetSamples, held: Collection[int], features: Features) -> Head | None:
+    """Fit the head `cause` to the samples that are not in held units.
+
+    Args:
+        samples: of the target.
+        held: units whose samples are left out.
+        features: of the samples.
+
+    Returns:
+        The head; None with fewer than two causes of at least `MIN_CAUSE_SAMPLES`.
+    """
+    kept, codes = samples.kept(held), np.asarray(samples.values, dtype=np.int64)
+    counts = np.bincount(codes[kept], minlength=len(CAUSES) + 1)
+    kept &= counts[codes] >= MIN_CAUSE_SAMPLES
+    if np.count_nonzero(counts >= MIN_CAUSE_SAMPLES) < 2:
+        return None
+    names = np.array([str(cause) for cause in CAUSES])[codes[kept] - 1]
+    rule, classes = fit_causes(samples.features[kept], names, CAUSE_PENALTY)
+    return Head(name="cause", link="softmax", features=features, rule=rule, classes=classes)
+
+
+def missing_heads(
+    model: Model, slips: Mapping[str, TargetSamples], causes: Mapping[str, TargetSamples]
+) -> Iterator[str]:
+    """Yield a warning for each finger whose slips or causes are known, but too few to train.
+
+    Args:
+        model: that was trained.
+        slips: samples of the target of `slip`, by finger.
+        causes: of that of `cause`.
+    """
+    for finger, samples in causes.items():
+        if model.finger(finger).head("cause") is None:
+            counts = np.bincount(np.asarray(samples.values), minlength=len(CAUSES) + 1)[1:]
+            given = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
+            yield (
+                f"{_name(finger)}: unstable samples {', '.join(given)} given, at least "
+                f"{MIN_CAUSE_SAMPLES} of each of two causes expected; the model names no cause "
+                "there"
+            )
+    for finger, samples in slips.items():
+        if model.finger(finger).slip is None:
+            n = samples.n_positive
+            yield (
+                f"{_name(finger)}: {n} samples that slide and {samples.n_usable - n} that hold "
+                f"still given, at least {MIN_SLIDING_SAMPLES} and 1 expected; the model gets no "
+                "slip rule there"
+            )
+
+
+def _name(finger: str) -> str:
+    return "all fingers" if finger == ANY_FINGER else finger

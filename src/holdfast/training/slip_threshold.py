@@ -1,0 +1,110 @@
+"""Choice of the threshold of slips from decisions out of fold, for `holdfast train`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from holdfast.metrics.slip_thresholds import (
+    SLIP_THRESHOLDS,
+    SlipSummary,
+    ThresholdChoice,
+    choose_threshold,
+    held_out_places,
+    slip_intervals,
+    slip_summary,
+)
+from holdfast.metrics.slips import SlipCounts, SlipCurve, slip_metrics
+from holdfast.model import Model
+from holdfast.training.tune import CurvePoint
+
+SLIP_FALSE_ALARMS = 1.0
+"""False alarms per minute of all held time of a finger for which the threshold is set."""
+
+NO_SLIP_DECISIONS = (
+    "no decision about a slip out of fold, from which a threshold could be chosen; the model gets "
+    "no slip rule"
+)
+
+
+@dataclass(frozen=True)
+class ChosenThreshold:
+    """Threshold of the slip rules of a model, and the metrics out of fold.
+
+    Attributes:
+        place: of the threshold in `SLIP_THRESHOLDS`; None if none has few enough false alarms.
+        counts: of all recordings at this threshold; at the highest if there is none.
+        metrics: out of fold, each recording by the threshold of the others.
+    """
+
+    place: int | None
+    counts: SlipCounts
+    metrics: SlipSummary
+
+    @property
+    def reason(self) -> str:
+        """Why there is no threshold; empty if there is one."""
+        if self.place is not None:
+            return ""
+        minutes = self.counts.held_seconds / 60
+        if not _supports(self.counts, SLIP_FALSE_ALARMS):
+            return (
+                f"{minutes:.2g} min of held time given; a threshold of slips for "
+                f"{SLIP_FALSE_ALARMS:g} false alarms a minute needs at least "
+                f"{1 / SLIP_FALSE_ALARMS:.2g} min; the model gets no slip rule"
+            )
+        return (
+            f"no threshold of slips has at most {SLIP_FALSE_ALARMS:g} false alarms a minute in "
+            f"{minutes:.2g} min of held time; the model gets no slip rule"
+        )
+
+
+def choose_slip_threshold(
+    curves: Sequence[Mapping[str, SlipCurve]], groups: Sequence[int], seed: int
+) -> ChosenThreshold | None:
+    """Choose the threshold of slips from decisions out of fold.
+
+    Args:
+        curves: of each finger, of each recording.
+        groups: unit of each recording; the threshold of its metrics is chosen without it.
+        seed: of the bootstrap.
+
+    Returns:
+        The threshold; None if no recording has decisions about known slips.
+    """
+    used = [(curve, group) for curve, group in zip(curves, groups, strict=True) if curve]
+    if not used:
+        return None
+    by_recording = [SlipCurve.total(list(fingers.values())) for fingers, _ in used]
+    own = [group for _, group in used]
+    pooled, highest = SlipCurve.total(by_recording), len(SLIP_THRESHOLDS) - 1
+    place = choose_threshold(pooled, SLIP_FALSE_ALARMS)
+    places, intervals = [highest if place is None else place] * len(used), None
+    if has_others := len(set(own)) > 1:
+        choice = ThresholdChoice(SLIP_FALSE_ALARMS)
+        places = held_out_places(by_recording, own, choice).tolist()
+        intervals = slip_intervals(by_recording, choice, groups=own, seed=seed)
+    counts = [
+        {name: curve[place] for name, curve in fingers.items()}
+        for (fingers, _), place in zip(used, places, strict=True)
+    ]
+    metrics = slip_summary(counts, intervals, threshold_chosen=has_others)
+    if metrics is None:
+        return None
+    supported = _supports(pooled[0], SLIP_FALSE_ALARMS)
+    shown = pooled[highest if place is None else place]
+    return ChosenThreshold(place if supported else None, shown, metrics)
+
+
+def _supports(counts: SlipCounts, false_alarms: float) -> bool:
+    """Return whether the held time is long enough for one false alarm at the rate."""
+    return counts.held_seconds / 60 * false_alarms >= 1
+
+
+def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
+    """Return the model whose slip rules have a threshold; without slip rules if there is none."""
+    if chosen is None or chosen.place is None:
+        return model.changed(
+            lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
+        )
+    threshold = float(SLIP_THRESHOLDS[chosen.place])
+    point = CurvePoint(threshold, slips=slip_metrics(chosen.counts))
+    return model.with_threshold("slip", threshold, point.choice(SLIP_FALSE_ALARMS))

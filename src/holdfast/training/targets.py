@@ -1,0 +1,213 @@
+"""Targets of the heads beside stability: what each is fitted to, sample by sample.
+
+The target of a head turns a finger of a recording into values at some of its samples: whether it
+slides, how fast, why it is unstable.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import CAUSES, Cause, ContactState
+from holdfast.metrics.slip_truth import DISTANCES, SLIDING, STILL, SlipTruth, has_slip_truth
+from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
+from holdfast.model import HeadName
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Flags, Integers
+
+EARLY_DURATION = 0.1
+"""Time after the onset of a slip whose samples train the head `slip`: later it is found [s]."""
+QUIET_STEP = 10
+"""Only every tenth sample of quiet hold trains `slip`, beside all that are disturbed: the head must
+tell a slip from a push."""
+STILL_STEP = 10
+"""Every tenth sample that holds still trains `slip_speed`, with the speed 0."""
+MILLIMETRES = 1e3
+"""Millimetres in a metre."""
+ALIKE = {Cause.RELEASED: Cause.LOST}
+"""Causes that look alike to a finger: it loses contact."""
+
+
+@dataclass(frozen=True)
+class TargetSamples:
+    """Samples of one finger that train a head.
+
+    Attributes:
+        features: (n, n_features) finite.
+        values: (n,) of the target: True where it slides, its speed [mm/s], or the code of a cause.
+        units: (n,) unit of each sample, with which it is held out; -1 if it is held out with
+            every unit.
+        recordings: (n,) index of the recording of each sample.
+        n_usable: number of samples from which these were taken.
+    """
+
+    features: Array
+    values: npt.NDArray[np.generic]
+    units: Integers
+    recordings: Integers
+    n_usable: int
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the samples of at least one part, in order."""
+        return cls(
+            np.concatenate([part.features for part in parts]),
+            np.concatenate([part.values for part in parts]),
+            np.concatenate([part.units for part in parts]),
+            np.concatenate([part.recordings for part in parts]),
+            sum(part.n_usable for part in parts),
+        )
+
+    def kept(self, held: Collection[int]) -> Flags:
+        """Return (n,) whether a sample is not in held units."""
+        return ~np.isin(self.units, [-1, *held] if held else [])
+
+    @property
+    def n_positive(self) -> int:
+        """Number of samples whose value is not 0."""
+        return int(np.count_nonzero(self.values))
+
+
+class TargetInput(NamedTuple):
+    """A finger of a recording, from which the targets of its heads are made.
+
+    Attributes:
+        recording: that has the finger.
+        finger: its name.
+        truth: of its slips.
+        units: (n,) unit of each sample in the split.
+        recording_index: in the dataset.
+        step: every step-th sample is kept of what there is plenty of.
+        is_any: whether the model is for any hand.
+    """
+
+    recording: Recording
+    finger: str
+    truth: SlipTruth
+    units: Integers
+    recording_index: int
+    step: int
+    is_any: bool
+
+    @property
+    def times(self) -> Array:
+        """(n,) times of the samples [s]."""
+        return self.recording.modules[self.finger].times
+
+    def samples(
+        self, features: Array, values: npt.NDArray[np.generic], rows: Integers, n_usable: int
+    ) -> TargetSamples:
+        """Return the samples in some rows."""
+        recordings = np.full(len(rows), self.recording_index)
+        return TargetSamples(features[rows], values[rows], self.units[rows], recordings, n_usable)
+
+
+def slip_target(given: TargetInput, features: Array) -> TargetSamples:
+    """Return what slides, and some of what holds still.
+
+    A model of one hand learns the first 0.1 s of slips, and to tell them from pushes. On real
+    recordings that misled a model of any hand, so it learns all that slides and all that does not.
+
+    Args:
+        given: the finger.
+        features: (n, n_features) of the head.
+    """
+    truth, step = given.truth, given.step
+    slides = truth.codes == SLIDING
+    if not given.is_any:
+        slides &= _in_spans([(s.onset, s.onset + EARLY_DURATION) for s in truth.slips], given.times)
+    is_still = truth.codes == STILL
+    usable = np.flatnonzero((slides | is_still) & np.isfinite(features).all(axis=1))
+    quiet = usable[(is_still & truth.quiet)[usable]][:: step * (1 if given.is_any else QUIET_STEP)]
+    disturbed = usable[(is_still & ~truth.quiet)[usable]][::step]
+    rows = np.sort(np.concatenate([usable[slides[usable]], quiet, disturbed]))
+    return given.samples(features, slides, rows, len(usable))
+
+
+def speed_target(given: TargetInput, features: Array) -> TargetSamples | None:
+    """Return what slides, of slips over 1 mm, and some of what holds still, with its speed.
+
+    Args:
+        given: the finger.
+        features: (n, n_features) of the head.
+
+    Returns:
+        The samples; None if the true speed is not known.
+    """
+    recording, finger, truth = given.recording, given.finger, given.truth
+    if recording.truth is None or not has_slip_truth(recording.truth, finger):
+        return None
+    slides = in_long_slips(given.times, truth)
+    used = slides.copy()
+    used[np.flatnonzero(truth.codes == STILL)[::STILL_STEP]] = True
+    rows = np.flatnonzero(used & np.isfinite(features).all(axis=1))
+    speed = np.where(slides, true_speed(recording, finger, given.times), 0.0)
+    return given.samples(features, speed, rows, len(rows))
+
+
+def cause_target(given: TargetInput, features: Array) -> TargetSamples | None:
+    """Return the unstable samples whose cause is known, as codes.
+
+    Causes are those of the truth, where the recording has one, else those of the labels. What
+    slides is left out: the head `slip` decides about it.
+
+    Args:
+        given: the finger.
+        features: (n, n_features) of the head.
+
+    Returns:
+        The samples; None if there are none.
+    """
+    recording, finger = given.recording, given.finger
+    labels = labels_by_truth(recording, LabelRule(margin=0.0)).get(
+        finger, recording.modules[finger].labels
+    )
+    codes = np.zeros(len(given.times), dtype=np.int64)
+    for label in labels:
+        if label.state is ContactState.UNSTABLE and label.cause not in (None, Cause.SLIP):
+            first, last = np.searchsorted(given.times, (label.start, label.end))
+            codes[first:last] = CAUSES.index(ALIKE.get(label.cause, label.cause)) + 1
+    used = (codes > 0) & (given.truth.codes != SLIDING) & np.isfinite(features).all(axis=1)
+    rows = np.flatnonzero(used)[:: given.step]
+    return given.samples(features, codes, rows, int(used.sum())) if len(rows) else None
+
+
+TARGETS: dict[HeadName, Callable[[TargetInput, Array], TargetSamples | None]] = {
+    "slip": slip_target,
+    "slip_speed": speed_target,
+    "cause": cause_target,
+}
+"""Target of each head beside `stable`, whose target are the labels."""
+
+
+def true_speed(recording: Recording, finger: str, times: Array) -> Array:
+    """Return (n,) the true speed of a finger over its object at some times [mm/s].
+
+    Args:
+        recording: with a truth that has the speed of the finger.
+        finger: name of the finger.
+        times: (n,) [s].
+    """
+    if recording.truth is None:
+        raise ValueError(f"recording {recording.name!r} has no truth; one with a speed expected")
+    truth = recording.truth
+    index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
+    return np.asarray(MILLIMETRES * truth.fingers[finger]["slip_speed"][index])
+
+
+def in_long_slips(times: Array, truth: SlipTruth) -> Flags:
+    """Return (n,) where a finger slides, in a slip over 1 mm."""
+    spans = [(slip.onset, slip.end) for slip in truth.slips if slip.distance >= DISTANCES[0]]
+    return np.asarray(_in_spans(spans, times) & (truth.codes == SLIDING))
+
+
+def _in_spans(spans: Sequence[tuple[float, float]], times: Array) -> Flags:
+    """Return (n,) where a time is in one of the spans."""
+    inside = np.zeros(len(times), dtype=np.bool_)
+    for span in spans:
+        first, last = np.searchsorted(times, span)
+        inside[first:last] = True
+    return inside
