@@ -39,7 +39,7 @@ def main():
         samples = next(iter(training.samples.values()))
         _, _, features = standardise(samples.features)
         for c in CONSTANTS:
-            print(_line(METHODS[name].title, features, samples.stable, c), flush=True)
+            print(_line(METHODS[name].title, features, samples.positive, c), flush=True)
 
 
 def _line(title, features, stable, c):

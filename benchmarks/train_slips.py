@@ -79,11 +79,11 @@ def main(options: argparse.Namespace) -> None:
     calls = ((models[fold], item) for fold, item in zip(folds, recordings, strict=True))
     curves = list(engine.map_ordered(curves_of, calls))
     chosen = choose_slip_threshold(curves, folds.tolist(), seed=0)
-    if chosen is None or chosen.place is None:
+    if chosen is None or chosen.index is None:
         raise SystemExit(chosen.reason if chosen else "no slips are known")
     print_metrics(chosen.metrics.pooled)
     for folder in options.folders:
-        print_folder(folder.name, recordings, curves, chosen.place)
+        print_folder(folder.name, recordings, curves, chosen.index)
     complete = replaced(model, fitted(model, samples, speeds, [], features, squares))
     complete = with_slip_threshold(complete, chosen)
     print(msgspec.json.encode(complete.finger("*").slip.choice).decode())

@@ -104,7 +104,7 @@ class Sphere:
         import onnx
 
         check_classes(samples)
-        mean, spread = samples.features[samples.stable].mean(0), samples.features.std(0)
+        mean, spread = samples.features[samples.positive].mean(0), samples.features.std(0)
         axes = np.array([1])
         constants = {"mean": mean, "spread": spread * parameters["size"] + 1e-9, "axes": axes}
         helper, real = onnx.helper, onnx.TensorProto.DOUBLE
@@ -150,8 +150,8 @@ class Middle:
         """Fit the means."""
         check_classes(samples)
         mean, scale, rows = standardise(samples.features)
-        high, low = rows[samples.stable].mean(axis=0), rows[~samples.stable].mean(axis=0)
-        slope, offset = sigmoid(rows @ (high - low), samples.stable)
+        high, low = rows[samples.positive].mean(axis=0), rows[~samples.positive].mean(axis=0)
+        slope, offset = sigmoid(rows @ (high - low), samples.positive)
         return Fitted(Linear.of(mean, scale, high - low, 0.0, slope=slope, offset=offset))
 '''
 

@@ -59,7 +59,7 @@ def test_the_weights_have_the_least_loss_of_the_docstring(prior, C):
     rows = np.column_stack([np.ones(len(scaled)), scaled])
     known = prior.slope * rule_of(prior)
     known[0] += prior.offset
-    given = (rows, GIVEN.stable, known, C)
+    given = (rows, GIVEN.positive, known, C)
     found = rule_of(adapted(C, prior=prior))
     slope = approx_fprime(found, lambda v: loss(v, *given), 1e-6)
     assert slope == pytest.approx(np.zeros(4), abs=2e-3 * (1 + C))
@@ -75,8 +75,8 @@ def test_the_calibration_has_the_least_loss_of_the_docstring(C):
     stretch = rule.slope / UNLIKE.slope
     found = np.array([rule.offset - stretch * UNLIKE.offset, stretch])
     for step in 1e-3 * np.vstack([np.eye(2), -np.eye(2)]):
-        assert loss(found + step, rows, GIVEN.stable, known, C) > loss(
-            found, rows, GIVEN.stable, known, C
+        assert loss(found + step, rows, GIVEN.positive, known, C) > loss(
+            found, rows, GIVEN.positive, known, C
         )
 
 
@@ -94,14 +94,14 @@ def test_with_a_small_c_decisions_and_probabilities_of_the_prior_stay(prior, cha
 
 def test_without_a_change_the_prior_is_returned():
     assert adapted(1.0, prior=UNLIKE, change=NONE) == UNLIKE
-    one_class = GIVEN._replace(stable=np.ones(600, dtype=bool))
+    one_class = GIVEN._replace(positive=np.ones(600, dtype=bool))
     assert adapted(1.0, one_class, UNLIKE, NONE) == UNLIKE
 
 
 def test_the_calibration_is_that_of_scikit_learn_on_the_log_odds():
     p = UNLIKE.probability(GIVEN.features)
     odds = np.log(p / (1 - p))[:, None]
-    peer = LogisticRegression(C=1e6, tol=1e-10, max_iter=1000).fit(odds, GIVEN.stable)
+    peer = LogisticRegression(C=1e6, tol=1e-10, max_iter=1000).fit(odds, GIVEN.positive)
     found = adapted(1e6, prior=UNLIKE, change=CALIBRATION)
     expected = peer.predict_proba(odds)[:, 1]
     assert found.probability(GIVEN.features) == pytest.approx(expected, abs=1e-4)
@@ -112,7 +112,7 @@ def test_a_prior_that_is_upside_down_loses_its_slope():
     """A calibration does not turn the order of the samples round."""
     flipped = msgspec.structs.replace(PRIOR, weights=((-0.2, 0.4, -1.5),))
     given = samples(600, share=0.3)
-    other = given._replace(stable=~decided(flipped, given))
+    other = given._replace(positive=~decided(flipped, given))
     found = adapted(1e3, other, flipped, CALIBRATION)
     assert found.slope == pytest.approx(1e-6)
 
@@ -128,7 +128,7 @@ def test_the_log_odds_of_a_prior_are_those_of_its_probability():
 def test_with_a_large_c_it_equals_scikit_learn(prior):
     scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
     peer = LogisticRegression(C=1e6, tol=1e-10, max_iter=1000)
-    peer.fit(scaled, GIVEN.stable)
+    peer.fit(scaled, GIVEN.positive)
     found = adapted(1e6, prior=prior)
     expected = [peer.intercept_[0], *peer.coef_[0]]
     assert rule_of(found) == pytest.approx(expected, abs=1e-4)
@@ -164,14 +164,14 @@ def test_few_samples_help_a_prior_that_is_nearly_right():
     test = samples(4000, seed=9)
 
     def right(found):
-        return (decided(found, test) == test.stable).mean()
+        return (decided(found, test) == test.positive).mean()
 
     assert right(adapted(0.1, few, prior)) > right(prior) + 0.02
 
 
 @pytest.mark.parametrize("stable", [True, False])
 def test_one_class_is_refused(stable):
-    given = GIVEN._replace(stable=np.full(600, stable))
+    given = GIVEN._replace(positive=np.full(600, stable))
     n = 600 if stable else 0
     with pytest.raises(TrainingError) as raised:
         adapted(1.0, given)

@@ -55,7 +55,7 @@ def test_one_class_is_refused(name, n_stable):
 def test_it_learns(name):
     train, test = samples(seed=0), samples(seed=1)
     fitted = recipe(name).fit(train, recipe(name).reference, 0)
-    right = (fitted.probability(test.features) >= fitted.threshold) == test.stable
+    right = (fitted.probability(test.features) >= fitted.threshold) == test.positive
     assert right.mean() > 0.8
 
 
@@ -81,7 +81,9 @@ def test_units_do_not_matter(name):
 def test_the_mean_probability_is_the_base_rate(name, weight, share):
     given = samples(6000, share)
     fitted = recipe(name).fit(given, parameters(name, weight), 0)
-    assert fitted.probability(given.features).mean() == pytest.approx(given.stable.mean(), abs=0.03)
+    assert fitted.probability(given.features).mean() == pytest.approx(
+        given.positive.mean(), abs=0.03
+    )
 
 
 @pytest.mark.slow
@@ -94,15 +96,15 @@ def test_probabilities_are_calibrated(name, weight, share):
     for low, high in ((0.0, 0.1), (0.1, 0.3), (0.3, 0.7), (0.7, 0.9), (0.9, 1.0)):
         inside = (found >= low) & (found < high)
         if inside.sum() > 200:
-            assert test.stable[inside].mean() == pytest.approx(found[inside].mean(), abs=0.08)
+            assert test.positive[inside].mean() == pytest.approx(found[inside].mean(), abs=0.08)
 
 
 @pytest.mark.parametrize("weight", WEIGHTS)
 def test_it_beats_the_base_rate_by_brier_score(name, weight):
     train, test = samples(seed=0, share=0.25), samples(seed=1, share=0.25)
     fitted = recipe(name).fit(train, parameters(name, weight), 0)
-    brier = ((fitted.probability(test.features) - test.stable) ** 2).mean()
-    assert brier < 0.7 * test.stable.var()
+    brier = ((fitted.probability(test.features) - test.positive) ** 2).mean()
+    assert brier < 0.7 * test.positive.var()
 
 
 def test_a_constant_feature_has_no_effect(name):
@@ -120,7 +122,7 @@ def test_logistic_regression_decides_as_scikit_learn(weight, share):
     fitted = recipe("logreg").fit(given, parameters("logreg", weight), 0)
     _, _, features = standardise(given.features)
     peer = LogisticRegression(C=1.0, class_weight=weight, tol=1e-10, max_iter=1000)
-    peer.fit(features, given.stable)
+    peer.fit(features, given.positive)
     decision = peer.decision_function(features)
     assert fitted.linear.decision(given.features) == pytest.approx(decision, abs=1e-3)
     clear = np.abs(decision) > 1e-3
@@ -142,7 +144,7 @@ def test_svm_decides_as_scikit_learn(weight):
     peer = LinearSVC(
         loss="hinge", class_weight=weight, tol=1e-8, max_iter=1_000_000, random_state=1
     )
-    decision = peer.fit(features, given.stable).decision_function(features)
+    decision = peer.fit(features, given.positive).decision_function(features)
     assert fitted.linear.decision(given.features) == pytest.approx(decision, abs=0.05)
     clear = np.abs(decision) > 0.05
     stable = fitted.probability(given.features) >= fitted.threshold
@@ -155,11 +157,11 @@ def test_svm_minimises_the_hinge_loss(weight):
     given = samples(share=0.2)
     fitted = recipe("svm").fit(given, parameters("svm", weight), 0)
     _, _, features = standardise(given.features)
-    sign = np.where(given.stable, 1.0, -1.0)
-    n, n_stable = len(sign), given.stable.sum()
+    sign = np.where(given.positive, 1.0, -1.0)
+    n, n_stable = len(sign), given.positive.sum()
     costs = np.ones(n)
     if weight == "balanced":
-        costs = np.where(given.stable, n / (2 * n_stable), n / (2 * (n - n_stable)))
+        costs = np.where(given.positive, n / (2 * n_stable), n / (2 * (n - n_stable)))
     constant = parameters("svm", weight)["C"]
 
     def objective(rule):
@@ -174,9 +176,11 @@ def test_svm_minimises_the_hinge_loss(weight):
 @pytest.mark.parametrize("groups", [np.zeros(200, dtype=int), None])
 def test_svm_calibrates_where_groups_allow_nothing_else(groups):
     given = samples(200, seed=4)
-    groups = given.stable.astype(int) if groups is None else groups
+    groups = given.positive.astype(int) if groups is None else groups
     fitted = recipe("svm").fit(given._replace(groups=groups), RECIPES["svm"].reference, 0)
-    assert fitted.probability(given.features).mean() == pytest.approx(given.stable.mean(), abs=0.02)
+    assert fitted.probability(given.features).mean() == pytest.approx(
+        given.positive.mean(), abs=0.02
+    )
 
 
 def test_svm_probability_rises_with_the_decision_even_where_there_is_nothing_to_learn():
@@ -184,4 +188,6 @@ def test_svm_probability_rises_with_the_decision_even_where_there_is_nothing_to_
     given = Samples(rng.normal(size=(300, 2)), rng.random(300) < 0.4, np.arange(300) % 5)
     fitted = recipe("svm").fit(given, RECIPES["svm"].reference, 0)
     assert fitted.linear.slope > 0
-    assert fitted.probability(given.features).mean() == pytest.approx(given.stable.mean(), abs=0.05)
+    assert fitted.probability(given.features).mean() == pytest.approx(
+        given.positive.mean(), abs=0.05
+    )

@@ -51,7 +51,7 @@ def test_with_enough_recordings_wrong_weights_are_replaced():
 def test_held_out_units_have_no_influence():
     own = hand(4)
     noise = np.random.default_rng(1).random(400) < 0.5
-    other = own.samples._replace(stable=np.concatenate([own.samples.stable[:-400], noise]))
+    other = own.samples._replace(positive=np.concatenate([own.samples.positive[:-400], noise]))
     changed = FingerSamples(None, other, own.units, own.recordings, own.times, own.at_rest)
     assert choose_adaptation(own, RIGHT, {3}) == choose_adaptation(changed, RIGHT, {3})
     assert choose_adaptation(own, RIGHT) != choose_adaptation(changed, RIGHT)
@@ -61,7 +61,12 @@ def test_one_class_in_a_fold_keeps_the_model():
     own = hand(2)
     stable = own.recordings == 0
     alone = FingerSamples(
-        None, own.samples._replace(stable=stable), own.units, own.recordings, own.times, own.at_rest
+        None,
+        own.samples._replace(positive=stable),
+        own.units,
+        own.recordings,
+        own.times,
+        own.at_rest,
     )
     assert chosen(alone) == NONE
 

@@ -83,7 +83,7 @@ def test_samples_without_contact_are_left_to_the_load(mixed):
     states = [ContactState.NO_CONTACT, ContactState.STABLE, None, ContactState.UNSTABLE]
     only = samples_of([tiny_recording(4, states=states, n=400)])[ANY_FINGER]
     assert only.times.min() == pytest.approx(1.0, abs=0.06)
-    assert 0.4 < only.samples.stable.mean() < 0.6
+    assert 0.4 < only.samples.positive.mean() < 0.6
 
 
 def test_units_and_gains_do_not_change_the_samples():
@@ -122,4 +122,4 @@ def test_modules_may_have_any_sensors_within_a_recording():
     own = tiny_recording(8)
     other = tiny_module(9, sensor=sensor("anyskin"))
     both = replace(own, modules={**own.modules, "palm": other})
-    assert len(samples_of([both])[ANY_FINGER].samples.stable) > 0
+    assert len(samples_of([both])[ANY_FINGER].samples.positive) > 0

@@ -207,7 +207,7 @@ class TestNoRule:
         never = SlipDecisions(times, np.full(3000, 1e-9), codes > STILL, 0.0, truth)
         chosen = choose_slip_threshold([{"thumb": slip_curve(never)}], [0], 0)
         minutes = "0.5" if code == STILL else "0"
-        assert chosen.place is None
+        assert chosen.index is None
         assert chosen.reason.startswith(f"{minutes} min of held time given; ")
         assert "needs at least 1 min" in chosen.reason
         assert not chosen.metrics.threshold_chosen

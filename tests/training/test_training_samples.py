@@ -43,9 +43,9 @@ def test_rows_are_the_features_of_the_labelled_samples(grasps):
         stable.append((module.label_states == STABLE)[usable])
         groups += [place] * usable.sum()
     np.testing.assert_allclose(own.samples.features, np.concatenate(rows), atol=1e-9)
-    assert (own.samples.stable == np.concatenate(stable)).all()
+    assert (own.samples.positive == np.concatenate(stable)).all()
     assert own.samples.groups.tolist() == groups == own.units.tolist()
-    assert len(own.samples.stable) == 6 * (400 - 50 - 5)  # tare, then one sample short
+    assert len(own.samples.positive) == 6 * (400 - 50 - 5)  # tare, then one sample short
 
 
 def test_unlabelled_samples_are_left_out(grasps):
@@ -59,7 +59,7 @@ def test_held_out_samples_are_left_out(grasps):
     own = finger_samples(grasps)["thumb"]
     left = own.without({1, 4})
     assert np.unique(left.groups).tolist() == [0, 2, 3, 5]
-    assert len(left.stable) == len(own.samples.stable) * 4 // 6
+    assert len(left.positive) == len(own.samples.positive) * 4 // 6
 
 
 @given(max_samples=st.integers(1, 3000), n=st.integers(2, 4))
@@ -71,7 +71,7 @@ def test_max_samples_bounds_rows_and_thins_evenly(max_samples, n):
         "thumb"
     ].samples
     step = max(1, -(-400 * n // max_samples))
-    assert len(kept.stable) <= max_samples
+    assert len(kept.positive) <= max_samples
     np.testing.assert_array_equal(kept.features, whole.features[::step])
     np.testing.assert_array_equal(kept.groups, whole.groups[::step])
 
@@ -104,7 +104,7 @@ def test_shared_samples_pool_the_fingers(grasps):
     shared = finger_samples(grasps, replace(SETTING, shared=True))
     assert set(shared) == {ANY_FINGER}
     own = shared[ANY_FINGER]
-    assert len(own.samples.stable) == sum(len(each.samples.stable) for each in apart.values())
+    assert len(own.samples.positive) == sum(len(each.samples.positive) for each in apart.values())
     amplitude = np.concatenate([rest_amplitudes(grasps, f) for f in ("thumb", "index")])
     expected = amplitude.mean() + 5 * amplitude.std()
     assert own.contact_threshold(range(6)) == pytest.approx(expected, rel=1e-9)
@@ -138,8 +138,8 @@ def test_recordings_may_lack_fingers_labels_or_finite_samples(grasps):
     half_dead = Recording("half dead", {"thumb": tiny_module(11), "index": dead})
     bare = tiny_recording(12, fingers=("ring",), states=[None] * 4)
     found = finger_samples([*grasps, thumb_only, half_dead, bare])
-    assert len(found["index"].samples.stable) == len(whole["index"].samples.stable)
-    assert len(found["thumb"].samples.stable) == len(whole["thumb"].samples.stable) + 2 * 345
+    assert len(found["index"].samples.positive) == len(whole["index"].samples.positive)
+    assert len(found["thumb"].samples.positive) == len(whole["thumb"].samples.positive) + 2 * 345
     assert set(found) == {"thumb", "index"}
     expected = whole["index"].contact_threshold(range(6))
     assert found["index"].contact_threshold(range(9)) == pytest.approx(expected)

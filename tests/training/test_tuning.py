@@ -79,7 +79,7 @@ def test_the_parameters_with_the_least_log_loss_are_returned():
         for held in inner_folds(samples, 3, 0):
             fit = recipe("logreg").fit(samples.take(~held), parameters, 0)
             p = fit.probability(samples.features[held])
-            logs += np.log(np.where(samples.stable[held], p, 1 - p)).tolist()
+            logs += np.log(np.where(samples.positive[held], p, 1 - p)).tolist()
         return -np.mean(logs)
 
     assert len(tried) == 8
@@ -97,7 +97,7 @@ def test_the_best_by_error_is_taken():
         for held in inner_folds(samples, 3, 0):
             fit = recipe("svm").fit(samples.take(~held), parameters, 0)
             decided = fit.probability(samples.features[held]) >= fit.threshold
-            wrong += (decided != samples.stable[held]).sum()
+            wrong += (decided != samples.positive[held]).sum()
         return wrong
 
     assert error(best) == min(map(error, tried))

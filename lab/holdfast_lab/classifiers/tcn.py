@@ -152,7 +152,7 @@ class TemporalConvolution:
         with _one_thread(torch):
             weights = _train(torch, windows, samples, parameters, seed)
         n_steps = n_features // self.n_channels
-        return Network(weights, mean, scale, n_steps, class_ratio(samples.stable))
+        return Network(weights, mean, scale, n_steps, class_ratio(samples.positive))
 
 
 def weight_shapes(n_channels: int) -> dict[str, tuple[int, ...]]:
@@ -266,7 +266,7 @@ def validation_rows(samples: Samples, seed: int) -> npt.NDArray[np.bool_]:
         held = np.isin(samples.groups, np.roll(groups, -start)[:n_held])
         if not samples.take(held).one_class and not samples.take(~held).one_class:
             return held
-    return np.zeros(len(samples.stable), dtype=np.bool_)
+    return np.zeros(len(samples.positive), dtype=np.bool_)
 
 
 def _train(
@@ -277,15 +277,15 @@ def _train(
         n: _initial_weights(generator, n, s) for n, s in weight_shapes(windows.shape[1]).items()
     }
     optimiser = torch.optim.Adam(weights.values(), lr=parameters["learning_rate"])
-    classes = torch.from_numpy(samples.stable.astype(np.int64))
+    classes = torch.from_numpy(samples.positive.astype(np.int64))
     rng = np.random.default_rng(seed)
     dropout = partial(_drop_channels, fraction=parameters["dropout"], generator=generator)
     patience = parameters.get("patience", 0)
-    held = validation_rows(samples, seed) if patience else np.zeros(len(samples.stable), bool)
+    held = validation_rows(samples, seed) if patience else np.zeros(len(samples.positive), bool)
     fitted, stopping = np.flatnonzero(~held), EarlyStopping(patience)
     best = _copied(weights)
     for _ in range(parameters["n_epochs"]):
-        order = torch.from_numpy(fitted[_balanced_rows(samples.stable[fitted], rng)])
+        order = torch.from_numpy(fitted[_balanced_rows(samples.positive[fitted], rng)])
         for rows in order.split(BATCH_SIZE):
             optimiser.zero_grad()
             scores = forward(windows[rows], weights, dropout)

@@ -70,14 +70,14 @@ class Threshold:
         """
         del parameters, seed
         check_classes(samples)
-        cuts = [best_cut(column, samples.stable, self.side) for column in samples.features.T]
+        cuts = [best_cut(column, samples.positive, self.side) for column in samples.features.T]
         chosen = int(np.argmax([cut.gain for cut in cuts]))
         value, sign, _ = cuts[chosen]
         mean, scale, features = standardise(samples.features)
         weights = np.zeros(len(mean))
         weights[chosen] = sign
         intercept = sign * (mean[chosen] - value) / scale[chosen]
-        slope, offset = sigmoid(sign * features[:, chosen] + intercept, samples.stable)
+        slope, offset = sigmoid(sign * features[:, chosen] + intercept, samples.positive)
         rule = Linear.of(mean, scale, weights, intercept, slope=slope, offset=offset)
         return Fitted(rule, float(1.0 / (1.0 + np.exp(-offset))))
 

@@ -105,8 +105,8 @@ class GradientBoosting:
             random_state=seed,
         )
         with _one_thread():
-            estimator.fit(samples.features, samples.stable)
-        return Trees(estimator, class_ratio(samples.stable))
+            estimator.fit(samples.features, samples.positive)
+        return Trees(estimator, class_ratio(samples.positive))
 
 
 def _one_thread() -> AbstractContextManager[Any]:

@@ -179,7 +179,7 @@ def test_it_learns():
     quick = {"n_epochs": 10, "learning_rate": 1e-2, "dropout": 0.0}
     network = RECIPE.fit(waves(2000), quick, 0)
     test = waves(seed=1)
-    right = (network.probability(test.features) >= network.threshold) == test.stable
+    right = (network.probability(test.features) >= network.threshold) == test.positive
     assert right.mean() > 0.9
 
 
@@ -206,7 +206,7 @@ def test_mean_scale_and_shapes_after_training():
     assert network.mean == pytest.approx(steps.mean(axis=0), rel=1e-6)
     assert network.scale == pytest.approx(steps.std(axis=0), rel=1e-4)
     assert network.n_features == given.features.shape[1]
-    assert network.threshold == pytest.approx(given.stable.mean())
+    assert network.threshold == pytest.approx(given.positive.mean())
     assert {n: w.shape for n, w in network.weights.items()} == weight_shapes(3)
 
 
@@ -264,7 +264,7 @@ def test_refusals():
         RECIPE.fit(given._replace(features=given.features[:, :-1]), SHORT, 0)
     assert str(raised.value) == "steps of 3 channels expected, 59 features given"
     with pytest.raises(TrainingError) as refused:
-        RECIPE.fit(given._replace(stable=np.ones(50, dtype=bool)), SHORT, 0)
+        RECIPE.fit(given._replace(positive=np.ones(50, dtype=bool)), SHORT, 0)
     assert str(refused.value) == (
         "50 samples labelled stable and 0 labelled not stable given; both classes are needed to "
         "train"

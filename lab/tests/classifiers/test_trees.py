@@ -30,7 +30,7 @@ def test_they_learn_classes_that_no_line_separates():
     found = trees.probability([[0.0, 0.0], [0.5, -0.5], [0.9, 0.9], [-0.9, 0.0], [0.0, 0.95]])
     assert (found >= trees.threshold).tolist() == [True, True, False, False, False]
     test = square(seed=1)
-    assert ((trees.probability(test.features) >= trees.threshold) == test.stable).mean() > 0.97
+    assert ((trees.probability(test.features) >= trees.threshold) == test.positive).mean() > 0.97
 
 
 def test_nan_features_have_no_probability():

@@ -28,22 +28,22 @@ class Samples(NamedTuple):
 
     Attributes:
         features: (n, n_features) finite.
-        stable: (n,) class: True if the label is STABLE.
+        positive: (n,) True in the class that is counted: of a head, what it answers yes to.
         groups: (n,) index of the recording, or object, of each sample.
     """
 
     features: npt.NDArray[np.float64]
-    stable: npt.NDArray[np.bool_]
+    positive: npt.NDArray[np.bool_]
     groups: npt.NDArray[np.int64]
 
     def take(self, rows: npt.NDArray[np.bool_]) -> "Samples":
         """Return the samples where `rows` is True."""
-        return Samples(self.features[rows], self.stable[rows], self.groups[rows])
+        return Samples(self.features[rows], self.positive[rows], self.groups[rows])
 
     @property
     def one_class(self) -> bool:
         """Whether all labels are the same, or there are no samples."""
-        return not self.stable.any() or bool(self.stable.all())
+        return not self.positive.any() or bool(self.positive.all())
 
 
 class Fitted(NamedTuple):
@@ -165,30 +165,31 @@ def check_classes(samples: Samples) -> None:
         TrainingError: they have only one class.
     """
     if samples.one_class:
-        n_stable = int(samples.stable.sum())
+        n_positive = int(samples.positive.sum())
+        n_negative = len(samples.positive) - n_positive
         raise TrainingError(
-            f"{n_stable} samples labelled stable and {len(samples.stable) - n_stable} labelled "
-            "not stable given; both classes are needed to train"
+            f"{n_positive} samples labelled stable and {n_negative} labelled not stable given; "
+            "both classes are needed to train"
         )
 
 
-def class_ratio(stable: npt.NDArray[np.bool_]) -> float:
+def class_ratio(positive: npt.NDArray[np.bool_]) -> float:
     """Return n_0 / n_1, the factor by which balanced classes multiply the odds of stability."""
-    n_stable = int(stable.sum())
-    return (len(stable) - n_stable) / n_stable
+    n_positive = int(positive.sum())
+    return (len(positive) - n_positive) / n_positive
 
 
-def class_weights(stable: npt.NDArray[np.bool_], class_weight: str | None) -> tuple[float, float]:
+def class_weights(positive: npt.NDArray[np.bool_], class_weight: str | None) -> tuple[float, float]:
     """Return the weight of a sample that is not stable, and of one that is.
 
     Args:
-        stable: (n,) class.
+        positive: (n,) class.
         class_weight: `balanced` for n / (2 n_0) and n / (2 n_1); None for 1 and 1.
     """
     if class_weight != "balanced":
         return 1.0, 1.0
-    n, n_stable = len(stable), int(stable.sum())
-    return n / (2 * (n - n_stable)), n / (2 * n_stable)
+    n, n_positive = len(positive), int(positive.sum())
+    return n / (2 * (n - n_positive)), n / (2 * n_positive)
 
 
 def undo_balancing(
@@ -203,7 +204,9 @@ def logistic(value: float) -> float:
     return 1.0 / (1.0 + math.exp(min(-value, 709.0)))
 
 
-def sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
+def sigmoid(
+    values: npt.NDArray[np.float64], positive: npt.NDArray[np.bool_]
+) -> tuple[float, float]:
     """Fit a logistic function of the values to the classes; return its slope and offset.
 
     The slope is above 0. If the fitted slope is not, the offset is that of the base rate. The fit
@@ -213,8 +216,8 @@ def sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> t
     from sklearn.linear_model import LogisticRegression
 
     spread = float(values.std()) or 1.0
-    fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, stable)
+    fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, positive)
     slope = float(fit.coef_[0, 0]) / spread
     if slope < MIN_SLOPE:
-        return MIN_SLOPE, -float(np.log(class_ratio(stable)))
+        return MIN_SLOPE, -float(np.log(class_ratio(positive)))
     return slope, float(fit.intercept_[0])

@@ -35,9 +35,9 @@ def group_folds(groups: Integers, n_folds: int, seed: int | None = None) -> list
         n_folds: maximum number of folds; there are no more than groups.
         seed: of the random order in which groups are dealt; None for their own order.
     """
-    names, places = np.unique(groups, return_inverse=True)
+    names, indices = np.unique(groups, return_inverse=True)
     order = None if seed is None else shuffled(len(names), seed)
-    fold_of = deal_folds(len(names), n_folds, order)[places]
+    fold_of = deal_folds(len(names), n_folds, order)[indices]
     return [fold_of == fold for fold in range(min(n_folds, len(names)))]
 
 
@@ -68,8 +68,8 @@ def time_folds(recordings: Integers, times: Array, n_blocks: int) -> Integers:
         n_blocks: number of blocks of equal duration.
     """
     blocks = np.zeros(len(times), dtype=np.int64)
-    for place in np.unique(recordings):
-        chosen = recordings == place
+    for index in np.unique(recordings):
+        chosen = recordings == index
         first, last = times[chosen].min(), times[chosen].max()
         share = (times[chosen] - first) / max(float(last - first), 1e-9)
         blocks[chosen] = np.minimum(n_blocks * share, n_blocks - 1).astype(np.int64)

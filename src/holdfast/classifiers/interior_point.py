@@ -36,7 +36,7 @@ class _Point(NamedTuple):
 
 def fit_svm(
     features: Array,
-    stable: npt.NDArray[np.bool_],
+    positive: npt.NDArray[np.bool_],
     class_weights: tuple[float, float],
     c: float,
 ) -> Solution:
@@ -44,13 +44,13 @@ def fit_svm(
 
     Args:
         features: (n, n_features), standardised.
-        stable: (n,) class.
+        positive: (n,) class.
         class_weights: weight of a sample that is not stable, and of one that is.
         c: inverse strength of the L2 penalty, which the intercept has too, as in liblinear.
     """
     columns = np.vstack([features.T, np.ones(len(features))])
-    columns *= np.where(stable, 1.0, -1.0)
-    limits = c * np.where(stable, class_weights[1], class_weights[0])
+    columns *= np.where(positive, 1.0, -1.0)
+    limits = c * np.where(positive, class_weights[1], class_weights[0])
     point = _start(columns, limits)
     for _ in range(MAX_STEPS):
         margins, supported = point.weights @ columns, columns @ point.multipliers

@@ -59,11 +59,11 @@ class LogisticRegression:
         balanced = parameters["class_weight"] == "balanced"
         solution = fit_logistic(
             features,
-            samples.stable,
-            class_weights(samples.stable, parameters["class_weight"]),
+            samples.positive,
+            class_weights(samples.positive, parameters["class_weight"]),
             parameters["C"],
         )
-        odds = class_ratio(samples.stable) if balanced else 1.0
+        odds = class_ratio(samples.positive) if balanced else 1.0
         rule = Linear.of(
             mean, scale, solution.weights, solution.intercept, offset=-float(np.log(odds))
         )
@@ -141,14 +141,16 @@ class Adapted:
 def _calibrated(prior: Linear, samples: Samples, c: float) -> Linear:
     odds = prior.slope * prior.decision(samples.features) + prior.offset
     identity = Solution(np.array([1.0]), 0.0)
-    (slope,), shift = fit_logistic(odds[:, None], samples.stable, (1.0, 1.0), c, identity)
+    (slope,), shift = fit_logistic(odds[:, None], samples.positive, (1.0, 1.0), c, identity)
     stretch = max(float(slope), MIN_SLOPE)
     return replace(prior, slope=stretch * prior.slope, offset=stretch * prior.offset + shift)
 
 
 def _reweighted(prior: Linear, samples: Samples, c: float) -> Linear:
     standardised = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
-    weights, intercept = fit_logistic(standardised, samples.stable, (1.0, 1.0), c, log_odds(prior))
+    weights, intercept = fit_logistic(
+        standardised, samples.positive, (1.0, 1.0), c, log_odds(prior)
+    )
     return Linear.of(np.array(prior.mean), np.array(prior.scale), weights, intercept)
 
 

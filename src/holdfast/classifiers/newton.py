@@ -52,7 +52,7 @@ class MultinomialSolution(NamedTuple):
 
 def fit_logistic(
     features: Array,
-    stable: npt.NDArray[np.bool_],
+    positive: npt.NDArray[np.bool_],
     class_weights: tuple[float, float],
     c: float,
     prior: Solution | None = None,
@@ -61,13 +61,13 @@ def fit_logistic(
 
     Args:
         features: (n, n_features), standardised.
-        stable: (n,) class.
+        positive: (n,) class.
         class_weights: weight of a sample that is not stable, and of one that is.
         c: inverse strength of the L2 penalty.
         prior: towards which weights and intercept are drawn, and where the search begins; without
             it the weights are drawn towards zero, and the intercept has no penalty.
     """
-    total = float(np.where(stable, class_weights[1], class_weights[0]).sum())
+    total = float(np.where(positive, class_weights[1], class_weights[0]).sum())
     penalty = np.full(features.shape[1] + 1, 1.0 / (c * total))
     if prior is None:
         penalty[-1] = 0.0
@@ -77,7 +77,7 @@ def fit_logistic(
     shares = (class_weights[0] / total, class_weights[1] / total)
 
     def evaluate(weights: Array, gradient: Array, hessian: Array) -> float:
-        samples = (features, stable, shares)
+        samples = (features, positive, shares)
         return _evaluate(*samples, penalty, start, weights, gradient, hessian)
 
     weights = _minimise(evaluate, start)
@@ -140,7 +140,7 @@ def _step(hessian: Array, gradient: Array) -> Array:
 @compiled
 def _evaluate(
     features: Array,
-    stable: npt.NDArray[np.bool_],
+    positive: npt.NDArray[np.bool_],
     class_weights: tuple[float, float],
     penalty: Array,
     prior: Array,
@@ -158,14 +158,14 @@ def _evaluate(
         z = weights[d]
         for a in range(d):
             z += weights[a] * features[i, a]
-        kind = 1 if stable[i] else 0
+        kind = 1 if positive[i] else 0
         size = math.exp(-abs(z))
         likely = 1.0 / (1.0 + size)  # probability of the sign of z
         products[kind] *= likely
         if products[kind] < MIN_PRODUCT:
             losses[kind] -= math.log(products[kind])
             products[kind] = 1.0
-        if (z >= 0.0) != stable[i]:
+        if (z >= 0.0) != positive[i]:
             losses[kind] += abs(z)
         slope = class_weights[kind] * ((likely if z >= 0.0 else size * likely) - kind)
         bend = class_weights[kind] * likely * (size * likely)

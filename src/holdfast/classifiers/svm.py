@@ -56,11 +56,11 @@ class LinearSVM:
         del seed
         check_classes(samples)
         mean, scale, features = standardise(samples.features)
-        solution = _fit(features, samples.stable, parameters)
+        solution = _fit(features, samples.positive, parameters)
         values = _values_out_of_fold(samples._replace(features=features), parameters)
         if values is None:
             values = solution.decision(features)
-        slope, offset = sigmoid(values, samples.stable)
+        slope, offset = sigmoid(values, samples.positive)
         rule = Linear.of(
             mean, scale, solution.weights, solution.intercept, slope=slope, offset=offset
         )
@@ -68,19 +68,19 @@ class LinearSVM:
 
 
 def _fit(
-    features: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_], parameters: Parameters
+    features: npt.NDArray[np.float64], positive: npt.NDArray[np.bool_], parameters: Parameters
 ) -> Solution:
-    weights = class_weights(stable, parameters["class_weight"])
-    return fit_svm(features, stable, weights, parameters["C"])
+    weights = class_weights(positive, parameters["class_weight"])
+    return fit_svm(features, positive, weights, parameters["C"])
 
 
 def _values_out_of_fold(samples: Samples, parameters: Parameters) -> npt.NDArray[np.float64] | None:
     """Compute decision values out of fold by group; None if a fold lacks a class."""
-    features, stable, groups = samples
+    features, positive, groups = samples
     held = group_folds(groups, SIGMOID_FOLDS)
     if len(held) < 2 or any(samples.take(~rows).one_class for rows in held):
         return None
-    values = np.empty(len(stable))
+    values = np.empty(len(positive))
     for rows in held:
-        values[rows] = _fit(features[~rows], stable[~rows], parameters).decision(features[rows])
+        values[rows] = _fit(features[~rows], positive[~rows], parameters).decision(features[rows])
     return values

@@ -95,8 +95,8 @@ def choose_threshold(
         The place in `SLIP_THRESHOLDS`; None if no threshold fits, or nothing is held.
     """
     choice = ThresholdChoice(false_alarms, counted_in)
-    place = int(_places(_limited([_ratios(curve)], choice), choice, np.ones((1, 1)))[0])
-    return place if place < len(curve) else None
+    index = int(_places(_limited([_ratios(curve)], choice), choice, np.ones((1, 1)))[0])
+    return index if index < len(curve) else None
 
 
 def _lowest(fits: Flags) -> Integers:
@@ -130,8 +130,8 @@ def held_out_places(
         choice: of the threshold; if no threshold fits, the highest is taken.
     """
     table = [_ratios(curve) for curve in curves]
-    places = _held_out(table, choice, groups, np.ones((1, len(curves))))
-    return places.reshape(-1)
+    indices = _held_out(table, choice, groups, np.ones((1, len(curves))))
+    return indices.reshape(-1)
 
 
 class _Ratio(NamedTuple):
@@ -197,15 +197,15 @@ def slip_intervals(
     table = [_ratios(curve) for curve in curves]
     draws = draw_recordings(len(curves), n, seed)
     if choice is None:
-        places = np.zeros((n, 1), dtype=np.int64)
+        indices = np.zeros((n, 1), dtype=np.int64)
     elif training:
-        places = _resampled(training, choice, n, seed)[:, None]
+        indices = _resampled(training, choice, n, seed)[:, None]
     else:
-        places = _held_out(table, choice, groups or range(len(curves)), draws)
+        indices = _held_out(table, choice, groups or range(len(curves)), draws)
     intervals: dict[str, dict[str, Interval | None]] = {}
     for name, limit in table[0]:
         intervals.setdefault(name, {})[limit] = bootstrap_interval(
-            _statistic(table, (name, limit), places), len(curves), n=n, seed=seed, level=level
+            _statistic(table, (name, limit), indices), len(curves), n=n, seed=seed, level=level
         )
     return SlipIntervals(
         incipient=intervals["incipient"],
@@ -228,8 +228,8 @@ def _resampled(
     """Return the place of the threshold in n resamples of the training recordings, (n,)."""
     table = [_ratios(curve) for curve in training]
     draws = draw_recordings(len(training), n, seed + 1)
-    places = _places(_limited(table, choice), choice, draws)
-    return np.minimum(places, len(training[0]) - 1)
+    indices = _places(_limited(table, choice), choice, draws)
+    return np.minimum(indices, len(training[0]) - 1)
 
 
 def _held_out(
@@ -248,11 +248,11 @@ def _held_out(
     """
     own = np.array(groups)
     limited = _limited(table, choice)
-    places = np.empty(draws.shape, dtype=np.int64)
+    indices = np.empty(draws.shape, dtype=np.int64)
     for group in np.unique(own):
         others = np.where(own == group, 0.0, draws)
-        places[:, own == group] = _places(limited, choice, others)[:, None]
-    return np.asarray(np.minimum(places, limited[0].n_thresholds - 1))
+        indices[:, own == group] = _places(limited, choice, others)[:, None]
+    return np.asarray(np.minimum(indices, limited[0].n_thresholds - 1))
 
 
 def _limits(choice: ThresholdChoice) -> dict[tuple[str, str], float]:
@@ -315,17 +315,17 @@ class _Sums:
         return draws @ self.parts, (draws @ self.wholes)[:, None]
 
 
-def _statistic(table: Table, name: tuple[str, str], places: Integers) -> Statistic:
+def _statistic(table: Table, name: tuple[str, str], indices: Integers) -> Statistic:
     """Return the statistic of a metric, each recording at its threshold.
 
     Args:
         table: of the recordings.
         name: of the metric.
-        places: (n, n_recordings), or (n, 1) for one threshold of all.
+        indices: (n, n_recordings), or (n, 1) for one threshold of all.
     """
     sums = _Sums.of(table, name)
     parts = sums.parts[
-        np.arange(len(sums.parts)), np.broadcast_to(places, (len(places), len(sums.parts)))
+        np.arange(len(sums.parts)), np.broadcast_to(indices, (len(indices), len(sums.parts)))
     ]
 
     def rates(draws: Array) -> Array:

@@ -155,13 +155,13 @@ def _slip(times: Array, steps: Array, speed: Array, share: Array, start: int, en
     slid = np.cumsum((speed * steps)[start:end])
     ends = times[start:end] + steps[start:end]
     gross = np.flatnonzero((share[start:end] >= GROSS_SHARE) & (speed[start:end] > 0))
-    places = np.searchsorted(slid, np.array(DISTANCES) * (1 - ROUNDING))
+    indices = np.searchsorted(slid, np.array(DISTANCES) * (1 - ROUNDING))
     return Slip(
         float(times[start]),
         float(ends[-1]),
         float(times[start + gross[0]]) if len(gross) else math.nan,
         float(slid[-1]),
-        tuple(float(ends[k]) if k < len(ends) else math.nan for k in places),
+        tuple(float(ends[k]) if k < len(ends) else math.nan for k in indices),
     )
 
 
@@ -198,8 +198,8 @@ def slip_truth(
     module, truth = recording.modules[finger], recording.truth
     stable = module_states(module.labels, times) if quiet is None else quiet
     if truth is not None and has_slip_truth(truth, finger):
-        place = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
-        codes = _truth_codes(truth, finger)[place]
+        index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
+        codes = _truth_codes(truth, finger)[index]
         return SlipTruth(codes, stable & (codes == STILL), finger_slips(truth, finger), "truth")
     if not module.labels:
         return None

@@ -147,16 +147,16 @@ class SlipCurve:
     def __len__(self) -> int:
         return len(self.delays)
 
-    def __getitem__(self, place: int) -> SlipCounts:
+    def __getitem__(self, index: int) -> SlipCounts:
         """Return the counts at one threshold."""
         return replace(
             self.silent,
-            delays=self.delays[place],
-            gross_delays=self.gross_delays[place],
-            found_before=self.found_before[place],
-            false_quiet=int(self.false_quiet[place]),
-            false_held=int(self.false_held[place]),
-            raised_seconds=float(self.raised_seconds[place]),
+            delays=self.delays[index],
+            gross_delays=self.gross_delays[index],
+            found_before=self.found_before[index],
+            false_quiet=int(self.false_quiet[index]),
+            false_held=int(self.false_held[index]),
+            raised_seconds=float(self.raised_seconds[index]),
         )
 
 

@@ -303,11 +303,11 @@ class ResultTotal:
 
     def _group(self) -> _Group:
         """Return the group of the next recording with labels."""
-        place = self.n_labelled % MAX_GROUPS
+        index = self.n_labelled % MAX_GROUPS
         self.n_labelled += 1
-        if place == len(self.groups):
+        if index == len(self.groups):
             self.groups.append(_Group())
-        return self.groups[place]
+        return self.groups[index]
 
     def _bin(self) -> None:
         self.binned = True

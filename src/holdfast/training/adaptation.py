@@ -197,5 +197,5 @@ def _held_out_losses(
     for candidate in candidates:
         weighted = {**candidate, "C": step * candidate["C"]}
         rule = prior if trained.one_class else recipe.fit(trained, weighted, 0).rule
-        losses.append(log_losses(rule.probability(tested.features), tested.stable))
+        losses.append(log_losses(rule.probability(tested.features), tested.positive))
     return np.array(losses)

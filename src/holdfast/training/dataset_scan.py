@@ -47,20 +47,20 @@ class OneRecording(Sequence[Recording]):
 
     Args:
         recordings: a dataset, or any sequence; one without slices stays in this process.
-        place: index of the recording.
+        index: of the recording.
     """
 
-    def __init__(self, recordings: Sequence[Recording], place: int) -> None:
-        self._recordings, self._place = recordings, place
+    def __init__(self, recordings: Sequence[Recording], index: int) -> None:
+        self._recordings, self._index = recordings, index
 
     def __len__(self) -> int:
         return 1
 
     def __getitem__(self, index: Any) -> Any:  # noqa: ANN401 (an index, or a slice)
-        return self._recordings[range(self._place, self._place + 1)[index]]
+        return self._recordings[range(self._index, self._index + 1)[index]]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unchanged, (self._recordings[self._place : self._place + 1],)
+        return _unchanged, (self._recordings[self._index : self._index + 1],)
 
 
 def _unchanged(part: Sequence[Recording]) -> Sequence[Recording]:

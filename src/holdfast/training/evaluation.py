@@ -205,7 +205,7 @@ def evaluate_recordings(
         ModelError: a recording has other fingers or sensors.
         EngineError: the engine cannot be used.
     """
-    parts = ((OneRecording(recordings, place),) for place in range(len(recordings)))
+    parts = ((OneRecording(recordings, index),) for index in range(len(recordings)))
     trained_on: list[str] = []
     tares: list[bool] = []
     kept: list[Decisions] = []

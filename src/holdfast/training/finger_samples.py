@@ -62,8 +62,8 @@ class FingerSamples:
 
     def _class_counts(self, n_units: int) -> Integers:
         """Return (2, n_units) number of samples of class 0 and class 1 in each unit."""
-        stable, whole = self.samples.stable, self.units >= 0
-        parts = (self.units[whole & (stable == kind)] for kind in (False, True))
+        positive, whole = self.samples.positive, self.units >= 0
+        parts = (self.units[whole & (positive == kind)] for kind in (False, True))
         return np.array([np.bincount(part, minlength=n_units) for part in parts])
 
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
@@ -105,8 +105,8 @@ def thinning_step(n: int, n_max: int) -> int:
 
 def thin(samples: Samples, n_max: int) -> Samples:
     """Return at most `n_max` of the samples, at even steps."""
-    step = thinning_step(len(samples.stable), n_max)
-    return Samples(samples.features[::step], samples.stable[::step], samples.groups[::step])
+    step = thinning_step(len(samples.positive), n_max)
+    return Samples(samples.features[::step], samples.positive[::step], samples.groups[::step])
 
 
 def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:

@@ -74,10 +74,10 @@ class TrainingData:
         """
         for finger, pool in self.fingers.items():
             if pool.samples.one_class:
-                n_stable = int(np.count_nonzero(pool.samples.stable))
+                n_stable = int(np.count_nonzero(pool.samples.positive))
                 raise TrainingError(
                     f"{finger}: {n_stable} samples labelled stable and "
-                    f"{len(pool.samples.stable) - n_stable} labelled not stable; both classes "
+                    f"{len(pool.samples.positive) - n_stable} labelled not stable; both classes "
                     "are needed"
                 )
 

@@ -30,19 +30,19 @@ class ChosenThreshold:
     """Threshold of the slip rules of a model, and the metrics out of fold.
 
     Attributes:
-        place: of the threshold in `SLIP_THRESHOLDS`; None if none has few enough false alarms.
+        index: of the threshold in `SLIP_THRESHOLDS`; None if none has few enough false alarms.
         counts: of all recordings at this threshold; at the highest if there is none.
         metrics: out of fold, each recording by the threshold of the others.
     """
 
-    place: int | None
+    index: int | None
     counts: SlipCounts
     metrics: SlipSummary
 
     @property
     def reason(self) -> str:
         """Why there is no threshold; empty if there is one."""
-        if self.place is not None:
+        if self.index is not None:
             return ""
         minutes = self.counts.held_seconds / 60
         if not _supports(self.counts, SLIP_FALSE_ALARMS):
@@ -76,22 +76,22 @@ def choose_slip_threshold(
     by_recording = [SlipCurve.total(list(fingers.values())) for fingers, _ in used]
     own = [group for _, group in used]
     pooled, highest = SlipCurve.total(by_recording), len(SLIP_THRESHOLDS) - 1
-    place = choose_threshold(pooled, SLIP_FALSE_ALARMS)
-    places, intervals = [highest if place is None else place] * len(used), None
+    index = choose_threshold(pooled, SLIP_FALSE_ALARMS)
+    indices, intervals = [highest if index is None else index] * len(used), None
     if has_others := len(set(own)) > 1:
         choice = ThresholdChoice(SLIP_FALSE_ALARMS)
-        places = held_out_places(by_recording, own, choice).tolist()
+        indices = held_out_places(by_recording, own, choice).tolist()
         intervals = slip_intervals(by_recording, choice, groups=own, seed=seed)
     counts = [
-        {name: curve[place] for name, curve in fingers.items()}
-        for (fingers, _), place in zip(used, places, strict=True)
+        {name: curve[index] for name, curve in fingers.items()}
+        for (fingers, _), index in zip(used, indices, strict=True)
     ]
     metrics = slip_summary(counts, intervals, threshold_chosen=has_others)
     if metrics is None:
         return None
     supported = _supports(pooled[0], SLIP_FALSE_ALARMS)
-    shown = pooled[highest if place is None else place]
-    return ChosenThreshold(place if supported else None, shown, metrics)
+    shown = pooled[highest if index is None else index]
+    return ChosenThreshold(index if supported else None, shown, metrics)
 
 
 def _supports(counts: SlipCounts, false_alarms: float) -> bool:
@@ -101,10 +101,10 @@ def _supports(counts: SlipCounts, false_alarms: float) -> bool:
 
 def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
     """Return the model whose slip rules have a threshold; without slip rules if there is none."""
-    if chosen is None or chosen.place is None:
+    if chosen is None or chosen.index is None:
         return model.changed(
             lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
         )
-    threshold = float(SLIP_THRESHOLDS[chosen.place])
+    threshold = float(SLIP_THRESHOLDS[chosen.index])
     point = CurvePoint(threshold, slips=slip_metrics(chosen.counts))
     return model.with_threshold("slip", threshold, point.choice(SLIP_FALSE_ALARMS))

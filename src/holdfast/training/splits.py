@@ -45,11 +45,11 @@ class DataSplit:
     seed: int
     rates: npt.NDArray[np.float64]
 
-    def units_of(self, place: int, n_samples: int) -> Integers:
+    def units_of(self, index: int, n_samples: int) -> Integers:
         """Return the unit of each sample of a recording, the same at every call.
 
         Args:
-            place: index of the recording in the dataset.
+            index: index of the recording in the dataset.
             n_samples: number of its samples.
 
         Returns:
@@ -57,18 +57,18 @@ class DataSplit:
         """
         if self.split == "time":
             longest = n_samples // (4 * len(self.units))
-            gap = min(round(TIME_GAP * self.rates[place]), longest)
+            gap = min(round(TIME_GAP * self.rates[index]), longest)
             return block_folds(n_samples, len(self.units), gap)
         if self.split == "random":
-            generator = np.random.default_rng([self.seed, place])
+            generator = np.random.default_rng([self.seed, index])
             return random_folds(n_samples, len(self.units), generator)
-        return np.full(n_samples, self.group_of[place])
+        return np.full(n_samples, self.group_of[index])
 
     def recordings_without(self, held: Collection[int]) -> list[int]:
         """Return the indices of the recordings of which not all samples are in held units."""
         if self.split in ("time", "random"):
             return list(range(len(self.group_of)))
-        return [place for place, unit in enumerate(self.group_of) if unit not in held]
+        return [index for index, unit in enumerate(self.group_of) if unit not in held]
 
 
 def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) -> DataSplit:
@@ -92,8 +92,8 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
             "the split by object needs the object of every recording"
         )
     groups = list(dict.fromkeys(str(name) for name in names))
-    places = {name: place for place, name in enumerate(groups)}
-    group_of = np.array([places[str(name)] for name in names])
+    indices = {name: index for index, name in enumerate(groups)}
+    group_of = np.array([indices[str(name)] for name in names])
     rates = np.array([recording.rate for recording in recordings])
     if split in ("time", "random"):
         n_folds = TIME_FOLDS if split == "time" else RANDOM_FOLDS

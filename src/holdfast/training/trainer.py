@@ -326,7 +326,7 @@ class _Trainer:
                 f"{n_units} {self.data_split.split}s are held out in {n_fits} groups, not alone"
             )
         context = (self.data_split, len(self.fingers))
-        calls = (self._call(place, models) for place in range(len(self.recordings)))
+        calls = (self._call(index, models) for index in range(len(self.recordings)))
         evaluated = self.engine.map_ordered(_score_out_of_fold, calls, shared=context)
         total, slip_curves, n_loaded = ResultTotal(), [], 0
         for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
@@ -336,14 +336,14 @@ class _Trainer:
         return OutOfFold(total.metrics(seed=self.setting.seed), slip_curves, n_loaded)
 
     def _call(
-        self, place: int, models: Sequence[Model | None]
+        self, index: int, models: Sequence[Model | None]
     ) -> tuple[int, str, Sequence[Recording], list[Model | None]]:
         """Return the arguments of `_score_out_of_fold`, without models if there are no labels."""
-        scanned = self.scan.recordings[place]
+        scanned = self.scan.recordings[index]
         used = list(models) if scanned.n_labelled else []
         if used and self.data_split.split not in ("time", "random"):
-            used = [models[self.data_split.group_of[place] % len(models)]]
-        return place, scanned.name, OneRecording(self.recordings, place), used
+            used = [models[self.data_split.group_of[index] % len(models)]]
+        return index, scanned.name, OneRecording(self.recordings, index), used
 
     def choose_slip_threshold(self, model: Model, scored: OutOfFold) -> tuple[Model, Metrics]:
         """Return the model with the threshold of its slip rules, and the metrics with slips.
@@ -415,7 +415,7 @@ def _scan_part(relative: bool, part: Sequence[Recording]) -> RecordingScan:
 def _score_out_of_fold(
     data_split: DataSplit,
     n_fingers: int,
-    place: int,
+    index: int,
     name: str,
     part: Sequence[Recording],
     models: Sequence[Model | None],
@@ -427,7 +427,7 @@ def _score_out_of_fold(
     Args:
         data_split: of the dataset.
         n_fingers: number of fingers of the models.
-        place: index of the recording in the dataset.
+        index: of the recording in the dataset.
         name: of the recording.
         part: only this recording.
         models: that are fitted without it, or without each unit of a split by samples.
@@ -446,7 +446,7 @@ def _score_out_of_fold(
     if data_split.split not in ("time", "random"):
         combined = by_model[0]
     elif len(used) == len(models) and len({tuple(by.fingers) for by in by_model}) == 1:
-        combined = combine_decisions(by_model, lambda n: data_split.units_of(place, n), n_fingers)
+        combined = combine_decisions(by_model, lambda n: data_split.units_of(index, n), n_fingers)
     return score_recording(combined, slip_curves=True), loaded
 
 

@@ -99,10 +99,10 @@ def _loss(
         classifier = recipe.fit(fitted, parameters, seed)
         probability = classifier.probability(tested.features)
         if objective == "error":
-            total += float(((probability >= classifier.threshold) != tested.stable).sum())
+            total += float(((probability >= classifier.threshold) != tested.positive).sum())
         else:
-            total += float(log_losses(probability, tested.stable).sum())
-        n += len(tested.stable)
+            total += float(log_losses(probability, tested.positive).sum())
+        n += len(tested.positive)
     return total / n
 
 

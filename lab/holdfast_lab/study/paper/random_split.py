@@ -173,7 +173,7 @@ def evaluate_variants(
 def confusion_counts(classifier: Classifier, samples: Samples, n_recordings: int) -> Integers:
     """Return the numbers (n_recordings, 4) of TN, FP, FN and TP of each recording."""
     called_stable = classifier.probability(samples.features) >= classifier.threshold
-    cell = 4 * samples.groups + 2 * samples.stable + called_stable
+    cell = 4 * samples.groups + 2 * samples.positive + called_stable
     return np.bincount(cell, minlength=4 * n_recordings).reshape(-1, 4)
 
 
@@ -253,7 +253,7 @@ def _evaluate(
         name,
         tuple(features),
         dict(parameters),
-        len(thin(train, budget.n_fit).stable),
+        len(thin(train, budget.n_fit).positive),
         {on: counts[on].tolist() for on in TEST_DATA if on in counts},
     )
 

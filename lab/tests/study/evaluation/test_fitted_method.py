@@ -82,7 +82,7 @@ def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
         corpus_features(METHODS["logreg"], corpus, Variation()), max_samples=100
     )
     for samples in training.samples.values():
-        assert len(samples.stable) <= 100
+        assert len(samples.positive) <= 100
         assert np.bincount(samples.groups).min() >= 20
         assert np.isfinite(samples.features).all()
 

@@ -138,5 +138,5 @@ def test_the_classifier_is_fitted_and_gives_probabilities(method, recordings):
     assert 0 <= fitted.threshold <= 1
     assert np.isnan(fitted.probability(np.full((1, fitted.n_features), np.nan))).all()
     called = probability >= fitted.threshold
-    right = (called[samples.stable].mean() + (~called[~samples.stable]).mean()) / 2
+    right = (called[samples.positive].mean() + (~called[~samples.positive]).mean()) / 2
     assert right > 0.5

@@ -25,7 +25,7 @@ def test_features_and_classes_are_those_of_each_recording(corpus):
         known = np.isfinite(features[:, 0]) & (module.label_states != UNKNOWN)
         mine = pool.samples.groups == place
         assert np.array_equal(pool.samples.features[mine, :6], features[known])
-        assert np.array_equal(pool.samples.stable[mine], module.label_states[known] == STABLE)
+        assert np.array_equal(pool.samples.positive[mine], module.label_states[known] == STABLE)
 
 
 def test_energy_is_the_sum_of_squared_details_of_the_normal_force(corpus):
@@ -63,7 +63,7 @@ def test_a_recording_without_the_finger_has_no_samples(tmp_path):
     recordings = [synthetic_recording(f"r{k}", k, names) for k, names in enumerate(fingers)]
     corpus = scan_corpus("main", save_all(tmp_path / "data", recordings))
     assert set(pool_samples(corpus, corpus.rate, "index", 14, seed=0).samples.groups) == {0, 2}
-    assert len(pool_samples(corpus, corpus.rate, "ring", 14, seed=0).samples.stable) == 0
+    assert len(pool_samples(corpus, corpus.rate, "ring", 14, seed=0).samples.positive) == 0
 
 
 def test_objects_are_those_of_the_metadata(tmp_path):

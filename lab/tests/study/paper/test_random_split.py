@@ -74,7 +74,7 @@ def naive(corpora, on):
         rule = how.fit(Samples(*(part[fitted] for part in data)), how.reference, 0)
         called = rule.probability(data.features[tested]) >= rule.threshold
         for k, stable in zip(tested, called, strict=True):
-            counts[data.groups[k]][2 * int(data.stable[k]) + int(stable)] += 1
+            counts[data.groups[k]][2 * int(data.positive[k]) + int(stable)] += 1
     return counts
 
 
@@ -152,8 +152,8 @@ def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpor
     pool = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
     train = pool.parts >= 5
     energy = pool.select(["energy"]).features[:, 0]
-    cut = best_cut(energy[train], pool.samples.stable[train], "below").value
-    right = (energy <= cut) == pool.samples.stable
+    cut = best_cut(energy[train], pool.samples.positive[train], "below").value
+    right = (energy <= cut) == pool.samples.positive
     tn, _, _, tp = np.sum(cell.counts[HELD_OUT], axis=0)
     assert tn + tp == right[~train].sum()
 

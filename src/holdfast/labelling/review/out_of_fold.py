@@ -188,7 +188,7 @@ def _one_class_fingers(data: TrainingData, fingers: Collection[str]) -> dict[str
     shared = data.fingers.get(ANY_FINGER)
     samples_of = {f: data.fingers.get(f, shared) for f in fingers}
     return {
-        f: float(own.samples.stable.any())
+        f: float(own.samples.positive.any())
         for f, own in samples_of.items()
         if own and own.samples.one_class
     }
