@@ -44,7 +44,7 @@ class Case(NamedTuple):
     """What a detector did with one finger of which some taxels were frozen.
 
     Attributes:
-        delay: from the begin of the freeze to the fault [s]; infinite without one.
+        delay: from the beginning of the freeze to the fault [s]; infinite without one.
         moved: number of samples after the grace in which the finger is pushed or released.
         stable: number of those that are called STABLE.
     """
@@ -101,7 +101,7 @@ def cases_of(model: Model, recording: Recording, moment: str, n: int) -> Iterato
 def begin(module: Tactile, moment: str) -> int | None:
     """Return the sample at which the freeze begins; None if there is no such moment.
 
-    A hold is frozen in the middle of the longest stable stretch, and a push at the begin of the
+    A hold is frozen in the middle of the longest stable stretch, and a push at the beginning of the
     unstable stretch that follows it.
     """
     if moment == "start":

@@ -17,7 +17,7 @@ from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.resampling import true_updates
 from holdfast.training.calibration import location_and_scale
-from holdfast.training.own_handling import held_samples
+from holdfast.training.own_handling import grasped_samples
 
 MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
@@ -88,7 +88,7 @@ def read_grasp(
         kept = np.isfinite(finger.features).all(axis=1)
         kept &= np.arange(len(kept)) % step == 1 % step
         stable = module.label_states == STABLE
-        held = held_samples(module.times, traces[name].state)
+        held = grasped_samples(module.times, traces[name].state)
         features = changed(finger.features, module) if changed else finger.features
         parts = features, held, stable, truth.codes == SLIDING, truth.codes == STILL
         columns.append(tuple(part[kept] for part in parts))

@@ -28,7 +28,7 @@ MIN_HELD_UPDATES = 4
 LATE_UPDATE = 1.6
 """Periods of the updates after which a reading that is still the same counts as a sample."""
 HELD_ROWS = 4096
-"""Rows at the begin of a recording that show whether its sensors hold their samples."""
+"""Rows at the beginning of a recording that show whether its sensors hold their samples."""
 
 
 def rows_per_update(changed: Sequence[bool] | Flags) -> float:

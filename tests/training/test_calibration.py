@@ -15,7 +15,7 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training import Setting, calibrate, calibrate_with_report, train
 from holdfast.training.calibration import CALIBRATED_SUFFIX, activity, n_changed
 from holdfast.training.operating_point import HandlingFigures
-from holdfast.training.own_handling import MIN_SCALE, held_samples
+from holdfast.training.own_handling import MIN_SCALE, grasped_samples
 from holdfast.training.tune import tune
 from training.build import (
     PAD,
@@ -48,7 +48,7 @@ def handling_of(model, sensor="pad"):
 def stable_share(model, recording):
     shares = []
     for trace in detect(model, recording).fingers.values():
-        held = held_samples(trace.times, trace.state)
+        held = grasped_samples(trace.times, trace.state)
         shares.append(np.mean(trace.state[held] == STABLE))
     return np.mean(shares)
 

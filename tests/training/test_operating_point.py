@@ -11,8 +11,8 @@ from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.model import Debounce
 from holdfast.training.operating_point import (
     STABLE_SHARE,
-    HeldFinger,
-    HeldFingers,
+    GraspingFinger,
+    GraspingFingers,
     choose_operating_point,
 )
 from holdfast.training.replay import ThresholdReplay
@@ -36,11 +36,11 @@ def held_finger(probability, slips=None, *, hold=0.0, states=None, name="thumb")
     finger = FingerDecisions(times, np.zeros(n), states, np.asarray(probability), slip=slip)
     raw = Decisions("made", {name: finger}, finger)
     replay = ThresholdReplay(raw, Debounce(hold=hold), 1 / RATE, 1)
-    return HeldFinger(name, replay, states == STABLE)
+    return GraspingFinger(name, replay, states == STABLE)
 
 
 def handling(*args, **options):
-    return HeldFingers([held_finger(*args, **options)])
+    return GraspingFingers([held_finger(*args, **options)])
 
 
 def logistic(values):
@@ -114,9 +114,9 @@ def test_false_alarms_are_counted_per_minute_of_holding():
 def test_two_fingers_have_more_alarms_in_the_same_time():
     probability = np.full(6000, 0.9)
     probability[1000:1010] = 0.05
-    both = HeldFingers([held_finger(probability), held_finger(probability, name="index")])
+    both = GraspingFingers([held_finger(probability), held_finger(probability, name="index")])
     assert (both.seconds, both.alarms_per_minute(0.5)) == (pytest.approx(60.0), 2.0)
-    parts = HeldFingers([held_finger(probability), held_finger(probability)])
+    parts = GraspingFingers([held_finger(probability), held_finger(probability)])
     assert (parts.seconds, parts.alarms_per_minute(0.5)) == (pytest.approx(120.0), 1.0)
 
 
@@ -158,5 +158,5 @@ def test_the_replay_decides_as_the_detector_does():
     held = handling(SPREAD)
     assert held.stable_share(0.5) == pytest.approx(np.mean(SPREAD >= 0.5), abs=1e-12)
     states = np.where(np.arange(3000) < 1500, UNSTABLE, STABLE)
-    half = HeldFingers([held_finger(SPREAD, states=states)])
+    half = GraspingFingers([held_finger(SPREAD, states=states)])
     assert half.stable_share(0.5) == pytest.approx(np.mean(SPREAD[1500:] >= 0.5), abs=1e-12)

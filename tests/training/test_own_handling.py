@@ -16,8 +16,8 @@ from holdfast.training.own_handling import (
     MIN_SCALE,
     HandlingKey,
     OwnHandling,
-    held_durations,
-    held_samples,
+    grasped_durations,
+    grasped_samples,
     location_and_scale,
 )
 from training.build import PAD, handling_module, handling_recording, normalised_model
@@ -31,7 +31,7 @@ def codes(*runs):
 
 def held_runs(*runs):
     states = codes(*runs)
-    held = held_samples(np.arange(len(states)) / 100, states)
+    held = grasped_samples(np.arange(len(states)) / 100, states)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], held, [0]])))
     return edges.reshape(-1, 2).tolist()
 
@@ -55,7 +55,7 @@ def test_what_begins_or_ends_in_contact_is_held_there():
 
 def test_a_gap_is_not_held():
     times = np.concatenate([np.arange(100), 500 + np.arange(100)]) / 100
-    assert held_durations(times).sum() == pytest.approx(2.0, abs=0.01)
+    assert grasped_durations(times).sum() == pytest.approx(2.0, abs=0.01)
 
 
 def test_location_and_scale_of_normal_values():

@@ -77,10 +77,10 @@ def _fit(
 def _values_out_of_fold(samples: Samples, parameters: Parameters) -> npt.NDArray[np.float64] | None:
     """Compute decision values out of fold by group; None if a fold lacks a class."""
     features, positive, groups = samples
-    held = group_folds(groups, SIGMOID_FOLDS)
-    if len(held) < 2 or any(samples.take(~rows).one_class for rows in held):
+    left_out = group_folds(groups, SIGMOID_FOLDS)
+    if len(left_out) < 2 or any(samples.take(~rows).one_class for rows in left_out):
         return None
     values = np.empty(len(positive))
-    for rows in held:
+    for rows in left_out:
         values[rows] = _fit(features[~rows], positive[~rows], parameters).decision(features[rows])
     return values

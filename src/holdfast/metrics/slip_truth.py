@@ -119,8 +119,8 @@ class SlipDecisions:
         end = np.maximum.accumulate(np.where(ended, times, -np.inf))
         last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
         period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-        held = (times - last + 0.5 * period < self.hold) & (last > end)
-        return np.asarray((over | held) & ~ended)
+        lasting = (times - last + 0.5 * period < self.hold) & (last > end)
+        return np.asarray((over | lasting) & ~ended)
 
 
 def finger_slips(truth: Truth, finger: str) -> tuple[Slip, ...]:

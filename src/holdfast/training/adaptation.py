@@ -69,7 +69,9 @@ class Adaptation(NamedTuple):
         )
 
 
-def choose_adaptation(pool: FingerSamples, prior: Linear, held: Collection[int] = ()) -> Adaptation:
+def choose_adaptation(
+    pool: FingerSamples, prior: Linear, left_out: Collection[int] = ()
+) -> Adaptation:
     """Choose how far a classifier is adapted to samples.
 
     Every candidate is fitted without some recordings (of a single recording: without blocks of
@@ -80,9 +82,9 @@ def choose_adaptation(pool: FingerSamples, prior: Linear, held: Collection[int] 
     Args:
         pool: samples of one classifier.
         prior: to adapt.
-        held: units that are left out.
+        left_out: units that are left out.
     """
-    kept = np.flatnonzero(pool.kept(held))
+    kept = np.flatnonzero(pool.kept(left_out))
     step = thinning_step(len(kept), MAX_ADAPTATION_SAMPLES)
     rows = np.zeros(len(pool.times), dtype=bool)
     rows[kept[::step]] = True

@@ -13,9 +13,9 @@ from holdfast.model import FingerModel, Handling, Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast.training.operating_point import (
+    GraspingFinger,
+    GraspingFingers,
     HandlingFigures,
-    HeldFinger,
-    HeldFingers,
     choose_operating_point,
 )
 from holdfast.training.own_handling import (
@@ -24,7 +24,7 @@ from holdfast.training.own_handling import (
     MIN_HANDLING,
     HandlingKey,
     OwnHandling,
-    held_samples,
+    grasped_samples,
     location_and_scale,
 )
 from holdfast.training.replay import ThresholdReplay
@@ -303,21 +303,21 @@ class _Calibration:
         moves = self.seen.load_change(key) >= STILL_CHANGE  # not where it is unknown
         return not moves and _stretch(self.model.finger(key.finger), scale) > 1
 
-    def _decide(self, model: Model) -> dict[HandlingKey, HeldFingers]:
+    def _decide(self, model: Model) -> dict[HandlingKey, GraspingFingers]:
         """Return the decisions of a model about the own handling, for any threshold."""
-        fingers: dict[HandlingKey, list[HeldFinger]] = {}
+        fingers: dict[HandlingKey, list[GraspingFinger]] = {}
         for recording in self.recordings:
             if recording.name not in self.seen.digests:
                 continue
             replay = ThresholdReplay.of(model, recording)
             for name, decisions in replay.raw.fingers.items():
                 key = HandlingKey.of(model, name, recording.modules[name].sensor)
-                held = held_samples(decisions.times, decisions.states)
-                fingers.setdefault(key, []).append(HeldFinger(name, replay, held))
-        return {key: HeldFingers(held) for key, held in fingers.items()}
+                grasped = grasped_samples(decisions.times, decisions.states)
+                fingers.setdefault(key, []).append(GraspingFinger(name, replay, grasped))
+        return {key: GraspingFingers(grasped) for key, grasped in fingers.items()}
 
     def _summary(
-        self, key: HandlingKey, handling: Handling, before: HeldFingers, after: HeldFingers
+        self, key: HandlingKey, handling: Handling, before: GraspingFingers, after: GraspingFingers
     ) -> HandlingSummary:
         part = self.model.finger(key.finger)
         return HandlingSummary(

@@ -40,13 +40,13 @@ class FingerSamples:
     at_rest: npt.NDArray[np.float64]
     n_usable: int = 0
 
-    def without(self, held: Collection[int]) -> Samples:
+    def without(self, left_out: Collection[int]) -> Samples:
         """Return the samples that are not in held units."""
-        return self.samples.take(self.kept(held))
+        return self.samples.take(self.kept(left_out))
 
-    def kept(self, held: Collection[int]) -> npt.NDArray[np.bool_]:
+    def kept(self, left_out: Collection[int]) -> npt.NDArray[np.bool_]:
         """Return (n,) whether a sample is not in held units."""
-        return ~np.isin(self.units, [-1, *held] if held else [])
+        return ~np.isin(self.units, [-1, *left_out] if left_out else [])
 
     def can_evaluate(self, n_units: int) -> npt.NDArray[np.bool_]:
         """Return (n_units,) whether a unit has samples, and both classes are left without it."""

@@ -38,7 +38,7 @@ Features = tuple[FeatureSpec, ...]
 
 def fit_slip(
     samples: TargetSamples,
-    held: Collection[int],
+    left_out: Collection[int],
     features: Features,
     *,
     is_any: bool,
@@ -51,7 +51,7 @@ def fit_slip(
 
     Args:
         samples: of the target.
-        held: units whose samples are left out.
+        left_out: units whose samples are left out.
         features: of the samples.
         is_any: whether the model is for any hand.
         squares: whether the head has squares of the features.
@@ -60,7 +60,7 @@ def fit_slip(
         The head, with a threshold of 0.5; None with too few samples that slide, or none that hold
         still.
     """
-    kept = samples.kept(held)
+    kept = samples.kept(left_out)
     slides = np.asarray(samples.values[kept], dtype=bool)
     if slides.all() or slides.sum() < MIN_SLIDING_SAMPLES:
         return None
@@ -91,7 +91,7 @@ def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> L
     return Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
 
 
-def fit_speed(samples: TargetSamples, held: Collection[int], features: Features) -> Head | None:
+def fit_speed(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:
     """Fit the head `slip_speed` to the samples that are not in held units.
 
     The root of the speed is fitted by least squares with a small penalty. So fast slides count
@@ -99,13 +99,13 @@ def fit_speed(samples: TargetSamples, held: Collection[int], features: Features)
 
     Args:
         samples: of the target.
-        held: units whose samples are left out.
+        left_out: units whose samples are left out.
         features: of the samples.
 
     Returns:
         The head; None with too few samples that slide.
     """
-    kept = samples.kept(held)
+    kept = samples.kept(left_out)
     values, speed = samples.features[kept], np.asarray(samples.values[kept], dtype=np.float64)
     slides = speed > 0
     if np.count_nonzero(slides) < MIN_SPEED_SAMPLES:
@@ -136,18 +136,18 @@ def _solve(columns: Array, target: Array, weights: Array) -> Array:
     return np.asarray(np.linalg.solve(weighted @ columns + penalty, weighted @ target))
 
 
-def fit_cause(samples: TargetSamples, held: Collection[int], features: Features) -> Head | None:
+def fit_cause(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:
     """Fit the head `cause` to the samples that are not in held units.
 
     Args:
         samples: of the target.
-        held: units whose samples are left out.
+        left_out: units whose samples are left out.
         features: of the samples.
 
     Returns:
         The head; None with fewer than two causes of at least `MIN_CAUSE_SAMPLES`.
     """
-    kept, codes = samples.kept(held), np.asarray(samples.values, dtype=np.int64)
+    kept, codes = samples.kept(left_out), np.asarray(samples.values, dtype=np.int64)
     counts = np.bincount(codes[kept], minlength=len(CAUSES) + 1)
     kept &= counts[codes] >= MIN_CAUSE_SAMPLES
     if np.count_nonzero(counts >= MIN_CAUSE_SAMPLES) < 2:

@@ -104,7 +104,7 @@ def fit_model(
     data: TrainingData,
     setting: Setting,
     parameters: Mapping[str, Parameters],
-    held: Collection[int],
+    left_out: Collection[int],
 ) -> Model | None:
     """Fit a model to all samples that are not in held units. It has no provenance yet.
 
@@ -112,15 +112,15 @@ def fit_model(
         data: to fit.
         setting: of the training.
         parameters: of each finger's classifier.
-        held: units that are left out.
+        left_out: units that are left out.
 
     Returns:
         The model of all fingers that have both classes left; None if there is no such finger.
     """
-    recordings = data.data_split.recordings_without(held)
+    recordings = data.data_split.recordings_without(left_out)
     fingers = {}
     for finger, pool in data.fingers.items():
-        samples = pool.without(held)
+        samples = pool.without(left_out)
         if samples.one_class:
             continue
         threshold = setting.contact_threshold
@@ -129,7 +129,7 @@ def fit_model(
             name="stable", link="logit", features=setting.features, rule=rule, threshold=limit
         )
         fingers[finger] = FingerModel(
-            heads=(stable, *_other_heads(data, setting, finger, held)),
+            heads=(stable, *_other_heads(data, setting, finger, left_out)),
             sensor=None if pool.sensor is None else pool.sensor.name,
             contact_threshold=(
                 pool.contact_threshold(recordings) if threshold is None else threshold
@@ -149,21 +149,25 @@ def fit_model(
 
 
 def _other_heads(
-    data: TrainingData, setting: Setting, finger: str, held: Collection[int]
+    data: TrainingData, setting: Setting, finger: str, left_out: Collection[int]
 ) -> Iterator[Head]:
     """Yield the heads of a finger beside `stable` that its samples can train."""
     slips, speeds, causes = (
         data.samples.of(head).get(finger) for head in ("slip", "slip_speed", "cause")
     )
     slip = slips and fit_slip(
-        slips, held, data.slip_features, is_any=setting.relative, squares=data.slip_squares
+        slips, left_out, data.slip_features, is_any=setting.relative, squares=data.slip_squares
     )
     if slip:
         yield slip
-        if speeds and data.slip_squares and (head := fit_speed(speeds, held, data.slip_features)):
+        if (
+            speeds
+            and data.slip_squares
+            and (head := fit_speed(speeds, left_out, data.slip_features))
+        ):
             yield head
     # No metric out of fold counts causes.
-    if causes and not held and (head := fit_cause(causes, held, setting.features)):
+    if causes and not left_out and (head := fit_cause(causes, left_out, setting.features)):
         yield head
 
 

@@ -15,7 +15,7 @@ from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_thresholds import THRESHOLDS
 from holdfast.model import FingerModel, HeadName
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.own_handling import held_durations, location_and_scale
+from holdfast.training.own_handling import grasped_durations, location_and_scale
 from holdfast.training.replay import ThresholdReplay
 
 STABLE_SHARE = 0.95
@@ -65,18 +65,18 @@ class HandlingFigures(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, eq=False)
-class HeldFinger:
+class GraspingFinger:
     """One finger of one recording of own handling, decided with any threshold.
 
     Attributes:
         name: of the finger.
         replay: of the recording.
-        held: (n,) True where the finger holds something.
+        grasped: (n,) True where the finger holds something.
     """
 
     name: str
     replay: ThresholdReplay
-    held: Flags
+    grasped: Flags
 
     @property
     def decisions(self) -> FingerDecisions:
@@ -86,7 +86,7 @@ class HeldFinger:
     @property
     def seconds(self) -> float:
         """Held time [s]."""
-        return float(held_durations(self.decisions.times)[self.held].sum())
+        return float(grasped_durations(self.decisions.times)[self.grasped].sum())
 
     def stable(self, threshold: float) -> Flags:
         """Return (n,) where the finger is STABLE at a threshold."""
@@ -99,22 +99,22 @@ class HeldFinger:
         """
         states = self.replay.states(self.decisions, threshold)
         spells = runs(states == UNSTABLE)
-        inside = [(a, b) for a, b in spells if self.held[a] and a > 0 and b < len(states)]
+        inside = [(a, b) for a, b in spells if self.grasped[a] and a > 0 and b < len(states)]
         return sum(bool(states[a - 1] == states[b] == STABLE) for a, b in inside)
 
     def raised(self, threshold: float) -> Flags:
         """Return (n,) where a slip is reported at a threshold; nowhere without a slip rule."""
         slip = self.decisions.slip
         if slip is None:
-            return np.zeros_like(self.held)
+            return np.zeros_like(self.grasped)
         return np.asarray(slip.raised_at(np.array([threshold]))[0])
 
 
 @dataclass(frozen=True, eq=False)
-class HeldFingers:
+class GraspingFingers:
     """All fingers of one sensor in own handling."""
 
-    fingers: Sequence[HeldFinger]
+    fingers: Sequence[GraspingFinger]
 
     @property
     def seconds(self) -> float:
@@ -142,12 +142,12 @@ class HeldFingers:
 
     def stable_log_odds(self) -> Array:
         """Return the log odds of stability of the held samples."""
-        return _log_odds([f.decisions.stable_probability[f.held] for f in self.fingers])
+        return _log_odds([f.decisions.stable_probability[f.grasped] for f in self.fingers])
 
     def slip_log_odds(self) -> Array:
         """Return the log odds of a slip of the held samples; none without a slip rule."""
-        slips = [(finger.decisions.slip, finger.held) for finger in self.fingers]
-        return _log_odds([slip.probability[held] for slip, held in slips if slip is not None])
+        slips = [(finger.decisions.slip, finger.grasped) for finger in self.fingers]
+        return _log_odds([slip.probability[grasped] for slip, grasped in slips if slip is not None])
 
     def alarms_per_minute(self, threshold: float) -> float:
         """Return the number of alarms of all fingers per minute of held time."""
@@ -160,17 +160,17 @@ class HeldFingers:
 
     def slips_per_minute(self, threshold: float) -> float:
         """Return the number of reported slips of all fingers per minute of held time."""
-        n = sum(len(runs(finger.raised(threshold) & finger.held)) for finger in self.fingers)
+        n = sum(len(runs(finger.raised(threshold) & finger.grasped)) for finger in self.fingers)
         return 60 * n / self.seconds
 
-    def _share(self, mask_of: Callable[[HeldFinger], Flags]) -> float:
-        n_held = sum(int(finger.held.sum()) for finger in self.fingers)
-        n = sum(int((mask_of(finger) & finger.held).sum()) for finger in self.fingers)
-        return n / max(n_held, 1)
+    def _share(self, mask_of: Callable[[GraspingFinger], Flags]) -> float:
+        n_grasped = sum(int(finger.grasped.sum()) for finger in self.fingers)
+        n = sum(int((mask_of(finger) & finger.grasped).sum()) for finger in self.fingers)
+        return n / max(n_grasped, 1)
 
 
 def choose_operating_point(
-    handling: HeldFingers,
+    handling: GraspingFingers,
     part: FingerModel,
     false_alarms: float | None = None,
     *,

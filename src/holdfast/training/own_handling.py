@@ -68,7 +68,7 @@ class HandlingKey(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class HeldSamples:
+class GraspedSamples:
     """Held samples of one finger of one recording.
 
     Attributes:
@@ -105,7 +105,7 @@ class OwnHandling:
     """
 
     model: Model
-    samples: dict[HandlingKey, list[HeldSamples]] = field(default_factory=dict)
+    samples: dict[HandlingKey, list[GraspedSamples]] = field(default_factory=dict)
     digests: dict[str, str] = field(default_factory=dict)
     n_left_out: int = 0
     _faults: dict[str, _Faults] = field(default_factory=dict)
@@ -200,13 +200,13 @@ class OwnHandling:
                 f"{known[0].sensor.n_taxels} in {known[0].sensor.unit}; one sensor of a name "
                 "expected"
             )
-        held = held_samples(trace.times, trace.state) & np.isfinite(features).all(axis=1)
-        touching = held_samples(trace.times, trace.state, edge_seconds=0.0)
-        seconds = float(held_durations(trace.times)[touching].sum())
-        changes = _load_changes(trace, held)
+        grasped = grasped_samples(trace.times, trace.state) & np.isfinite(features).all(axis=1)
+        touching = grasped_samples(trace.times, trace.state, edge_seconds=0.0)
+        seconds = float(grasped_durations(trace.times)[touching].sum())
+        changes = _load_changes(trace, grasped)
         if loaded and sensor.unit == "count":  # newtons have a zero
             changes = np.full_like(changes, np.nan)
-        known.append(HeldSamples(name, sensor, features[held], changes, seconds))
+        known.append(GraspedSamples(name, sensor, features[grasped], changes, seconds))
 
     def _count_faults(self, finger: str, trace: FingerTrace) -> None:
         before = self._faults.get(finger, _Faults(0, 0, 0))
@@ -245,7 +245,7 @@ def location_and_scale(features: Array) -> tuple[Array, Array]:
     return location, np.maximum(scale, MIN_SCALE)
 
 
-def held_samples(times: Array, states: Codes, *, edge_seconds: float = EDGE_SECONDS) -> Flags:
+def grasped_samples(times: Array, states: Codes, *, edge_seconds: float = EDGE_SECONDS) -> Flags:
     """Return (n,) where a finger holds something for at least `MIN_TOUCH`.
 
     While it closes and opens it does not hold: the samples next to those without contact are left
@@ -258,17 +258,17 @@ def held_samples(times: Array, states: Codes, *, edge_seconds: float = EDGE_SECO
     """
     period = _period(times)
     touching = np.asarray((states == STABLE) | (states == UNSTABLE))
-    held = np.zeros_like(touching)
+    grasped = np.zeros_like(touching)
     for start, end in runs(touching):
         edge = min(round(edge_seconds / period), int(MAX_EDGE_SHARE * (end - start)))
         closes = start > 0 and states[start - 1] == NO_CONTACT
         opens = end < len(states) and states[end] == NO_CONTACT
         if end - start >= MIN_TOUCH / period:
-            held[start + closes * edge : end - opens * edge] = True
-    return held
+            grasped[start + closes * edge : end - opens * edge] = True
+    return grasped
 
 
-def held_durations(times: Array) -> Array:
+def grasped_durations(times: Array) -> Array:
     """Return (n,) the duration of each sample, which is a period before a gap [s]."""
     return np.minimum(sample_durations(times), 1.5 * _period(times))
 
@@ -278,7 +278,7 @@ def _period(times: Array) -> float:
     return float(np.median(np.diff(times))) if len(times) > 1 else MIN_TOUCH
 
 
-def _load_changes(trace: FingerTrace, held: Flags) -> Array:
+def _load_changes(trace: FingerTrace, grasped: Flags) -> Array:
     """Return the change of the force within `CHANGE_SECONDS`, as a share of it, where it is held.
 
     Samples before which the finger did not hold for so long are left out.
@@ -286,8 +286,8 @@ def _load_changes(trace: FingerTrace, held: Flags) -> Array:
     step = max(1, round(CHANGE_SECONDS / _period(trace.times)))
     if len(trace) <= step:
         return np.empty(0)
-    n_held = np.cumsum(np.append(0, held))
-    kept = n_held[step + 1 :] - n_held[: -step - 1] == step + 1
+    n_grasped = np.cumsum(np.append(0, grasped))
+    kept = n_grasped[step + 1 :] - n_grasped[: -step - 1] == step + 1
     change = np.linalg.norm(trace.force[step:] - trace.force[:-step], axis=1)[kept]
     load = np.linalg.norm(trace.force[step:], axis=1)[kept]
     return np.asarray(change[load > 0] / load[load > 0])

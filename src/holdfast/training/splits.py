@@ -64,11 +64,11 @@ class DataSplit:
             return random_folds(n_samples, len(self.units), generator)
         return np.full(n_samples, self.group_of[index])
 
-    def recordings_without(self, held: Collection[int]) -> list[int]:
+    def recordings_without(self, left_out: Collection[int]) -> list[int]:
         """Return the indices of the recordings of which not all samples are in held units."""
         if self.split in ("time", "random"):
             return list(range(len(self.group_of)))
-        return [index for index, unit in enumerate(self.group_of) if unit not in held]
+        return [index for index, unit in enumerate(self.group_of) if unit not in left_out]
 
 
 def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) -> DataSplit:

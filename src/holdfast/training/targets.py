@@ -61,9 +61,9 @@ class TargetSamples:
             sum(part.n_usable for part in parts),
         )
 
-    def kept(self, held: Collection[int]) -> Flags:
+    def kept(self, left_out: Collection[int]) -> Flags:
         """Return (n,) whether a sample is not in held units."""
-        return ~np.isin(self.units, [-1, *held] if held else [])
+        return ~np.isin(self.units, [-1, *left_out] if left_out else [])
 
     @property
     def n_positive(self) -> int:

@@ -272,7 +272,7 @@ class _Trainer:
         n_searches = min(MAX_SEARCHES, n_units) if self.setting.trials else 0
         return [set(range(k, n_units, n_searches)) for k in range(n_searches)]
 
-    def search(self, held_units: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
+    def search(self, left_out_units: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
         """Search the parameters of every finger, once for each collection of held-out units.
 
         Without trials, return the reference parameters. A model to adapt has a few candidates
@@ -281,30 +281,30 @@ class _Trainer:
         setting = self.setting
         if not setting.trials:
             reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
-            return [reference for _ in held_units]
+            return [reference for _ in left_out_units]
         if setting.init is not None:
-            return [self._adapt(held, setting.init) for held in held_units]
+            return [self._adapt(left_out, setting.init) for left_out in left_out_units]
         tasks = (
-            (thin(pool.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
-            for held in held_units
+            (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger, self.journal)
+            for left_out in left_out_units
             for finger, pool in self.fingers.items()
         )
         results = self.engine.map_ordered(_search, tasks)
-        n_tasks = len(held_units) * len(self.fingers)
+        n_tasks = len(left_out_units) * len(self.fingers)
         searched = list(self.progress(results, "searching", n_tasks))
         for warning in dict.fromkeys(warning for _, warning in searched if warning):
             self.warn(warning)
         parameters = iter(parameters for parameters, _ in searched)
-        return [{finger: next(parameters) for finger in self.fingers} for _ in held_units]
+        return [{finger: next(parameters) for finger in self.fingers} for _ in left_out_units]
 
-    def _adapt(self, held: Collection[int], init: Model) -> dict[str, Parameters]:
+    def _adapt(self, left_out: Collection[int], init: Model) -> dict[str, Parameters]:
         """Choose how far every finger is adapted; report it if nothing is held out."""
         parameters: dict[str, Parameters] = {}
         for finger, pool in self.fingers.items():
             prior = linear_prior(init.finger(finger).stable.rule)
-            adaptation = choose_adaptation(pool, prior, held)
+            adaptation = choose_adaptation(pool, prior, left_out)
             parameters[finger] = adaptation.parameters
-            if not held:
+            if not left_out:
                 self.warn(adaptation.describe(init.name or "the model to adapt", finger))
         return parameters
 

@@ -57,7 +57,7 @@ class Action(NamedTuple):
         tremors: (2, 3, n, 3) tremor of the hand that holds, and of the hand or finger that
             disturbs.
         rms: rms of both tremors [m].
-        time: time at the begin of the sample [s].
+        time: time at the beginning of the sample [s].
         parameters: (9,) parameters of the `Disturbance`.
         origin: (12,) position and rotation of the object when the disturbance began.
         style: style of the disturbance; -1 for none.

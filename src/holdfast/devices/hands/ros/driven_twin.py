@@ -18,7 +18,7 @@ from holdfast.ros.topic_messages import topic_definition
 class DrivenTwin(LiveTwin):
     """Twin that takes its commands on the topic of a Plexus hand, as the driver of that does.
 
-    The mean of a finger's largest torques, over that at the begin of the grip, is its force
+    The mean of a finger's largest torques, over that at the beginning of the grip, is its force
     scale. Zeros open the hand.
 
     Args:

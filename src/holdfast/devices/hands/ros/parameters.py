@@ -147,7 +147,7 @@ class Parameters:
         return self._given[name]
 
     def prefix(self, default: str) -> str:
-        """Return the begin of the names of the joints."""
+        """Return the beginning of the names of the joints."""
         return self._given.get("prefix", default)
 
     def _numbers(self, name: str, sizes: Sequence[int], expected: str) -> list[float]:

@@ -25,7 +25,7 @@ SILENCE_TIME, SILENCE_PERIODS = 0.1, 3.0
 """A hand is silent without joint states for this time [s], or this number of their periods if that
 is longer."""
 STATE_MEMORY = 0.2
-"""Time of the joint states whose median counts at the begin of a grip; the hand has been STABLE
+"""Time of the joint states whose median counts at the beginning of a grip; the hand has been STABLE
 for as long [s]."""
 MIN_STATES = 5
 """Least number of these joint states, so that two wrong ones cannot define their median."""

@@ -72,7 +72,7 @@ class WidthSetup:
         return self.closed_position + share * (self.open_position - self.closed_position)
 
     def closing(self, scale: float) -> float:
-        """Return by how much a commanded width is below that at the begin of the grip [m].
+        """Return by how much a commanded width is below that at the beginning of the grip [m].
 
         The gripper's own control needs effort / gain to keep the first force, and each newton
         more needs 1 / stiffness.
@@ -172,7 +172,7 @@ class WidthHand(RosHand):
         return number_message(position)
 
     def _excess(self, scale: float) -> str:
-        """Return the begin of a message about a force above its ceiling; empty if it is not."""
+        """Return the beginning of a message about a force above its ceiling; empty if it is not."""
         setup = self.setup
         force = scale * setup.effort
         if force <= setup.max_effort * (1.0 + SLACK):
