@@ -29,7 +29,7 @@ MAX_TICKS = 9
 """Maximum number of values of x that all get a tick."""
 
 
-class Curve(NamedTuple):
+class PlottedCurve(NamedTuple):
     """Values over a parameter.
 
     Attributes:
@@ -48,7 +48,7 @@ class Curve(NamedTuple):
 
 
 def draw_lines(
-    groups: Mapping[str, Mapping[str, Curve]], x: str, *, log: bool = False, per_row: int = 3
+    groups: Mapping[str, Mapping[str, PlottedCurve]], x: str, *, log: bool = False, per_row: int = 3
 ) -> Figure:
     """Draw the curves of several methods with bands of their intervals, in panels.
 
@@ -75,7 +75,7 @@ def draw_lines(
 
 
 def draw_alarms(
-    groups: Mapping[str, Mapping[str, Curve]],
+    groups: Mapping[str, Mapping[str, PlottedCurve]],
     x: str = "false alarms per minute of stable label",
     bar: float | None = None,
 ) -> Figure:
@@ -141,7 +141,7 @@ def _draw_bins(axes: Axes, below: Axes, table: Array, style: SeriesStyle) -> Non
     below.plot(table[:, 0], share, linewidth=0.9, markersize=3, **look)
 
 
-def _draw_curve(axes: Axes, curve: Curve, style: SeriesStyle, *, dots: bool = True) -> None:
+def _draw_curve(axes: Axes, curve: PlottedCurve, style: SeriesStyle, *, dots: bool = True) -> None:
     color, marker, dashes = style
     axes.plot(
         curve.x, curve.y, color=color, marker=marker if dots else "", linestyle=dashes,
@@ -156,7 +156,7 @@ def _draw_curve(axes: Axes, curve: Curve, style: SeriesStyle, *, dots: bool = Tr
         )  # fmt: skip
 
 
-def _set_ticks(axes: Axes, curves: Iterable[Curve], log: bool) -> None:
+def _set_ticks(axes: Axes, curves: Iterable[PlottedCurve], log: bool) -> None:
     """Name every value of x if there are few; use plain numbers on a logarithmic axis."""
     values = sorted({float(value) for curve in curves for value in curve.x})
     if 0 < len(values) <= MAX_TICKS:

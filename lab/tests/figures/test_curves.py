@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.plots.style import PAPER
-from holdfast_lab.figures.curves import Curve, draw_alarms, draw_lines, draw_reliability
+from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_lines, draw_reliability
 
 X = np.array([4.0, 8.0, 14.0])
 
@@ -16,10 +16,13 @@ def drawn(figure):
 
 
 def test_lines_have_bands_and_the_paper_is_black():
-    curve = Curve(X, np.array([90.0, 91, 92]), np.array([89.0, 90, 91]), np.array([91.0, 92, 93]))
+    curve = PlottedCurve(
+        X, np.array([90.0, 91, 92]), np.array([89.0, 90, 91]), np.array([91.0, 92, 93])
+    )
     figure = drawn(
         draw_lines(
-            {"Acc [%]": {"ours": curve, PAPER: Curve(X, X + 80)}, "FNR [%]": {"b": curve}}, "N_w"
+            {"Acc [%]": {"ours": curve, PAPER: PlottedCurve(X, X + 80)}, "FNR [%]": {"b": curve}},
+            "N_w",
         )
     )
     axes = figure.axes[0]
@@ -36,13 +39,13 @@ def test_lines_have_bands_and_the_paper_is_black():
 
 def test_many_values_on_a_logarithmic_axis():
     x = np.geomspace(0.01, 100, 30)
-    axes = drawn(draw_lines({"y": {"a": Curve(x, x)}}, "x", log=True)).axes[0]
+    axes = drawn(draw_lines({"y": {"a": PlottedCurve(x, x)}}, "x", log=True)).axes[0]
     assert axes.get_xscale() == "log"
     assert "0.01" in [label.get_text() for label in axes.get_xticklabels()]
 
 
 def test_a_rate_of_zero_false_alarms_is_marked_zero():
-    curve = Curve(np.array([0.0, 0.5, 10.0]), np.array([np.inf, 40.0, 5.0]), chosen=1)
+    curve = PlottedCurve(np.array([0.0, 0.5, 10.0]), np.array([np.inf, 40.0, 5.0]), chosen=1)
     axes = drawn(draw_alarms({"missed [%]": {"a": curve}}, bar=1.0)).axes[0]
     line = next(each for each in axes.lines if len(each.get_xdata()) == 3)
     floor = line.get_xdata()[0]
@@ -56,7 +59,7 @@ def test_a_rate_of_zero_false_alarms_is_marked_zero():
 def test_alarms_without_curves():
     drawn(draw_alarms({}))
     drawn(draw_alarms({"missed": {}}))
-    drawn(draw_alarms({"missed": {"a": Curve(np.zeros(2), np.zeros(2))}}))
+    drawn(draw_alarms({"missed": {"a": PlottedCurve(np.zeros(2), np.zeros(2))}}))
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ LOG_ODDS = np.arange(-160, 161) * 0.05
 """Log odds of the thresholds that are tried, for every head."""
 THRESHOLDS = 1.0 / (1.0 + np.exp(-LOG_ODDS))
 """Thresholds of a probability that are tried, lowest first."""
-SLIP_LOG_ODDS, SLIP_THRESHOLDS = LOG_ODDS[80:], THRESHOLDS[80:]
+SLIP_THRESHOLD_LOG_ODDS, SLIP_THRESHOLDS = LOG_ODDS[80:], THRESHOLDS[80:]
 """Those of a slip, which are not below a probability of 0.018."""
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from holdfast.metrics.events import POST_DURATIONS
 from holdfast.sensors.types import Array
-from holdfast_lab.figures.curves import Curve, draw_alarms, draw_reliability
+from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_reliability
 from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, Row
@@ -134,12 +134,12 @@ def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     )
 
 
-def _alarm_curve(evaluation: MethodEvaluation) -> Curve:
+def _alarm_curve(evaluation: MethodEvaluation) -> PlottedCurve:
     """Return missed events over false alarms under a stable label."""
     by_rate = evaluation.alarms.by_rate
     rates = np.array([_false_alarms_per_minute(alarms) for alarms in by_rate])
     missed = np.array([_missed_share(alarms) for alarms in by_rate])
-    return Curve(rates, missed, chosen=FALSE_ALARM_RATES.index(COMPARED_RATE))
+    return PlottedCurve(rates, missed, chosen=FALSE_ALARM_RATES.index(COMPARED_RATE))
 
 
 def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from holdfast.contact import UNSTABLE_MARGIN
 from holdfast.twin.profile import profile, profiles
-from holdfast_lab.figures.curves import Curve, draw_lines
+from holdfast_lab.figures.curves import PlottedCurve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
@@ -263,7 +263,7 @@ def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
 def _draw(table: ResultTable, sweep: Sweep, columns: Sequence[str]) -> ReportFigure:
     """Draw columns of a table over the values of a condition, one curve for each other key."""
     head = table.lines[0] if table.lines[0] != sweep.key else table.lines[1]
-    groups: dict[str, dict[str, Curve]] = {}
+    groups: dict[str, dict[str, PlottedCurve]] = {}
     for column in columns:
         rows = [row for row in table.rows if row.keys["figure"] == column]
         names = dict.fromkeys(str(row.keys[head]) for row in rows)
@@ -274,7 +274,7 @@ def _draw(table: ResultTable, sweep: Sweep, columns: Sequence[str]) -> ReportFig
     return ReportFigure(f"{sweep.name}_curves", caption, draw_lines(groups, sweep.key))
 
 
-def _curve(rows: Sequence[Row], key: str) -> Curve:
+def _curve(rows: Sequence[Row], key: str) -> PlottedCurve:
     rows = sorted(rows, key=lambda row: float(row.keys[key]))
     ends = [row.interval or (None, None) for row in rows]
     x, y, low, high = (
@@ -286,4 +286,4 @@ def _curve(rows: Sequence[Row], key: str) -> Curve:
             [high for _, high in ends],
         )
     )
-    return Curve(x, y, low, high)
+    return PlottedCurve(x, y, low, high)

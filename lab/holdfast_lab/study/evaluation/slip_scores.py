@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask, runs
-from holdfast.metrics.slip_thresholds import SLIP_LOG_ODDS, slip_curve
+from holdfast.metrics.slip_thresholds import SLIP_THRESHOLD_LOG_ODDS, slip_curve
 from holdfast.metrics.slip_truth import (
     NOT_HELD,
     SLIDING,
@@ -248,7 +248,7 @@ def log_odds_of(score: Array, ranks: Array) -> Array:
         score: (n,); NaN stays NaN.
         ranks: (m,) sorted scores of the still samples.
     """
-    lowest, highest = SLIP_LOG_ODDS[0], SLIP_LOG_ODDS[-1]
+    lowest, highest = SLIP_THRESHOLD_LOG_ODDS[0], SLIP_THRESHOLD_LOG_ODDS[-1]
     m = len(ranks)
     above = m - np.searchsorted(ranks, score, side="left")
     depth = -np.log((above + 0.5) / (m + 1)) / np.log(m + 1)

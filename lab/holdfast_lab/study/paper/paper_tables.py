@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.plots.style import PAPER
-from holdfast_lab.figures.curves import Curve, draw_lines
+from holdfast_lab.figures.curves import PlottedCurve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.paper import published
@@ -362,21 +362,21 @@ def _window_figure(window: ResultTable) -> ReportFigure:
     return ReportFigure("window", caption, draw_lines(groups, "$N_w$ [samples]", per_row=2))
 
 
-def _curves(rows: Sequence[Row]) -> dict[str, Curve]:
+def _curves(rows: Sequence[Row]) -> dict[str, PlottedCurve]:
     """Return the curves of one rate: ours by test data, and the paper's."""
     test_data = dict.fromkeys(str(row.keys["on"]) for row in rows)
     curves = {on: _curve([row for row in rows if row.keys["on"] == on]) for on in test_data}
     paper = {_window_of(row): row.paper for row in rows if row.paper is not None}
     if paper:
-        curves[PAPER] = Curve(np.array(list(paper)), np.array(list(paper.values())))
+        curves[PAPER] = PlottedCurve(np.array(list(paper)), np.array(list(paper.values())))
     return curves
 
 
-def _curve(rows: Sequence[Row]) -> Curve:
+def _curve(rows: Sequence[Row]) -> PlottedCurve:
     ends = [row.interval or (None, None) for row in rows]
     low, high = (np.array([_number(end[k]) for end in ends]) for k in (0, 1))
     x = np.array([_window_of(row) for row in rows])
-    return Curve(x, np.array([_number(row.ours) for row in rows]), low, high)
+    return PlottedCurve(x, np.array([_number(row.ours) for row in rows]), low, high)
 
 
 def _window_of(row: Row) -> float:
