@@ -71,8 +71,8 @@ def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
     training = gather_sliding_samples(recordings, max_samples=200)
     thumb = training.samples["thumb"]
     n_sliding = sum(int((r.truth["thumb"].codes == SLIDING).sum()) for r in recordings)
-    assert (~thumb.stable).sum() == n_sliding
-    assert 100 < thumb.stable.sum() <= 200
+    assert (~thumb.positive).sum() == n_sliding
+    assert 100 < thumb.positive.sum() <= 200
     assert training.samples["index"].one_class
 
 
