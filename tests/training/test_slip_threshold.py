@@ -241,7 +241,7 @@ class TestTuning:
     def test_a_higher_rate_never_finds_less(self, model, others):
         strict, loose = (tune(model, others, rate, "slip") for rate in (1.0, 20.0))
         assert loose.chosen.threshold <= strict.chosen.threshold
-        assert loose.chosen.missed <= strict.chosen.missed
+        assert loose.chosen.missed["0.1"] <= strict.chosen.missed["0.1"]
 
     def test_points_around_it_are_in_order(self, model, others):
         tuned = tune(model, others, 5.0, "slip")

@@ -106,5 +106,5 @@ def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
             lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
         )
     threshold = float(SLIP_THRESHOLDS[chosen.index])
-    point = CurvePoint(threshold, slips=slip_metrics(chosen.counts))
+    point = CurvePoint.of_slips(threshold, slip_metrics(chosen.counts))
     return model.with_threshold("slip", threshold, point.choice(SLIP_FALSE_ALARMS))

@@ -7,7 +7,7 @@ and events without an alarm in time.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import msgspec
 import numpy as np
@@ -44,44 +44,42 @@ class CurvePoint(msgspec.Struct, frozen=True):
 
     Attributes:
         threshold: of the probability.
-        events: onsets of instability of the hand, and its false alarms; None for slips.
+        false_alarms: per minute of the time that counts.
+        missed: share of the events without an alarm in time [%], by that time [s].
+        in_time: the time of `missed` that the record of a choice has.
+        n: number of events: onsets of instability of the hand, or slips of the fingers.
+        minutes: duration of the time that counts [min]: labelled stable, or held by a finger.
+        events: all metrics of the hand; None for slips.
         stable: share of the samples labelled STABLE that are decided STABLE [%]; None for slips.
-        slips: of all fingers; None for stability.
+        slips: all metrics of slips; None for stability.
     """
 
     threshold: float
+    false_alarms: float
+    missed: dict[str, float | None]
+    in_time: str
+    n: int
+    minutes: float
     events: EventMetrics | None = None
     stable: float | None = None
     slips: SlipMetrics | None = None
 
-    @property
-    def false_alarms(self) -> float:
-        """False alarms per minute of the time that counts: stable label, or all held time."""
-        if self.slips is not None:
-            return self.slips.false_alarms_per_minute["held"] or 0.0
-        return (self.events and self.events.false_alarms_per_minute) or 0.0
+    @classmethod
+    def of_events(cls, threshold: float, events: EventMetrics, stable: float) -> Self:
+        """Return the point of the events of the hand, missed without an alarm in 0.2 s."""
+        return cls(
+            threshold, events.false_alarms_per_minute or 0.0, events.missed, "0.2",
+            events.n_events, events.stable_minutes, events=events, stable=stable,
+        )  # fmt: skip
 
-    @property
-    def minutes(self) -> float:
-        """Duration of the time that counts [min]."""
-        if self.slips is not None:
-            return self.slips.held_minutes
-        return 0.0 if self.events is None else self.events.stable_minutes
-
-    @property
-    def n(self) -> int:
-        """Number of events, or of slips."""
-        if self.slips is not None:
-            return self.slips.n
-        return 0 if self.events is None else self.events.n_events
-
-    @property
-    def missed(self) -> float | None:
-        """Share without an alarm in time [%]: within 0.2 s, a slip within 0.1 s."""
-        if self.slips is not None:
-            found = self.slips.incipient["0.1"]
-            return None if found is None else 100 - found
-        return None if self.events is None else self.events.missed["0.2"]
+    @classmethod
+    def of_slips(cls, threshold: float, slips: SlipMetrics) -> Self:
+        """Return the point of the slips of fingers, missed without an alarm in 0.1 s."""
+        missed = {t: None if found is None else 100 - found for t, found in slips.incipient.items()}
+        return cls(
+            threshold, slips.false_alarms_per_minute["held"] or 0.0, missed, "0.1",
+            slips.n, slips.held_minutes, slips=slips,
+        )  # fmt: skip
 
     def cost(self, false_alarms: float) -> tuple[float, ...]:
         """Return what the best point has least of.
@@ -90,11 +88,8 @@ class CurvePoint(msgspec.Struct, frozen=True):
         which they are counted), then few false alarms.
         """
         excess = max(self.false_alarms - false_alarms, 0.0)
-        if self.slips is not None:
-            missed = [100 - (share or 0.0) for share in self.slips.incipient.values()]
-        else:
-            missed = [share or 0.0 for share in self.events.missed.values()] if self.events else []
-        return excess, sum(missed), self.false_alarms if self.n else 0.0
+        missed = sum(share or 0.0 for share in self.missed.values())
+        return excess, missed, self.false_alarms if self.n else 0.0
 
     def choice(
         self,
@@ -103,15 +98,17 @@ class CurvePoint(msgspec.Struct, frozen=True):
         points: "Sequence[CurvePoint]" = (),
     ) -> Choice:
         """Return the record of a choice of this threshold, for the model file."""
+        missed = self.missed[self.in_time]
         return Choice(
             requested=requested,
             false_alarms_per_minute=self.false_alarms,
-            found=None if self.missed is None else 100 - self.missed,
+            found=None if missed is None else 100 - missed,
             n=self.n,
             minutes=self.minutes,
             recordings=dict(recordings),
             points=tuple(
-                ThresholdPoint(p.threshold, round(p.false_alarms, 3), p.missed) for p in points
+                ThresholdPoint(p.threshold, round(p.false_alarms, 3), p.missed[p.in_time])
+                for p in points
             ),
         )
 
@@ -146,15 +143,14 @@ class Curve:
         points = self._usable(self.thresholds[::COARSE_STEP])
         best = best_of(points)
         if best.false_alarms > false_alarms:
-            missed = (
-                "has no event to miss"
-                if best.missed is None
-                else f"misses {best.missed:.0f} % of {best.n} in time"
-            )
+            missed = best.missed[best.in_time]
+            misses = "has no event to miss"
+            if missed is not None:
+                misses = f"misses {missed:.0f} % of {best.n} within {best.in_time} s"
             raise TrainingError(
                 f"no threshold gives at most {false_alarms:g} false alarms a minute on these "
                 f"recordings; the least is {best.false_alarms:.2g} at the threshold "
-                f"{best.threshold:.3g}, which {missed}"
+                f"{best.threshold:.3g}, which {misses}"
             )
         index = self.thresholds.index(best.threshold)
         around = self.thresholds[max(index - COARSE_STEP + 1, 0) : index + COARSE_STEP]
@@ -272,7 +268,7 @@ def _of_stability(model: Model, recordings: Iterable[Recording]) -> Curve:
 
     def is_usable(point: CurvePoint) -> bool:
         # Below the hysteresis a stable contact stays stable, so that every event is missed.
-        return (point.stable or 0.0) >= USABLE_SHARE * most and (point.missed or 0.0) < 100
+        return (point.stable or 0.0) >= USABLE_SHARE * most and (point.missed["0.2"] or 0.0) < 100
 
     return Curve(THRESHOLDS.tolist(), at, is_usable)
 
@@ -288,7 +284,7 @@ def _stable_point(hands: Sequence[FingerDecisions], threshold: float) -> CurvePo
             "no time in which the hand is labelled stable; false alarms are counted per minute "
             "of it"
         )
-    return CurvePoint(threshold, events, 100 * int(stable.sum()) / len(stable))
+    return CurvePoint.of_events(threshold, events, 100 * int(stable.sum()) / len(stable))
 
 
 def _of_slips(model: Model, recordings: Iterable[Recording]) -> Curve:
@@ -315,7 +311,7 @@ def _of_slips(model: Model, recordings: Iterable[Recording]) -> Curve:
         counts = [
             counter.count(slip.raised_at(np.array([threshold])))[0] for slip, counter in counters
         ]
-        return CurvePoint(threshold, slips=slip_metrics(SlipCounts.total(counts)))
+        return CurvePoint.of_slips(threshold, slip_metrics(SlipCounts.total(counts)))
 
     def is_usable(point: CurvePoint) -> bool:
         raised = None if point.slips is None else point.slips.raised_quiet
