@@ -51,7 +51,7 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     SlipEvaluation,
     SlipJob,
     evaluate_slips,
-    summarise_fresh,
+    summarise_slips,
 )
 from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -110,7 +110,8 @@ def model_rows(name: str, train: Path, test: Path, seed: int) -> Iterator[Row]:
         shipped = SlipEvaluation("", len(by_recording), summary)
         yield from slip_rows({**keys, THRESHOLD: SHIPPED}, shipped)
     training = count_model(model, train)
-    chosen = summarise_fresh(tested.curves, training.curves, seed)
+    summary = summarise_slips(tested.curves, seed, training=training.curves)
+    chosen = SlipEvaluation("", len(by_recording), summary)
     yield from slip_rows({**keys, THRESHOLD: CHOSEN}, chosen)
 
 

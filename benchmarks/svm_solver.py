@@ -17,9 +17,8 @@ from sklearn.svm import LinearSVC
 
 from holdfast.classifiers.fitting import class_weights, standardise
 from holdfast.classifiers.interior_point import fit_svm
-from holdfast_lab.study.evaluation.fitted_method import gather_training_samples
+from holdfast_lab.study.evaluation.fitted_method import Training
 from holdfast_lab.study.evaluation.recording_features import corpus_features
-from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import scan_corpus
 
@@ -35,7 +34,7 @@ def main():
     print("| method | features | C | own | liblinear | above the minimum | other decisions |")
     print("|---|--:|--:|--:|--:|--:|--:|")
     for name in METHOD_NAMES:
-        training = gather_training_samples(corpus_features(METHODS[name], corpus, Variation()))
+        training = Training.of(METHODS[name], corpus_features(METHODS[name], corpus))
         samples = next(iter(training.samples.values()))
         _, _, features = standardise(samples.features)
         for c in CONSTANTS:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from sklearn.metrics import brier_score_loss, confusion_matrix, roc_auc_score
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
-from holdfast.metrics import sample_metrics
+from holdfast.metrics import FingerDecisions, calibration_sums, sample_metrics
 from holdfast.metrics.samples import metrics_of_samples, pool_samples, score_samples
 
 sample = st.tuples(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0, 0.1, 0.5, 0.7, 1]))
@@ -113,3 +113,13 @@ def test_scores_count_by_their_order_alone(samples):
     labels, states, scores = columns(samples)
     bent = sample_metrics(labels, states, scores**3)
     assert bent.auc == sample_metrics(labels, states, scores).auc
+
+
+def test_calibration_sums_by_hand():
+    labels, states = [STABLE, UNSTABLE, STABLE, STABLE], [STABLE, STABLE, UNSTABLE, UNKNOWN]
+    finger = FingerDecisions(np.arange(4.0), labels, states, [0.95, 0.91, 0.05, np.nan])
+    table = calibration_sums([finger])
+    assert table[9] == pytest.approx([1.86, 1, 2])
+    assert table[0] == pytest.approx([0.05, 1, 1])
+    assert table[1:9].sum() == 0
+    assert (calibration_sums([finger, finger]) == 2 * table).all()

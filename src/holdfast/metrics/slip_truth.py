@@ -6,7 +6,7 @@ A finger slides where the load-weighted speed of its contact exceeds 1 mm/s, and
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -206,6 +206,19 @@ def slip_truth(
     codes = _label_codes(module.labels, times)
     onsets: Onsets = "rule" if labels_by_rule(module.labels) else "labels"
     return SlipTruth(codes, stable & (codes == STILL), label_slips(module.labels), onsets)
+
+
+def truth_without(times: Array, truth: SlipTruth, left_out: Mask) -> SlipTruth:
+    """Return the truth without some samples, and without the slips that begin in them."""
+    if not left_out.any():
+        return truth
+    onsets = np.searchsorted(times, [slip.onset for slip in truth.slips]).clip(max=len(times) - 1)
+    return replace(
+        truth,
+        codes=np.where(left_out, NOT_HELD, truth.codes).astype(np.int8),
+        quiet=truth.quiet & ~left_out,
+        slips=tuple(slip for slip, k in zip(truth.slips, onsets, strict=True) if not left_out[k]),
+    )
 
 
 def has_slip_truth(truth: Truth, finger: str) -> bool:

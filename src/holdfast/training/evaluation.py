@@ -18,7 +18,7 @@ from holdfast.metrics import (
     summarise,
 )
 from holdfast.metrics.decisions import hand_decisions
-from holdfast.metrics.slip_truth import NOT_HELD, SlipDecisions, SlipTruth, slip_truth
+from holdfast.metrics.slip_truth import SlipDecisions, slip_truth, truth_without
 from holdfast.metrics.truth_labels import (
     LabelRule,
     labels_by_rule,
@@ -28,7 +28,7 @@ from holdfast.metrics.truth_labels import (
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording, label_states
-from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.sensors.types import Integers
 from holdfast.training.dataset_scan import (
     OneRecording,
     Progress,
@@ -270,26 +270,13 @@ def _combined_slips(
     known = [slip for slip in decisions if slip is not None]
     if not known or len(known) < len(decisions):
         return None
-    every, left_out = np.arange(len(unit)), unit < 0
+    every, left_out, truth = np.arange(len(unit)), unit < 0, known[0].truth
     probability = np.stack([slip.probability for slip in known])[unit, every]
     return replace(
         known[0],
         probability=np.where(left_out, np.nan, probability),
         raised=np.stack([slip.raised for slip in known])[unit, every] & ~left_out,
-        truth=_truth_without(known[0].times, known[0].truth, left_out),
-    )
-
-
-def _truth_without(times: Array, truth: SlipTruth | None, left_out: Flags) -> SlipTruth | None:
-    """Return the truth without some samples, and without the slips that begin in them."""
-    if truth is None or not left_out.any():
-        return truth
-    onsets = np.searchsorted(times, [slip.onset for slip in truth.slips]).clip(max=len(times) - 1)
-    return replace(
-        truth,
-        codes=np.where(left_out, NOT_HELD, truth.codes).astype(np.int8),
-        quiet=truth.quiet & ~left_out,
-        slips=tuple(slip for slip, k in zip(truth.slips, onsets, strict=True) if not left_out[k]),
+        truth=None if truth is None else truth_without(known[0].times, truth, left_out),
     )
 
 

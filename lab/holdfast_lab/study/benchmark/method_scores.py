@@ -14,20 +14,11 @@ from holdfast.io import load_dataset
 from holdfast.sensors.types import Array
 from holdfast.training.finger_samples import contact_threshold
 from holdfast_lab.study.benchmark.submission import COLUMN_TYPES, FingerScores
-from holdfast_lab.study.evaluation.fitted_method import (
-    MAX_FITTED_SAMPLES,
-    FittedMethod,
-    gather_training_samples,
-)
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
-from holdfast_lab.study.evaluation.scores import RecordingScores, probability_of
-from holdfast_lab.study.evaluation.slip_scores import (
-    SlipRecording,
-    gather_sliding_samples,
-    score_slips,
-    slip_recordings,
-)
-from holdfast_lab.study.methods import HAND, Method
+from holdfast_lab.study.evaluation.evaluate_slips import score_slips
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
+from holdfast_lab.study.evaluation.scores import probability_of
+from holdfast_lab.study.methods import Method
 from holdfast_lab.study.plan import Corpus
 
 SCHEMA = pa.schema(list(COLUMN_TYPES.items()))
@@ -51,7 +42,7 @@ class BothTargets(NamedTuple):
     def fit(
         cls,
         method: Method,
-        recordings: Sequence[SlipRecording],
+        recordings: Sequence[RecordingFeatures],
         seed: int = 0,
         *,
         own_rest: bool = False,
@@ -67,20 +58,13 @@ class BothTargets(NamedTuple):
         Raises:
             TrainingError: no finger has samples of both classes.
         """
-        features = [recording.features for recording in recordings]
-        everything = range(len(recordings))
-        stable, slip = (
-            FittedMethod.fit(method, training, everything, seed)
-            for training in (
-                gather_training_samples(features, MAX_FITTED_SAMPLES),
-                gather_sliding_samples(recordings, MAX_FITTED_SAMPLES),
-            )
-        )
+        stable = Training.of(method, recordings, seed=seed).fit()
+        slip = Training.of(method, recordings, seed=seed, sliding=True).fit()
         if not (stable.classifiers and slip.classifiers):
             raise TrainingError(f"{method.name}: no finger with samples of both classes given")
         return cls(stable, slip, own_rest)
 
-    def scores(self, recording: SlipRecording) -> dict[str, FingerScores]:
+    def scores(self, recording: RecordingFeatures) -> dict[str, FingerScores]:
         """Return the scores of each finger of a recording, 0 where there is no estimate.
 
         A score of 0.5 is the method's own threshold. A finger that did not slide in training has
@@ -89,29 +73,30 @@ class BothTargets(NamedTuple):
         Raises:
             ValueError: a finger has no estimate at all: the method does not fit the sensor.
         """
-        stable = self._for(self.stable, recording).scores(recording.features)
+        stable = self._for(self.stable, recording).scores(recording).fingers
         slips = score_slips(self._for(self.slip, recording), recording)
         scored = {}
-        for finger in recording.truth:
-            margins = _margins(stable, recording.features, finger)
-            if np.isnan(margins).all():
-                raise ValueError(f"no estimate of {finger} in {recording.features.name}")
-            margins = np.where(stable.in_contact[finger], margins, -np.inf)
+        for finger in recording.slips:
+            own = stable[finger]
+            if not own.known.any():
+                raise ValueError(f"no estimate of {finger} in {recording.name}")
+            margins = np.where(own.known, own.margin, np.nan)
+            margins = np.where(own.grasped, margins, -np.inf)
             scored[finger] = FingerScores(_known(margins), _known(slips[finger].score))
         return scored
 
-    def _for(self, fitted: FittedMethod, recording: SlipRecording) -> FittedMethod:
+    def _for(self, fitted: FittedMethod, recording: RecordingFeatures) -> FittedMethod:
         """Return a fitted method with the contact thresholds that apply to a recording."""
         if not self.own_rest:
             return fitted
-        at_rest = recording.features.at_rest
+        at_rest = recording.at_rest
         thresholds = {
             finger: contact_threshold(np.array([moments])) for finger, moments in at_rest.items()
         }
         return replace(fitted, contact_thresholds=thresholds)
 
 
-def load_features(method: Method, folder: Path) -> list[SlipRecording]:
+def load_features(method: Method, folder: Path) -> list[RecordingFeatures]:
     """Return the features and the truth of all recordings of a folder.
 
     Args:
@@ -121,11 +106,11 @@ def load_features(method: Method, folder: Path) -> list[SlipRecording]:
     dataset = load_dataset(folder)
     fingers = dict.fromkeys(name for recording in dataset for name in recording.modules)
     corpus = Corpus(folder.name, str(folder), dataset.names, "", tuple(fingers), dataset[0].rate)
-    return slip_recordings(method, corpus)
+    return [recording for recording in corpus_features(method, corpus) if recording.slips]
 
 
 def write_submission(
-    path: Path, fitted: BothTargets, splits: Mapping[str, Iterable[SlipRecording]]
+    path: Path, fitted: BothTargets, splits: Mapping[str, Iterable[RecordingFeatures]]
 ) -> None:
     """Write the scores of a fitted method for some splits, as Parquet.
 
@@ -136,7 +121,7 @@ def write_submission(
         table
         for split, recordings in splits.items()
         for recording in recordings
-        for table in _tables(f"{split}/{recording.features.name}", fitted.scores(recording))
+        for table in _tables(f"{split}/{recording.name}", fitted.scores(recording))
     ]
     pq.write_table(pa.concat_tables(tables), path, compression="zstd")
 
@@ -146,15 +131,6 @@ def _tables(name: str, fingers: Mapping[str, FingerScores]) -> Iterator[pa.Table
         n = len(scores.stable)
         columns = [[name] * n, [finger] * n, np.arange(n), scores.stable, scores.slip]
         yield pa.table(columns, schema=SCHEMA)
-
-
-def _margins(scores: RecordingScores, features: RecordingFeatures, finger: str) -> Array:
-    """Return the margins of a finger, or the latest ones of its hand."""
-    if HAND not in scores.margins:
-        return scores.margins[finger]
-    first = next(iter(features.times.values()))
-    place = np.searchsorted(first, features.times[finger], side="right") - 1
-    return np.where(place >= 0, scores.margins[HAND][place], np.nan)
 
 
 def _known(log_odds: Array) -> Array:

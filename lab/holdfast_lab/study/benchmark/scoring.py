@@ -3,7 +3,7 @@
 The scorer chooses every threshold itself, on the split `tuning`, for a budget of false alarms.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +15,6 @@ from holdfast.io import Dataset
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.slip_truth import slip_truth
-from holdfast.metrics.slips import SlipCurve
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
@@ -35,12 +34,22 @@ from holdfast_lab.study.comparison.event_tables import (
 )
 from holdfast_lab.study.comparison.rows import DIGITS, sample_rows
 from holdfast_lab.study.comparison.slip_table import SLIP_DIGITS, slip_rows
-from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics, alarm_statistics
+from holdfast_lab.study.evaluation.alarms import (
+    AlarmLabels,
+    AlarmStatistics,
+    FalseAlarmRanges,
+    threshold_shift,
+)
 from holdfast_lab.study.evaluation.evaluate_method import HOLD_TIME
-from holdfast_lab.study.evaluation.evaluate_slips import SLIP_RATE, summarise_fresh
-from holdfast_lab.study.evaluation.scores import HandScores
-from holdfast_lab.study.evaluation.slip_scores import SlipScores, still_ranks
-from holdfast_lab.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
+from holdfast_lab.study.evaluation.evaluate_slips import (
+    SLIP_RATE,
+    SlipEvaluation,
+    SlipScores,
+    slip_curves,
+    still_ranks,
+    summarise_slips,
+)
+from holdfast_lab.study.evaluation.scores import Scores
 
 EVENT_BUDGETS = (1.0, 5.0)
 """Rates of false alarms of a finger under a stable label that events are scored at [1/min]."""
@@ -71,23 +80,19 @@ class FingerTruth(NamedTuple):
     """A finger of a recording: its scores beside its labels, which are made from the truth.
 
     Attributes:
-        hand: scores of stability as those of a hand with this finger alone.
+        scores: of stability.
         labels: (n,) label codes.
         slip: scores of slips; None if there are none, or the truth is not known.
     """
 
-    hand: HandScores
+    scores: Scores
     labels: Codes
     slip: SlipScores | None
 
-    def at(self, shift: float) -> FingerDecisions:
-        """Return the held decisions with a threshold [log odds]."""
-        return self.hand.hold(HOLD_TIME).decide(self.labels, shift)
-
     def samples(self) -> FingerDecisions:
         """Return the decision of every sample by itself."""
-        states = np.where(self.hand.probability >= DECISION_SCORE, STABLE, UNSTABLE)
-        times, scores = self.hand.times, self.hand.probability
+        times, scores = self.scores.times, self.scores.probability
+        states = np.where(scores >= DECISION_SCORE, STABLE, UNSTABLE)
         return FingerDecisions(times, self.labels, states.astype(np.int8), scores)
 
 
@@ -180,12 +185,12 @@ def _finger_truth(recording: Recording, finger: str, scores: FingerScores) -> Fi
     module = recording.modules[finger]
     everywhere = np.ones(module.n_samples, dtype=np.bool_)
     margin = log_odds(scores.stable)
-    hand = HandScores(module.times, margin, everywhere, everywhere, scores.stable)
+    stable = Scores(module.times, margin, everywhere, everywhere, scores.stable)
     truth = None if scores.slip is None else slip_truth(recording, finger, module.times)
     slip = None
     if truth is not None and scores.slip is not None:
         slip = SlipScores(module.times, log_odds(scores.slip), truth)
-    return FingerTruth(hand, module.label_states, slip)
+    return FingerTruth(stable, module.label_states, slip)
 
 
 def log_odds(scores: Array) -> Array:
@@ -216,7 +221,7 @@ def _stability_table(scored: Mapping[str, Scored]) -> ResultTable:
 
 def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
     ranges = [
-        FalseAlarmRanges.of(own.hand.hold(HOLD_TIME), own.labels)
+        FalseAlarmRanges.of(own.scores.hold(HOLD_TIME), AlarmLabels.of(own.labels))
         for fingers in tuning.values()
         for own in fingers.values()
     ]
@@ -236,16 +241,11 @@ def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
 
 def _alarms(fingers: Iterable[FingerTruth], shift: float) -> AlarmStatistics:
     """Return the statistics of all fingers of a recording together."""
-    parts = [alarm_statistics(own.at(shift)) for own in fingers]
-    return AlarmStatistics(
-        delays=[delay for part in parts for delay in part.delays],
-        n_events_not_stable=sum(part.n_events_not_stable for part in parts),
-        n_false_alarms=sum(part.n_false_alarms for part in parts),
-        n_under_stable=sum(part.n_under_stable for part in parts),
-        n_of_glitch=sum(part.n_of_glitch for part in parts),
-        stable_seconds=sum(part.stable_seconds for part in parts),
-        n_stable=sum(part.n_stable for part in parts),
-        n_not_called_stable=sum(part.n_not_called_stable for part in parts),
+    return AlarmStatistics.total(
+        [
+            AlarmStatistics.of(own.scores.hold(HOLD_TIME), AlarmLabels.of(own.labels), shift)
+            for own in fingers
+        ]
     )
 
 
@@ -253,11 +253,12 @@ def _slips_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
     ranks = still_ranks(_slip_scores(tuning))
     if not len(ranks):
         raise ValueError(f"{TUNING}: no scored sample that is held and does not slide")
-    chosen_from = _curves(tuning, ranks)
+    chosen_from = [slip_curves(fingers, ranks) for fingers in _slip_scores(tuning)]
     rows: list[Row] = []
     for split, recordings in scored.items():
-        curves = _curves(recordings, ranks)
-        rows += slip_rows({"on": split}, summarise_fresh(curves, chosen_from, BOOTSTRAP_SEED))
+        curves = [slip_curves(fingers, ranks) for fingers in _slip_scores(recordings)]
+        summary = summarise_slips(curves, BOOTSTRAP_SEED, training=chosen_from)
+        rows += slip_rows({"on": split}, SlipEvaluation("", len(curves), summary))
     return ResultTable(
         "slips", "Slips of fingers", SLIPS_NOTE, rows, ("on",), digits_of=SLIP_DIGITS,
         has_paper=False,
@@ -271,10 +272,3 @@ def _slip_scores(recordings: Scored) -> list[dict[str, SlipScores]]:
         for fingers in recordings.values()
     ]
     return [fingers for fingers in made if fingers]
-
-
-def _curves(recordings: Scored, ranks: Array) -> Sequence[Mapping[str, SlipCurve]]:
-    return [
-        {finger: scores.curve(ranks) for finger, scores in fingers.items()}
-        for fingers in _slip_scores(recordings)
-    ]

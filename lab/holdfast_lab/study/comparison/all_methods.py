@@ -28,7 +28,7 @@ from holdfast_lab.study.comparison.jobs import (
     method_task,
     method_titles,
 )
-from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics
+from holdfast_lab.study.evaluation.alarms import AlarmStatistics
 from holdfast_lab.study.evaluation.evaluate_method import (
     COMPARED_RATE,
     FALSE_ALARM_RATES,

@@ -14,7 +14,6 @@ from holdfast_lab.study.evaluation.error_breakdown import (
     OBLIQUE,
     PULL_DIRECTIONS,
     CountPair,
-    DisturbanceErrors,
     ErrorBreakdown,
     GripErrors,
 )
@@ -72,8 +71,8 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     for keys, breakdowns in _lines(plan, results):
         for direction in (*PULL_DIRECTIONS, OBLIQUE):
             events = [_disturbances(breakdown, direction) for breakdown in breakdowns]
-            n = [sum(event.n for event in of_recording) for of_recording in events]
-            wrong = [sum(event.n_wrong for event in of_recording) for of_recording in events]
+            n = [sum(n for n, _ in of_recording) for of_recording in events]
+            wrong = [sum(wrong for _, wrong in of_recording) for of_recording in events]
             if sum(n):
                 rows.append(ratio_row(keys | {"direction": direction}, wrong, n, plan.seed))
                 n_disturbances.setdefault(direction, sum(map(len, events)))
@@ -88,13 +87,9 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     return ResultTable("directions", title, note, rows, ("on", "method"), column="direction")
 
 
-def _disturbances(breakdown: ErrorBreakdown, direction: str) -> list[DisturbanceErrors]:
-    """Return the disturbances in a direction that have labelled samples."""
-    return [
-        disturbance
-        for disturbance in breakdown.disturbances
-        if disturbance.n and disturbance.direction == direction
-    ]
+def _disturbances(breakdown: ErrorBreakdown, direction: str) -> list[CountPair]:
+    """Return the counts of the disturbances in a direction that have labelled samples."""
+    return [count for name, count in breakdown.disturbances if count[0] and name == direction]
 
 
 def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:

@@ -15,17 +15,16 @@ from holdfast_lab.study.comparison.jobs import (
     method_titles,
 )
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
-from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics
+from holdfast_lab.study.evaluation.alarms import READINGS, AlarmStatistics
+from holdfast_lab.study.evaluation.error_breakdown import GlitchCount
 from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME, ReadingAlarms
-from holdfast_lab.study.evaluation.glitch_counts import GlitchCount
-from holdfast_lab.study.evaluation.glitch_readings import READINGS
 from holdfast_lab.study.plan import StudyPlan
 
 COMPARED = f"for {COMPARED_RATE:g}/min"
-HELD = f"own, held {HOLD_TIME:g} s"
+LASTING = f"own, held {HOLD_TIME:g} s"
 ALARMS_BY_THRESHOLD: dict[str, Callable[[ReadingAlarms], list[AlarmStatistics]]] = {
     "own": lambda alarms: alarms.own,
-    HELD: lambda alarms: alarms.held,
+    LASTING: lambda alarms: alarms.lasting,
     COMPARED: lambda alarms: alarms.compared,
 }
 READING = "a glitch is"
@@ -103,7 +102,7 @@ def glitches(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for key, evaluation in method_results(plan, results, REFERENCE_METHOD):
         counts = evaluation.glitches
-        if key != "object" and any(count.held_seconds for count in counts):
+        if key != "object" and any(count.grasped_seconds for count in counts):
             rows += _glitch_rows({"on": SPLIT_TITLES[key]}, counts, plan.seed)
     note = (
         "By the truth of the recordings, while the hand holds the object; no method is involved. "
@@ -176,7 +175,7 @@ def _false_alarm_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) 
 
 def _glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:
     n = [count.n for count in counts]
-    minutes = [count.held_seconds / 60 for count in counts]
+    minutes = [count.grasped_seconds / 60 for count in counts]
     yield ratio_row(keys | {"figure": "glitches per minute held"}, n, minutes, seed, scale=1.0)
     for figure, least in (("object slides [%]", 0.0), ("by 0.1 mm or more [%]", 1e-4)):
         slid = [int((np.array(count.distances) > least).sum()) for count in counts]

@@ -150,8 +150,7 @@ def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEsti
 
 def _estimates(scored: ScoredRecording) -> RecordingEstimates:
     recording = scored.recording
-    decided = scored.scores.decide(recording, recording.labels)
-    hand = scored.scores.hand(recording)
+    decided, hand = scored.decide(recording.labels), scored.scores.hand
     return RecordingEstimates(
         recording.name,
         {

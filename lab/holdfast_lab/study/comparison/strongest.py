@@ -21,9 +21,13 @@ from holdfast_lab.study.comparison.jobs import (
     method_titles,
 )
 from holdfast_lab.study.comparison.rows import correct_and_all, quotient_row, ratio_row
-from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics
+from holdfast_lab.study.evaluation.alarms import (
+    EVENT,
+    FALSE_ALARM,
+    LEFT_OUT,
+    AlarmStatistics,
+)
 from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, MethodEvaluation
-from holdfast_lab.study.evaluation.glitch_readings import EVENT, FALSE_ALARM, LEFT_OUT_SPLIT
 from holdfast_lab.study.methods import PAPER_FAMILY
 from holdfast_lab.study.plan import StudyPlan
 
@@ -175,6 +179,6 @@ MEASURES = (
     Measure("events, a glitch is an event [%]", NOTHING, _missed_events(EVENT), EVENT),
     Measure("events, a glitch is a false alarm [%]", NOTHING, _missed_events(FALSE_ALARM),
             FALSE_ALARM),
-    Measure("events [%]", "glitches", _missed_events(LEFT_OUT_SPLIT), LEFT_OUT_SPLIT),
+    Measure("events [%]", "glitches", _missed_events(LEFT_OUT), LEFT_OUT),
 )  # fmt: skip
 """The kinds of errors in the table: without any exclusion, then with exclusions."""

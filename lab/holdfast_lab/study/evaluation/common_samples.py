@@ -57,13 +57,6 @@ def warm_up(method: str, rate: float) -> float:
         >>> round(150 * warm_up("logreg", 150.0)), round(150 * warm_up("difference", 150.0))
         (13, 1)
     """
-    hand = hand_signal(_probe(rate), Tare.parse("none"), PROBE_FINGERS)
-    features = find_method(method).features(hand)
-    known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
-    return int(np.argmax(known)) / rate if known.any() else math.inf
-
-
-def _probe(rate: float) -> Recording:
     generator = np.random.default_rng(0)
     times = np.arange(math.ceil(PROBE_DURATION * rate)) / rate
     kind = replace(sensor("uskin-4x4"), rate=rate, range=None)  # of small readings
@@ -71,4 +64,7 @@ def _probe(rate: float) -> Recording:
         name: Tactile(kind, times, generator.normal(100.0, 10.0, (len(times), kind.n_taxels, 3)))
         for name in PROBE_FINGERS
     }
-    return Recording("probe", modules)
+    hand = hand_signal(Recording("probe", modules), Tare.parse("none"), PROBE_FINGERS)
+    features = find_method(method).features(hand)
+    known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
+    return int(np.argmax(known)) / rate if known.any() else math.inf

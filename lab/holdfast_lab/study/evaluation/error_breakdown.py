@@ -1,14 +1,24 @@
-"""The errors of one recording by phase, grip force and direction of the disturbance."""
+"""The errors of one recording by phase, grip force and direction, and the glitches of its hand."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from holdfast.contact import HELD_PHASES, STABLE, TIME_TOLERANCE, UNKNOWN, Phase
-from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
+from holdfast.contact import (
+    CONTACT_FORCE,
+    HELD_PHASES,
+    SLIP_SPEED,
+    STABLE,
+    TIME_TOLERANCE,
+    UNKNOWN,
+    Phase,
+)
+from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.masks import Mask, runs
+from holdfast.metrics.slip_truth import sample_durations
+from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast_lab.study.methods import HAND
@@ -44,32 +54,19 @@ class GripErrors(msgspec.Struct, frozen=True):
     not_stable: CountPair
 
 
-class DisturbanceErrors(msgspec.Struct, frozen=True):
-    """Errors of all fingers during one disturbance.
-
-    Attributes:
-        direction: of the mean outside force: one of `PULL_DIRECTIONS`, or `OBLIQUE`.
-        n: samples labelled not stable.
-        n_wrong: of those, samples called stable.
-    """
-
-    direction: str
-    n: int
-    n_wrong: int
-
-
 class ErrorBreakdown(msgspec.Struct, frozen=True):
     """The errors of one recording by phase, finger and disturbance.
 
     Attributes:
         phases: count of all fingers in each phase.
         grips: of each finger.
-        disturbances: of each disturbance.
+        disturbances: direction of each, one of `PULL_DIRECTIONS` or `OBLIQUE`, and count of its
+            samples labelled not stable, of all fingers.
     """
 
-    phases: dict[str, CountPair]
-    grips: list[GripErrors]
-    disturbances: list[DisturbanceErrors]
+    phases: dict[str, CountPair] = {}
+    grips: list[GripErrors] = []
+    disturbances: list[tuple[str, CountPair]] = []
 
 
 def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdown:
@@ -80,10 +77,45 @@ def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdo
     """
     units = decided_units(decisions)
     if truth is None or not {"phase", "outside_force"} <= set(truth.hand) or not units:
-        return ErrorBreakdown({}, [], [])
+        return ErrorBreakdown()
+    phase = truth.hand["phase"]
+    locked = phase == Phase.LOCKED
+    disturbed = runs(np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)))
+    phases = {str(name): (0, 0) for name in Phase}
+    pushes, grips = [(0, 0)] * len(disturbed), []
+    for name, unit in units.items():
+        now = phase[latest_rows(truth, unit.times)]
+        stable = unit.labels == STABLE
+        for each, count in phases.items():
+            phases[each] = _added(count, unit, now == each)
+        for k, (start, end) in enumerate(disturbed):
+            inside = np.zeros(len(now), dtype=np.bool_)
+            inside[slice(*np.searchsorted(unit.times, truth.times[[start, end - 1]]))] = True
+            pushes[k] = _added(pushes[k], unit, inside & ~stable)
+        if "contact_force" in truth.fingers.get(name, {}) and locked.any():
+            force = np.linalg.norm(truth.fingers[name]["contact_force"], axis=1)
+            grasped = np.isin(now, HELD_PHASES)
+            counts = (_added((0, 0), unit, grasped & kind) for kind in (stable, ~stable))
+            grips.append(GripErrors(float(force[locked].mean()), *counts))
+    forces = (truth.hand["outside_force"][start:end].mean(axis=0) for start, end in disturbed)
     return ErrorBreakdown(
-        _phase_errors(truth, units), _grip_errors(truth, units), _disturbance_errors(truth, units)
+        {each: count for each, count in phases.items() if count[0]},
+        grips,
+        list(zip(map(_direction, forces), pushes, strict=True)),
     )
+
+
+def _added(count: CountPair, unit: FingerDecisions, samples: Mask) -> CountPair:
+    """Return a count with those of some samples that have a label and a decision."""
+    counted = samples & (unit.labels != UNKNOWN) & (unit.states != UNKNOWN)
+    wrong = counted & ((unit.labels == STABLE) != (unit.states == STABLE))
+    return count[0] + int(counted.sum()), count[1] + int(wrong.sum())
+
+
+def _direction(force: Array) -> str:
+    along = {name: float(force @ np.array(axis)) for name, axis in PULL_DIRECTIONS.items()}
+    best = max(along, key=lambda name: along[name])
+    return best if along[best] >= MIN_DIRECTION_COSINE * float(np.linalg.norm(force)) else OBLIQUE
 
 
 def decided_units(decisions: Decisions) -> Mapping[str, FingerDecisions]:
@@ -93,80 +125,51 @@ def decided_units(decisions: Decisions) -> Mapping[str, FingerDecisions]:
     return {HAND: decisions.hand}
 
 
-def _phase_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> dict[str, CountPair]:
-    counts = {str(phase): np.zeros(2, dtype=np.int64) for phase in Phase}
-    for unit in units.values():
-        known, wrong = _known_and_wrong(unit)
-        phase = truth.hand["phase"][_truth_rows(truth, unit.times)]
-        for name, total in counts.items():
-            total[:] += _count(known & (phase == name), wrong)
-    return {name: (int(n), int(n_wrong)) for name, (n, n_wrong) in counts.items() if n}
-
-
-def _grip_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> list[GripErrors]:
-    phase = truth.hand["phase"]
-    locked = phase == Phase.LOCKED
-    grips = []
-    for name, unit in units.items():
-        if "contact_force" not in truth.fingers.get(name, {}) or not locked.any():
-            continue
-        force = np.linalg.norm(truth.fingers[name]["contact_force"], axis=1)
-        held = np.isin(phase, HELD_PHASES)[_truth_rows(truth, unit.times)]
-        known, wrong = _known_and_wrong(unit)
-        stable = unit.labels == STABLE
-        grips.append(
-            GripErrors(
-                force=float(force[locked].mean()),
-                stable=_count(known & held & stable, wrong),
-                not_stable=_count(known & held & ~stable, wrong),
-            )
-        )
-    return grips
-
-
-def _disturbance_errors(
-    truth: Truth, units: Mapping[str, FingerDecisions]
-) -> list[DisturbanceErrors]:
-    disturbed = np.isin(truth.hand["phase"], (Phase.DISTURBED, Phase.SLIPPING))
-    disturbances = []
-    for start, end in runs(disturbed):
-        n = n_wrong = 0
-        for unit in units.values():
-            known, wrong = _known_and_wrong(unit)
-            inside = np.zeros(len(unit.times), dtype=np.bool_)
-            inside[slice(*np.searchsorted(unit.times, truth.times[[start, end - 1]]))] = True
-            of_unit, wrong_of_unit = _count(inside & known & (unit.labels != STABLE), wrong)
-            n, n_wrong = n + of_unit, n_wrong + wrong_of_unit
-        force = truth.hand["outside_force"][start:end].mean(axis=0)
-        disturbances.append(DisturbanceErrors(_direction(force), n, n_wrong))
-    return disturbances
-
-
-def _direction(force: Array) -> str:
-    along = {name: float(force @ np.array(axis)) for name, axis in PULL_DIRECTIONS.items()}
-    best = max(along, key=lambda name: along[name])
-    return best if along[best] >= MIN_DIRECTION_COSINE * float(np.linalg.norm(force)) else OBLIQUE
-
-
-def _known_and_wrong(unit: FingerDecisions) -> tuple[Mask, Mask]:
-    """Return which samples have a label and a decision, and which decisions are wrong."""
-    known = (unit.labels != UNKNOWN) & (unit.states != UNKNOWN)
-    return known, (unit.labels == STABLE) != (unit.states == STABLE)
-
-
-def _count(samples: Mask, wrong: Mask) -> CountPair:
-    return int(samples.sum()), int((samples & wrong).sum())
-
-
-def _truth_rows(truth: Truth, times: Array) -> npt.NDArray[np.intp]:
+def latest_rows(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
     """Return the latest row of the truth at each time."""
-    return np.maximum(np.searchsorted(truth.times, times + TIME_TOLERANCE) - 1, 0)
+    return np.maximum(np.searchsorted(truth.times, times + TIME_TOLERANCE, side="right") - 1, 0)
 
 
-def calibration_counts(decisions: Decisions) -> list[list[float]]:
-    """Return (10, 3): sum of probabilities, stable samples and all samples of each bin.
+class GlitchCount(msgspec.Struct, frozen=True):
+    """Glitches of the hand's controller in one recording, while the hand holds the object.
 
-    The bins are ten equal intervals of the probability of stability.
+    Attributes:
+        n: number of glitches.
+        distances: for each glitch, how far the object slides until the effect of the glitch and
+            the sliding that began in it are over [m].
+        grasped_seconds: time for which the hand holds the object [s].
     """
-    sums = calibration_sums(list(decided_units(decisions).values()))
-    return [[float(x) for x in row] for row in sums]
+
+    n: int = 0
+    distances: list[float] = []
+    grasped_seconds: float = 0.0
+
+
+def count_glitches(truth: Truth | None) -> GlitchCount:
+    """Return the glitches while the hand holds the object, and how far the object slides."""
+    if truth is None or not {"phase", "set_point_error"} <= set(truth.hand):
+        return GlitchCount()
+    grasped = np.isin(truth.hand["phase"], HELD_PHASES)
+    steps = sample_durations(truth.times)
+    speed = _sliding_speed(truth)
+    sliding = runs(speed > 0)
+    distances = []
+    for start, end in runs(grasped & glitches(truth, LabelRule())):
+        begun = sliding[(sliding[:, 0] >= start) & (sliding[:, 0] < end)]
+        last = max([end, *begun[:, 1].tolist()])
+        distances.append(float((speed * steps)[start:last].sum()))
+    return GlitchCount(len(distances), distances, float(steps[grasped].sum()))
+
+
+def _sliding_speed(truth: Truth) -> Array:
+    """Return the speed of the held object on the finger on which it slides fastest, (n,) [m/s].
+
+    The speed is 0 while nothing is held, and below 1 mm/s. A finger counts if it touches.
+    """
+    speed = np.zeros(len(truth.times))
+    for finger in truth.fingers.values():
+        if {"contact_force", "slip_speed"} <= set(finger):
+            touching = np.linalg.norm(finger["contact_force"], axis=1) > CONTACT_FORCE
+            sliding = touching & (finger["slip_speed"] > SLIP_SPEED)
+            speed = np.maximum(speed, np.where(sliding, finger["slip_speed"], 0.0))
+    return np.where(np.isin(truth.hand["phase"], HELD_PHASES), speed, 0.0)

@@ -5,44 +5,40 @@ not on the contact thresholds, and not on the thresholds for a rate of false ala
 chosen on the training recordings, each scored by a fit without it.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
-from holdfast.contact import STABLE, UNKNOWN
-from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
-from holdfast.metrics.masks import Mask
+from holdfast.contact import UNKNOWN
+from holdfast.metrics import Decisions, FingerDecisions, Metrics, calibration_sums, summarise
+from holdfast.metrics.decisions import Codes
+from holdfast.metrics.samples import score_samples
 from holdfast.training.splits import RANDOM_FOLDS
-from holdfast_lab.study.evaluation.alarm_statistics import (
+from holdfast_lab.study.evaluation.alarms import (
+    EVENT,
+    READINGS,
     AlarmStatistics,
-    alarm_statistics,
-    near_glitch,
+    FalseAlarmRanges,
+    labels_by_reading,
+    threshold_shift,
 )
 from holdfast_lab.study.evaluation.common_samples import find_method, longest_warm_up
 from holdfast_lab.study.evaluation.error_breakdown import (
     CountPair,
     ErrorBreakdown,
+    GlitchCount,
     break_down_errors,
-    calibration_counts,
+    count_glitches,
     decided_units,
 )
-from holdfast_lab.study.evaluation.fitted_method import (
-    FittedMethod,
-    TrainingSamples,
-    gather_training_samples,
-)
-from holdfast_lab.study.evaluation.glitch_counts import GlitchCount, count_glitches
-from holdfast_lab.study.evaluation.glitch_readings import EVENT, READINGS, labels_by_reading
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, RecordingScores, Training
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.scores import RecordingScores
-from holdfast_lab.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
 from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.methods import HAND, Method
+from holdfast_lab.study.methods import HAND
 from holdfast_lab.study.plan import Corpus
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -56,6 +52,8 @@ So one disturbance is one alarm, whatever the method.
 """
 
 GroupSplit = Literal["recording", "object"]
+Shifts = Mapping[str, Sequence[float]]
+"""Shifts of the threshold for each of `FALSE_ALARM_RATES`, for each of `READINGS`."""
 
 
 class EvaluationEffort(msgspec.Struct, frozen=True):
@@ -80,7 +78,7 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     Attributes:
         method: its name.
         train: corpus that the method is fitted to.
-        splits: of that corpus. A fold holds out recordings, or all recordings of one object.
+        splits: of that corpus. A fold leaves out recordings, or all recordings of one object.
         tests: other corpora, evaluated with a fit to all of `train`.
         variation: of the recordings of all corpora.
         effort: size of the evaluation.
@@ -97,10 +95,16 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     seed: int = 0
     compared: tuple[str, ...] = ()
 
-    @property
-    def warm_up(self) -> float:
-        """Time at the start of every stretch that is not scored [s]."""
-        return longest_warm_up(self.compared, self.train.rate / self.variation.every)
+    def features(self, corpus: Corpus) -> list[RecordingFeatures]:
+        """Return the features of the recordings of a corpus."""
+        warm_up = longest_warm_up(self.compared, self.train.rate / self.variation.every)
+        method = find_method(self.method)
+        return corpus_features(method, corpus, self.variation, self.effort.stride, warm_up)
+
+    def training(self, recordings: Sequence[RecordingFeatures]) -> Training:
+        """Return the samples of recordings, from which the method is fitted."""
+        method = find_method(self.method)
+        return Training.of(method, recordings, self.effort.max_samples, self.seed)
 
 
 class ReadingAlarms(msgspec.Struct, frozen=True):
@@ -108,12 +112,12 @@ class ReadingAlarms(msgspec.Struct, frozen=True):
 
     Attributes:
         own: at the method's own threshold.
-        held: the same, with decisions held for `HOLD_TIME`.
+        lasting: the same, with states held for `HOLD_TIME`.
         by_rate: the same, held, at the threshold chosen for each of `FALSE_ALARM_RATES`.
     """
 
     own: list[AlarmStatistics]
-    held: list[AlarmStatistics]
+    lasting: list[AlarmStatistics]
     by_rate: list[list[AlarmStatistics]]
 
     @property
@@ -159,24 +163,16 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         return self.readings[EVENT]
 
 
-class FittedFold(NamedTuple):
-    """A fitted method and its thresholds.
-
-    Attributes:
-        fitted: to all training recordings.
-        shifts: of the threshold for each of `FALSE_ALARM_RATES`, for each of `READINGS`.
-    """
-
-    fitted: FittedMethod
-    shifts: Mapping[str, Sequence[float]]
-
-
 class ScoredRecording(NamedTuple):
-    """A recording, its scores and the shifts of the threshold, see `FittedFold`."""
+    """A recording, its scores, and the shifts of the threshold, chosen without it."""
 
     recording: RecordingFeatures
     scores: RecordingScores
-    shifts: Mapping[str, Sequence[float]]
+    shifts: Shifts
+
+    def decide(self, labels: Mapping[str, Codes]) -> Decisions:
+        """Return the decisions at the own threshold, with labels of the fingers."""
+        return self.scores.decide(self.recording.name, labels)
 
 
 def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
@@ -195,34 +191,32 @@ def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
 
 def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording]]]:
     """Yield the scored recordings of each split and of each other corpus, in order."""
-    method = find_method(job.method)
-    recordings = _corpus_features(job, method, job.train)
-    training = gather_training_samples(recordings, job.effort.max_samples)
-    everything = frozenset(range(len(recordings)))
+    training = job.training(job.features(job.train))
+    everything = frozenset(range(len(training.recordings)))
+
+    def scored_by(fitted: FittedMethod, shifts: Shifts, one: RecordingFeatures) -> ScoredRecording:
+        # Features are dropped to save memory.
+        return ScoredRecording(replace(one, features={}), fitted.scores(one), shifts)
+
     for split in job.splits:
         scored: dict[int, ScoredRecording] = {}
-        for held in held_out_folds(training.objects, split, job.effort.folds, job.seed):
-            fold = _fit_fold(job, method, training, recordings, everything - held)
-            scored |= {place: _score(fold, recordings[place]) for place in held}
-        yield split, [scored[place] for place in sorted(scored)]
+        for left_out in held_out_folds(training.objects, split, job.effort.folds, job.seed):
+            fold = _fit_fold(job, training, everything - left_out)
+            scored |= {k: scored_by(*fold, training.recordings[k]) for k in left_out}
+        yield split, [scored[index] for index in sorted(scored)]
     if job.tests:
-        fold = _fit_fold(job, method, training, recordings, everything)
+        fold = _fit_fold(job, training, everything)
         for corpus in job.tests:
-            tested = _corpus_features(job, method, corpus)
-            yield corpus.name, [_score(fold, recording) for recording in tested]
-
-
-def _corpus_features(job: EvaluationJob, method: Method, corpus: Corpus) -> list[RecordingFeatures]:
-    return corpus_features(method, corpus, job.variation, job.effort.stride, job.warm_up)
+            yield corpus.name, [scored_by(*fold, tested) for tested in job.features(corpus)]
 
 
 def held_out_folds(
     objects: Sequence[str | None], split: GroupSplit, n_folds: int, seed: int
 ) -> Iterator[frozenset[int]]:
-    """Yield the numbers of the recordings that each fold holds out.
+    """Yield the numbers of the recordings that each fold leaves out.
 
-    Every recording is in one fold. There is no fold by object if there are fewer than two
-    objects, or an unknown one.
+    Every recording is in one fold. By recording, each object is spread over all folds. There is
+    no fold by object if there are fewer than two objects, or an unknown one.
 
     Args:
         objects: of the recordings; None if unknown.
@@ -236,133 +230,77 @@ def held_out_folds(
             return
         folds = np.array([names.index(name) for name in objects])
     else:
-        folds = balanced_groups(objects, min(n_folds, len(objects)), seed)
+        order = shuffled(len(objects), seed)
+        order = order[np.argsort(np.array([str(objects[k]) for k in order]), kind="stable")]
+        folds = deal_folds(len(objects), min(n_folds, len(objects)), order)
     for fold in np.unique(folds):
         yield frozenset(np.flatnonzero(folds == fold).tolist())
 
 
-def balanced_groups(
-    objects: Sequence[str | None], n_groups: int, seed: int
-) -> npt.NDArray[np.int64]:
-    """Return (n_recordings,) groups of equal size, with each object spread over the groups."""
-    order = shuffled(len(objects), seed)
-    order = order[np.argsort(np.array([str(objects[k]) for k in order]), kind="stable")]
-    return deal_folds(len(objects), n_groups, order)
-
-
 def _fit_fold(
-    job: EvaluationJob,
-    method: Method,
-    training: TrainingSamples,
-    recordings: Sequence[RecordingFeatures],
-    places: frozenset[int],
-) -> FittedFold:
-    """Fit the method to the recordings at `places`, and choose its thresholds on them."""
-    ordered = sorted(places)
-    objects = [training.objects[place] for place in ordered]
-    n_inner = min(job.effort.inner, len(ordered))
-    folds = held_out_folds(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ()
-    ranges: list[dict[str, FalseAlarmRanges]] = []
-    for fold in folds:
-        held = {ordered[k] for k in fold}
-        fitted = FittedMethod.fit(method, training, places - held, job.seed)
-        ranges += [_false_alarm_ranges(fitted, recordings[place]) for place in sorted(held)]
-    return FittedFold(FittedMethod.fit(method, training, places, job.seed), _shifts(ranges))
-
-
-def _false_alarm_ranges(
-    fitted: FittedMethod, recording: RecordingFeatures
-) -> dict[str, FalseAlarmRanges]:
-    """Return the ranges of the false alarms for each reading of glitches."""
-    scores = fitted.scores(recording).hand(recording).hold(HOLD_TIME)
-    return {
-        reading: FalseAlarmRanges.of(
-            scores,
-            hand.labels,
-            near_glitch(scores.times, hand.glitch) if hand.without_glitches else None,
-        )
-        for reading, hand in labels_by_reading(recording).items()
+    job: EvaluationJob, training: Training, indices: Collection[int]
+) -> tuple[FittedMethod, Shifts]:
+    """Fit the method to some recordings, and choose its thresholds on them."""
+    chosen = sorted(indices)
+    n_inner = min(job.effort.inner, len(chosen))
+    objects = [training.objects[index] for index in chosen]
+    ranges: dict[str, list[FalseAlarmRanges]] = {reading: [] for reading in READINGS}
+    for fold in held_out_folds(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ():
+        fitted = training.fit(set(chosen) - {chosen[k] for k in fold})
+        for recording in (training.recordings[chosen[k]] for k in sorted(fold)):
+            scores = fitted.scores(recording).hand.hold(HOLD_TIME)
+            for reading, labels in labels_by_reading(recording).items():
+                ranges[reading].append(FalseAlarmRanges.of(scores, labels))
+    shifts = {
+        reading: [threshold_shift(own, rate) if own else 0.0 for rate in FALSE_ALARM_RATES]
+        for reading, own in ranges.items()
     }
-
-
-def _shifts(ranges: Sequence[Mapping[str, FalseAlarmRanges]]) -> dict[str, list[float]]:
-    if not ranges:
-        return {reading: [0.0] * len(FALSE_ALARM_RATES) for reading in READINGS}
-    return {
-        reading: [threshold_shift([each[reading] for each in ranges], rate)
-                  for rate in FALSE_ALARM_RATES]
-        for reading in READINGS
-    }  # fmt: skip
-
-
-def _score(fold: FittedFold, recording: RecordingFeatures) -> ScoredRecording:
-    """Score a recording; its features are dropped to save memory."""
-    scores = fold.fitted.scores(recording)
-    return ScoredRecording(replace(recording, features={}), scores, fold.shifts)
+    return training.fit(chosen), shifts
 
 
 def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     """Return the results of a method on scored recordings."""
-    decisions = [
-        each.scores.decide(each.recording, each.recording.scored_labels) for each in scored
-    ]
-    every = [each.scores.decide(each.recording, each.recording.labels) for each in scored]
-    alarms = [_alarms(each) for each in scored]
-    pairs = zip(scored, decisions, strict=True)
+    truths = [each.recording.truth for each in scored]
+    decided = [each.decide(each.recording.scored_labels) for each in scored]
+    every = [each.decide(each.recording.labels) for each in scored]
+    hands = [Decisions(d.name, {HAND: d.hand}, d.hand) for d in decided if d.hand is not None]
+    alarms, readings = [_alarms(each) for each in scored], {}
+    for reading in READINGS:
+        by_threshold = zip(*(of_recording[reading] for of_recording in alarms), strict=True)
+        own, lasting, *by_rate = map(list, by_threshold)
+        readings[reading] = ReadingAlarms(own, lasting, by_rate)
     return MethodEvaluation(
         names=[each.recording.name for each in scored],
-        fingers=summarise(decisions) if any(decision.fingers for decision in decisions) else None,
-        hand=summarise(_hands(decisions)),
+        fingers=summarise(decided) if any(each.fingers for each in decided) else None,
+        hand=summarise(hands),
         without_estimate=[_n_without_estimate(decided_units(each).values()) for each in every],
-        hand_without_estimate=[_n_without_estimate([each.hand]) for each in every],
-        readings={reading: _pooled([alarm[reading] for alarm in alarms]) for reading in READINGS},
-        glitches=[count_glitches(each.recording.truth) for each in scored],
-        breakdown=[break_down_errors(each.recording.truth, decided) for each, decided in pairs],
-        calibration=[calibration_counts(decision) for decision in decisions],
+        hand_without_estimate=[_n_without_estimate([d.hand]) for d in every if d.hand is not None],
+        readings=readings,
+        glitches=[count_glitches(truth) for truth in truths],
+        breakdown=list(map(break_down_errors, truths, decided)),
+        calibration=[
+            calibration_sums([*decided_units(each).values()]).tolist() for each in decided
+        ],
     )
 
 
-def _n_without_estimate(units: Iterable[FingerDecisions | None]) -> CountPair:
+def _n_without_estimate(units: Iterable[FingerDecisions]) -> CountPair:
     """Return the number of labelled samples, and of those of them without an estimate."""
-    n = n_without = 0
-    for unit in units:
-        if unit is not None:
-            labelled = unit.labels != UNKNOWN
-            n += int(labelled.sum())
-            n_without += int((labelled & (unit.states == UNKNOWN)).sum())
-    return n, n_without
+    labelled = [unit.states[unit.labels != UNKNOWN] for unit in units]
+    return sum(map(len, labelled)), sum(int((states == UNKNOWN).sum()) for states in labelled)
 
 
 def _alarms(scored: ScoredRecording) -> dict[str, list[AlarmStatistics]]:
     """Return the alarms for each reading: at the own threshold, held at it, at each chosen one."""
-    recording = scored.recording
-    scores = scored.scores.hand(recording)
-    held = scores.hold(HOLD_TIME)
-    by_reading = {}
-    for reading, hand in labels_by_reading(recording).items():
-        decided = [scores.decide(hand.labels)]
-        decided += [held.decide(hand.labels, s) for s in (0.0, *scored.shifts[reading])]
-        left_out = hand.without_glitches
-        by_reading[reading] = [
-            alarm_statistics(each, hand.glitch, without_glitches=left_out) for each in decided
+    hand = scored.scores.hand
+    lasting = hand.hold(HOLD_TIME)
+    return {
+        reading: [
+            AlarmStatistics.of(hand, labels),
+            *(AlarmStatistics.of(lasting, labels, s) for s in (0.0, *scored.shifts[reading])),
         ]
-    return by_reading
-
-
-def _pooled(alarms: Sequence[Sequence[AlarmStatistics]]) -> ReadingAlarms:
-    """Return the alarms of all recordings, by threshold."""
-    return ReadingAlarms(
-        own=[alarm[0] for alarm in alarms],
-        held=[alarm[1] for alarm in alarms],
-        by_rate=[[alarm[2 + k] for alarm in alarms] for k in range(len(FALSE_ALARM_RATES))],
-    )
-
-
-def _hands(decisions: Iterable[Decisions]) -> Iterator[Decisions]:
-    """Yield the hands alone, each as the one finger of its recording."""
-    for decision in decisions:
-        if decision.hand is not None:
-            yield Decisions(decision.name, {HAND: decision.hand}, decision.hand)
+        for reading, labels in labels_by_reading(scored.recording).items()
+    }
 
 
 def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
@@ -374,48 +312,30 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
     Args:
         job: gives the method, the training corpus, the variation, the effort and the seed.
     """
-    method = find_method(job.method)
-    recordings = _corpus_features(job, method, job.train)
+    recordings = job.features(job.train)
     generator = np.random.default_rng(job.seed)
     folds = [
-        {
-            unit: random_folds(len(rows), RANDOM_FOLDS, generator)
-            for unit, rows in recording.features.items()
-        }
-        for recording in recordings
+        {u: random_folds(len(rows), RANDOM_FOLDS, generator) for u, rows in one.features.items()}
+        for one in recordings
     ]
+
+    def part(fold: int, *, left_out: bool) -> list[RecordingFeatures]:
+        """Return the recordings with NaN as the features of the other samples."""
+        parts = []
+        for one, own in zip(recordings, folds, strict=True):
+            features = {
+                unit: np.where(((own[unit] == fold) == left_out)[:, None], rows, np.nan)
+                for unit, rows in one.features.items()
+            }
+            parts.append(replace(one, features=features))
+        return parts
+
     counts = np.zeros((len(recordings), 4), dtype=np.int64)
     for fold in range(RANDOM_FOLDS):
-        trained = [
-            _with_features_of(recording, {unit: each != fold for unit, each in own.items()})
-            for recording, own in zip(recordings, folds, strict=True)
-        ]
-        training = gather_training_samples(trained, job.effort.max_samples)
-        fitted = FittedMethod.fit(method, training, range(len(recordings)), job.seed)
-        for place, (recording, own) in enumerate(zip(recordings, folds, strict=True)):
-            tested = _with_features_of(
-                recording, {unit: each == fold for unit, each in own.items()}
-            )
-            counts[place] += _confusion(fitted.scores(tested).decide(tested, tested.scored_labels))
+        fitted = job.training(part(fold, left_out=False)).fit()
+        for index, tested in enumerate(part(fold, left_out=True)):
+            decided = fitted.scores(tested).decide(tested.name, tested.scored_labels)
+            for unit in decided_units(decided).values():
+                samples = score_samples(unit.labels, unit.states, unit.stable_probability)
+                counts[index] += samples.confusion.ravel()
     return [[int(n) for n in row] for row in counts]
-
-
-def _with_features_of(
-    recording: RecordingFeatures, chosen: Mapping[str, Mask]
-) -> RecordingFeatures:
-    """Return the recording with NaN as the features of all other samples."""
-    features = {
-        unit: np.where(chosen[unit][:, None], rows, np.nan)
-        for unit, rows in recording.features.items()
-    }
-    return replace(recording, features=features)
-
-
-def _confusion(decisions: Decisions) -> npt.NDArray[np.int64]:
-    """Return (4,) TN, FP, FN, TP of the samples with a label and a decision."""
-    counts = np.zeros(4, dtype=np.int64)
-    for unit in decided_units(decisions).values():
-        known = (unit.labels != UNKNOWN) & (unit.states != UNKNOWN)
-        place = 2 * (unit.labels == STABLE) + (unit.states == STABLE)
-        counts += np.bincount(place[known], minlength=4)
-    return counts

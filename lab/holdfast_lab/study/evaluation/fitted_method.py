@@ -1,6 +1,6 @@
 """A method fitted to some recordings of a corpus, which scores other recordings."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Classifier, Samples
+from holdfast.contact import UNSTABLE
+from holdfast.metrics import Decisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.sensors.types import Array
 from holdfast.training.finger_samples import (
@@ -18,8 +20,8 @@ from holdfast.training.finger_samples import (
     usable_rows,
 )
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
-from holdfast_lab.study.evaluation.scores import RecordingScores
-from holdfast_lab.study.methods import Method
+from holdfast_lab.study.evaluation.scores import Scores
+from holdfast_lab.study.methods import HAND, Method
 
 MAX_FITTED_SAMPLES = 20_000
 """Maximum samples of a unit that train a classifier. All samples are evaluated."""
@@ -29,84 +31,109 @@ MIN_PROBABILITY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingSamples:
-    """The samples of a corpus that a method can be fitted to.
+class Training:
+    """The recordings that a method can be fitted to, and their samples.
 
     Attributes:
-        samples: of each unit. A group is the number of a recording in the corpus.
-        at_rest: (n_recordings, 3) moments of F_a of each finger in the tare intervals.
-        objects: of each recording; None if the recording does not name it.
+        method: to fit.
+        recordings: of a corpus.
+        samples: of each unit. A group is the number of a recording.
+        seed: of the fits.
     """
 
+    method: Method
+    recordings: Sequence[RecordingFeatures]
     samples: Mapping[str, Samples]
-    at_rest: Mapping[str, Array]
-    objects: tuple[str | None, ...]
+    seed: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        method: Method,
+        recordings: Sequence[RecordingFeatures],
+        max_samples: int = MAX_FITTED_SAMPLES,
+        seed: int = 0,
+        *,
+        sliding: bool = False,
+    ) -> "Training":
+        """Gather the labelled samples of recordings, thinned evenly over the recordings.
+
+        A recording without one of the fingers gives no samples to a whole-hand method.
+
+        Args:
+            method: to fit.
+            recordings: features of the corpus.
+            max_samples: of each unit; all samples that slide are kept beside them.
+            seed: of the fits.
+            sliding: fit to true rest against sliding, not to the labels of stability.
+        """
+        most = -(-max_samples // max(len(recordings), 1))
+        widths: dict[str, int] = {}
+        for recording in recordings:
+            for unit, rows in recording.features.items():
+                widths[unit] = max(widths.get(unit, 0), rows.shape[1])
+        parts: dict[str, list[Samples]] = {}
+        for index, recording in enumerate(recordings):
+            for unit, rows in recording.features.items():
+                labels = recording.slip_labels(unit) if sliding else recording.unit_labels(unit)
+                if labels is None or rows.shape[1] != widths[unit]:
+                    continue
+                usable = usable_rows(rows, labels)
+                is_kept = sliding & (labels[usable] == UNSTABLE)
+                thinned = usable[~is_kept]
+                thinned = thinned[:: thinning_step(len(thinned), most)]
+                chosen = np.sort(np.concatenate([usable[is_kept], thinned]))
+                part = labelled_samples(rows, labels, chosen, index)
+                parts.setdefault(unit, []).append(part)
+        samples = {unit: concatenate(of_unit) for unit, of_unit in parts.items()}
+        return cls(method, recordings, samples, seed)
+
+    @property
+    def objects(self) -> list[str | None]:
+        """The object of each recording; None if it is not known."""
+        return [recording.object for recording in self.recordings]
+
+    def fit(self, indices: Collection[int] | None = None) -> "FittedMethod":
+        """Fit the method to some recordings, given by number; by default to all."""
+        fitted_to = sorted(range(len(self.recordings)) if indices is None else indices)
+        classifiers: dict[str, Classifier] = {}
+        for unit, samples in self.samples.items():
+            own = samples.take(np.isin(samples.groups, fitted_to))
+            if not own.one_class:
+                recipe = self.method.recipe
+                classifiers[unit] = recipe.fit(own, self.method.reference, self.seed)
+        rest = [self.recordings[index].at_rest for index in fitted_to]
+        fingers = dict.fromkeys(finger for moments in rest for finger in moments)
+        nothing = (0, 0.0, 0.0)
+        contact = {
+            f: contact_threshold(np.array([r.get(f, nothing) for r in rest])) for f in fingers
+        }
+        return FittedMethod(classifiers, contact)
 
 
-def gather_training_samples(
-    recordings: Sequence[RecordingFeatures], max_samples: int = MAX_FITTED_SAMPLES
-) -> TrainingSamples:
-    """Return the labelled samples of recordings, thinned evenly over the recordings.
+class RecordingScores(NamedTuple):
+    """Scores of one recording by a fitted method.
 
-    A recording without one of the fingers gives no samples to a whole-hand method.
-
-    Args:
-        recordings: features of the corpus.
-        max_samples: of each unit.
+    Attributes:
+        fingers: those of a whole-hand method have the latest margin of the hand.
+        hand: at every time of any finger.
+        whole_hand: whether the method decides for the hand only.
     """
-    most = -(-max_samples // max(len(recordings), 1))
 
-    def choose(place: int, unit: str) -> ChosenRows:
-        recording = recordings[place]
-        labels = recording.unit_labels(unit)
-        rows = usable_rows(recording.features[unit], labels)
-        return ChosenRows(labels, rows[:: thinning_step(len(rows), most)])
+    fingers: Mapping[str, Scores]
+    hand: Scores
+    whole_hand: bool
 
-    return gather_rows(recordings, choose)
+    def decide(self, name: str, labels: Mapping[str, Codes]) -> Decisions:
+        """Return the decisions for fingers and hand with these labels, at the own thresholds.
 
-
-class ChosenRows(NamedTuple):
-    """Labels of a unit in one recording, and the places of the samples that train it."""
-
-    labels: Codes
-    rows: npt.NDArray[np.int64]
-
-
-def gather_rows(
-    recordings: Sequence[RecordingFeatures], choose: Callable[[int, str], ChosenRows | None]
-) -> TrainingSamples:
-    """Return chosen samples of recordings.
-
-    A recording without one of the fingers gives no samples to a whole-hand method.
-
-    Args:
-        recordings: features of the corpus.
-        choose: function from the place of a recording and the name of a unit to the samples
-            that train it; None for none.
-    """
-    n_features = _n_features(recordings)
-    parts: dict[str, list[Samples]] = {}
-    fingers = dict.fromkeys(finger for recording in recordings for finger in recording.at_rest)
-    at_rest = {finger: np.zeros((len(recordings), 3)) for finger in fingers}
-    for place, recording in enumerate(recordings):
-        for unit, features in recording.features.items():
-            chosen = choose(place, unit) if features.shape[1] == n_features[unit] else None
-            if chosen is not None:
-                samples = labelled_samples(features, chosen.labels, chosen.rows, place)
-                parts.setdefault(unit, []).append(samples)
-        for finger, moments in recording.at_rest.items():
-            at_rest[finger][place] = moments
-    gathered = {unit: concatenate(each) for unit, each in parts.items()}
-    return TrainingSamples(gathered, at_rest, tuple(each.object for each in recordings))
-
-
-def _n_features(recordings: Sequence[RecordingFeatures]) -> dict[str, int]:
-    """Return the number of features of each unit: the largest of all recordings."""
-    widths: dict[str, int] = {}
-    for recording in recordings:
-        for unit, features in recording.features.items():
-            widths[unit] = max(widths.get(unit, 0), features.shape[1])
-    return widths
+        Args:
+            name: of the recording.
+            labels: (n,) codes of each finger.
+        """
+        fingers = {finger: own.decide(labels[finger]) for finger, own in self.fingers.items()}
+        hand = self.hand.decide(hand_decisions(fingers, len(fingers)).labels)
+        return Decisions(name, {} if self.whole_hand else fingers, hand)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,41 +148,34 @@ class FittedMethod:
     classifiers: Mapping[str, Classifier]
     contact_thresholds: Mapping[str, float | None]
 
-    @classmethod
-    def fit(
-        cls, method: Method, training: TrainingSamples, recordings: Collection[int], seed: int
-    ) -> "FittedMethod":
-        """Fit a method to some of the recordings of the training samples, given by number."""
-        places = sorted(recordings)
-        classifiers = {}
-        for unit, samples in training.samples.items():
-            own = samples.take(np.isin(samples.groups, places))
-            if not own.one_class:
-                classifiers[unit] = method.recipe.fit(own, method.reference, seed)
-        contact = {f: contact_threshold(rows[places]) for f, rows in training.at_rest.items()}
-        return cls(classifiers, contact)
-
     def scores(self, recording: RecordingFeatures) -> RecordingScores:
         """Return the scores of a recording; NaN for a unit without a matching classifier."""
-        scored = {u: rows for u, rows in recording.features.items() if self._can_score(u, rows)}
-        thresholds = {u: float(_log_odds(self.classifiers[u].threshold)) for u in scored}
-        margins = {
-            unit: _log_odds(self.classifiers[unit].probability(rows)) - thresholds[unit]
-            for unit, rows in scored.items()
-        }
-        for unit, rows in recording.features.items():
-            margins.setdefault(unit, np.full(len(rows), np.nan))
-            thresholds.setdefault(unit, 0.0)
-        with np.errstate(invalid="ignore"):
-            in_contact = {
-                name: ~(amplitude < (self.contact_thresholds.get(name) or 0.0))
-                for name, amplitude in recording.amplitude.items()
-            }
-        return RecordingScores(margins, thresholds, in_contact)
+        margins = {unit: self._margins(unit, rows) for unit, rows in recording.features.items()}
+        first = next(iter(recording.times.values()))
 
-    def _can_score(self, unit: str, rows: Array) -> bool:
+        def score(unit: str, times: Array, in_contact: npt.NDArray[np.bool_]) -> Scores:
+            margin, threshold = margins[unit if unit in margins else HAND]
+            if unit not in margins or unit == HAND:
+                at = np.searchsorted(first, times, side="right") - 1
+                margin = np.where(at >= 0, margin[at], np.nan)
+            return Scores.of_finger(times, margin, threshold, in_contact)
+
+        fingers = {}
+        for name, times in recording.times.items():
+            lowest = self.contact_thresholds.get(name) or 0.0
+            fingers[name] = score(name, times, ~(recording.amplitude[name] < lowest))
+        hand = Scores.of_hand(fingers.values())
+        if HAND in margins:
+            hand = score(HAND, hand.times, hand.grasped)
+        return RecordingScores(fingers, hand, HAND in margins)
+
+    def _margins(self, unit: str, rows: npt.NDArray[Any]) -> tuple[Array, float]:
+        """Return the margins of a unit, and the threshold of its classifier [log odds]."""
         classifier = self.classifiers.get(unit)
-        return classifier is not None and classifier.n_features == rows.shape[1]
+        if classifier is None or classifier.n_features != rows.shape[1]:
+            return np.full(len(rows), np.nan), 0.0
+        threshold = float(_log_odds(classifier.threshold))
+        return _log_odds(classifier.probability(rows)) - threshold, threshold
 
 
 def _log_odds(probability: npt.ArrayLike) -> Any:  # noqa: ANN401 (an array or a number, as given)

@@ -1,7 +1,7 @@
 """The features that a method computes from the recordings of a corpus, with their labels."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -9,13 +9,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import STABLE, UNKNOWN, Cause
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause
 from holdfast.features import Tare
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.slip_truth import (
+    NOT_HELD,
+    SLIDING,
+    STILL,
+    SlipTruth,
+    slip_truth,
+    truth_without,
+)
 from holdfast.metrics.truth_labels import LabelRule, relabel
-from holdfast.recordings import Recording, Tactile, Truth, label_states
+from holdfast.recordings import Recording, Truth, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.evaluation.variation import Variation
@@ -23,71 +31,7 @@ from holdfast_lab.study.kept import WORKER_MEMORY
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
 
-
-@dataclass(frozen=True, eq=False)
-class RecordingFeatures:
-    """Features, labels and truth of one recording, without its readings.
-
-    A unit is what has one classifier: a finger, or `HAND` for a whole-hand method.
-
-    Attributes:
-        name: of the recording.
-        object: the object in the hand; None if the recording does not name it.
-        truth: of the recording.
-        times: sample times of each finger [s].
-        amplitude: F_a of each finger [unit of the readings]; NaN where there is no force.
-        labels: label codes of each finger.
-        compared: (n,) samples of each finger at which all compared methods can have an estimate.
-        scored_labels: the labels, UNKNOWN at other samples.
-        exact_labels: the same without margin, if the truth is known.
-        glitches: (n,) samples of each finger whose exact label has the cause glitch.
-        at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
-        features: (n, n_features) of each unit. Those of `HAND` are at the times of the first
-            finger.
-    """
-
-    name: str
-    object: str | None
-    truth: Truth | None
-    times: Mapping[str, Array]
-    amplitude: Mapping[str, Array]
-    labels: Mapping[str, Codes]
-    compared: Mapping[str, Mask]
-    scored_labels: Mapping[str, Codes]
-    exact_labels: Mapping[str, Codes]
-    glitches: Mapping[str, Mask]
-    at_rest: Mapping[str, tuple[int, float, float]]
-    features: Mapping[str, npt.NDArray[Any]]
-
-    def finger_labels(self, labels: Mapping[str, Codes]) -> dict[str, FingerDecisions]:
-        """Return the fingers with these labels and no decision."""
-        return {
-            name: FingerDecisions(
-                times,
-                labels[name],
-                np.zeros(len(times), dtype=np.int8),
-                np.full(len(times), np.nan),
-            )
-            for name, times in self.times.items()
-        }
-
-    def hand_labels(self, labels: Mapping[str, Codes]) -> FingerDecisions:
-        """Return the hand with the label that follows from these finger labels."""
-        return hand_decisions(self.finger_labels(labels), len(labels))
-
-    def labels_without_glitches(self) -> dict[str, Codes]:
-        """Return the exact labels of each finger with every glitch labelled stable."""
-        return {
-            name: np.where(self.glitches[name] & (codes != UNKNOWN), STABLE, codes).astype(np.int8)
-            for name, codes in self.exact_labels.items()
-        }
-
-    def unit_labels(self, unit: str) -> Codes:
-        """Return the labels that train a unit: for the hand, at the times of the first finger."""
-        if unit != HAND:
-            return self.labels[unit]
-        hand = self.hand_labels(self.labels)
-        return hand.labels[np.searchsorted(hand.times, next(iter(self.times.values())))]
+UNCHANGED = Variation()
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +43,7 @@ class PreparedRecording:
         labels: label codes of each finger.
         exact_labels: the same without margin, if the truth is known.
         glitches: (n,) samples of each finger whose exact label has the cause glitch.
+        slips: truth of each finger whose slips are known.
         at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
     """
 
@@ -106,6 +51,7 @@ class PreparedRecording:
     labels: Mapping[str, Codes]
     exact_labels: Mapping[str, Codes]
     glitches: Mapping[str, Mask]
+    slips: Mapping[str, SlipTruth]
     at_rest: Mapping[str, tuple[int, float, float]]
 
     @classmethod
@@ -113,17 +59,21 @@ class PreparedRecording:
         """Prepare some fingers of a recording."""
         hand = hand_signal(recording, tare, tuple(fingers))
         modules = {name: recording.modules[name] for name in fingers}
-        without_contact = modules if tare.without_contact else {}
         exact = relabel(recording, LabelRule(margin=0.0)).modules
+        exact_labels = {name: exact[name].label_states for name in fingers}
+        glitches, slips = {}, {}
+        for name, module in modules.items():
+            of_glitch = [label for label in exact[name].labels if label.cause is Cause.GLITCH]
+            glitches[name] = label_states(of_glitch, module.times) != UNKNOWN
+            slips[name] = slip_truth(recording, name, module.times, exact_labels[name] == STABLE)
+        rest = modules if tare.without_contact else {}
         return cls(
-            hand=hand,
-            labels={name: module.label_states for name, module in modules.items()},
-            exact_labels={name: exact[name].label_states for name in fingers},
-            glitches={name: _glitch_samples(exact[name]) for name in fingers},
-            at_rest={
-                name: rest_moments(module, tare, hand.rate)
-                for name, module in without_contact.items()
-            },
+            hand,
+            {name: module.label_states for name, module in modules.items()},
+            exact_labels,
+            glitches,
+            {name: truth for name, truth in slips.items() if truth is not None},
+            {name: rest_moments(module, tare, hand.rate) for name, module in rest.items()},
         )
 
     @property
@@ -136,11 +86,85 @@ class PreparedRecording:
         """Size of the arrays that it adds to those of the recording [byte]."""
         codes = (self.labels, self.exact_labels, self.glitches)
         n_bytes = sum(array.nbytes for arrays in codes for array in arrays.values())
+        n_bytes += sum(truth.codes.nbytes + truth.quiet.nbytes for truth in self.slips.values())
         return n_bytes + sum(finger.force.nbytes for finger in self.hand.fingers.values())
 
 
+@dataclass(frozen=True, eq=False)
+class RecordingFeatures:
+    """Features, labels and truth of one recording, without its readings.
+
+    A unit is what has one classifier: a finger, or `HAND` for a whole-hand method. Scored are the
+    samples at which all compared methods can have an estimate.
+
+    Attributes:
+        name: of the recording.
+        object: the object in the hand; None if the recording does not name it.
+        truth: of the recording.
+        times: sample times of each finger [s].
+        amplitude: F_a of each finger [unit of the readings]; NaN where there is no force.
+        labels: label codes of each finger.
+        scored_labels: the same, UNKNOWN at samples that are not scored.
+        exact_labels: the same without margin, if the truth is known.
+        glitches: (n,) samples of each finger whose exact label has the cause glitch.
+        slips: truth of the scored samples, of each finger whose slips are known.
+        at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
+        features: (n, n_features) of each unit. Those of `HAND` are at the times of the first
+            finger.
+    """
+
+    name: str
+    object: str | None
+    truth: Truth | None
+    times: Mapping[str, Array]
+    amplitude: Mapping[str, Array]
+    labels: Mapping[str, Codes]
+    scored_labels: Mapping[str, Codes]
+    exact_labels: Mapping[str, Codes]
+    glitches: Mapping[str, Mask]
+    slips: Mapping[str, SlipTruth]
+    at_rest: Mapping[str, tuple[int, float, float]]
+    features: Mapping[str, npt.NDArray[Any]]
+
+    def hand_labels(self, labels: Mapping[str, Codes]) -> FingerDecisions:
+        """Return the hand with the label that follows from these finger labels."""
+        fingers = {
+            name: FingerDecisions(times, labels[name], labels[name], np.full(len(times), np.nan))
+            for name, times in self.times.items()
+        }
+        return hand_decisions(fingers, len(fingers))
+
+    def unit_labels(self, unit: str) -> Codes:
+        """Return the labels that train a unit: for the hand, at the times of the first finger."""
+        if unit != HAND:
+            return self.labels[unit]
+        hand = self.hand_labels(self.labels)
+        return hand.labels[np.searchsorted(hand.times, next(iter(self.times.values())))]
+
+    def slip_labels(self, unit: str) -> Codes | None:
+        """Return STABLE where a unit is still, UNSTABLE where it slides; None if it is not known.
+
+        The hand slides if one of its fingers slides.
+        """
+        fingers = list(self.slips) if unit == HAND else [unit] if unit in self.slips else []
+        if not fingers:
+            return None
+        times = self.times[unit] if unit != HAND else next(iter(self.times.values()))
+        codes = np.full(len(times), NOT_HELD, dtype=np.int8)
+        for finger in fingers:
+            own = np.append(np.int8(NOT_HELD), self.slips[finger].codes)
+            at = np.searchsorted(self.times[finger], times, side="right")
+            codes = np.maximum(codes, own[at])
+        states = np.select([codes == STILL, codes == SLIDING], [STABLE, UNSTABLE], default=UNKNOWN)
+        return states.astype(np.int8)
+
+
 def corpus_features(
-    method: Method, corpus: Corpus, variation: Variation, stride: int = 1, warm_up: float = 0.0
+    method: Method,
+    corpus: Corpus,
+    variation: Variation = UNCHANGED,
+    stride: int = 1,
+    warm_up: float = 0.0,
 ) -> list[RecordingFeatures]:
     """Return the features of all recordings of a corpus that have one of its fingers.
 
@@ -156,8 +180,7 @@ def corpus_features(
 
 
 def prepared_recordings(
-    corpus: Corpus,
-    variation: Variation = Variation(),  # noqa: B008 (frozen)
+    corpus: Corpus, variation: Variation = UNCHANGED
 ) -> Iterator[PreparedRecording]:
     """Yield the recordings of a corpus that have one of its fingers, in order.
 
@@ -170,9 +193,11 @@ def prepared_recordings(
     """
     tare = Tare.parse(corpus.tare)
     for recording in corpus.load():
-        if not (fingers := _fingers(corpus, recording)):
+        modules = recording.modules
+        fingers = tuple(f for f in corpus.fingers if f in modules and modules[f].n_samples)
+        if not fingers:
             continue
-        if variation != Variation():
+        if variation != UNCHANGED:
             yield PreparedRecording.of(variation.apply(recording), tare, fingers)
             continue
         prepare = partial(PreparedRecording.of, recording, tare, fingers)
@@ -180,44 +205,38 @@ def prepared_recordings(
         yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
 
 
-def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
-    modules = recording.modules
-    return tuple(f for f in corpus.fingers if f in modules and modules[f].n_samples)
-
-
-def _glitch_samples(module: Tactile) -> Mask:
-    """Return the samples of a finger whose label has the cause glitch."""
-    of_glitch = [label for label in module.labels if label.cause is Cause.GLITCH]
-    return np.asarray(label_states(of_glitch, module.times) != UNKNOWN)
-
-
 def recording_features(
     method: Method, prepared: PreparedRecording, stride: int = 1, warm_up: float = 0.0
 ) -> RecordingFeatures:
-    """Return the features of a recording.
-
-    Args:
-        method: computes the features.
-        prepared: the recording.
-        stride: keep the features of every n-th sample. They are computed from all samples.
-        warm_up: time at the start of every unbroken stretch that is not scored [s].
-    """
+    """Return the features of a recording; the arguments are those of `corpus_features`."""
     hand, recording = prepared.hand, prepared.recording
-    held = recording.metadata.get("object")
+    grasped_object = recording.metadata.get("object")
     kept = slice(None, None, stride)
-    compared = {name: _after(warm_up, hand, name)[kept] for name in hand.fingers}
-    labels = _every(prepared.labels, kept)
+    times = {name: finger.times[kept] for name, finger in hand.fingers.items()}
+    scored = {name: _scored(hand, name, warm_up)[kept] for name in hand.fingers}
+    labels = {name: codes[kept] for name, codes in prepared.labels.items()}
+    exact = {name: codes[kept] for name, codes in prepared.exact_labels.items()}
+    slips = {
+        name: replace(truth, codes=truth.codes[kept], quiet=truth.quiet[kept])
+        for name, truth in prepared.slips.items()
+    }
     return RecordingFeatures(
         name=recording.name,
-        object=None if held is None else str(held),
+        object=None if grasped_object is None else str(grasped_object),
         truth=recording.truth,
-        times={name: finger.times[kept] for name, finger in hand.fingers.items()},
+        times=times,
         amplitude={name: finger.amplitude[kept] for name, finger in hand.fingers.items()},
         labels=labels,
-        compared=compared,
-        scored_labels=_masked(labels, compared),
-        exact_labels=_masked(_every(prepared.exact_labels, kept), compared),
-        glitches=_every(prepared.glitches, kept),
+        scored_labels={
+            name: np.where(scored[name], codes, UNKNOWN) for name, codes in labels.items()
+        },
+        exact_labels={
+            name: np.where(scored[name], codes, UNKNOWN) for name, codes in exact.items()
+        },
+        glitches={name: mask[kept] for name, mask in prepared.glitches.items()},
+        slips={
+            name: truth_without(times[name], truth, ~scored[name]) for name, truth in slips.items()
+        },
         at_rest=prepared.at_rest,
         features={
             unit: np.asarray(rows[kept], dtype=np.float32)
@@ -226,23 +245,10 @@ def recording_features(
     )
 
 
-def _every(arrays: Mapping[str, npt.NDArray[Any]], kept: slice) -> dict[str, npt.NDArray[Any]]:
-    return {name: array[kept] for name, array in arrays.items()}
-
-
-def _after(warm_up: float, hand: HandSignal, name: str) -> Mask:
+def _scored(hand: HandSignal, name: str, warm_up: float) -> Mask:
     """Return the samples of a finger that come at least `warm_up` [s] after a stretch begins."""
     times = hand.fingers[name].times
-    if not warm_up:
-        return np.ones(len(times), dtype=np.bool_)
-    after = np.zeros(len(times), dtype=np.bool_)
-    for rows in hand.fingers[name].stretches:
-        after[rows] = times[rows] >= times[rows.start] + warm_up - 0.5 / hand.rate
-    return after
-
-
-def _masked(labels: Mapping[str, Codes], compared: Mapping[str, Mask]) -> dict[str, Codes]:
-    return {
-        name: np.where(compared[name], codes, UNKNOWN).astype(np.int8)
-        for name, codes in labels.items()
-    }
+    scored = np.full(len(times), not warm_up)
+    for rows in hand.fingers[name].stretches if warm_up else ():
+        scored[rows] = times[rows] >= times[rows.start] + warm_up - 0.5 / hand.rate
+    return scored

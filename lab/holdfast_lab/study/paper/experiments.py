@@ -15,14 +15,9 @@ from holdfast.plots.time_series import FingerSeries, StateCodes, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable
-from holdfast_lab.study.evaluation.fitted_method import (
-    FittedMethod,
-    TrainingSamples,
-    gather_training_samples,
-)
+from holdfast_lab.study.evaluation.fitted_method import Training
 from holdfast_lab.study.evaluation.recording_features import corpus_features
-from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.methods import METHODS, Method
+from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.paper_tables import first_finger
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
@@ -104,10 +99,10 @@ def predict_examples(
     main = corpora["main"]
     examples = list(_choose(corpora, finger))
     for name in TITLES:
-        features = corpus_features(METHODS[name], _select(main, finger), Variation())
-        samples = gather_training_samples(features)
+        features = corpus_features(METHODS[name], _select(main, finger))
+        training = Training.of(METHODS[name], features, seed=seed)
         for example in examples:
-            states = _predict(METHODS[name], samples, corpora, example, seed)
+            states = _predict(training, corpora, example)
             example.states[name] = states.tolist()
     first = _first(main, finger, EXPERIMENT_CASES["disturbed"]) or main.recordings[0]
     return [ExampleRecording("protocol", "main", first, finger), *examples]
@@ -137,24 +132,20 @@ def _first(corpus: Corpus, finger: str, case: str) -> str | None:
 
 
 def _predict(
-    method: Method,
-    samples: TrainingSamples,
-    corpora: Mapping[str, Corpus],
-    example: ExampleRecording,
-    seed: int,
+    training: Training, corpora: Mapping[str, Corpus], example: ExampleRecording
 ) -> StateCodes:
     """Return states (n,) of a recording, by a fit to all other main recordings."""
     own = (example.role, example.recording)
     names = corpora["main"].recordings
     numbers = {k for k, name in enumerate(names) if own != ("main", name)}
-    fitted = FittedMethod.fit(method, samples, numbers, seed)
+    fitted = training.fit(numbers)
     if not fitted.classifiers:
         raise TrainingError(
             f"without {example.recording} the {example.finger} has labels of one class"
         )
     corpus = _select(corpora[example.role], example.finger, example.recording)
-    (features,) = corpus_features(method, corpus, Variation())
-    return fitted.scores(features).decide(features, features.labels).fingers[example.finger].states
+    (features,) = corpus_features(training.method, corpus)
+    return fitted.scores(features).fingers[example.finger].states()
 
 
 def _select(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus:

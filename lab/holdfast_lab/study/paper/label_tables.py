@@ -14,9 +14,8 @@ from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.rows import DIGITS, ratio_row, sample_rows
 from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast_lab.study.evaluation.fitted_method import Training
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.label_sources import LabelSource, has_truth, relabelled
 from holdfast_lab.study.paper.random_split import ConfusionCounts, rate_rows
@@ -112,23 +111,21 @@ def evaluate_labels(
         seed: of folds and fits.
     """
     method = METHODS[name]
-    by_source = _features_by_source(corpus, corpus_features(method, corpus, Variation()))
-    n = len(by_source["exact"])
-    objects = [samples.object for samples in by_source["exact"]]
+    by_source = _features_by_source(corpus, corpus_features(method, corpus))
     metrics = {}
     for trained in SOURCES:
-        training = gather_training_samples(by_source[trained], max_samples)
+        training = Training.of(method, by_source[trained], max_samples, seed)
+        everything = set(range(len(training.recordings)))
         decided: dict[LabelSource, dict[int, Decisions]] = {source: {} for source in SOURCES}
-        for held in held_out_folds(objects, "recording", n_folds, seed):
-            fitted = FittedMethod.fit(method, training, set(range(n)) - held, seed)
-            for place in held:
+        for left_out in held_out_folds(training.objects, "recording", n_folds, seed):
+            fitted = training.fit(everything - left_out)
+            for index in left_out:
                 for tested in SOURCES:
-                    recording = by_source[tested][place]
-                    decided[tested][place] = fitted.scores(recording).decide(
-                        recording, recording.labels
-                    )
+                    recording = by_source[tested][index]
+                    scores = fitted.scores(recording)
+                    decided[tested][index] = scores.decide(recording.name, recording.labels)
         for tested, of_recording in decided.items():
-            ordered = [of_recording[place] for place in sorted(of_recording)]
+            ordered = [of_recording[index] for index in sorted(of_recording)]
             metrics[f"{trained}/{tested}"] = summarise(ordered, seed=seed)
     rule = [_confusion(exact, drawn) for exact, drawn in zip(*by_source.values(), strict=True)]
     return LabelEvaluation(metrics, rule)

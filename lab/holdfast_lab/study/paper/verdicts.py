@@ -26,10 +26,10 @@ from holdfast.sensors.types import Array
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
+from holdfast_lab.study.evaluation.error_breakdown import latest_rows
 from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
@@ -143,18 +143,18 @@ def grasp_verdicts(
         seed: of folds and fits.
     """
     method = METHODS[name]
-    main = corpus_features(method, corpora["main"], Variation())
+    main = corpus_features(method, corpora["main"])
     cases = {role: _cases(corpus) for role, corpus in corpora.items()}
-    training = gather_training_samples(main, max_samples)
+    training = Training.of(method, main, max_samples, seed)
     everything = set(range(len(main)))
-    by_place: dict[int, GraspVerdict] = {}
-    for held in held_out_folds(training.objects, "recording", n_folds, seed):
-        fitted = FittedMethod.fit(method, training, everything - held, seed)
-        for place in held:
-            case = cases["main"][main[place].name]
-            by_place[place] = _verdict("main", case, main[place], fitted)
-    verdicts = [by_place[place] for place in sorted(by_place)]
-    fitted = FittedMethod.fit(method, training, everything, seed)
+    by_index: dict[int, GraspVerdict] = {}
+    for left_out in held_out_folds(training.objects, "recording", n_folds, seed):
+        fitted = training.fit(everything - left_out)
+        for index in left_out:
+            case = cases["main"][main[index].name]
+            by_index[index] = _verdict("main", case, main[index], fitted)
+    verdicts = [by_index[index] for index in sorted(by_index)]
+    fitted = training.fit()
     for role, corpus in corpora.items():
         names = tuple(
             recording
@@ -165,7 +165,7 @@ def grasp_verdicts(
             chosen = msgspec.structs.replace(corpus, recordings=names)
             verdicts += [
                 _verdict(role, cases[role][corpus_feature.name], corpus_feature, fitted)
-                for corpus_feature in corpus_features(method, chosen, Variation())
+                for corpus_feature in corpus_features(method, chosen)
             ]
     return verdicts
 
@@ -177,7 +177,7 @@ def _cases(corpus: Corpus) -> dict[str, str]:
 def _verdict(
     role: str, case: str, recording: RecordingFeatures, fitted: FittedMethod
 ) -> GraspVerdict:
-    decisions = fitted.scores(recording).decide(recording, recording.exact_labels)
+    decisions = fitted.scores(recording).decide(recording.name, recording.exact_labels)
     contact, unstable = _contact_counts(decisions, recording.truth)
     stable_after = [
         stable_after_lock(finger.times, finger.states, recording.truth)
@@ -207,7 +207,7 @@ def _contact_counts(
     contact, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
     if truth is not None:
         for finger in decisions.fingers.values():
-            phase = truth.hand["phase"][_at(truth, finger.times)]
+            phase = truth.hand["phase"][latest_rows(truth, finger.times)]
             closing = np.flatnonzero(phase == Phase.CLOSING)
             grasp = np.zeros(len(phase), dtype=bool)
             grasp[closing[0] if len(closing) else len(phase) :] = True
@@ -238,7 +238,9 @@ def stable_after_lock(
     if not held.any():
         return None
     locked_at = float(truth.times[np.argmax(held)])
-    stable = (times >= locked_at - TIME_TOLERANCE) & held[_at(truth, times)] & (states == STABLE)
+    stable = (
+        (times >= locked_at - TIME_TOLERANCE) & held[latest_rows(truth, times)] & (states == STABLE)
+    )
     first, lasting = math.inf, math.inf
     for start, end in runs(stable):
         begin = max(float(times[start]) - locked_at, 0.0)
@@ -281,11 +283,6 @@ def find_disturbances(
             )
         )
     return disturbances
-
-
-def _at(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
-    last = np.searchsorted(truth.times, times + TIME_TOLERANCE, side="right") - 1
-    return np.clip(last, 0, len(truth.times) - 1)
 
 
 def _failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:

@@ -212,8 +212,8 @@ def test_the_script_scores_the_methods_of_the_study(capsys, folder, tmp_path, mo
 def test_a_method_that_does_not_fit_a_sensor_has_no_scores(folder):
     recordings = load_features(METHODS["logreg"], folder / "tuning")
     fitted = BothTargets.fit(METHODS["logreg"], recordings)
-    fewer = {name: rows[:, :-1] for name, rows in recordings[0].features.features.items()}
-    other = replace(recordings[0], features=replace(recordings[0].features, features=fewer))
+    fewer = {name: rows[:, :-1] for name, rows in recordings[0].features.items()}
+    other = replace(recordings[0], features=fewer)
     assert set(fitted.scores(recordings[0])) == {"thumb", "index"}
     with pytest.raises(ValueError, match="no estimate of thumb in grasp0"):
         fitted.scores(other)
@@ -223,16 +223,15 @@ def test_a_hand_of_another_unit_has_the_contact_threshold_of_its_own_rest(folder
     """Readings ten thousand times smaller: nothing touches by the threshold of training."""
     method = METHODS["tangential"]
     recordings = load_features(method, folder / "tuning")
-    features = recordings[0].features
+    features = recordings[0]
     small = replace(
         features,
         amplitude={name: 1e-4 * rows for name, rows in features.amplitude.items()},
         at_rest={n: (k, 1e-4 * a, 1e-8 * b) for n, (k, a, b) in features.at_rest.items()},
     )
-    other = replace(recordings[0], features=small)
     own, trained = (BothTargets.fit(method, recordings, own_rest=rest) for rest in (True, False))
-    assert trained.scores(other)["thumb"].stable.max() < 1e-9
-    scores = own.scores(other)["thumb"].stable
+    assert trained.scores(small)["thumb"].stable.max() < 1e-9
+    scores = own.scores(small)["thumb"].stable
     assert (scores == own.scores(recordings[0])["thumb"].stable).all()
     assert scores.max() > 0.5
 

@@ -72,7 +72,7 @@ def test_each_recording_has_the_estimates_of_a_fit_to_the_others(corpus):
     assert [each.name for each in found] == ["r0", "r1", "r2"]
     ((_, scored),) = score_splits(EvaluationJob("logreg", corpus))
     for each, expected in zip(found, scored, strict=True):
-        decided = expected.scores.decide(expected.recording, expected.recording.labels)
+        decided = expected.decide(expected.recording.labels)
         for name, finger in decided.fingers.items():
             np.testing.assert_array_equal(each.fingers[name].states.array, finger.states)
             np.testing.assert_array_equal(

@@ -6,10 +6,11 @@ import pytest
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
-from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, calibration_counts
-from study.example_recordings import PUSH, truth_of
+from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, count_glitches
+from study.example_recordings import GLITCH, PUSH, truth_of
 
 TIMES = np.arange(1725) / 150
+GROUND_TRUTH = truth_of(TIMES, ("thumb", "index"))
 LABELS = np.where((TIMES >= 2.3) & (TIMES < 9.5), STABLE, UNSTABLE)
 LABELS = np.where((TIMES >= 5.3 - 1e-9) & (TIMES < 6.5), UNSTABLE, LABELS).astype(np.int8)
 
@@ -29,8 +30,7 @@ def test_everything_called_stable():
     assert found.phases["disturbed"] == (360, 360)
     assert found.phases["locked"] == (1800, 0)
     assert found.phases["free"][0] == found.phases["free"][1] == 2 * (225 + 225)
-    (push,) = found.disturbances
-    assert (push.direction, push.n, push.n_wrong) == ("down", 358, 358)
+    assert found.disturbances == [("down", (358, 358))]
     assert [(grip.stable, grip.not_stable) for grip in found.grips] == [((900, 0), (180, 180))] * 2
     assert [grip.force for grip in found.grips] == pytest.approx([2.0, 2.0])
 
@@ -52,15 +52,14 @@ def test_directions(force, direction):
     outside = np.outer(np.linalg.norm(truth.hand["outside_force"], axis=1), force)
     turned = Truth(TIMES, {**truth.hand, "outside_force": outside}, truth.fingers)
     assert force != PUSH
-    assert [p.direction for p in breakdown_of(np.full(1725, STABLE), turned).disturbances] == [
-        direction
-    ]
+    ((found, _),) = breakdown_of(np.full(1725, STABLE), turned).disturbances
+    assert found == direction
 
 
 def test_a_whole_hand_method_has_phases_and_disturbances_but_no_grips():
     found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=())
     assert found.phases["disturbed"] == (180, 180)
-    assert found.disturbances[0].n == 179
+    assert found.disturbances == [("down", (179, 179))]
     assert found.grips == []
 
 
@@ -69,12 +68,33 @@ def test_the_breakdown_is_empty_without_a_truth():
     assert (found.phases, found.grips, found.disturbances) == ({}, [], [])
 
 
-def test_calibration_counts_by_hand():
-    labels, states = [STABLE, UNSTABLE, STABLE, STABLE], [STABLE, STABLE, UNSTABLE, UNKNOWN]
-    finger = FingerDecisions(np.arange(4.0), labels, states, [0.95, 0.91, 0.05, np.nan])
-    table = np.array(calibration_counts(Decisions("one", {"thumb": finger})))
-    assert table[9] == pytest.approx([1.86, 1, 2])
-    assert table[0] == pytest.approx([0.05, 1, 1])
-    assert table[1:9].sum() == 0
-    as_hand = replace(Decisions("one", {}), hand=finger)
-    assert (np.array(calibration_counts(as_hand)) == table).all()
+def sliding(*spans, speed=0.01):
+    """Return the truth with sliding on the index alone, at other times [s] and speeds [m/s]."""
+    given = np.zeros(len(TIMES))
+    for start, end in spans:
+        given[(start - 1e-9 <= TIMES) & (end - 1e-9 > TIMES)] = speed
+    fingers = {name: dict(arrays) for name, arrays in GROUND_TRUTH.fingers.items()}
+    fingers["thumb"]["slip_speed"] = np.zeros(len(TIMES))
+    fingers["index"]["slip_speed"] = given
+    return replace(GROUND_TRUTH, fingers=fingers)
+
+
+def test_nothing_slides_that_is_not_held_or_not_touched():
+    """Sliding that began in the glitch counts until it is over, but not once it is released."""
+    released = count_glitches(sliding((GLITCH + 0.05, 9.9)))
+    assert released.distances == [pytest.approx(0.01 * (9.5 - GLITCH - 0.05), rel=0.01)]
+    moved = sliding((GLITCH + 0.05, GLITCH + 0.25))
+    fingers = {
+        f: {**own, "contact_force": np.zeros((len(TIMES), 3))} for f, own in moved.fingers.items()
+    }
+    assert count_glitches(replace(moved, fingers=fingers)).distances == [0.0]
+
+
+def test_glitches_are_counted_with_the_distance_that_the_object_slides():
+    calm = count_glitches(sliding())
+    assert (calm.n, calm.distances) == (1, [0.0])
+    assert calm.grasped_seconds == pytest.approx(7.2, abs=0.01)
+    moved = count_glitches(sliding((5.6, 5.9), (GLITCH + 0.05, GLITCH + 0.25)))
+    assert moved.distances == [pytest.approx(2e-3, rel=0.01)]
+    assert count_glitches(sliding((GLITCH + 0.2, GLITCH + 0.3))).distances == [0.0]
+    assert count_glitches(None).n == 0

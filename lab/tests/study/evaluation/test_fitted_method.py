@@ -5,10 +5,9 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, hand_decisions
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.scores import RecordingScores
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.scores import Scores
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
@@ -18,7 +17,8 @@ pytestmark = pytest.mark.slow
 
 def recording_at(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
-    return RecordingFeatures("one", None, None, times, {}, empty, {}, empty, empty, {}, {}, {})
+    nothing = [dict(empty) for _ in range(4)]
+    return RecordingFeatures("one", None, None, times, {}, *nothing, {}, {}, {})
 
 
 def state_of_finger(margin, in_contact, shift):
@@ -37,8 +37,9 @@ def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
     for each in margins.values():
         each[generator.random(60) < 0.1] = np.nan
     in_contact = {f: generator.random(60) < 0.7 for f in times}
-    scores = RecordingScores(margins, dict.fromkeys(times, 0.3), in_contact)
-    score = scores.hand(recording_at(times))
+    score = Scores.of_hand(
+        [Scores.of_finger(own, margins[f], 0.3, in_contact[f]) for f, own in times.items()]
+    )
     for shift in (-np.inf, -1.0, 0.0, 0.4, np.inf):
         fingers = {}
         for f, own in times.items():
@@ -52,24 +53,41 @@ def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
 
 
 def test_the_probability_of_a_hand_is_the_smallest_of_the_fingers_in_contact():
-    times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b", "c")}
+    times = np.array([0.0, 1.0, 2.0])
     margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
                "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
     in_contact = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
-    scores = RecordingScores(margins, {"a": 2.0, "b": 0.0, "c": 0.0}, in_contact)
-    found = scores.hand(recording_at(times)).probability
+    thresholds = {"a": 2.0, "b": 0.0, "c": 0.0}
+    fingers = [Scores.of_finger(times, margins[f], thresholds[f], in_contact[f]) for f in margins]
+    found = Scores.of_hand(fingers).probability
     odds = np.exp([1.0, 1.0, 2.0])
     assert found == pytest.approx(odds / (1 + odds))
 
 
 def test_a_whole_hand_method_decides_for_no_finger():
-    times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b")}
-    in_contact = {"a": np.ones(3, bool), "b": np.array([True, True, False])}
-    scores = RecordingScores({HAND: np.array([np.nan, 1.0, 1.0])}, {HAND: 0.0}, in_contact)
-    recording = recording_at(times)
-    decided = scores.decide(recording, recording.labels)
+    """Its estimate of the hand is the latest one of every finger."""
+    recording = replace(
+        recording_at({"a": np.array([0.0, 1.0, 2.0]), "b": np.array([0.0, 1.5, 2.0])}),
+        amplitude={"a": np.ones(3), "b": np.array([1.0, 1.0, 0.0])},
+        features={HAND: np.array([[np.nan], [0.8], [0.9]])},
+    )
+    scores = FittedMethod({HAND: Fixed()}, {"a": 0.5, "b": 0.5}).scores(recording)
+    decided = scores.decide("one", recording.labels)
     assert not decided.fingers
-    assert decided.hand.states.tolist() == [UNKNOWN, STABLE, NO_CONTACT]
+    assert scores.fingers["b"].known.tolist() == [False, True, True]
+    assert scores.fingers["b"].margin == pytest.approx([np.inf, np.log(4), np.inf])
+    assert scores.fingers["b"].grasped.tolist() == [True, True, False]
+    assert decided.hand.times.tolist() == [0.0, 1.0, 1.5, 2.0]
+    assert decided.hand.states.tolist() == [UNKNOWN, STABLE, STABLE, NO_CONTACT]
+
+
+class Fixed:
+    """A classifier whose probability is its feature."""
+
+    n_features, threshold = 1, 0.5
+
+    def probability(self, features):
+        return features[:, 0]
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +96,8 @@ def corpus(tmp_path_factory):
 
 
 def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
-    training = gather_training_samples(
-        corpus_features(METHODS["logreg"], corpus, Variation()), max_samples=100
+    training = Training.of(
+        METHODS["logreg"], corpus_features(METHODS["logreg"], corpus), max_samples=100
     )
     for samples in training.samples.values():
         assert len(samples.positive) <= 100
@@ -89,17 +107,13 @@ def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
 
 def test_a_fit_does_not_depend_on_other_recordings(corpus):
     method = METHODS["logreg"]
-    recordings = corpus_features(method, corpus, Variation())
+    recordings = corpus_features(method, corpus)
     other = [*recordings[:3], scrambled(recordings[3])]
-    fitted_methods = [
-        FittedMethod.fit(method, gather_training_samples(each), {0, 1, 2}, 0)
-        for each in (recordings, other)
-    ]
+    fitted_methods = [Training.of(method, each).fit({0, 1, 2}) for each in (recordings, other)]
     assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
     assert fitted_methods[0].contact_thresholds == fitted_methods[1].contact_thresholds
-    assert FittedMethod.fit(method, gather_training_samples(other), {1, 2, 3}, 0).classifiers != (
-        FittedMethod.fit(method, gather_training_samples(recordings), {1, 2, 3}, 0).classifiers
-    )
+    late = [Training.of(method, each).fit({1, 2, 3}) for each in (recordings, other)]
+    assert late[0].classifiers != late[1].classifiers
 
 
 def scrambled(recording):
@@ -114,27 +128,23 @@ def scrambled(recording):
 
 def test_a_missing_finger_is_not_evaluated(corpus):
     method = METHODS["logreg"]
-    recordings = corpus_features(method, corpus, Variation())
+    recordings = corpus_features(method, corpus)
     lacking = without(recordings[3], "index")
-    fitted = FittedMethod.fit(
-        method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0
-    )
-    decided = fitted.scores(lacking).decide(lacking, lacking.labels)
+    fitted = Training.of(method, [*recordings[:3], lacking]).fit()
+    decided = fitted.scores(lacking).decide("one", lacking.labels)
     assert set(decided.fingers) == {"thumb"}
     assert (decided.hand.states == STABLE).any()
 
 
 def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
     method = METHODS["jl_global_logreg"]
-    recordings = corpus_features(method, corpus, Variation())
+    recordings = corpus_features(method, corpus)
     lacking = without(recordings[3], "index")
     narrow = {HAND: lacking.features[HAND][:, :36]}
     lacking = replace(lacking, features=narrow)
-    fitted = FittedMethod.fit(
-        method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0
-    )
-    assert (fitted.scores(lacking).decide(lacking, lacking.labels).hand.states == UNKNOWN).all()
-    known = fitted.scores(recordings[0]).decide(recordings[0], recordings[0].labels).hand
+    fitted = Training.of(method, [*recordings[:3], lacking]).fit()
+    assert (fitted.scores(lacking).decide("one", lacking.labels).hand.states == UNKNOWN).all()
+    known = fitted.scores(recordings[0]).decide("one", recordings[0].labels).hand
     assert (known.states == STABLE).any()
 
 
@@ -155,11 +165,11 @@ def without(recording, finger):
 
 def test_one_class_gives_no_classifier_and_no_scores(corpus):
     method = METHODS["logreg"]
-    recordings = corpus_features(method, corpus, Variation())
+    recordings = corpus_features(method, corpus)
     stable = {f: np.full(len(t), STABLE, dtype=np.int8) for f, t in recordings[0].times.items()}
     one = replace(recordings[0], labels=stable)
-    fitted = FittedMethod.fit(method, gather_training_samples([one]), {0}, 0)
+    fitted = Training.of(method, [one]).fit()
     assert not fitted.classifiers
-    decided = fitted.scores(one).decide(one, one.labels)
+    decided = fitted.scores(one).decide("one", one.labels)
     assert (decided.hand.states == UNKNOWN).all()
     assert all((finger.states == UNKNOWN).all() for finger in decided.fingers.values())

@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
-from holdfast_lab.study.evaluation.scores import HandScores
+from holdfast_lab.study.evaluation.scores import Scores
 
 
-def hand_scores(margin, known=None, held=None, rate=100.0):
+def hand_scores(margin, known=None, grasped=None, rate=100.0):
     margin = np.array(margin, dtype=float)
     n = len(margin)
-    return HandScores(
+    return Scores(
         times=np.arange(n) / rate,
         margin=margin,
         known=np.ones(n, dtype=bool) if known is None else np.array(known, dtype=bool),
-        held=np.ones(n, dtype=bool) if held is None else np.array(held, dtype=bool),
+        grasped=np.ones(n, dtype=bool) if grasped is None else np.array(grasped, dtype=bool),
         probability=np.full(n, 0.5),
     )
 
@@ -22,9 +22,9 @@ def test_an_unstable_sample_is_held():
     assert found.tolist() == [STABLE] * 2 + [UNSTABLE] * 3 + [STABLE] * 3
 
 
-def test_no_state_is_held_without_a_held_object_or_with_an_unknown_finger():
-    held, known = [1, 1, 1, 0, 1, 1], [1, 1, 1, 1, 0, 1]
-    found = hand_scores([1, 1, -1, np.inf, 1, 1], known, held).hold(0.04).states()
+def test_no_state_is_held_without_a_grasped_object_or_with_an_unknown_finger():
+    grasped, known = [1, 1, 1, 0, 1, 1], [1, 1, 1, 1, 0, 1]
+    found = hand_scores([1, 1, -1, np.inf, 1, 1], known, grasped).hold(0.04).states()
     assert found.tolist() == [STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, UNSTABLE]
 
 

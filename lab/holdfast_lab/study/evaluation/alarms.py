@@ -1,0 +1,192 @@
+"""Alarms of a hand: which are false, which are of a glitch, and at which threshold they are few.
+
+The paper counts the detection of a glitch of the hand's controller as a success. For a user it is
+a false alarm, because nothing but the hand itself moved the object. So every table of events has
+both readings. In a third one glitches are left out.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import msgspec
+import numpy as np
+
+from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE
+from holdfast.metrics import match_alarms
+from holdfast.metrics.decisions import Codes
+from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
+from holdfast.metrics.masks import Mask, runs
+from holdfast.metrics.slip_truth import sample_durations
+from holdfast.sensors.types import Array
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
+from holdfast_lab.study.evaluation.scores import Scores
+
+EVENT = "an event"
+FALSE_ALARM = "a false alarm"
+LEFT_OUT = "left out"
+READINGS = (EVENT, FALSE_ALARM, LEFT_OUT)
+"""Readings by the words that stand for them in tables, under "a glitch is"."""
+
+
+class AlarmLabels(NamedTuple):
+    """Labels by which the alarms of a hand, or a finger, are counted.
+
+    Attributes:
+        labels: (n,) label codes.
+        glitch: (n,) samples at which an alarm is one of a glitch.
+        left_out: (n,) samples at which neither an alarm nor a stable label is counted.
+    """
+
+    labels: Codes
+    glitch: Mask
+    left_out: Mask
+
+    @classmethod
+    def of(cls, labels: Codes) -> Self:
+        """Return labels without glitches."""
+        nowhere = np.zeros(len(labels), dtype=np.bool_)
+        return cls(labels, nowhere, nowhere)
+
+
+def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
+    """Return the exact labels of the hand for each of `READINGS`.
+
+    In an event a glitch is unstable; otherwise it is stable, unless something else happens.
+    """
+    stable = {
+        name: np.where(recording.glitches[name] & (codes != UNKNOWN), STABLE, codes)
+        for name, codes in recording.exact_labels.items()
+    }
+    event, other = (recording.hand_labels(labels) for labels in (recording.exact_labels, stable))
+    glitch = runs(event.labels != other.labels)
+    ends = event.times + sample_durations(event.times)
+    near = _near(event.times, event.times[glitch[:, 0]], ends[glitch[:, 1] - 1])
+    nowhere = np.zeros_like(near)
+    return {
+        EVENT: AlarmLabels(event.labels, near, nowhere),
+        FALSE_ALARM: AlarmLabels(other.labels, near, nowhere),
+        LEFT_OUT: AlarmLabels(other.labels, nowhere, near),
+    }
+
+
+def _near(times: Array, starts: Array, ends: Array) -> Mask:
+    """Return the samples at which an alarm belongs to a span of time, by the rule for events."""
+    near = np.zeros(len(times), dtype=np.bool_)
+    first = np.searchsorted(times, starts - EARLY_TOLERANCE - TIME_TOLERANCE)
+    last = np.searchsorted(times, ends + LATE_TOLERANCE + TIME_TOLERANCE, side="right")
+    for rows in map(slice, first, last):
+        near[rows] = True
+    return near
+
+
+class AlarmStatistics(msgspec.Struct, frozen=True):
+    """Statistics of the alarms of a hand in one or more recordings, at one threshold.
+
+    Attributes:
+        delays: alarm minus onset of each event [s]; infinite for a missed event.
+        n_events_not_stable: events at whose onset the hand was already not called stable.
+        n_false_alarms: alarms that belong to no event.
+        n_under_stable: false alarms under a stable label.
+        n_of_glitch: of those, alarms that belong to a glitch of the hand's controller.
+        stable_seconds: duration of the stable label [s].
+    """
+
+    delays: list[float]
+    n_events_not_stable: int
+    n_false_alarms: int
+    n_under_stable: int
+    n_of_glitch: int
+    stable_seconds: float
+
+    @classmethod
+    def of(cls, scores: Scores, labels: AlarmLabels, shift: float = 0.0) -> Self:
+        """Return the statistics of a hand, or a finger, at a shifted threshold."""
+        times, states = scores.times, scores.states(shift)
+        match = match_alarms(times, labels.labels, states)
+        at = np.searchsorted(times, [alarm.time for alarm in match.false_alarms])
+        at = at[~labels.left_out[at]]
+        is_stable = labels.labels[at] == STABLE
+        left_out = sample_durations(times)[(labels.labels == STABLE) & labels.left_out]
+        # The state just before the first time at which an alarm belongs to the onset.
+        onsets = np.array([event.onset for event in match.events])
+        before = np.searchsorted(times, onsets - EARLY_TOLERANCE - TIME_TOLERANCE) - 1
+        return cls(
+            delays=[event.delay for event in match.events],
+            n_events_not_stable=int(
+                np.isin(states[before[before >= 0]], (UNSTABLE, NO_CONTACT)).sum()
+            ),
+            n_false_alarms=len(at),
+            n_under_stable=int(is_stable.sum()),
+            n_of_glitch=int((is_stable & labels.glitch[at]).sum()),
+            stable_seconds=match.stable_seconds - float(left_out.sum()),
+        )
+
+    @classmethod
+    def total(cls, parts: Sequence[Self]) -> Self:
+        """Return the statistics of all parts together."""
+        sums = {
+            name: sum(getattr(part, name) for part in parts) for name in cls.__struct_fields__[1:]
+        }
+        return cls([delay for part in parts for delay in part.delays], **sums)
+
+    def n_missed(self, post: float) -> int:
+        """Return the number of events without an alarm until onset + post [s]."""
+        return sum(delay > post + TIME_TOLERANCE for delay in self.delays)
+
+
+class FalseAlarmRanges(NamedTuple):
+    """The ranges of the threshold at which samples of one recording raise false alarms.
+
+    A sample raises an alarm if the hand was stable at the sample before and is not stable any
+    more. This is so for the thresholds above its own margin, up to the margin of the sample
+    before. So the false alarms at all thresholds are counted at once.
+
+    Attributes:
+        lower: (m,) the threshold above which the hand is not stable at the sample; minus
+            infinity if the object is not grasped, infinity if the state is not known.
+        upper: (m,) the threshold up to which the hand was stable at the sample before.
+        minutes: duration of the stable label [min].
+    """
+
+    lower: Array
+    upper: Array
+    minutes: float
+
+    @classmethod
+    def of(cls, scores: Scores, labels: AlarmLabels) -> Self:
+        """Return the ranges of the false alarms under a stable label."""
+        times, stable = scores.times, labels.labels == STABLE
+        match = match_alarms(times, labels.labels, labels.labels)
+        spans = np.array([(event.onset, event.end) for event in match.events]).reshape(-1, 2)
+        counted = stable & ~labels.left_out & ~_near(times, *spans.T)
+        seconds = match.stable_seconds
+        seconds -= float(sample_durations(times)[stable & labels.left_out].sum())
+        after = np.where(scores.known & ~scores.grasped, -np.inf, scores.margin)
+        before = np.where(scores.known & scores.grasped, scores.margin, -np.inf)
+        rows = np.flatnonzero(counted[1:] & (before[:-1] > after[1:]))
+        return cls(after[rows + 1], before[rows], seconds / 60)
+
+
+def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> float:
+    """Return the highest shift of the threshold with at most this rate of false alarms.
+
+    The rate is not exceeded at any smaller shift either. The search ends at the shift with the
+    most false alarms. Above it a hand is so rarely stable that it has few alarms to raise.
+
+    Args:
+        ranges: of the recordings that the threshold is chosen on.
+        per_minute: false alarms per minute of stable label [1/min].
+
+    Returns:
+        The shift [log odds]; minus infinity if the alarms by loss of contact alone are too many,
+        0 if there is no false alarm at any threshold.
+    """
+    lower = np.sort(np.concatenate([of_one.lower for of_one in ranges]))
+    upper = np.sort(np.concatenate([of_one.upper for of_one in ranges]))
+    edges = np.unique(np.concatenate([upper, lower]))
+    if not len(edges):
+        return 0.0
+    n_alarms = np.searchsorted(lower, edges, "right") - np.searchsorted(upper, edges, "right")
+    too_many = n_alarms > per_minute * sum(of_one.minutes for of_one in ranges)
+    last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
+    return float(edges[last])
