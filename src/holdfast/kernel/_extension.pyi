@@ -1,0 +1,2 @@
+SOURCES: str
+"""The digest of the C files that this extension was built from."""
