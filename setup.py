@@ -19,6 +19,7 @@ from setuptools.build_meta import *  # noqa: F403 (the hooks of a backend)
 from setuptools.command.build_ext import build_ext
 
 KERNEL = Path("src/holdfast/kernel")  # backends run in the folder of pyproject.toml
+SOURCES = ("module.c", "haar.c", "force.c")
 COMPILER_PACKAGE = "ziglang==0.15.2"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 """The same bits by every compiler: no fused multiply-add, and sums in the order of the source. A
@@ -88,7 +89,7 @@ if __name__ == "__main__":
     digest = runpy.run_path(str(KERNEL / "sources.py"))["digest"](KERNEL)
     kernel = Extension(
         "holdfast.kernel._extension",
-        sorted(map(str, KERNEL.glob("*.c"))),
+        [str(KERNEL / name) for name in SOURCES],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("HOLDFAST_SOURCES", f'"{digest}"')],
         py_limited_api=True,
     )
