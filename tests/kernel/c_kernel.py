@@ -11,11 +11,9 @@ import numpy as np
 from holdfast.features import arrays as at
 from holdfast.features import kernel
 from holdfast.features.specs import VALUE_KINDS
-from holdfast.features.stream import FeatureStream
 
 SOURCES = Path(kernel.__file__).parents[1] / "kernel"
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
-LANES = 4
 TYPES = {
     "size_t": ctypes.c_size_t, "hf_real": ctypes.c_double, "double": ctypes.c_double,
     "bool": ctypes.c_bool, "uint8_t": ctypes.c_uint8, "int32_t": ctypes.c_int32,
@@ -44,38 +42,33 @@ def _structures():
 STRUCTURES = _structures()
 
 
-def compiled(folder, *options, sources="kernel.c", compiler="cc"):
-    """Compile the kernel to a library in a folder, and load it."""
+def compiled(folder, *options, lanes=4, compiler="cc"):
+    """Compile the kernel to a library in a folder, and load it.
+
+    Args:
+        folder: that is written to.
+        options: of the compiler.
+        lanes: in which the taxels are added up; with 1 in the order of the Python kernel.
+        compiler: the command.
+    """
     path = Path(folder) / "kernel.so"
     words = ["-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *options, "-shared", "-fPIC"]
-    command = [shutil.which(compiler), *words, "-DHOLDFAST_API=extern", SOURCES / sources]
-    subprocess.run([*command, "-o", path, "-lm"], check=True)
+    command = [shutil.which(compiler), *words, "-DHOLDFAST_API=extern", f"-DHF_LANES={lanes}"]
+    subprocess.run([*command, SOURCES / "kernel.c", "-o", path, "-lm"], check=True)
     library = ctypes.CDLL(str(path))
+    library.lanes = lanes
     library.holdfast_check.restype = ctypes.c_char_p
     library.holdfast_memory_size.restype = ctypes.c_size_t
     return library
 
 
-def lanes_of(n_taxels):
-    """Return the number of lanes of a finger."""
-    return -(-n_taxels // LANES) * LANES
-
-
-def _in_lanes(layout, values, fill=0):
-    """Return values of all taxels (n_taxels, ...) as those of lanes: by finger (..., lanes)."""
-    parts = []
-    for first, n in zip(layout.offsets, layout.n_taxels, strict=False):
-        own = values[first : first + n].reshape(n, -1).T
-        parts.append(np.pad(own, ((0, 0), (0, lanes_of(n) - n)), constant_values=fill).ravel())
-    return np.ascontiguousarray(np.concatenate(parts))
-
-
 class Tables:
     """`holdfast_hand` with the numbers of a `Layout`, and what it points to."""
 
-    def __init__(self, layout, memory):
+    def __init__(self, layout, memory, lanes):
         self.layout, self.arrays, n_fingers = layout, {}, len(layout.windows)
-        lanes = np.cumsum([0, *map(lanes_of, layout.n_taxels)])
+        self._n_lanes = -(-layout.n_taxels // lanes) * lanes  # of each finger
+        lanes = np.cumsum([0, *self._n_lanes])
         hand = self.hand = STRUCTURES["holdfast_hand"]()
         hand.n_fingers, hand.n_lanes = n_fingers, lanes[-1]
         hand.n_features, hand.n_lags = layout.specs.shape[1], len(layout.lags)
@@ -100,11 +93,20 @@ class Tables:
         ):
             lag.samples, lag.seconds = samples, seconds
             lag.has_changes, lag.has_seconds, lag.has_means, lag.has_ratios = map(bool, families)
-        for name, values, fill in (
-            ("ignored", layout.ignored.astype(np.uint8), 1),
-            ("rotations", layout.rotations, 0), ("places", layout.places, 0),
+        for name, values in (
+            ("used", ~layout.ignored), ("rotations", layout.rotations), ("places", layout.places)
         ):  # fmt: skip
-            setattr(hand, name, self._place(name, _in_lanes(layout, values, fill)))
+            setattr(hand, name, self._place(name, self._in_lanes(values)))
+
+    def _in_lanes(self, values):
+        """Return values of all taxels (n_taxels, ...) as those of lanes: by finger (..., lanes)."""
+        parts = []
+        for first, n, lanes in zip(
+            self.layout.offsets, self.layout.n_taxels, self._n_lanes, strict=False
+        ):
+            own = values[first : first + n].reshape(n, -1).T
+            parts.append(np.pad(own, ((0, 0), (0, lanes - n))).ravel())
+        return np.concatenate(parts).astype(np.float64)
 
     def _place(self, name, array):
         self.arrays[name] = array
@@ -121,7 +123,7 @@ class Tables:
         ):  # fmt: skip
             setattr(finger, name, layout.constants[f, column])
         finger.normal[:] = layout.normals[f]
-        finger.normal_axis, finger.bridges = layout.normal_axes[f], layout.windows[f, at.BRIDGES]
+        finger.bridges = layout.windows[f, at.BRIDGES]
         finger.sigma_window = layout.windows[f, at.SIGMA_WINDOW]
         finger.ready_window = layout.windows[f, at.READY_WINDOW]
 
@@ -140,7 +142,7 @@ class CStream:
 
     def __init__(self, library, stream):
         self._library, layout = library, stream.layout
-        self.tables = Tables(layout, stream.memory)
+        self.tables = Tables(layout, stream.memory, library.lanes)
         self.address = ctypes.byref(self.tables.hand)
         wrong = library.holdfast_check(self.address)
         if wrong:
@@ -177,24 +179,22 @@ def _pointer(array):
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-def same_bits(left, right):
-    """Return whether two arrays have the same bits; NaN is equal to NaN."""
-    left, right = np.ascontiguousarray(left), np.ascontiguousarray(right)
-    same = left.view(np.int64) == right.view(np.int64)
-    return bool((same | ((left != left) & (right != right))).all())
+def close(got, expected, tolerance):
+    """Return which numbers are equal, within a share of those above 1; NaN is equal to NaN."""
+    with np.errstate(invalid="ignore"):
+        near = np.abs(got - expected) <= tolerance * np.maximum(1.0, np.abs(expected))
+    return near | (got == expected) | (np.isnan(got) & np.isnan(expected))
 
 
-def difference(library, plan_or_stream, samples):
+def difference(library, stream, samples, tolerance=0.0):
     """Return the first sample at which both kernels differ, as text; and the samples compared.
 
     Args:
         library: the C kernel.
-        plan_or_stream: of the hand.
+        stream: before its first sample.
         samples: of readings (n_taxels, 3), present (n_fingers) and time.
+        tolerance: of numbers. Reasons, faults and their taxels must be equal.
     """
-    stream = plan_or_stream
-    if not isinstance(stream, FeatureStream):
-        stream = FeatureStream(stream)
     c, output, n = CStream(library, stream), stream.output, 0
     for n, (readings, present, time) in enumerate(samples, 1):
         c.advance(np.ascontiguousarray(readings), present, time)
@@ -204,9 +204,9 @@ def difference(library, plan_or_stream, samples):
             ("status", status, output.status), ("values", values, output.values),
             ("features", features, output.features),
         ):  # fmt: skip
-            if not same_bits(got, expected):
-                places = np.argwhere(~((got == expected) | (np.isnan(got) & np.isnan(expected))))
-                first = tuple(places[0]) if len(places) else ()
+            fits = close(got, expected, 0.0 if name == "status" else tolerance)
+            if not fits.all():
+                first = tuple(np.argwhere(~fits)[0])
                 where = f"{name}{[int(i) for i in first]} of sample {n - 1} at {time:.17g} s"
                 return f"{where}: {got[first]!r} in C, {expected[first]!r} expected", n
     return None, n

@@ -19,9 +19,18 @@ from kernel.random_streams import random_plan
 N_SAMPLES = 6000
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    return compiled(tmp_path_factory.mktemp("kernel"))
+@pytest.fixture(scope="module", params=[1, 4], ids=["in-order", "in-lanes"])
+def library(request, tmp_path_factory):
+    """The kernel with the sums of Python's, whose bits it has; and as it is used."""
+    return compiled(tmp_path_factory.mktemp("kernel"), lanes=request.param)
+
+
+def assert_equal(library, stream, rows, ill_conditioned=False):
+    """Hold the kernels equal: to the last bit, or but for the rounding of sums over taxels."""
+    of_lanes = np.inf if ill_conditioned else 1e-9
+    found, n = difference(library, stream, rows, 0.0 if library.lanes == 1 else of_lanes)
+    assert found is None, stream.plan
+    return n
 
 
 def stream_of(name, tare=None, ignore=None, **options):
@@ -62,34 +71,32 @@ def assert_equal_on(library, name, recording):
     """Hold the kernels equal on a recording that some samples and readings are lost of."""
     stream = Detector.for_recording(Model.load(name), recording)._stream
     rows = recorded_rows(stream, recording, np.random.default_rng(9))
-    assert difference(library, FeatureStream(stream.plan), rows)[0] is None
+    assert_equal(library, FeatureStream(stream.plan), rows)
 
 
-class TestSameBitsAsThePythonKernel:
+class TestEqualsThePythonKernel:
     @pytest.mark.parametrize("in_contact", [False, True])
     @pytest.mark.parametrize("name", MODELS)
     def test_random_samples(self, library, name, in_contact):
         stream = stream_of(name, in_contact=in_contact)
-        found, n = difference(library, stream, random_rows(stream, 5))
-        assert found is None
-        assert n > 0.9 * N_SAMPLES
+        assert assert_equal(library, stream, random_rows(stream, 5)) > 0.9 * N_SAMPLES
 
     @pytest.mark.parametrize("tare", ["first", "none", 0.1, 5.0])
     @pytest.mark.parametrize("name", ["rich", "any"])
     def test_other_tares(self, library, name, tare):
         stream = stream_of(name, tare=tare)
-        assert difference(library, stream, random_rows(stream, 6, 3000))[0] is None
+        assert_equal(library, stream, random_rows(stream, 6, 3000))
 
     @pytest.mark.parametrize("n_ignored", [1, 20, 30])
     def test_ignored_taxels(self, library, n_ignored):
         ignore = {"index": range(n_ignored), "thumb": [7]}
         stream = stream_of("twin", ignore=ignore)
-        assert difference(library, stream, random_rows(stream, 7, 3000))[0] is None
+        assert_equal(library, stream, random_rows(stream, 7, 3000))
 
     def test_baselines_of_a_loaded_start(self, library):
         baselines = {name: np.full((30, 3), 29990.0) for name in ("thumb", "index", "middle")}
         stream = stream_of("any", in_contact=True, baselines=baselines)
-        assert difference(library, stream, random_rows(stream, 8, 3000))[0] is None
+        assert_equal(library, stream, random_rows(stream, 8, 3000))
 
     @pytest.mark.parametrize("name", ["builtin:noise-floor", "builtin:any"])
     def test_the_recording_of_the_package(self, library, name):
@@ -106,5 +113,6 @@ class TestSameBitsAsThePythonKernel:
         rng = np.random.default_rng(seed)
         for _ in range(5):
             plan = random_plan(rng)
-            found, _ = difference(library, plan, random_streams.random_rows(rng, plan, 600))
-            assert found is None, plan
+            rows = random_streams.random_rows(rng, plan, 600)
+            # In lanes only faults are equal: what is added up may be far larger than what changes.
+            assert_equal(library, FeatureStream(plan), rows, ill_conditioned=True)

@@ -46,30 +46,38 @@ typedef struct {
     hf_real most;
 } hf_scan;
 
-/* Scan the readings of a finger (3, n). Those of ignored taxels are set to zero. */
-static hf_scan hf_scan_readings(const hf_finger *f, hf_real *readings)
+/* Scan the readings of a finger (3, n). */
+static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
 {
     const size_t n = f->n;
-    hf_real sum_x = 0, sum_y = 0, sum_z = 0;
-    hf_scan scan = {0, HF_INFINITY, -HF_INFINITY};
-    for (size_t i = 0; i < f->n_taxels; ++i) {
-        if (f->ignored[i]) {
-            readings[i] = readings[n + i] = readings[2 * n + i] = 0;
-            continue;
-        }
-        const hf_real x = readings[i], y = readings[n + i], z = readings[2 * n + i];
-        sum_x += x;
-        sum_y += y;
-        sum_z += z;
-        /* Each comparison by itself: a branch of two is mispredicted by half of the samples. */
-        hf_real low = x < y ? x : y;
-        hf_real high = x > y ? x : y;
-        low = z < low ? z : low;
-        high = z > high ? z : high;
-        scan.least = low < scan.least ? low : scan.least;
-        scan.most = high > scan.most ? high : scan.most;
+    const hf_real *const used = f->used;
+    hf_sum sum_x = {{0}}, sum_y = {{0}}, sum_z = {{0}}, least, most;
+    for (size_t l = 0; l < 4; ++l) {
+        least.lane[l] = HF_INFINITY;
+        most.lane[l] = -HF_INFINITY;
     }
-    scan.total = sum_x + HF_WEIGHT_Y * sum_y + HF_WEIGHT_Z * sum_z;
+    for (size_t start = 0; start < n; start += HF_LANES) {
+        for (size_t l = 0; l < HF_LANES; ++l) {
+            const size_t i = start + l;
+            const hf_real x = readings[i], y = readings[n + i], z = readings[2 * n + i];
+            sum_x.lane[l] += x;
+            sum_y.lane[l] += y;
+            sum_z.lane[l] += z;
+            /* Each comparison by itself: a branch of two is mispredicted by half of the samples. */
+            hf_real low = x < y ? x : y;
+            hf_real high = x > y ? x : y;
+            low = z < low ? z : low;
+            high = z > high ? z : high;
+            low = used[i] > 0 ? low : HF_INFINITY;
+            high = used[i] > 0 ? high : -HF_INFINITY;
+            least.lane[l] = low < least.lane[l] ? low : least.lane[l];
+            most.lane[l] = high > most.lane[l] ? high : most.lane[l];
+        }
+    }
+    const hf_scan scan = {
+        hf_total(sum_x) + HF_WEIGHT_Y * hf_total(sum_y) + HF_WEIGHT_Z * hf_total(sum_z),
+        hf_min(hf_min(least.lane[0], least.lane[1]), hf_min(least.lane[2], least.lane[3])),
+        hf_max(hf_max(most.lane[0], most.lane[1]), hf_max(most.lane[2], most.lane[3]))};
     return scan;
 }
 
@@ -80,7 +88,7 @@ static uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
     for (size_t axis = 0; axis < 3; ++axis) {
         for (size_t i = 0; i < f->n_taxels; ++i) {
             const hf_real reading = f->readings[axis * f->n + i];
-            if (!(low < reading && reading < high) && !f->ignored[i]) {
+            if (!(low < reading && reading < high) && f->used[i] > 0) {
                 bits |= hf_bit(i);
             }
         }
@@ -199,7 +207,7 @@ static hf_changes hf_update_taxels(const hf_finger *f)
     /* s = T / tau: the weight of a sample in a first order mean. */
     const hf_real share = hf_min(1, f->hand->period / HF_NOISE_SMOOTHING);
     hf_changes changes = {false, false, 0};
-    hf_real total = 0;
+    hf_sum total = {{0}};
     for (size_t i = 0; i < f->n_taxels; ++i) {
         /* D1 = f_i(k) - f_i(k-1), D2 = D1 - D1 of the last change:
          * P1 = (1 - s) P1 + s |D1|^2, P2 = (1 - s) P2 + s |D2|^2. Without a change D1 = D2 = 0. */
@@ -222,10 +230,10 @@ static hf_changes hf_update_taxels(const hf_finger *f)
         }
         taxel->first_power = first_power;
         taxel->second_power = second_power;
-        total += second_power;
+        hf_add(&total, i, second_power);
         changes.largest = second_power > changes.largest ? second_power : changes.largest;
     }
-    changes.alone = changes.largest >= HF_LONE_SHARE * total;
+    changes.alone = changes.largest >= HF_LONE_SHARE * hf_total(total);
     return changes;
 }
 
@@ -252,7 +260,7 @@ static int64_t hf_longest_still_of_moving(const hf_finger *f)
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const holdfast_taxel *const taxel = &f->taxels[i];
         const bool silent = taxel->n_changed == 0 && !hf_has_reading(f->readings, f->n, i);
-        if (f->ignored[i] || silent || hf_is_still(f, taxel)) {
+        if (f->used[i] == 0 || silent || hf_is_still(f, taxel)) {
             continue;
         }
         n_live += 1;
@@ -282,7 +290,7 @@ static void hf_find_still_taxels(const hf_finger *f)
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const holdfast_taxel *const taxel = &f->taxels[i];
         const int64_t still = s->n_changes - taxel->changed_at;
-        if (f->ignored[i] || !hf_is_still(f, taxel)) {
+        if (f->used[i] == 0 || !hf_is_still(f, taxel)) {
             continue;
         }
         if (!hf_has_reading(f->readings, f->n, i)) {

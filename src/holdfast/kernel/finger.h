@@ -11,6 +11,13 @@
 
 #define HF_SQRT_2 ((hf_real)1.4142135623730951)
 
+/* Taxel arrays of a finger do not overlap: compilers may load several numbers ahead. */
+#ifdef __cplusplus
+#define HF_RESTRICT __restrict
+#else
+#define HF_RESTRICT restrict
+#endif
+
 /* One finger: its constants, and its part of the memory. Lanes of taxels count from its first. */
 typedef struct {
     const holdfast_hand *hand;
@@ -19,7 +26,7 @@ typedef struct {
     holdfast_values *values;
     size_t n_taxels;
     size_t n; /* lanes: n_taxels rounded up */
-    const uint8_t *ignored;
+    const hf_real *used;      /* (n) 1 for taxels that contribute, else 0 */
     const hf_real *rotations; /* (9, n) */
     const hf_real *places;    /* (3, n) */
     hf_real *readings;        /* (3, n), as those that follow */
@@ -78,6 +85,23 @@ static inline void hf_fill(hf_real *values, size_t n, hf_real value)
 static inline hf_real hf_square(const hf_real v[3])
 {
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+/* The order of every sum over taxels: lane l adds up taxels l, l + 4, l + 8, ..., and the total is
+ * (lane 0 + lane 1) + (lane 2 + lane 3). So compilers may compute several taxels at a time, and all
+ * get the same bits. Lanes without a taxel, and ignored taxels, add 0. */
+typedef struct {
+    hf_real lane[4];
+} hf_sum;
+
+static inline void hf_add(hf_sum *sum, size_t taxel, hf_real value)
+{
+    sum->lane[taxel % HF_LANES] += value;
+}
+
+static inline hf_real hf_total(hf_sum sum)
+{
+    return (sum.lane[0] + sum.lane[1]) + (sum.lane[2] + sum.lane[3]);
 }
 
 static inline hf_real hf_dot(const hf_real a[3], const hf_real b[3])

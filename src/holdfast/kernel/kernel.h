@@ -100,6 +100,12 @@ typedef double hf_real;
 #define HF_ARRAY(type, name, length) type *name
 #endif
 
+/* Partial sums of which a sum over taxels consists (finger.h); the taxels of a finger are padded to a
+ * multiple of it. Tests also compile with 1: all taxels one after the other, as in Python. */
+#ifndef HF_LANES
+#define HF_LANES 4
+#endif
+
 /* Why a finger has no features at a sample. */
 enum {
     HOLDFAST_READY = 0,   /* it has */
@@ -170,7 +176,6 @@ enum {
 };
 
 enum {
-    HF_LANES = 4,          /* taxels of a finger are padded to a multiple of this */
     HF_N_RING_SUMS = 128,  /* sums of samples that are kept to find repeated ones (untrue.c) */
     HF_N_SUMS = 3,         /* of a block of pairs: P, D and S (window.c) */
     HF_N_COMPONENTS = 4,   /* of the history: F_a, F_x, F_y, F_z */
@@ -195,7 +200,6 @@ typedef struct {
     hf_real rounding_noise; /* noise of a reading by its step; NaN where the step is not known */
     hf_real max_step;       /* a longer step in time is a gap of the finger [s] */
     hf_real normal[3];      /* of the patch, in the fingertip frame; of length 1 */
-    size_t normal_axis;     /* axis that the normal is; 3 if it is none */
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */
     size_t ready_window;    /* samples of a stretch from which on all features are known */
     bool bridges;           /* all windows are in seconds: gaps of up to 0.1 s are bridged */
@@ -223,8 +227,7 @@ typedef struct {
 } holdfast_lag;
 
 /* Tables: constants of a hand. Values of taxels stand in lanes: for each finger all x, then all y,
- * then all z, of `n` lanes each, where n is n_taxels rounded up to HF_LANES. Lanes without a taxel
- * are ignored ones. */
+ * then all z, of `n` lanes each, where n is n_taxels rounded up to HF_LANES. */
 typedef struct {
     size_t n_fingers;
     size_t n_lanes;      /* of all fingers */
@@ -245,7 +248,8 @@ typedef struct {
     const holdfast_finger *fingers;   /* (n_fingers) */
     const holdfast_feature *features; /* (n_fingers, n_features) */
     const holdfast_lag *lags;         /* (n_lags), ascending */
-    const uint8_t *ignored;           /* (n_lanes) 1 for taxels that contribute nothing */
+    const hf_real *used;              /* (n_lanes) 1 for taxels that contribute; 0 for ignored
+                                         ones, and for lanes without a taxel */
     const hf_real *rotations;         /* (9 n_lanes) from taxel frame to fingertip frame; 0 of
                                          ignored taxels. Of each finger R_00 of all lanes, R_01 ... */
     const hf_real *places;            /* (3 n_lanes) from the centroid, in radii of the patch */

@@ -133,30 +133,31 @@ typedef struct {
 static hf_weight hf_weigh(const hf_finger *f, uint64_t bits)
 {
     const hf_real n_used = f->finger->n_used;
-    hf_real carried = 0, healthy = 0, all_squares = 0;
+    hf_sum carried = {{0}}, healthy = {{0}}, all_squares = {{0}};
     size_t n_masked = 0, n_unweighed = 0;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        if (f->ignored[i]) {
+        if (f->used[i] == 0) {
             continue;
         }
         hf_real load[3];
         hf_load_of(f, i, load);
         const hf_real square = hf_square(load);
-        all_squares += square;
+        hf_add(&all_squares, i, square);
         if (bits & hf_bit(i)) {
-            carried += hf_sqrt(square);
+            hf_add(&carried, i, hf_sqrt(square));
             n_masked += 1;
             n_unweighed += hf_is_unweighed(f, i);
         } else {
-            healthy += hf_sqrt(square);
+            hf_add(&healthy, i, hf_sqrt(square));
         }
     }
     /* Enough: sum over the healthy |h_i| >= half of that over all; and where loads are not known,
      * n - n_unknown >= n / 2. */
+    const hf_real load = hf_total(healthy) + hf_total(carried);
     hf_weight weight;
-    weight.known = all_squares > hf_known_squares(f); /* false for NaN */
+    weight.known = hf_total(all_squares) > hf_known_squares(f); /* false for NaN */
     weight.enough = (hf_real)n_masked < n_used;
-    if (weight.known && !(healthy >= HF_MIN_HEALTHY_SHARE * (healthy + carried))) {
+    if (weight.known && !(hf_total(healthy) >= HF_MIN_HEALTHY_SHARE * load)) {
         weight.enough = false;
     }
     const hf_real left = n_used - (hf_real)(weight.known ? n_unweighed : n_masked);
@@ -213,7 +214,7 @@ static void hf_change_mask(const hf_finger *f, uint64_t bits, double time)
     holdfast_finger_memory *const s = f->state;
     const uint64_t before = s->too_many ? 0 : s->masked;
     const hf_weight weight = hf_weigh(f, bits);
-    hf_real squares = 0;
+    hf_sum sum = {{0}};
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const uint64_t bit = hf_bit(i);
         holdfast_mask *const mask = &f->masks[i];
@@ -238,14 +239,15 @@ static void hf_change_mask(const hf_finger *f, uint64_t bits, double time)
         for (size_t axis = 0; axis < 3; ++axis) {
             mask->last_healthy[axis] = load[axis];
         }
-        if (!(bits & bit) && !f->ignored[i]) {
-            squares += hf_square(load);
+        if (!(bits & bit) && f->used[i] > 0) {
+            hf_add(&sum, i, hf_square(load));
         }
     }
     /* No window holds the samples of a taxel that became noisy, nor both ways to sum a finger. */
     if ((s->noisy_taxels & ~s->masked) || (!weight.enough && before)) {
         s->n_stretch = s->motion.n_samples = 0;
     }
+    const hf_real squares = hf_total(sum);
     s->masked = bits;
     s->too_many = !weight.enough;
     s->load_known = weight.known && squares > 0;
@@ -283,20 +285,20 @@ static void hf_update_fill_ratio(const hf_finger *f)
 {
     /* ratio = sum over the healthy h_i . shape_i / sum |shape_i|^2: linear in the readings. */
     holdfast_finger_memory *const s = f->state;
-    hf_real ratio = 0, squares = 0;
+    hf_sum along = {{0}}, squares = {{0}};
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        if ((s->masked & hf_bit(i)) || f->ignored[i]) {
+        if ((s->masked & hf_bit(i)) || f->used[i] == 0) {
             continue;
         }
         hf_real beyond[3];
         hf_beyond_rest(f, i, beyond);
         for (size_t axis = 0; axis < 3; ++axis) {
-            ratio += beyond[axis] * f->masks[i].last_healthy[axis];
+            hf_add(&along, i, beyond[axis] * f->masks[i].last_healthy[axis]);
         }
-        squares += hf_square(beyond);
+        hf_add(&squares, i, hf_square(beyond));
     }
-    s->fill_ratio = ratio / s->fill_squares;
-    s->unloaded = squares < hf_known_squares(f);
+    s->fill_ratio = hf_total(along) / s->fill_squares;
+    s->unloaded = hf_total(squares) < hf_known_squares(f);
 }
 
 /* Fill in the masked taxels of a finger, and let those fade that came back. */

@@ -109,11 +109,12 @@ static hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3
     const hf_real weight = hf_max(sums.weight, HF_TINY);
     m->n_samples += 1;
     track->time = time;
+    hf_real centre[3] = {0, 0, 0};
+    track->moment = f->hand->has_centres ? hf_moment(f, now, centre) : 0;
     for (size_t axis = 0; axis < 3; ++axis) {
         track->force[axis] = force[axis] = sums.force[axis];
-        track->pressure[axis] = sums.centre[axis] / weight;
+        track->pressure[axis] = centre[axis] / weight;
     }
-    track->moment = sums.moment;
     m->pressure = weight;
     m->pressure_squares = sums.pressure_squares;
     m->taxel_load = hf_sqrt(sums.squares);

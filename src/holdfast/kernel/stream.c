@@ -14,7 +14,7 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
     f.values = &memory->values[index];
     f.n_taxels = finger->n_taxels;
     f.n = hf_n_lanes(finger->n_taxels);
-    f.ignored = hand->ignored + first;
+    f.used = hand->used + first;
     f.rotations = hand->rotations + 9 * first;
     f.places = hand->places + 3 * first;
     f.readings = memory->readings + 3 * first;
@@ -35,14 +35,15 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
     return f;
 }
 
-/* Copy rows of taxels (n_taxels, 3) to the lanes of a finger (3, n). */
+/* Copy rows of taxels (n_taxels, 3) to the lanes of a finger (3, n); 0 for ignored taxels. */
 static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
 {
     const hf_real *const row = rows + 3 * f->finger->first_taxel;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        lanes[i] = row[3 * i];
-        lanes[f->n + i] = row[3 * i + 1];
-        lanes[2 * f->n + i] = row[3 * i + 2];
+        const bool is_used = f->used[i] > 0;
+        lanes[i] = is_used ? row[3 * i] : 0;
+        lanes[f->n + i] = is_used ? row[3 * i + 1] : 0;
+        lanes[2 * f->n + i] = is_used ? row[3 * i + 2] : 0;
     }
 }
 

@@ -90,11 +90,11 @@ static const char *hf_check_finger(
     }
     size_t n_used = 0;
     for (size_t i = 0; i < hf_n_lanes(finger->n_taxels); ++i) {
-        const uint8_t ignored = hand->ignored[first + i];
-        if (ignored > 1 || (i >= finger->n_taxels && !ignored)) {
-            return "ignored";
+        const hf_real used = hand->used[first + i];
+        if (!(used == 0 || (used == 1 && i < finger->n_taxels))) {
+            return "used";
         }
-        n_used += !ignored;
+        n_used += used > 0;
     }
     if (!(finger->n_used == (hf_real)n_used)) {
         return "n_used of a finger";
@@ -106,8 +106,8 @@ static const char *hf_check_finger(
     if (finger->bridges && hand->n_lags == 0) {
         return "bridges of a finger without lags";
     }
-    if (finger->normal_axis > 3 || !hf_are_finite(finger->normal, 3)) {
-        return "normal or normal_axis of a finger";
+    if (!hf_are_finite(finger->normal, 3)) {
+        return "normal of a finger";
     }
     return NULL;
 }
@@ -237,7 +237,7 @@ static void hf_begin_finger(const hf_finger *f)
         f->hand->tare_kind == HOLDFAST_TARE_SECONDS ? HOLDFAST_TARE : HOLDFAST_WARM_UP;
     hf_fill(f->sums, HF_N_RING_SUMS, HF_NAN);
     for (size_t i = 0; i < f->n; ++i) {
-        f->taxels[i].changed_at = f->ignored[i] ? INT64_MAX : 0; /* an ignored one is never still */
+        f->taxels[i].changed_at = f->used[i] > 0 ? 0 : INT64_MAX; /* never still */
     }
 }
 

@@ -145,7 +145,7 @@ static bool hf_is_near_end(const hf_finger *f, const hf_scan *scan)
             const hf_real reading = f->readings[axis * f->n + i];
             near_end = near_end || reading < low || reading > high;
         }
-        n_near += near_end && !f->ignored[i];
+        n_near += near_end && f->used[i] > 0;
     }
     return (hf_real)(2 * n_near) > f->finger->n_used;
 }
