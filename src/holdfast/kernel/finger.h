@@ -11,13 +11,6 @@
 
 #define HF_SQRT_2 ((hf_real)1.4142135623730951)
 
-/* Taxel arrays of a finger do not overlap: compilers may load several numbers ahead. */
-#ifdef __cplusplus
-#define HF_RESTRICT __restrict
-#else
-#define HF_RESTRICT restrict
-#endif
-
 /* One finger: its constants, and its part of the memory. Lanes of taxels count from its first. */
 typedef struct {
     const holdfast_hand *hand;

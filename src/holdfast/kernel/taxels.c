@@ -51,11 +51,12 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
     const size_t n = f->n;
     const hf_real *const r = f->readings, *const b = f->baseline, *const turn = f->rotations;
     const hf_real *const rest = f->reference, *const then = hf_forces_at(f, before);
-    hf_real *const HF_RESTRICT g = hf_forces_at(f, now), *const HF_RESTRICT p = f->pressed;
+    hf_real *const g = hf_forces_at(f, now), *const p = f->pressed;
     const hf_real nx = f->finger->normal[0], ny = f->finger->normal[1], nz = f->finger->normal[2];
     hf_sum fx = {{0}}, fy = {{0}}, fz = {{0}}, normal = {{0}};
     hf_sum weight = {{0}}, pressure_squares = {{0}}, squares = {{0}}, moved = {{0}};
     for (size_t start = 0; start < n; start += HF_LANES) {
+        hf_real own[4][HF_LANES]; /* stored at the end: a store between would end the vectors */
         for (size_t l = 0; l < HF_LANES; ++l) {
             const size_t i = start + l;
             const hf_real x = r[i] - b[i];
@@ -67,10 +68,10 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
             const hf_real dx = gx - then[i], dy = gy - then[n + i], dz = gz - then[2 * n + i];
             const hf_real hx = gx - rest[i], hy = gy - rest[n + i], hz = gz - rest[2 * n + i];
             const hf_real pressed = hf_abs(hx * nx + hy * ny + hz * nz);
-            g[i] = gx;
-            g[n + i] = gy;
-            g[2 * n + i] = gz;
-            p[i] = pressed;
+            own[0][l] = gx;
+            own[1][l] = gy;
+            own[2][l] = gz;
+            own[3][l] = pressed;
             fx.lane[l] += gx;
             fy.lane[l] += gy;
             fz.lane[l] += gz;
@@ -79,6 +80,12 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
             weight.lane[l] += pressed;
             pressure_squares.lane[l] += pressed * pressed;
             squares.lane[l] += hx * hx + hy * hy + hz * hz;
+        }
+        for (size_t l = 0; l < HF_LANES; ++l) {
+            g[start + l] = own[0][l];
+            g[n + start + l] = own[1][l];
+            g[2 * n + start + l] = own[2][l];
+            p[start + l] = own[3][l];
         }
     }
     const hf_taxel_sums sums = {
