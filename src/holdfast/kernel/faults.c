@@ -1,0 +1,377 @@
+/* Faults that readings show: of single taxels and of whole fingers.
+ *
+ * A taxel is compared with the other taxels of its finger. Only samples that changed a reading of
+ * the finger count, because a sample that a server sends twice shows nothing about a taxel. */
+#include "finger.h"
+
+/* Readings that changed for this long and then do not change for this long are stuck [s]. */
+#define HF_STUCK_SECONDS ((hf_real)0.5)
+/* A taxel that has not changed for this long since the first sample, while others change, is dead
+ * [s]. */
+#define HF_DEAD_SECONDS ((hf_real)2)
+/* A taxel stands still by a fault if it does so this many times as long as ever before. Healthy
+ * taxels reached 5 times in 24 randomized hands, and once in real recordings. */
+#define HF_STILL_RATIO ((hf_real)10)
+/* Changes from which the past of a taxel shows how long it stands still. One that changed less
+ * often is compared with the others. */
+#define HF_MIN_CHANGES 10
+/* Least share of the other taxels that move before one that stands still counts as faulty. */
+#define HF_MOVING_SHARE ((hf_real)0.8)
+/* Time constant over which the noise of a taxel is smoothed [s]. */
+#define HF_NOISE_SMOOTHING ((hf_real)0.25)
+/* Least ratio of the mean squares of second and first differences in noise. It is 2 for
+ * independent steps, 3 for white noise, 4 for a value that jumps up and down, less for motion. */
+#define HF_WHITE_RATIO ((hf_real)2.5)
+/* Least share of a finger's second differences in one noisy taxel: a touch spreads over the skin
+ * to neighbouring taxels. */
+#define HF_LONE_SHARE ((hf_real)0.9)
+/* A taxel is noisy when it exceeds its least possible noise by this factor. */
+#define HF_LOUD_RATIO ((hf_real)100)
+/* Taxels from which one may count as noisy; of fewer, one may be touched alone. */
+#define HF_MIN_TAXELS ((hf_real)4)
+/* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6. Whole counts
+ * have the same sum only if the sum of each axis is the same. */
+#define HF_WEIGHT_Y (HF_SQRT_2 / (hf_real)1.5)
+#define HF_WEIGHT_Z ((hf_real)1.7320508075688772 / (hf_real)1.6)
+/* A pull for this long means that the tare was taken under load: nothing pulls a skin [s]. */
+#define HF_LOADED_SECONDS ((hf_real)0.25)
+
+/* Faults of a finger whose samples no window may hold, though they have a force. */
+enum { HF_SERIOUS = HOLDFAST_STUCK | HOLDFAST_NOISY };
+
+/* The readings of a finger in short. */
+typedef struct {
+    hf_real total; /* weighted sum; finite if all readings are */
+    hf_real least;
+    hf_real most;
+} hf_scan;
+
+/* Scan the readings of a finger (3, n). */
+static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
+{
+    const size_t n = f->n;
+    const hf_real *const used = f->used;
+    hf_sum sum_x = {{0}}, sum_y = {{0}}, sum_z = {{0}}, least, most;
+    for (size_t l = 0; l < 4; ++l) {
+        least.lane[l] = HF_INFINITY;
+        most.lane[l] = -HF_INFINITY;
+    }
+    for (size_t start = 0; start < n; start += HF_LANES) {
+        for (size_t l = 0; l < HF_LANES; ++l) {
+            const size_t i = start + l;
+            const hf_real x = readings[i], y = readings[n + i], z = readings[2 * n + i];
+            sum_x.lane[l] += x;
+            sum_y.lane[l] += y;
+            sum_z.lane[l] += z;
+            /* Each comparison by itself: a branch of two is mispredicted by half of the samples. */
+            hf_real low = x < y ? x : y;
+            hf_real high = x > y ? x : y;
+            low = z < low ? z : low;
+            high = z > high ? z : high;
+            low = used[i] > 0 ? low : HF_INFINITY;
+            high = used[i] > 0 ? high : -HF_INFINITY;
+            least.lane[l] = low < least.lane[l] ? low : least.lane[l];
+            most.lane[l] = high > most.lane[l] ? high : most.lane[l];
+        }
+    }
+    const hf_scan scan = {
+        hf_total(sum_x) + HF_WEIGHT_Y * hf_total(sum_y) + HF_WEIGHT_Z * hf_total(sum_z),
+        hf_min(hf_min(least.lane[0], least.lane[1]), hf_min(least.lane[2], least.lane[3])),
+        hf_max(hf_max(most.lane[0], most.lane[1]), hf_max(most.lane[2], most.lane[3]))};
+    return scan;
+}
+
+/* Return the bits of the taxels with a reading that is not strictly between low and high. */
+static uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
+{
+    uint64_t bits = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            const hf_real reading = f->readings[axis * f->n + i];
+            if (!(low < reading && reading < high) && f->used[i] > 0) {
+                bits |= hf_bit(i);
+            }
+        }
+    }
+    return bits;
+}
+
+/* Add NOT_FINITE and OUT_OF_RANGE to some faults, as far as some taxel has them. Return the bits of
+ * these taxels. At least one reading of the finger is not valid. */
+static uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults)
+{
+    const uint64_t infinite = hf_taxels_outside(f, -HF_INFINITY, HF_INFINITY);
+    const uint64_t bits = hf_taxels_outside(
+        f, hf_nextafter(f->finger->low, -HF_INFINITY), hf_nextafter(f->finger->high, HF_INFINITY));
+    if (infinite) {
+        *faults |= HOLDFAST_NOT_FINITE;
+    }
+    if (bits != infinite) {
+        *faults |= HOLDFAST_OUT_OF_RANGE;
+    }
+    return bits;
+}
+
+/* Return whether the readings of a finger stopped changing after they had changed.
+ *
+ * A sensor with a dead band, or with less noise than a step of its readings, rests while nothing
+ * moves it. */
+static bool hf_is_stuck(const hf_finger *f)
+{
+    /* Stuck: more than half of the steps before the rest changed a reading, 0.5 s of changes at
+     * least, and the rest lasts max(0.5 s, 10 times the longest rest before). */
+    const holdfast_finger_memory *const s = f->state;
+    const int64_t n_steps = s->n_seen - 1 - s->n_unchanged;
+    const hf_real least = HF_STUCK_SECONDS / f->hand->period;
+    const hf_real rested = HF_STILL_RATIO * (hf_real)s->longest_rest;
+    return 2 * s->n_changes > n_steps && (hf_real)s->n_unchanged >= hf_max(least, rested) &&
+           (hf_real)s->n_changes >= least;
+}
+
+/* Return whether the normal readings add up to a pull, well above noise, for a long time. */
+static bool hf_is_pulled(const hf_finger *f, hf_real normal)
+{
+    /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. */
+    holdfast_finger_memory *const s = f->state;
+    const hf_real limit = hf_max(20 * s->noise, (hf_real)0.1 * s->max_amplitude);
+    s->n_pulled = normal < -limit ? s->n_pulled + 1 : 0;
+    return (hf_real)s->n_pulled * f->hand->period >= HF_LOADED_SECONDS;
+}
+
+static bool hf_differ(const hf_real *readings, const hf_real *previous, size_t n)
+{
+    for (size_t i = 0; i < n; ++i) {
+        if (readings[i] != previous[i]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Return false for zeros: a sensor with a dead band jumps to and from zero without noise. */
+static bool hf_has_reading(const hf_real *readings, size_t n, size_t i)
+{
+    return readings[i] != 0 || readings[n + i] != 0 || readings[2 * n + i] != 0;
+}
+
+/* Note that a taxel which changes now did not for `still` samples before, or never did. */
+static void hf_note_still(const hf_finger *f, holdfast_taxel *taxel, int64_t still)
+{
+    const hf_real period = f->hand->period, length = (hf_real)still;
+    if ((length + 1) * hf_min(1, period / HF_NOISE_SMOOTHING) > 1) { /* jumps follow faster */
+        hf_fill(taxel->last_change, 3, 0);
+    }
+    if (taxel->n_changed == 0) {
+        taxel->longest_still = f->state->n_seen - 1;
+    } else if (still > taxel->longest_still) {
+        /* longest = still, unless still >= max(0.5 s, 10 (longest + 1)): that was a fault. */
+        const hf_real limit = HF_STILL_RATIO * (hf_real)(taxel->longest_still + 1);
+        if (taxel->n_changed < HF_MIN_CHANGES ||
+            length < hf_max(HF_STUCK_SECONDS / period, limit)) {
+            taxel->longest_still = still;
+        }
+    }
+}
+
+/* Note the change of a taxel. Return the square of its second difference. */
+static hf_real hf_second_square(const hf_finger *f, holdfast_taxel *taxel, const hf_real change[3])
+{
+    const int64_t still = f->state->n_changes - taxel->changed_at - 1;
+    if (still != 0 || taxel->n_changed == 0) {
+        hf_note_still(f, taxel, still);
+    }
+    /* |D2|^2, with D2 = D1 - D1 of the last change. */
+    hf_real second[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        second[axis] = change[axis] - taxel->last_change[axis];
+        taxel->last_change[axis] = change[axis];
+    }
+    taxel->n_changed += 1;
+    taxel->changed_at = f->state->n_changes;
+    return hf_square(second);
+}
+
+/* How the taxels of a finger change. */
+typedef struct {
+    bool any_still;  /* some taxel did not change for 0.5 s of changes of the finger */
+    bool alone;      /* one taxel has most of the second differences */
+    hf_real largest; /* its second_power */
+} hf_changes;
+
+/* Update the past of each taxel of a finger with a sample that changed a reading. */
+static hf_changes hf_update_taxels(const hf_finger *f)
+{
+    const size_t n = f->n;
+    const hf_real *const now = f->readings, *const then = f->previous;
+    const hf_real least = HF_STUCK_SECONDS / f->hand->period;
+    /* s = T / tau: the weight of a sample in a first order mean. */
+    const hf_real share = hf_min(1, f->hand->period / HF_NOISE_SMOOTHING);
+    hf_changes changes = {false, false, 0};
+    hf_sum total = {{0}};
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        /* D1 = f_i(k) - f_i(k-1), D2 = D1 - D1 of the last change:
+         * P1 = (1 - s) P1 + s |D1|^2, P2 = (1 - s) P2 + s |D2|^2. Without a change D1 = D2 = 0. */
+        holdfast_taxel *const taxel = &f->taxels[i];
+        const hf_real change[3] = {
+            now[i] - then[i], now[n + i] - then[n + i], now[2 * n + i] - then[2 * n + i]};
+        const hf_real square = hf_square(change);
+        hf_real first_power = (1 - share) * taxel->first_power;
+        hf_real second_power = (1 - share) * taxel->second_power;
+        if (square > 0) {
+            const hf_real second = hf_second_square(f, taxel, change);
+            if (hf_has_reading(now, n, i) && hf_has_reading(then, n, i)) {
+                first_power += share * square;
+                second_power += share * second;
+            } else {
+                hf_fill(taxel->last_change, 3, 0);
+            }
+        } else if ((hf_real)(f->state->n_changes - taxel->changed_at) >= least) {
+            changes.any_still = true;
+        }
+        taxel->first_power = first_power;
+        taxel->second_power = second_power;
+        hf_add(&total, i, second_power);
+        changes.largest = second_power > changes.largest ? second_power : changes.largest;
+    }
+    changes.alone = changes.largest >= HF_LONE_SHARE * hf_total(total);
+    return changes;
+}
+
+/* Return whether a taxel does not change for far longer than ever before. */
+static bool hf_is_still(const hf_finger *f, const holdfast_taxel *taxel)
+{
+    /* Still: 2 s at first; later max(0.5 s, 10 (longest + 1 sample)). */
+    const hf_real still = (hf_real)(f->state->n_changes - taxel->changed_at);
+    if (taxel->n_changed < HF_MIN_CHANGES) {
+        return still >= HF_DEAD_SECONDS / f->hand->period;
+    }
+    const hf_real limit = HF_STILL_RATIO * (hf_real)(taxel->longest_still + 1);
+    return still >= hf_max(HF_STUCK_SECONDS / f->hand->period, limit);
+}
+
+/* Return for how many samples a moving taxel stood still at most; -1 if too few move.
+ *
+ * A taxel that was ever still for long does not count as moving, because the noise of such a
+ * sensor is less than a step of its readings: it is still while nothing moves it. */
+static int64_t hf_longest_still_of_moving(const hf_finger *f)
+{
+    const hf_real least = HF_STUCK_SECONDS / f->hand->period;
+    int64_t n_live = 0, n_moving = 0, longest = 0;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        const holdfast_taxel *const taxel = &f->taxels[i];
+        const bool silent = taxel->n_changed == 0 && !hf_has_reading(f->readings, f->n, i);
+        if (f->used[i] == 0 || silent || hf_is_still(f, taxel)) {
+            continue;
+        }
+        n_live += 1;
+        /* Moving: changed in the last 0.25 s and in more than half of the samples. */
+        const int64_t still = f->state->n_changes - taxel->changed_at;
+        if ((hf_real)(2 * still) < least && 2 * taxel->n_changed > taxel->changed_at &&
+            (hf_real)taxel->longest_still < least) {
+            n_moving += 1;
+            longest = taxel->longest_still > longest ? taxel->longest_still : longest;
+        }
+    }
+    /* At least 80 % of the live taxels move. */
+    const bool enough = n_moving > 0 && (hf_real)n_moving >= HF_MOVING_SHARE * (hf_real)n_live;
+    return enough ? longest : -1;
+}
+
+/* Note the taxels of a finger that are DEAD or STUCK, if the others move. */
+static void hf_find_still_taxels(const hf_finger *f)
+{
+    holdfast_finger_memory *const s = f->state;
+    const int64_t others = hf_longest_still_of_moving(f);
+    if (others < 0) {
+        return;
+    }
+    /* A taxel at a limit of its range is saturated, not stuck. */
+    const uint64_t at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        const holdfast_taxel *const taxel = &f->taxels[i];
+        const int64_t still = s->n_changes - taxel->changed_at;
+        if (f->used[i] == 0 || !hf_is_still(f, taxel)) {
+            continue;
+        }
+        if (!hf_has_reading(f->readings, f->n, i)) {
+            continue; /* zeros: nothing touches a sensor with a dead band */
+        }
+        /* Too few changes of its own: compared with the others, still >= 10 (others + 1). */
+        if (taxel->n_changed < HF_MIN_CHANGES &&
+            (hf_real)still < HF_STILL_RATIO * (hf_real)(others + 1)) {
+            continue;
+        }
+        if (taxel->n_changed == 0) {
+            s->taxel_faults |= HOLDFAST_DEAD;
+            s->faulty_taxels |= hf_bit(i);
+        } else if ((at_limit & hf_bit(i)) == 0) {
+            s->taxel_faults |= HOLDFAST_STUCK;
+            s->faulty_taxels |= hf_bit(i);
+        }
+    }
+}
+
+/* Note the taxel of a finger that has most of the second differences, if it is NOISY. */
+static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
+{
+    holdfast_finger_memory *const s = f->state;
+    /* Noise of a reading: noise of F / sqrt(n_used), where the step is not known. */
+    hf_real quiet = f->finger->rounding_noise;
+    if (isnan(quiet)) {
+        quiet = s->noise / hf_sqrt(f->finger->n_used);
+    }
+    size_t loudest = 0;
+    while (loudest + 1 < f->n_taxels && f->taxels[loudest].second_power != largest) {
+        ++loudest;
+    }
+    /* Noisy: P2 > 2.5 P1 (white noise has 3 P1), and P2 > 6 (100 noise)^2: D2 of white noise of a
+     * reading has the variance 6 noise^2. */
+    const holdfast_taxel *const taxel = &f->taxels[loudest];
+    const hf_real loud = HF_LOUD_RATIO * quiet;
+    if (taxel->second_power > HF_WHITE_RATIO * taxel->first_power &&
+        taxel->second_power > 6 * (loud * loud)) {
+        s->taxel_faults |= HOLDFAST_NOISY;
+        s->noisy_taxels = hf_bit(loudest);
+        s->faulty_taxels |= s->noisy_taxels;
+    }
+}
+
+/* Find the faulty taxels of a finger at a sample that changed a reading. */
+static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
+{
+    holdfast_finger_memory *const s = f->state;
+    const hf_changes changes = hf_update_taxels(f);
+    for (size_t i = 0; after_gap && i < f->n_taxels; ++i) { /* a change over a gap is no noise */
+        hf_fill(f->taxels[i].last_change, 3, 0);
+        f->taxels[i].first_power = f->taxels[i].second_power = 0;
+    }
+    s->taxel_faults = 0;
+    s->faulty_taxels = s->noisy_taxels = 0;
+    if (changes.any_still) {
+        hf_find_still_taxels(f);
+    }
+    if (changes.alone && f->finger->n_used >= HF_MIN_TAXELS) {
+        hf_find_noisy_taxel(f, changes.largest);
+    }
+}
+
+/* Count a valid sample of a finger, and compare it with the one before. */
+static void hf_track_changes(const hf_finger *f, double time, bool after_gap)
+{
+    holdfast_finger_memory *const s = f->state;
+    if (s->n_seen == 0) {
+        s->first_time = time;
+    } else if (hf_differ(f->readings, f->previous, 3 * f->n)) {
+        /* longest rest = max(longest rest, rest), of rests of 0.5 s or more that are no fault. */
+        if (!hf_is_stuck(f) && (hf_real)s->n_unchanged >= HF_STUCK_SECONDS / f->hand->period &&
+            s->n_unchanged > s->longest_rest) {
+            s->longest_rest = s->n_unchanged;
+        }
+        s->n_unchanged = 0;
+        s->n_changes += 1;
+        hf_find_taxel_faults(f, after_gap);
+    } else {
+        s->n_unchanged += 1;
+    }
+    s->n_seen += 1;
+}

@@ -1,0 +1,341 @@
+/* One sample of a hand: tare, force, faults and features, in this order. */
+#include "finger.h"
+
+/* Return one finger of a hand: its constants, and its part of the memory. */
+static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
+{
+    const holdfast_finger *const finger = &hand->fingers[index];
+    const size_t first = finger->first, n_lags = HF_N_LAGS(hand);
+    const size_t n_blocks = HF_N_CHANNELS(hand) * HF_N_LEVELS(hand) * HF_N_SUMS;
+    hf_finger f;
+    f.hand = hand;
+    f.finger = finger;
+    f.state = &memory->fingers[index];
+    f.values = &memory->values[index];
+    f.n_taxels = finger->n_taxels;
+    f.n = hf_n_lanes(finger->n_taxels);
+    f.used = hand->used + first;
+    f.rotations = hand->rotations + 9 * first;
+    f.places = hand->places + 3 * first;
+    f.readings = memory->readings + 3 * first;
+    f.previous = memory->previous + 3 * first;
+    f.baseline = memory->baseline + 3 * first;
+    f.reference = memory->reference + 3 * first;
+    f.pressed = memory->pressed + first;
+    f.taxels = memory->taxels + first;
+    f.masks = memory->masks + first;
+    f.rings = memory->rings + first;
+    f.sums = memory->sums + index * HF_N_RING_SUMS;
+    f.history = memory->history + index * HF_N_HISTORY(hand) * HF_N_COMPONENTS;
+    f.blocks = memory->blocks + index * HF_N_HISTORY(hand) * n_blocks;
+    f.track = memory->track + index * HF_N_TRACK(hand);
+    f.taxel_forces = memory->taxel_forces + 3 * first;
+    f.relative = memory->relative + index * n_lags * HOLDFAST_N_RELATIVE;
+    f.averages = memory->averages + index * n_lags * HF_N_SECONDS;
+    return f;
+}
+
+/* Copy rows of taxels (n_taxels, 3) to the lanes of a finger (3, n); 0 for ignored taxels. */
+static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
+{
+    const hf_real *const row = rows + 3 * f->finger->first_taxel;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        const bool is_used = f->used[i] > 0;
+        lanes[i] = is_used ? row[3 * i] : 0;
+        lanes[f->n + i] = is_used ? row[3 * i + 1] : 0;
+        lanes[2 * f->n + i] = is_used ? row[3 * i + 2] : 0;
+    }
+}
+
+static void hf_clear_values(holdfast_values *values)
+{
+    hf_fill(values->force, 3, HF_NAN);
+    values->amplitude = values->m = values->sigma = HF_NAN;
+}
+
+/* Start the windows of a finger again, whether it has a sample or not: a gap. */
+static void hf_begin_gap(const hf_finger *f, hf_real *own)
+{
+    f->state->n_stretch = f->state->n_unchanged = f->state->n_pulled = 0;
+    f->state->after_gap = true;
+    hf_fill(own, HF_N_FEATURES(f->hand), HF_NAN);
+    hf_fill(f->relative, HF_N_LAGS(f->hand) * HOLDFAST_N_RELATIVE, HF_NAN);
+    hf_clear_values(f->values);
+    f->values->reason = HOLDFAST_GAP;
+    f->values->faults = 0;
+    f->values->taxels = 0;
+}
+
+/* Compute the force of a valid sample, and return the reason.
+ *
+ * enough: whether the finger goes on without its faulty taxels. */
+static int32_t hf_process_force(const hf_finger *f, bool enough, double time)
+{
+    holdfast_finger_memory *const s = f->state;
+    holdfast_values *const v = f->values;
+    /* F_tip = sum_i R_i (f_i - b_i). */
+    hf_real force[3], normal;
+    if (HF_N_LAGS(f->hand) > 0) {
+        normal = hf_append_taxels(f, time, force);
+        hf_append_force(f, force);
+        hf_update_motion(f, time);
+    } else {
+        normal = hf_sum_taxels(f, f->baseline, force);
+        hf_append_force(f, force);
+    }
+    uint32_t finger_faults = enough ? 0 : v->faults;
+    if (hf_is_stuck(f)) {
+        finger_faults |= HOLDFAST_STUCK;
+    }
+    v->faults |= finger_faults;
+    if (finger_faults & HF_SERIOUS) {
+        s->n_stretch = s->motion.n_samples = s->n_pulled = 0;
+        return HOLDFAST_FAULT;
+    }
+    s->max_amplitude = hf_max(s->max_amplitude, v->amplitude);
+    if (s->n_stretch >= (int64_t)f->finger->sigma_window) {
+        const hf_moments moments = hf_newest_moments(f, 0, f->finger->sigma_window);
+        v->m = moments.m;
+        v->sigma = hf_sqrt(moments.variance);
+    }
+    if (f->hand->tare_kind == HOLDFAST_TARE_SECONDS && hf_is_pulled(f, normal)) {
+        finger_faults |= HOLDFAST_TARE_LOADED;
+        v->faults |= HOLDFAST_TARE_LOADED;
+    }
+    if (finger_faults) {
+        return HOLDFAST_FAULT;
+    }
+    const int64_t n_known = f->finger->bridges ? s->motion.n_samples : s->n_stretch;
+    if (n_known < (int64_t)f->finger->ready_window) {
+        return s->after_gap ? HOLDFAST_GAP : HOLDFAST_WARM_UP;
+    }
+    s->after_gap = false;
+    return HOLDFAST_READY;
+}
+
+/* Replace the readings of a sample that are not valid, if enough are. Return false if not. */
+static bool hf_replace_or_refuse(const hf_finger *f, bool is_finite)
+{
+    uint32_t faults = is_finite ? 0 : HOLDFAST_NOT_FINITE; /* also of taxels beyond the mask */
+    const uint64_t bits = hf_find_invalid(f, &faults);
+    f->values->faults |= faults;
+    f->values->taxels |= bits;
+    if (!f->state->is_tared) {
+        hf_lose_taxels(f, faults, bits);
+        return false;
+    }
+    return hf_replace_invalid(f, bits);
+}
+
+/* Process a sample of one finger. Return its reason; its faults are in the values. */
+static int32_t hf_process(const hf_finger *f, double time)
+{
+    holdfast_finger_memory *const s = f->state;
+    holdfast_values *const v = f->values;
+    const hf_real low = f->finger->low, high = f->finger->high;
+    const bool after_gap =
+        (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
+    hf_clear_values(v);
+    s->last_time = time;
+    if (after_gap) {
+        s->n_stretch = 0;
+    }
+    v->faults = s->lost_faults;
+    v->taxels = s->lost;
+    if (s->lost) {
+        hf_hold_lost(f);
+    }
+    /* Valid: finite, and low <= every reading <= high. */
+    hf_scan scan = hf_scan_readings(f, f->readings);
+    if (!isfinite(scan.total) || scan.least < low || scan.most > high) {
+        if (!hf_replace_or_refuse(f, isfinite(scan.total))) {
+            s->n_stretch = 0;
+            return HOLDFAST_FAULT;
+        }
+        scan = hf_scan_readings(f, f->readings);
+    }
+    const uint32_t untrue = hf_find_untrue(f, &scan);
+    if (untrue) {
+        s->n_stretch = 0;
+        v->faults |= untrue;
+        return HOLDFAST_FAULT;
+    }
+    hf_track_changes(f, time, after_gap);
+    /* Half a period of tolerance: the rounding of times moves no sample. */
+    const hf_real elapsed = (hf_real)(time - s->first_time) + f->hand->period / 2;
+    /* Saturated: a reading at low or at high. */
+    const bool is_saturated = scan.least <= low || scan.most >= high;
+    uint64_t at_limit = 0;
+    if (is_saturated) {
+        at_limit = hf_taxels_outside(f, low, high);
+        if (s->is_tared && f->n_taxels <= HF_N_MASK_BITS) {
+            hf_note_saturated(f, at_limit & ~s->masked);
+        }
+    }
+    if (!hf_update_tare(f, elapsed)) {
+        return HOLDFAST_TARE;
+    }
+    v->faults |= s->taxel_faults;
+    v->taxels |= s->faulty_taxels;
+    if (is_saturated) {
+        v->faults |= HOLDFAST_SATURATED;
+        v->taxels |= at_limit;
+    }
+    const bool has_mask = v->faults || s->masked || s->fading;
+    const bool enough = !has_mask || hf_mask_taxels(f, v->taxels, time);
+    return hf_process_force(f, enough, time);
+}
+
+/* Return a value computed from a force feature. */
+static hf_real hf_transform(const holdfast_feature *feature, hf_real value, hf_real noise)
+{
+    if (feature->transform == HOLDFAST_LOG) {
+        return hf_log(hf_sqrt(value * value + feature->floor * feature->floor));
+    }
+    if (feature->transform == HOLDFAST_BY_NOISE) {
+        /* log(max(v, sigma_n / 1000) / sigma_n), with the sigma of noise alone. */
+        const hf_real expected = hf_noise_sigma(noise, feature->window);
+        return hf_log(hf_max(value, (hf_real)1e-3 * expected) / expected);
+    }
+    return value;
+}
+
+/* Return a force feature of a finger whose stretch is long enough for it, before its transform. */
+static hf_real hf_force_feature(const hf_finger *f, int32_t kind, size_t window)
+{
+    const hf_real *const newest = hf_history(f, 0);
+    if (kind < HF_N_COMPONENTS) {
+        return newest[kind]; /* F_a, F_x, F_y or F_z of the newest sample */
+    }
+    if (kind == HOLDFAST_M) {
+        return hf_newest_moments(f, 0, window).m;
+    }
+    if (kind == HOLDFAST_SIGMA) {
+        return hf_sqrt(hf_newest_moments(f, 0, window).variance);
+    }
+    /* change = |F_tip(k) - F_tip(k - N_w + 1)|.
+     * sigma_xyz = sqrt(sigma(F_x)^2 + sigma(F_y)^2 + sigma(F_z)^2). */
+    hf_real total = 0;
+    for (size_t axis = 1; axis <= 3; ++axis) {
+        if (kind == HOLDFAST_CHANGE) {
+            const hf_real change = newest[axis] - hf_history(f, window - 1)[axis];
+            total += change * change;
+        } else {
+            total += hf_newest_moments(f, axis, window).variance;
+        }
+    }
+    return hf_sqrt(total);
+}
+
+/* Return a feature of a finger by itself; NaN where its stretch is too short. */
+static hf_real hf_feature(const hf_finger *f, const holdfast_feature *feature)
+{
+    if (feature->kind >= HOLDFAST_FIRST_RELATIVE) {
+        return f->relative[feature->lag * HOLDFAST_N_RELATIVE +
+                           (size_t)(feature->kind - HOLDFAST_FIRST_RELATIVE)];
+    }
+    const size_t n_needed = feature->window > 1 ? feature->window : 1;
+    if (f->state->n_stretch < (int64_t)n_needed) {
+        return HF_NAN;
+    }
+    const hf_real value = hf_force_feature(f, feature->kind, feature->window);
+    return hf_transform(feature, value, f->state->noise);
+}
+
+/* Compute the features of a finger by itself. */
+static void hf_compute_own(const hf_finger *f, const holdfast_feature *features, hf_real *own)
+{
+    for (size_t j = 0; j < HF_N_FEATURES(f->hand); ++j) {
+        if (features[j].kind < 0) {
+            own[j] = 0; /* padding */
+        } else if (features[j].same_as < j) {
+            own[j] = own[features[j].same_as];
+        } else {
+            own[j] = hf_feature(f, &features[j]);
+        }
+    }
+}
+
+/* Return the larger of two values; one that is NaN does not count. */
+static hf_real hf_larger(hf_real value, hf_real rival)
+{
+    return rival > value || isnan(value) ? rival : value;
+}
+
+/* Return the largest value over the fingers of a feature of finger `index`. */
+static hf_real hf_largest(
+    const holdfast_hand *hand, holdfast_memory *memory, size_t index, size_t j)
+{
+    const size_t width = HF_N_FEATURES(hand);
+    if (hand->alike) {
+        return memory->of_hand[j];
+    }
+    hf_real value = memory->own[index * width + j];
+    for (size_t other = 0; other < HF_N_FINGERS(hand); ++other) {
+        const hf_finger f = hf_finger_of(hand, memory, other);
+        value = hf_larger(value, hf_feature(&f, &hand->features[index * width + j]));
+    }
+    return value;
+}
+
+/* Compute the largest value over the fingers of the features that all have. */
+static void hf_compute_of_hand(const holdfast_hand *hand, holdfast_memory *memory)
+{
+    const size_t width = HF_N_FEATURES(hand);
+    for (size_t j = 0; j < width; ++j) {
+        if (hand->features[j].of_hand) {
+            hf_real value = memory->own[j];
+            for (size_t f = 1; f < HF_N_FINGERS(hand); ++f) {
+                value = hf_larger(value, memory->own[f * width + j]);
+            }
+            memory->of_hand[j] = value;
+        }
+    }
+}
+
+/* Fill Phi = [F_a, F_x, F_y, F_z, m, sigma], or what the model asks for, of one finger. */
+static void hf_fill_features(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
+{
+    const size_t width = HF_N_FEATURES(hand);
+    const holdfast_feature *const features = hand->features + index * width;
+    hf_real *const out = memory->features + index * width;
+    hf_real total = 0;
+    for (size_t j = 0; j < width; ++j) {
+        out[j] = features[j].of_hand ? hf_largest(hand, memory, index, j)
+                                     : memory->own[index * width + j];
+        total += out[j];
+    }
+    if (isnan(total)) {
+        memory->values[index].reason = HOLDFAST_TARE; /* the noise is not known yet */
+    }
+}
+
+HOLDFAST_API void holdfast_advance(
+    const holdfast_hand *hand, holdfast_memory *memory, const hf_real *readings,
+    const bool *present, double time)
+{
+    const size_t width = HF_N_FEATURES(hand);
+    for (size_t i = 0; i < HF_N_FINGERS(hand); ++i) {
+        const hf_finger f = hf_finger_of(hand, memory, i);
+        /* A gap: t - t_last > 3 T, with the period T; or > 0.1 s where all windows are in seconds.
+         * False while last_time is NaN. */
+        if ((hf_real)(time - f.state->last_time) > f.finger->max_step) {
+            hf_begin_gap(&f, memory->own + i * width);
+        }
+        if (present[i]) {
+            hf_copy_to_lanes(&f, readings, f.readings);
+            f.values->reason = hf_process(&f, time);
+            hf_compute_own(&f, hand->features + i * width, memory->own + i * width);
+        }
+    }
+    if (hand->alike) {
+        hf_compute_of_hand(hand, memory);
+    }
+    for (size_t i = 0; i < HF_N_FINGERS(hand); ++i) {
+        if (memory->values[i].reason != HOLDFAST_READY) {
+            hf_fill(memory->features + i * width, width, HF_NAN);
+        } else if (present[i]) {
+            hf_fill_features(hand, memory, i);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+/* Samples that are valid but cannot be true: faults of a whole finger.
+ *
+ * They are judged by the readings alone, whatever the tare, and refused: they reach no tare, force
+ * or window. Each rule costs a few comparisons at a sample that is true. */
+#include "finger.h"
+
+/* No sensor sends readings that are all smaller than this but not all zero. It is a number of
+ * single precision too. */
+#define HF_LEAST_READING ((hf_real)1e-37)
+
+enum {
+    HF_MIN_PERIOD = 3,   /* of a ring: the shortest [samples] */
+    HF_LONG_PERIOD = 12, /* the first of the long ones */
+    HF_MAX_PERIOD = 64,  /* the longest */
+    HF_MIN_VARYING = 12  /* readings that change in a ring: few may repeat by chance */
+};
+
+/* Return the weighted sum of the readings `lag` samples ago. */
+static inline hf_real hf_sum_before(const hf_finger *f, uint64_t n, uint64_t lag)
+{
+    /* A lag beyond the first sample wraps round: the sum is NaN there. */
+    return f->sums[(n - lag) % HF_N_RING_SUMS];
+}
+
+/* Return the first lag of a range at which the sum of the readings was the same; else 0. */
+static uint64_t hf_equal_lag(
+    const hf_finger *f, uint64_t n, hf_real total, uint64_t begin, uint64_t end, uint64_t step)
+{
+    for (uint64_t lag = begin; lag < end; lag += step) {
+        if (hf_sum_before(f, n, lag) == total) {
+            return lag;
+        }
+    }
+    return 0;
+}
+
+/* Follow a ring, and count how many samples it has lasted, as far as the sums reach. */
+static void hf_begin_ring(const hf_finger *f, uint64_t period)
+{
+    holdfast_finger_memory *const s = f->state;
+    const uint64_t n = s->n_frames - 1;
+    uint64_t length = 1;
+    while (length + period < HF_N_RING_SUMS &&
+           hf_sum_before(f, n, length) == hf_sum_before(f, n, length + period)) {
+        ++length;
+    }
+    s->ring_period = period;
+    s->ring_length = length;
+    s->ring_age = 0;
+    s->ring_varies = false;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            f->rings[i].anchor[axis] = f->readings[axis * f->n + i];
+            f->rings[i].varies[axis] = false;
+        }
+    }
+}
+
+/* Return whether three samples of a ring differ. */
+static bool hf_has_three_sums(const hf_finger *f)
+{
+    const uint64_t n = f->state->n_frames - 1;
+    const hf_real first = hf_sum_before(f, n, 0);
+    hf_real second = first;
+    for (uint64_t lag = 1; lag < f->state->ring_period; ++lag) {
+        const hf_real sum = hf_sum_before(f, n, lag);
+        if (sum != first && second == first) {
+            second = sum;
+        } else if (sum != first && sum != second) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Return whether a ring that goes on has lasted for three periods, and is no rest. */
+static bool hf_has_repeated(const hf_finger *f)
+{
+    holdfast_finger_memory *const s = f->state;
+    s->ring_length += 1;
+    s->ring_age += 1;
+    if (s->ring_age <= s->ring_period) { /* one period is compared exactly */
+        size_t n_varying = 0;
+        bool is_equal = true;
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            for (size_t axis = 0; axis < 3; ++axis) {
+                if (f->readings[axis * f->n + i] != f->rings[i].anchor[axis]) {
+                    f->rings[i].varies[axis] = true;
+                    is_equal = false;
+                }
+                n_varying += f->rings[i].varies[axis];
+            }
+        }
+        if (s->ring_age == s->ring_period) {
+            if (!is_equal) {
+                s->ring_period = 0;
+                return false;
+            }
+            s->ring_varies = n_varying >= HF_MIN_VARYING && hf_has_three_sums(f);
+        }
+    }
+    return s->ring_varies && s->ring_length >= 2 * s->ring_period;
+}
+
+/* Return whether the last 3 p samples of a finger repeat with a period p.
+ *
+ * Samples are compared by their weighted sums, and one of each period exactly. A period that is
+ * found is followed until a sample differs from that a period before; then another is sought. */
+static bool hf_follow_ring(const hf_finger *f, hf_real total)
+{
+    /* S(k) = S(k - p) for the last 2 p samples k. Each sample tries a third of the short periods
+     * and a ninth of the others: a ring is found so early that it is followed for a period by
+     * then. */
+    holdfast_finger_memory *const s = f->state;
+    const uint64_t n = s->n_frames;
+    s->n_frames = n + 1;
+    f->sums[n % HF_N_RING_SUMS] = total;
+    if (s->ring_period > 0) {
+        if (hf_sum_before(f, n, s->ring_period) == total) {
+            return hf_has_repeated(f);
+        }
+        s->ring_period = 0; /* equal by chance, or at an end */
+    }
+    uint64_t period = hf_equal_lag(f, n, total, HF_MIN_PERIOD + n % 3, HF_LONG_PERIOD, 3);
+    if (period == 0) {
+        period = hf_equal_lag(f, n, total, HF_LONG_PERIOD + n % 9, HF_MAX_PERIOD + 1, 9);
+    }
+    if (period > 0) {
+        hf_begin_ring(f, period);
+    }
+    return false;
+}
+
+/* Return whether more than half of the taxels have a reading near an end of the range. */
+static bool hf_is_near_end(const hf_finger *f, const hf_scan *scan)
+{
+    const hf_real low = f->finger->low_end, high = f->finger->high_end;
+    if (!(scan->least < low || scan->most > high)) {
+        return false;
+    }
+    size_t n_near = 0;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        bool near_end = false;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const hf_real reading = f->readings[axis * f->n + i];
+            near_end = near_end || reading < low || reading > high;
+        }
+        n_near += near_end && f->used[i] > 0;
+    }
+    return (hf_real)(2 * n_near) > f->finger->n_used;
+}
+
+/* Return the faults of a finger whose readings, all valid, cannot be true; 0 without any. */
+static uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan)
+{
+    holdfast_finger_memory *const s = f->state;
+    uint32_t faults = hf_follow_ring(f, scan->total) ? HOLDFAST_REPEATED : 0;
+    if (hf_is_near_end(f, scan)) {
+        faults |= HOLDFAST_SATURATED;
+    }
+    if (s->is_tared) {
+        if (isnan(s->rest_sum)) { /* that of the tare; of the first sample where there is none */
+            s->rest_sum = f->hand->tare_kind == HOLDFAST_TARE_NONE
+                              ? scan->total
+                              : hf_scan_readings(f, f->baseline).total;
+        }
+        /* |sum f_i - sum f_i(rest)|: all readings have left together. */
+        if (hf_abs(scan->total - s->rest_sum) > f->finger->max_offset) {
+            faults |= HOLDFAST_OFFSET;
+        }
+    }
+    /* 0 < max |f| < 1e-37: bytes of another number type. */
+    const hf_real largest = hf_max(scan->most, -scan->least);
+    if (0 < largest && largest < HF_LEAST_READING) {
+        faults |= HOLDFAST_OUT_OF_RANGE;
+    }
+    return faults;
+}

@@ -1,0 +1,136 @@
+import ctypes
+
+import numpy as np
+import pytest
+
+from holdfast.features import Tare
+from holdfast.features.specs import ANY_FEATURES, HOLDFAST_FEATURES
+from holdfast.features.stream import FeatureStream, StreamPlan
+from holdfast.sensors import sensor
+from kernel.c_kernel import CStream, Tables, compiled
+
+PATCH = sensor("uskin-4x4")
+HUGE = 2**64 - 1
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return compiled(tmp_path_factory.mktemp("kernel"))
+
+
+@pytest.fixture
+def stream():
+    features = (*HOLDFAST_FEATURES, *ANY_FEATURES)
+    plan = StreamPlan(
+        {"one": PATCH, "two": PATCH}, {"one": features, "two": features}, 14, Tare.parse("0.5"), 100
+    )
+    return FeatureStream(plan)
+
+
+FIRST_RELATIVE = len(HOLDFAST_FEATURES)
+
+
+class TestCheck:
+    def test_tables_of_a_plan_fit(self, library, stream):
+        assert library.holdfast_check(CStream(library, stream).address) is None
+
+    @pytest.mark.parametrize(
+        ("field", "value", "wrong"),
+        [
+            ("n_fingers", 0, "n_fingers or n_lanes"),
+            ("n_fingers", HUGE, "n_fingers or n_lanes"),
+            ("n_lanes", 0, "n_fingers or n_lanes"),
+            ("n_lanes", HUGE, "n_fingers or n_lanes"),
+            ("n_lanes", 28, "first, first_taxel or n_taxels of a finger"),
+            ("n_features", 0, "n_features"),
+            ("n_features", HUGE, "n_features"),
+            ("n_history", 63, "n_history"),
+            ("n_history", 0, "n_history"),
+            ("n_history", HUGE - 1, "n_history"),
+            ("n_history", 32, "n_levels"),
+            ("n_channels", 2, "n_channels"),
+            ("n_channels", 1, "n_channels, too few for a feature"),
+            ("n_levels", 0, "n_levels"),
+            ("n_levels", 5, "n_levels"),
+            ("n_levels", HUGE, "n_levels"),
+            ("n_lags", HUGE, "n_lags or n_track"),
+            ("n_lags", 4, "lag of a feature"),
+            ("n_track", 2, "n_lags or n_track"),
+            ("n_track", HUGE, "n_lags or n_track"),
+            ("period", 0.0, "period"),
+            ("period", np.nan, "period"),
+            ("period", np.inf, "period"),
+            ("tare_kind", 4, "tare_kind"),
+            ("tare_kind", -1, "tare_kind"),
+            ("tare_seconds", np.nan, "tare_seconds, noise_seconds or average_gain"),
+            ("noise_seconds", np.inf, "tare_seconds, noise_seconds or average_gain"),
+            ("average_gain", np.nan, "tare_seconds, noise_seconds or average_gain"),
+            ("lags.1.seconds", np.nan, "a lag"),
+            ("lags.1.samples", HUGE, "a lag"),
+            ("fingers.1.first", 4, "first, first_taxel or n_taxels of a finger"),
+            ("fingers.1.first_taxel", 4, "first, first_taxel or n_taxels of a finger"),
+            ("fingers.1.n_taxels", HUGE, "first, first_taxel or n_taxels of a finger"),
+            ("fingers.0.n_taxels", 0, "first, first_taxel or n_taxels of a finger"),
+            ("fingers.0.n_taxels", 13, "used"),
+            ("fingers.0.n_used", 15.0, "n_used of a finger"),
+            ("fingers.0.n_used", np.nan, "n_used of a finger"),
+            ("fingers.0.sigma_window", 13, "sigma_window or ready_window of a finger"),
+            ("fingers.0.sigma_window", 66, "sigma_window or ready_window of a finger"),
+            ("fingers.0.ready_window", 65, "sigma_window or ready_window of a finger"),
+            ("features.0.kind", 28, "kind of a feature"),
+            ("features.0.kind", -2, "kind of a feature"),
+            ("features.0.transform", 3, "transform or floor of a feature"),
+            ("features.0.floor", np.nan, "transform or floor of a feature"),
+            ("features.0.same_as", 1, "same_as of a feature"),
+            ("features.1.same_as", 0, "same_as of a feature"),
+            ("features.0.window", 2, "window of a feature"),
+            ("features.1.window", 3, "window of a feature"),
+            ("features.1.window", 0, "window of a feature"),
+            ("features.1.window", 66, "window of a feature"),
+            ("features.1.lag", 1, "lag of a feature"),
+            (f"features.{FIRST_RELATIVE}.lag", HUGE, "lag of a feature"),
+            (f"features.{FIRST_RELATIVE}.window", 2, "window of a feature"),
+            ("used.3", 0.5, "used"),
+            ("used.3", np.nan, "used"),
+            ("used.3", 0.0, "n_used of a finger"),
+            ("rotations.5", np.inf, "a rotation or a place of a taxel"),
+            ("places.5", np.nan, "a rotation or a place of a taxel"),
+        ],
+    )
+    def test_what_does_not_fit_is_named(self, library, stream, field, value, wrong):
+        tables = Tables(stream.layout, stream.memory, library.lanes)
+        *names, last = field.split(".")
+        if not names:
+            setattr(tables.hand, last, value)
+        elif len(names) == 1:
+            tables.arrays[names[0]][int(last)] = value
+        else:
+            setattr(tables.arrays[names[0]][int(names[1])], last, value)
+        assert library.holdfast_check(ctypes.byref(tables.hand)) == wrong.encode()
+
+    def test_bridged_gaps_need_lags(self, library):
+        plan = StreamPlan({"one": PATCH}, {"one": HOLDFAST_FEATURES}, 14, Tare.parse("first"), 100)
+        stream = FeatureStream(plan)
+        tables = Tables(stream.layout, stream.memory, library.lanes)
+        tables.arrays["fingers"][0].bridges = True
+        wrong = library.holdfast_check(ctypes.byref(tables.hand))
+        assert wrong == b"bridges of a finger without lags"
+
+    def test_a_padding_has_no_scope(self, library):
+        plan = StreamPlan(
+            {"one": PATCH, "two": PATCH},
+            {"one": HOLDFAST_FEATURES, "two": HOLDFAST_FEATURES[:1]},
+            14, Tare.parse("first"), 100,
+        )  # fmt: skip
+        stream = FeatureStream(plan)
+        tables = Tables(stream.layout, stream.memory, library.lanes)
+        padding = tables.arrays["features"][len(HOLDFAST_FEATURES) + 1]
+        assert padding.kind == -1
+        padding.of_hand = True
+        wrong = library.holdfast_check(ctypes.byref(tables.hand))
+        assert wrong == b"of_hand of a padding"
+
+    def test_normals_are_finite(self, library, stream):
+        tables = Tables(stream.layout, stream.memory, library.lanes)
+        tables.arrays["fingers"][1].normal[2] = np.inf
+        assert library.holdfast_check(ctypes.byref(tables.hand)) == b"normal of a finger"
