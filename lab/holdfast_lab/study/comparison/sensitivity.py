@@ -28,7 +28,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationJob,
     MethodEvaluation,
 )
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.methods.wavelets import CUTS
 from holdfast_lab.study.plan import StudyPlan

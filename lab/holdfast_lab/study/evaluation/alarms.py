@@ -11,15 +11,15 @@ from typing import NamedTuple, Self
 import msgspec
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE
+from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
+from holdfast_lab.study.evaluation.fitted_method import Scores
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
-from holdfast_lab.study.evaluation.scores import Scores
 
 EVENT = "an event"
 FALSE_ALARM = "a false alarm"
@@ -53,11 +53,8 @@ def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
 
     In an event a glitch is unstable; otherwise it is stable, unless something else happens.
     """
-    stable = {
-        name: np.where(recording.glitches[name] & (codes != UNKNOWN), STABLE, codes)
-        for name, codes in recording.exact_labels.items()
-    }
-    event, other = (recording.hand_labels(labels) for labels in (recording.exact_labels, stable))
+    event = recording.hand_labels(recording.exact_labels)
+    other = recording.hand_labels(recording.calm_labels)
     glitch = runs(event.labels != other.labels)
     ends = event.times + sample_durations(event.times)
     near = _near(event.times, event.times[glitch[:, 0]], ends[glitch[:, 1] - 1])

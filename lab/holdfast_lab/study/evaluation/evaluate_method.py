@@ -5,18 +5,23 @@ not on the contact thresholds, and not on the thresholds for a rate of false ala
 chosen on the training recordings, each scored by a fit without it.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from functools import lru_cache
+from typing import Literal, NamedTuple, Self
 
 import msgspec
 import numpy as np
 
 from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.contact import UNKNOWN
+from holdfast.features import Tare
 from holdfast.metrics import Decisions, FingerDecisions, Metrics, calibration_sums, summarise
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.samples import score_samples
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
 from holdfast.training.splits import RANDOM_FOLDS
 from holdfast_lab.study.evaluation.alarms import (
     EVENT,
@@ -26,7 +31,6 @@ from holdfast_lab.study.evaluation.alarms import (
     labels_by_reading,
     threshold_shift,
 )
-from holdfast_lab.study.evaluation.common_samples import find_method, longest_warm_up
 from holdfast_lab.study.evaluation.error_breakdown import (
     CountPair,
     ErrorBreakdown,
@@ -36,15 +40,23 @@ from holdfast_lab.study.evaluation.error_breakdown import (
     decided_units,
 )
 from holdfast_lab.study.evaluation.fitted_method import FittedMethod, RecordingScores, Training
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.methods import HAND
+from holdfast_lab.study.evaluation.recording_features import (
+    RecordingFeatures,
+    Variation,
+    corpus_features,
+)
+from holdfast_lab.study.methods import HAND, METHODS, Method, hand_signal
+from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
+from holdfast_lab.study.methods.wavelets import CUTS
 from holdfast_lab.study.plan import Corpus
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Rates of false alarms that thresholds are chosen for, per minute of stable label [1/min]."""
 COMPARED_RATE = 1.0
 """The rate of false alarms at which methods are compared [1/min]."""
+PROBE_DURATION = 3.0
+"""Duration of the random recording on which the history of a method is measured [s]."""
+PROBE_FINGERS = ("thumb", "index")
 HOLD_TIME = 0.1
 """Time for which a hand stays not stable at the chosen thresholds [s].
 
@@ -54,6 +66,40 @@ So one disturbance is one alarm, whatever the method.
 GroupSplit = Literal["recording", "object"]
 Shifts = Mapping[str, Sequence[float]]
 """Shifts of the threshold for each of `FALSE_ALARM_RATES`, for each of `READINGS`."""
+
+
+def find_method(name: str) -> Method:
+    """Return the method of that name, of `METHODS`, `CUTS` or `SLIP_METHODS`."""
+    return METHODS.get(name) or CUTS.get(name) or SLIP_METHODS[name].method
+
+
+@lru_cache
+def warm_up(method: str, rate: float) -> float:
+    """Return the time from the start of a stretch until a method has an estimate [s].
+
+    Methods need histories of different lengths: one sample, a window of 14, a second. It is
+    measured: on a random recording of two fingers, it is the time of the first sample with
+    features; 0 if there is none within `PROBE_DURATION`.
+
+    Args:
+        method: name.
+        rate: samples per second [Hz].
+
+    Example:
+        >>> round(150 * warm_up("logreg", 150.0)), round(150 * warm_up("difference", 150.0))
+        (13, 1)
+    """
+    generator = np.random.default_rng(0)
+    times = np.arange(math.ceil(PROBE_DURATION * rate)) / rate
+    kind = replace(sensor("uskin-4x4"), rate=rate, range=None)  # of small readings
+    modules = {
+        name: Tactile(kind, times, generator.normal(100.0, 10.0, (len(times), kind.n_taxels, 3)))
+        for name in PROBE_FINGERS
+    }
+    hand = hand_signal(Recording("probe", modules), Tare.parse("none"), PROBE_FINGERS)
+    features = find_method(method).features(hand)
+    known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
+    return int(np.argmax(known)) / rate
 
 
 class EvaluationEffort(msgspec.Struct, frozen=True):
@@ -76,7 +122,7 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     """One method and the recordings that it is evaluated on.
 
     Attributes:
-        method: its name.
+        method: its name, see `find_method`.
         train: corpus that the method is fitted to.
         splits: of that corpus. A fold leaves out recordings, or all recordings of one object.
         tests: other corpora, evaluated with a fit to all of `train`.
@@ -84,6 +130,8 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         effort: size of the evaluation.
         seed: of all random numbers.
         compared: names of the methods that must have an estimate too where this one is scored.
+        slips: whether it decides about slips: only recordings whose slips are known are used, in
+            the first split that is possible, and no thresholds are chosen for events.
     """
 
     method: str
@@ -94,17 +142,21 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     effort: EvaluationEffort = EvaluationEffort()
     seed: int = 0
     compared: tuple[str, ...] = ()
+    slips: bool = False
 
     def features(self, corpus: Corpus) -> list[RecordingFeatures]:
         """Return the features of the recordings of a corpus."""
-        warm_up = longest_warm_up(self.compared, self.train.rate / self.variation.every)
-        method = find_method(self.method)
-        return corpus_features(method, corpus, self.variation, self.effort.stride, warm_up)
+        compared, rate = (self.method, *self.compared), self.train.rate / self.variation.every
+        longest = max(warm_up(name, rate) for name in compared)
+        method, stride = find_method(self.method), self.effort.stride
+        featured = corpus_features(method, corpus, self.variation, stride, longest)
+        return [one for one in featured if one.slips] if self.slips else featured
 
     def training(self, recordings: Sequence[RecordingFeatures]) -> Training:
         """Return the samples of recordings, from which the method is fitted."""
-        method = find_method(self.method)
-        return Training.of(method, recordings, self.effort.max_samples, self.seed)
+        sliding = self.slips and SLIP_METHODS[self.method].target == "sliding"
+        method, most = find_method(self.method), self.effort.max_samples
+        return Training.of(method, recordings, most, self.seed, sliding=sliding)
 
 
 class ReadingAlarms(msgspec.Struct, frozen=True):
@@ -164,11 +216,26 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
 
 
 class ScoredRecording(NamedTuple):
-    """A recording, its scores, and the shifts of the threshold, chosen without it."""
+    """A recording that did not train its scores.
+
+    Attributes:
+        recording: without its features, to save memory.
+        scores: by a fit to other recordings.
+        shifts: of the threshold, chosen on the same recordings.
+        fold: number of the fold that leaves it out.
+    """
 
     recording: RecordingFeatures
     scores: RecordingScores
     shifts: Shifts
+    fold: int
+
+    @classmethod
+    def of(
+        cls, recording: RecordingFeatures, fitted: FittedMethod, shifts: Shifts, fold: int = 0
+    ) -> Self:
+        """Score a recording by a fit to others."""
+        return cls(replace(recording, features={}), fitted.scores(recording), shifts, fold)
 
     def decide(self, labels: Mapping[str, Codes]) -> Decisions:
         """Return the decisions at the own threshold, with labels of the fingers."""
@@ -194,20 +261,20 @@ def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording
     training = job.training(job.features(job.train))
     everything = frozenset(range(len(training.recordings)))
 
-    def scored_by(fitted: FittedMethod, shifts: Shifts, one: RecordingFeatures) -> ScoredRecording:
-        # Features are dropped to save memory.
-        return ScoredRecording(replace(one, features={}), fitted.scores(one), shifts)
-
     for split in job.splits:
         scored: dict[int, ScoredRecording] = {}
-        for left_out in held_out_folds(training.objects, split, job.effort.folds, job.seed):
+        folds = held_out_folds(training.objects, split, job.effort.folds, job.seed)
+        for number, left_out in enumerate(folds):
             fold = _fit_fold(job, training, everything - left_out)
-            scored |= {k: scored_by(*fold, training.recordings[k]) for k in left_out}
+            for index in left_out:
+                scored[index] = ScoredRecording.of(training.recordings[index], *fold, number)
         yield split, [scored[index] for index in sorted(scored)]
+        if job.slips and scored:
+            break
     if job.tests:
         fold = _fit_fold(job, training, everything)
         for corpus in job.tests:
-            yield corpus.name, [scored_by(*fold, tested) for tested in job.features(corpus)]
+            yield corpus.name, [ScoredRecording.of(one, *fold) for one in job.features(corpus)]
 
 
 def held_out_folds(
@@ -242,7 +309,7 @@ def _fit_fold(
 ) -> tuple[FittedMethod, Shifts]:
     """Fit the method to some recordings, and choose its thresholds on them."""
     chosen = sorted(indices)
-    n_inner = min(job.effort.inner, len(chosen))
+    n_inner = 0 if job.slips else min(job.effort.inner, len(chosen))
     objects = [training.objects[index] for index in chosen]
     ranges: dict[str, list[FalseAlarmRanges]] = {reading: [] for reading in READINGS}
     for fold in held_out_folds(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ():

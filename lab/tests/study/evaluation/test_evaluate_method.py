@@ -18,8 +18,9 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     find_method,
     held_out_folds,
     score_splits,
+    warm_up,
 )
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
@@ -241,3 +242,15 @@ def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
     ):
         assert n == n_paper
         assert n_without < n_without_paper
+
+
+@pytest.mark.parametrize(
+    ("method", "samples"),
+    [("friction", 0), ("difference", 1), ("logreg", 13), ("sigma_cut", 13), ("spectrum", 29)],
+)
+def test_the_history_of_a_method_in_samples(method, samples):
+    assert warm_up(method, 150.0) == pytest.approx(samples / 150)
+
+
+def test_the_network_needs_a_second():
+    assert warm_up("tcn", 100.0) == pytest.approx(0.99)

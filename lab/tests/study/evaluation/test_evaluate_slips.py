@@ -11,10 +11,9 @@ from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip
 from holdfast.model import Head
 from holdfast.training.slips import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
-from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
+from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
 from holdfast_lab.study.evaluation.evaluate_slips import (
     SlipEvaluation,
-    SlipJob,
     SlipScores,
     evaluate_slips,
     log_odds_of,
@@ -22,9 +21,8 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     smoothed,
     still_ranks,
 )
-from holdfast_lab.study.evaluation.fitted_method import Training
+from holdfast_lab.study.evaluation.fitted_method import Training, probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
-from holdfast_lab.study.evaluation.scores import probability_of
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -166,9 +164,15 @@ def corpora(tmp_path_factory):
     }
 
 
+def job(name, main, tests=(), compared=()):
+    splits = ("object", "recording")
+    return EvaluationJob(name, main, splits, tests, effort=EFFORT, compared=compared, slips=True)
+
+
 def evaluated(corpora, name, compared=()):
-    job = SlipJob(name, corpora["main"], (corpora["others"],), EFFORT, 0, compared)
-    data = msgspec.msgpack.encode(evaluate_slips(job))
+    data = msgspec.msgpack.encode(
+        evaluate_slips(job(name, corpora["main"], (corpora["others"],), compared))
+    )
     return msgspec.msgpack.decode(data, type=dict[str, SlipEvaluation])
 
 
@@ -198,7 +202,7 @@ def test_methods_are_scored_on_the_same_samples(corpora):
 def test_without_known_slips_there_are_no_results(tmp_path):
     corpus = scan_corpus("main", save_synthetic(tmp_path / "main", range(3)))
     for name in ("holdfast", "holdfast_stability"):
-        assert evaluate_slips(SlipJob(name, corpus, effort=EFFORT)) == {}
+        assert evaluate_slips(job(name, corpus)) == {}
 
 
 def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
