@@ -25,6 +25,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     ScoredRecording,
     score_splits,
 )
+from holdfast_lab.study.methods import HAND
 from holdfast_lab.study.plan import Corpus
 
 MAX_REAL_FOLDS = 20
@@ -156,6 +157,7 @@ def _estimates(scored: ScoredRecording) -> RecordingEstimates:
         {
             name: unit_estimates(f.stable_probability, f.states)
             for name, f in decided.fingers.items()
+            if name != HAND
         },
         unit_estimates(hand.probability, hand.states()),
         Column.of(hand.hold(HOLD_TIME).states()),

@@ -1,6 +1,5 @@
 """The errors of one recording by phase, grip force and direction, and the glitches of its hand."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import msgspec
@@ -21,7 +20,6 @@ from holdfast.metrics.slip_truth import sample_durations
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast_lab.study.methods import HAND
 
 PULL_DIRECTIONS = {
     "down": (0.0, 0.0, -1.0),
@@ -70,20 +68,15 @@ class ErrorBreakdown(msgspec.Struct, frozen=True):
 
 
 def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdown:
-    """Return the errors of a recording by phase, finger and disturbance.
-
-    A method that decides for the whole hand has the errors of the hand. The breakdown is empty
-    if the truth is not known.
-    """
-    units = decided_units(decisions)
-    if truth is None or not {"phase", "outside_force"} <= set(truth.hand) or not units:
+    """Return the errors of a recording; empty if the truth is not known."""
+    if truth is None or not {"phase", "outside_force"} <= set(truth.hand):
         return ErrorBreakdown()
     phase = truth.hand["phase"]
     locked = phase == Phase.LOCKED
     disturbed = runs(np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)))
     phases = {str(name): (0, 0) for name in Phase}
     pushes, grips = [(0, 0)] * len(disturbed), []
-    for name, unit in units.items():
+    for name, unit in decisions.fingers.items():
         now = phase[latest_rows(truth, unit.times)]
         stable = unit.labels == STABLE
         for each, count in phases.items():
@@ -116,13 +109,6 @@ def _direction(force: Array) -> str:
     along = {name: float(force @ np.array(axis)) for name, axis in PULL_DIRECTIONS.items()}
     best = max(along, key=lambda name: along[name])
     return best if along[best] >= MIN_DIRECTION_COSINE * float(np.linalg.norm(force)) else OBLIQUE
-
-
-def decided_units(decisions: Decisions) -> Mapping[str, FingerDecisions]:
-    """Return what a method decides for: the fingers, or the hand under the name `HAND`."""
-    if decisions.fingers or decisions.hand is None:
-        return decisions.fingers
-    return {HAND: decisions.hand}
 
 
 def latest_rows(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)

@@ -6,7 +6,7 @@ chosen on the training recordings, each scored by a fit without it.
 """
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Literal, NamedTuple, Self
@@ -17,7 +17,7 @@ import numpy as np
 from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.contact import UNKNOWN
 from holdfast.features import Tare
-from holdfast.metrics import Decisions, FingerDecisions, Metrics, calibration_sums, summarise
+from holdfast.metrics import Decisions, Metrics, calibration_sums, summarise
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.samples import score_samples
 from holdfast.recordings import Recording, Tactile
@@ -37,7 +37,6 @@ from holdfast_lab.study.evaluation.error_breakdown import (
     GlitchCount,
     break_down_errors,
     count_glitches,
-    decided_units,
 )
 from holdfast_lab.study.evaluation.fitted_method import FittedMethod, RecordingScores, Training
 from holdfast_lab.study.evaluation.recording_features import (
@@ -63,9 +62,16 @@ HOLD_TIME = 0.1
 So one disturbance is one alarm, whatever the method.
 """
 
+OWN, LASTING = "own", f"own, held {HOLD_TIME:g} s"
+"""Names of a method's own threshold, and of the same with states held for `HOLD_TIME`."""
+BY_RATE = {f"for {rate:g}/min": rate for rate in FALSE_ALARM_RATES}
+"""Rates by the names of the thresholds that are chosen for them; states are held."""
+COMPARED = f"for {COMPARED_RATE:g}/min"
+"""Name of the threshold at which methods are compared."""
+
 GroupSplit = Literal["recording", "object"]
-Shifts = Mapping[str, Sequence[float]]
-"""Shifts of the threshold for each of `FALSE_ALARM_RATES`, for each of `READINGS`."""
+Shifts = Mapping[str, Mapping[str, float]]
+"""Shift of each threshold of `BY_RATE`, for each of `READINGS`."""
 
 
 def find_method(name: str) -> Method:
@@ -159,47 +165,26 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         return Training.of(method, recordings, most, self.seed, sliding=sliding)
 
 
-class ReadingAlarms(msgspec.Struct, frozen=True):
-    """Alarms of the hand under one reading of glitches. Lists have one entry per recording.
-
-    Attributes:
-        own: at the method's own threshold.
-        lasting: the same, with states held for `HOLD_TIME`.
-        by_rate: the same, held, at the threshold chosen for each of `FALSE_ALARM_RATES`.
-    """
-
-    own: list[AlarmStatistics]
-    lasting: list[AlarmStatistics]
-    by_rate: list[list[AlarmStatistics]]
-
-    @property
-    def compared(self) -> list[AlarmStatistics]:
-        """Alarms at the threshold at which methods are compared."""
-        return self.by_rate[FALSE_ALARM_RATES.index(COMPARED_RATE)]
-
-
 class MethodEvaluation(msgspec.Struct, frozen=True):
     """Results of one method on one split or corpus. Lists have one entry per recording.
 
     Attributes:
-        names: of the evaluated recordings.
         fingers: metrics by sample at the method's own threshold; None for a whole-hand method.
         hand: the same for the hand.
         without_estimate: labelled samples of what the method decides for, and those of them
             that have no estimate; before the samples are restricted to those of all methods.
         hand_without_estimate: the same for the hand.
-        readings: alarms of the hand, by exact labels, for each of `READINGS`.
+        readings: alarms of the hand by exact labels, for each of `READINGS` and each threshold.
         glitches: of the hand's controller.
         breakdown: of the errors at the method's own threshold.
         calibration: (10, 3) sum of probabilities, stable samples and all samples of each bin.
     """
 
-    names: list[str]
     fingers: Metrics | None
     hand: Metrics
     without_estimate: list[CountPair]
     hand_without_estimate: list[CountPair]
-    readings: dict[str, ReadingAlarms]
+    readings: dict[str, dict[str, list[AlarmStatistics]]]
     glitches: list[GlitchCount]
     breakdown: list[ErrorBreakdown]
     calibration: list[list[list[float]]]
@@ -210,8 +195,8 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         return self.fingers or self.hand
 
     @property
-    def alarms(self) -> ReadingAlarms:
-        """Alarms in the paper's reading: a glitch is an event."""
+    def alarms(self) -> dict[str, list[AlarmStatistics]]:
+        """Alarms at each threshold in the paper's reading: a glitch is an event."""
         return self.readings[EVENT]
 
 
@@ -319,7 +304,7 @@ def _fit_fold(
             for reading, labels in labels_by_reading(recording).items():
                 ranges[reading].append(FalseAlarmRanges.of(scores, labels))
     shifts = {
-        reading: [threshold_shift(own, rate) if own else 0.0 for rate in FALSE_ALARM_RATES]
+        reading: {n: threshold_shift(own, rate) if own else 0.0 for n, rate in BY_RATE.items()}
         for reading, own in ranges.items()
     }
     return training.fit(chosen), shifts
@@ -327,47 +312,49 @@ def _fit_fold(
 
 def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     """Return the results of a method on scored recordings."""
-    truths = [each.recording.truth for each in scored]
+    truths = [recording.truth for recording, *_ in scored]
     decided = [each.decide(each.recording.scored_labels) for each in scored]
     every = [each.decide(each.recording.labels) for each in scored]
-    hands = [Decisions(d.name, {HAND: d.hand}, d.hand) for d in decided if d.hand is not None]
-    alarms, readings = [_alarms(each) for each in scored], {}
-    for reading in READINGS:
-        by_threshold = zip(*(of_recording[reading] for of_recording in alarms), strict=True)
-        own, lasting, *by_rate = map(list, by_threshold)
-        readings[reading] = ReadingAlarms(own, lasting, by_rate)
+    whole_hand = scored[0].scores.whole_hand
+    alarms = [_alarms(each) for each in scored]
     return MethodEvaluation(
-        names=[each.recording.name for each in scored],
-        fingers=summarise(decided) if any(each.fingers for each in decided) else None,
-        hand=summarise(hands),
-        without_estimate=[_n_without_estimate(decided_units(each).values()) for each in every],
-        hand_without_estimate=[_n_without_estimate([d.hand]) for d in every if d.hand is not None],
-        readings=readings,
+        fingers=None if whole_hand else summarise(decided),
+        hand=summarise(map(_as_hand, decided)),
+        without_estimate=[_n_without_estimate(decisions) for decisions in every],
+        hand_without_estimate=[_n_without_estimate(_as_hand(decisions)) for decisions in every],
+        readings={
+            reading: {
+                name: [by[reading][name] for by in alarms] for name in (OWN, LASTING, *BY_RATE)
+            }
+            for reading in READINGS
+        },
         glitches=[count_glitches(truth) for truth in truths],
         breakdown=list(map(break_down_errors, truths, decided)),
-        calibration=[
-            calibration_sums([*decided_units(each).values()]).tolist() for each in decided
-        ],
+        calibration=[calibration_sums(list(d.fingers.values())).tolist() for d in decided],
     )
 
 
-def _n_without_estimate(units: Iterable[FingerDecisions]) -> CountPair:
+def _as_hand(decisions: Decisions) -> Decisions:
+    """Return the hand as the one finger of its recording."""
+    hand = {} if decisions.hand is None else {HAND: decisions.hand}
+    return Decisions(decisions.name, hand, decisions.hand)
+
+
+def _n_without_estimate(decisions: Decisions) -> CountPair:
     """Return the number of labelled samples, and of those of them without an estimate."""
-    labelled = [unit.states[unit.labels != UNKNOWN] for unit in units]
+    labelled = [unit.states[unit.labels != UNKNOWN] for unit in decisions.fingers.values()]
     return sum(map(len, labelled)), sum(int((states == UNKNOWN).sum()) for states in labelled)
 
 
-def _alarms(scored: ScoredRecording) -> dict[str, list[AlarmStatistics]]:
-    """Return the alarms for each reading: at the own threshold, held at it, at each chosen one."""
+def _alarms(scored: ScoredRecording) -> dict[str, dict[str, AlarmStatistics]]:
+    """Return the alarms for each reading, at each threshold."""
     hand = scored.scores.hand
-    lasting = hand.hold(HOLD_TIME)
-    return {
-        reading: [
-            AlarmStatistics.of(hand, labels),
-            *(AlarmStatistics.of(lasting, labels, s) for s in (0.0, *scored.shifts[reading])),
-        ]
-        for reading, labels in labels_by_reading(scored.recording).items()
-    }
+    lasting, alarms = hand.hold(HOLD_TIME), {}
+    for reading, labels in labels_by_reading(scored.recording).items():
+        alarms[reading] = {OWN: AlarmStatistics.of(hand, labels)}
+        for name, shift in {LASTING: 0.0, **scored.shifts[reading]}.items():
+            alarms[reading][name] = AlarmStatistics.of(lasting, labels, shift)
+    return alarms
 
 
 def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
@@ -377,32 +364,26 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
     else is as in the other splits, so that the difference is due to the split alone.
 
     Args:
-        job: gives the method, the training corpus, the variation, the effort and the seed.
+        job: gives a method for fingers, the training corpus, the variation, effort and seed.
     """
     recordings = job.features(job.train)
     generator = np.random.default_rng(job.seed)
     folds = [
-        {u: random_folds(len(rows), RANDOM_FOLDS, generator) for u, rows in one.features.items()}
-        for one in recordings
+        {f: random_folds(len(rows), RANDOM_FOLDS, generator) for f, rows in r.features.items()}
+        for r in recordings
     ]
-
-    def part(fold: int, *, left_out: bool) -> list[RecordingFeatures]:
-        """Return the recordings with NaN as the features of the other samples."""
-        parts = []
-        for one, own in zip(recordings, folds, strict=True):
-            features = {
-                unit: np.where(((own[unit] == fold) == left_out)[:, None], rows, np.nan)
-                for unit, rows in one.features.items()
-            }
-            parts.append(replace(one, features=features))
-        return parts
-
     counts = np.zeros((len(recordings), 4), dtype=np.int64)
     for fold in range(RANDOM_FOLDS):
-        fitted = job.training(part(fold, left_out=False)).fit()
-        for index, tested in enumerate(part(fold, left_out=True)):
-            decided = fitted.scores(tested).decide(tested.name, tested.scored_labels)
-            for unit in decided_units(decided).values():
-                samples = score_samples(unit.labels, unit.states, unit.stable_probability)
-                counts[index] += samples.confusion.ravel()
+        trained = []
+        for recording, fold_of in zip(recordings, folds, strict=True):
+            labels = recording.labels.items()
+            kept = {name: np.where(fold_of[name] == fold, UNKNOWN, codes) for name, codes in labels}
+            trained.append(replace(recording, labels=kept))
+        fitted = job.training(trained).fit()
+        for row, recording, fold_of in zip(counts, recordings, folds, strict=True):
+            for name, scores in fitted.scores(recording).fingers.items():
+                codes = recording.scored_labels[name]
+                finger = scores.decide(np.where(fold_of[name] == fold, codes, UNKNOWN))
+                samples = score_samples(finger.labels, finger.states, finger.stable_probability)
+                row[:] += samples.confusion.ravel()
     return [[int(n) for n in row] for row in counts]

@@ -225,13 +225,15 @@ class RecordingScores(NamedTuple):
     def decide(self, name: str, labels: Mapping[str, Codes]) -> Decisions:
         """Return the decisions for fingers and hand with these labels, at the own thresholds.
 
+        A whole-hand method has one finger, `HAND`.
+
         Args:
             name: of the recording.
             labels: (n,) codes of each finger.
         """
         fingers = {finger: own.decide(labels[finger]) for finger, own in self.fingers.items()}
         hand = self.hand.decide(hand_decisions(fingers, len(fingers)).labels)
-        return Decisions(name, {} if self.whole_hand else fingers, hand)
+        return Decisions(name, {HAND: hand} if self.whole_hand else fingers, hand)
 
 
 @dataclass(frozen=True, eq=False)

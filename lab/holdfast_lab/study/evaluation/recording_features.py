@@ -1,11 +1,11 @@
 """The features that a method computes from the recordings of a corpus, with their labels."""
 
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -203,6 +203,12 @@ class PreparedRecording(NamedTuple):
     hand: HandSignal
     labelled: RecordingFeatures
 
+    @classmethod
+    def of(cls, recording: Recording, tare: Tare, fingers: tuple[str, ...]) -> Self:
+        """Prepare some fingers of a recording."""
+        hand = hand_signal(recording, tare, fingers)
+        return cls(hand, RecordingFeatures.of(hand))
+
     @property
     def n_bytes(self) -> int:
         """Size of the arrays that it adds to those of the recording [byte]."""
@@ -268,14 +274,9 @@ def prepared_recordings(
         fingers = tuple(f for f in corpus.fingers if f in modules and modules[f].n_samples)
         if not fingers:
             continue
-        prepare = partial(_prepared, variation.apply(recording), tare, fingers)
+        prepare = partial(PreparedRecording.of, variation.apply(recording), tare, fingers)
         if variation != UNCHANGED:
             yield prepare()
-            continue
-        key = (*corpus.identity, recording.name, fingers, corpus.tare)
-        yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
-
-
-def _prepared(recording: Recording, tare: Tare, fingers: Sequence[str]) -> PreparedRecording:
-    hand = hand_signal(recording, tare, tuple(fingers))
-    return PreparedRecording(hand, RecordingFeatures.of(hand))
+        else:
+            key = (*corpus.identity, recording.name, fingers, corpus.tare)
+            yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))

@@ -7,6 +7,7 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
 from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, count_glitches
+from holdfast_lab.study.methods import HAND
 from study.example_recordings import GLITCH, PUSH, truth_of
 
 TIMES = np.arange(1725) / 150
@@ -57,7 +58,7 @@ def test_directions(force, direction):
 
 
 def test_a_whole_hand_method_has_phases_and_disturbances_but_no_grips():
-    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=())
+    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=(HAND,))
     assert found.phases["disturbed"] == (180, 180)
     assert found.disturbances == [("down", (179, 179))]
     assert found.grips == []

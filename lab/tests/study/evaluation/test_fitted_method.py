@@ -71,7 +71,7 @@ def test_a_whole_hand_method_decides_for_no_finger():
     )
     scores = FittedMethod({HAND: Fixed()}, {"a": 0.5, "b": 0.5}).scores(recording)
     decided = scores.decide("one", recording.labels)
-    assert not decided.fingers
+    assert decided.fingers == {HAND: decided.hand}
     assert scores.fingers["b"].known.tolist() == [False, True, True]
     assert scores.fingers["b"].margin == pytest.approx([np.inf, np.log(4), np.inf])
     assert scores.fingers["b"].grasped.tolist() == [True, True, False]
