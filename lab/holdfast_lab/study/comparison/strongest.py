@@ -163,8 +163,8 @@ def _held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
         return None
     counts = []
     for breakdown in evaluation.breakdown:
-        held = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
-        counts.append((sum(wrong for _, wrong in held), sum(n for n, _ in held)))
+        grasped = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
+        counts.append((sum(wrong for _, wrong in grasped), sum(n for n, _ in grasped)))
     return counts
 
 

@@ -228,12 +228,14 @@ def stable_after_lock(
     """
     if truth is None:
         return None
-    held = np.isin(truth.hand["phase"], HELD_PHASES)
-    if not held.any():
+    grasped = np.isin(truth.hand["phase"], HELD_PHASES)
+    if not grasped.any():
         return None
-    locked_at = float(truth.times[np.argmax(held)])
+    locked_at = float(truth.times[np.argmax(grasped)])
     stable = (
-        (times >= locked_at - TIME_TOLERANCE) & held[latest_rows(truth, times)] & (states == STABLE)
+        (times >= locked_at - TIME_TOLERANCE)
+        & grasped[latest_rows(truth, times)]
+        & (states == STABLE)
     )
     first, lasting = math.inf, math.inf
     for start, end in runs(stable):
