@@ -19,7 +19,7 @@ from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
 from holdfast_lab.study.evaluation.fitted_method import Scores
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, label_hand
 
 EVENT = "an event"
 FALSE_ALARM = "a false alarm"
@@ -53,8 +53,8 @@ def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
 
     In an event a glitch is unstable; otherwise it is stable, unless something else happens.
     """
-    event = recording.hand_labels(recording.exact_labels)
-    other = recording.hand_labels(recording.calm_labels)
+    event = label_hand(recording.times, recording.exact_labels)
+    other = label_hand(recording.times, recording.calm_labels)
     glitch = runs(event.labels != other.labels)
     ends = event.times + sample_durations(event.times)
     near = _near(event.times, event.times[glitch[:, 0]], ends[glitch[:, 1] - 1])
@@ -178,12 +178,12 @@ def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> fl
         The shift [log odds]; minus infinity if the alarms by loss of contact alone are too many,
         0 if there is no false alarm at any threshold.
     """
-    lower = np.sort(np.concatenate([of_one.lower for of_one in ranges]))
-    upper = np.sort(np.concatenate([of_one.upper for of_one in ranges]))
+    lower = np.sort(np.concatenate([interval.lower for interval in ranges]))
+    upper = np.sort(np.concatenate([interval.upper for interval in ranges]))
     edges = np.unique(np.concatenate([upper, lower]))
     if not len(edges):
         return 0.0
     n_alarms = np.searchsorted(lower, edges, "right") - np.searchsorted(upper, edges, "right")
-    too_many = n_alarms > per_minute * sum(of_one.minutes for of_one in ranges)
+    too_many = n_alarms > per_minute * sum(interval.minutes for interval in ranges)
     last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
     return float(edges[last])

@@ -79,8 +79,8 @@ def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdo
     for name, unit in decisions.fingers.items():
         now = phase[latest_rows(truth, unit.times)]
         stable = unit.labels == STABLE
-        for each, count in phases.items():
-            phases[each] = _added(count, unit, now == each)
+        for phase_name, count in phases.items():
+            phases[phase_name] = _added(count, unit, now == phase_name)
         for k, (start, end) in enumerate(disturbed):
             inside = np.zeros(len(now), dtype=np.bool_)
             inside[slice(*np.searchsorted(unit.times, truth.times[[start, end - 1]]))] = True
@@ -92,7 +92,7 @@ def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdo
             grips.append(GripErrors(float(force[locked].mean()), *counts))
     forces = (truth.hand["outside_force"][start:end].mean(axis=0) for start, end in disturbed)
     return ErrorBreakdown(
-        {each: count for each, count in phases.items() if count[0]},
+        {name: count for name, count in phases.items() if count[0]},
         grips,
         list(zip(map(_direction, forces), pushes, strict=True)),
     )

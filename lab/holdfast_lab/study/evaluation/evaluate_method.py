@@ -156,7 +156,7 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         longest = max(warm_up(name, rate) for name in compared)
         method, stride = find_method(self.method), self.effort.stride
         featured = corpus_features(method, corpus, self.variation, stride, longest)
-        return [one for one in featured if one.slips] if self.slips else featured
+        return [recording for recording in featured if recording.slips or not self.slips]
 
     def training(self, recordings: Sequence[RecordingFeatures]) -> Training:
         """Return the samples of recordings, from which the method is fitted."""
@@ -259,7 +259,7 @@ def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording
     if job.tests:
         fold = _fit_fold(job, training, everything)
         for corpus in job.tests:
-            yield corpus.name, [ScoredRecording.of(one, *fold) for one in job.features(corpus)]
+            yield corpus.name, [ScoredRecording.of(r, *fold) for r in job.features(corpus)]
 
 
 def held_out_folds(
@@ -304,8 +304,11 @@ def _fit_fold(
             for reading, labels in labels_by_reading(recording).items():
                 ranges[reading].append(FalseAlarmRanges.of(scores, labels))
     shifts = {
-        reading: {n: threshold_shift(own, rate) if own else 0.0 for n, rate in BY_RATE.items()}
-        for reading, own in ranges.items()
+        reading: {
+            name: threshold_shift(of_recordings, rate) if of_recordings else 0.0
+            for name, rate in BY_RATE.items()
+        }
+        for reading, of_recordings in ranges.items()
     }
     return training.fit(chosen), shifts
 
@@ -313,10 +316,10 @@ def _fit_fold(
 def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     """Return the results of a method on scored recordings."""
     truths = [recording.truth for recording, *_ in scored]
-    decided = [each.decide(each.recording.scored_labels) for each in scored]
-    every = [each.decide(each.recording.labels) for each in scored]
+    decided = [case.decide(case.recording.scored_labels) for case in scored]
+    every = [case.decide(case.recording.labels) for case in scored]
     whole_hand = scored[0].scores.whole_hand
-    alarms = [_alarms(each) for each in scored]
+    alarms = [_alarms(case) for case in scored]
     return MethodEvaluation(
         fingers=None if whole_hand else summarise(decided),
         hand=summarise(map(_as_hand, decided)),

@@ -18,11 +18,8 @@ from holdfast.metrics.slip_thresholds import (
     THRESHOLD_LOG_ODDS,
     SlipSummary,
     ThresholdChoice,
-    choose_threshold,
-    held_out_places,
     slip_curve,
-    slip_intervals,
-    slip_summary,
+    summarise_choice,
 )
 from holdfast.metrics.slip_truth import STILL, SlipDecisions, SlipTruth
 from holdfast.metrics.slips import SlipCurve
@@ -74,16 +71,17 @@ def evaluate_slips(job: EvaluationJob) -> dict[str, SlipEvaluation]:
     """
     scored = {name: recordings for name, recordings in score_splits(job) if recordings}
     scores = {
-        name: [score_slips(*one[:2]) for one in of_corpus] for name, of_corpus in scored.items()
+        name: [score_slips(case.recording, case.scores) for case in cases]
+        for name, cases in scored.items()
     }
     split = next((name for name in job.splits if name in scored), "")
     ranks = still_ranks(scores.get(split, []))
     results: dict[str, SlipEvaluation] = {}
     training: Curves = []
-    for name, of_corpus in scores.items() if len(ranks) else ():
-        curves = [slip_curves(own, ranks) for own in of_corpus]
+    for name, fingers in scores.items() if len(ranks) else ():
+        curves = [slip_curves(of_recording, ranks) for of_recording in fingers]
         if name == split:
-            training, folds = curves, [one.fold for one in scored[split]]
+            training, folds = curves, [case.fold for case in scored[split]]
             results[job.train.name] = summarise_slips(curves, job.seed, groups=folds, split=split)
         else:
             results[name] = summarise_slips(curves, job.seed, training=training)
@@ -114,11 +112,10 @@ def score_slips(recording: RecordingFeatures, scores: RecordingScores) -> dict[s
     """
     made = {}
     for finger, truth in recording.slips.items():
-        own = scores.fingers[finger]
-        score = smoothed(own.times, np.where(own.known & own.grasped, -own.margin, np.nan))
-        made[finger] = SlipScores(
-            own.times, np.where(own.known & ~own.grasped, -np.inf, score), truth
-        )
+        finger_scores = scores.fingers[finger]
+        times, known, touches = finger_scores.times, finger_scores.known, finger_scores.grasped
+        score = smoothed(times, np.where(known & touches, -finger_scores.margin, np.nan))
+        made[finger] = SlipScores(times, np.where(known & ~touches, -np.inf, score), truth)
     return made
 
 
@@ -143,7 +140,7 @@ def smoothed(times: Array, log_odds: Array) -> Array:
 
 def still_ranks(scores: Iterable[Mapping[str, SlipScores]]) -> Array:
     """Return the sorted scores of all samples of some recordings that are still, in contact."""
-    every = [own for fingers in scores for own in fingers.values()]
+    every = [finger for fingers in scores for finger in fingers.values()]
     still = [s.score[np.isfinite(s.score) & (s.truth.codes == STILL)] for s in every]
     return np.sort(np.concatenate([np.empty(0), *still]))
 
@@ -194,36 +191,17 @@ def summarise_slips(
     training: Curves = (),
     split: str = "",
 ) -> SlipEvaluation:
-    """Return the scores of recordings, each at thresholds that are chosen without it.
+    """Return the metrics of recordings at the thresholds of both budgets.
 
-    Args:
-        curves: of the recordings.
-        seed: of the bootstrap, which draws from `training` too.
-        groups: of each recording; its thresholds are those of the other groups.
-        training: of other recordings, from which the thresholds are chosen instead.
-        split: of the result.
+    The arguments are those of `summarise_choice`.
 
     Raises:
         ValueError: no slips are known.
     """
-    pooled, others = (
-        [SlipCurve.total(list(fingers.values())) for fingers in recordings]
-        for recordings in (curves, training)
+    summary, quiet_budget = (
+        summarise_choice(curves, choice, groups=groups, training=training, seed=seed)
+        for choice in (CHOICE, QUIET_CHOICE)
     )
-    summaries = []
-    for choice in (CHOICE, QUIET_CHOICE):
-        indices = [] if others else held_out_places(pooled, groups, choice).tolist()
-        if others:
-            total = SlipCurve.total(others)
-            index = choose_threshold(total, choice.false_alarms, choice.counted_in)
-            indices = [len(total) - 1 if index is None else index] * len(curves)
-        counts = [
-            {finger: curve[index] for finger, curve in fingers.items()}
-            for fingers, index in zip(curves, indices, strict=True)
-        ]
-        intervals = slip_intervals(pooled, choice, groups=groups, training=others, seed=seed)
-        summaries.append(slip_summary(counts, intervals, threshold_chosen=True))
-    held, quiet = summaries
-    if held is None:
+    if summary is None:
         raise ValueError("recordings with known slips expected")
-    return SlipEvaluation(split, len(curves), held, quiet)
+    return SlipEvaluation(split, len(curves), summary, quiet_budget)

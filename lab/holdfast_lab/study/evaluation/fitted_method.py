@@ -104,10 +104,10 @@ class Training:
         fitted_to = sorted(range(len(self.recordings)) if indices is None else indices)
         classifiers: dict[str, Classifier] = {}
         for unit, samples in self.samples.items():
-            own = samples.take(np.isin(samples.groups, fitted_to))
-            if not own.one_class:
+            trained = samples.take(np.isin(samples.groups, fitted_to))
+            if not trained.one_class:
                 recipe = self.method.recipe
-                classifiers[unit] = recipe.fit(own, self.method.reference, self.seed)
+                classifiers[unit] = recipe.fit(trained, self.method.reference, self.seed)
         rest = [self.recordings[index].at_rest for index in fitted_to]
         fingers = dict.fromkeys(finger for moments in rest for finger in moments)
         nothing = (0, 0.0, 0.0)
@@ -231,7 +231,7 @@ class RecordingScores(NamedTuple):
             name: of the recording.
             labels: (n,) codes of each finger.
         """
-        fingers = {finger: own.decide(labels[finger]) for finger, own in self.fingers.items()}
+        fingers = {name: scores.decide(labels[name]) for name, scores in self.fingers.items()}
         hand = self.hand.decide(hand_decisions(fingers, len(fingers)).labels)
         return Decisions(name, {HAND: hand} if self.whole_hand else fingers, hand)
 

@@ -164,19 +164,11 @@ class RecordingFeatures:
             )
         return replace(self, **changed)
 
-    def hand_labels(self, labels: Mapping[str, Codes]) -> FingerDecisions:
-        """Return the hand with the label that follows from these finger labels."""
-        fingers = {
-            name: FingerDecisions(times, labels[name], labels[name], np.full(len(times), np.nan))
-            for name, times in self.times.items()
-        }
-        return hand_decisions(fingers, len(fingers))
-
     def unit_labels(self, unit: str) -> Codes:
         """Return the labels that train a unit: for the hand, at the times of the first finger."""
         if unit != HAND:
             return self.labels[unit]
-        hand = self.hand_labels(self.labels)
+        hand = label_hand(self.times, self.labels)
         return hand.labels[np.searchsorted(hand.times, next(iter(self.times.values())))]
 
     def slip_labels(self, unit: str) -> Codes | None:
@@ -195,6 +187,20 @@ class RecordingFeatures:
             codes = np.maximum(codes, own[at])
         states = np.select([codes == STILL, codes == SLIDING], [STABLE, UNSTABLE], default=UNKNOWN)
         return states.astype(np.int8)
+
+
+def label_hand(times: Mapping[str, Array], labels: Mapping[str, Codes]) -> FingerDecisions:
+    """Return the labels of a hand that follow from those of its fingers, as its decisions.
+
+    Args:
+        times: (n,) of each finger [s].
+        labels: (n,) codes of each finger.
+    """
+    fingers = {
+        name: FingerDecisions(own, labels[name], labels[name], np.full(len(own), np.nan))
+        for name, own in times.items()
+    }
+    return hand_decisions(fingers, len(fingers))
 
 
 class PreparedRecording(NamedTuple):

@@ -23,7 +23,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     score_splits,
     warm_up,
 )
-from holdfast_lab.study.evaluation.recording_features import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation, label_hand
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
@@ -133,7 +133,7 @@ def test_events_are_counted_by_exact_labels(evaluations, corpus):
     """Equal to `event_metrics` of the hand, by labels without margin."""
     _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
     for case, alarms in zip(scored, evaluations["recording"].alarms[OWN], strict=True):
-        labels = case.recording.hand_labels(case.recording.exact_labels).labels
+        labels = label_hand(case.recording.times, case.recording.exact_labels).labels
         score = case.scores.hand
         known = event_metrics(score.times, labels, score.states())
         assert len(alarms.delays) == known.n_events

@@ -6,6 +6,7 @@ import pytest
 
 from holdfast.classifiers.linear import smooth
 from holdfast.contact import UNKNOWN, UNSTABLE
+from holdfast.metrics import slip_thresholds
 from holdfast.metrics.slip_thresholds import THRESHOLDS, ThresholdChoice
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
 from holdfast.model import Head
@@ -208,10 +209,13 @@ def test_without_known_slips_there_are_no_results(tmp_path):
 def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
     """What is tested does not change the choice."""
     seen = []
-    choose = module.choose_threshold
-    monkeypatch.setattr(
-        module, "choose_threshold", lambda curve, *rest: seen.append(curve) or choose(curve, *rest)
-    )
+    choose = slip_thresholds.choose_threshold
+
+    def noted(curve, *rest):
+        seen.append(curve)
+        return choose(curve, *rest)
+
+    monkeypatch.setattr(slip_thresholds, "choose_threshold", noted)
     evaluated(corpora, "holdfast")
     assert len(seen) == 2  # for each budget
     for curve in seen:
