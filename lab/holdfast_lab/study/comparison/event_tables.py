@@ -174,7 +174,7 @@ def _false_alarm_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) 
 
 
 def _glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:
-    n = [count.n for count in counts]
+    n = [len(count.distances) for count in counts]
     minutes = [count.grasped_seconds / 60 for count in counts]
     yield ratio_row(keys | {"figure": "glitches per minute held"}, n, minutes, seed, scale=1.0)
     for figure, least in (("object slides [%]", 0.0), ("by 0.1 mm or more [%]", 1e-4)):

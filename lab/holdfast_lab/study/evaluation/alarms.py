@@ -97,7 +97,13 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, scores: Scores, labels: AlarmLabels, shift: float = 0.0) -> Self:
-        """Return the statistics of a hand, or a finger, at a shifted threshold."""
+        """Return the statistics of a hand, or a finger, in one recording.
+
+        Args:
+            scores: of the same samples as the labels.
+            labels: in which events and false alarms are found.
+            shift: of the threshold [log odds].
+        """
         times, states = scores.times, scores.states(shift)
         match = match_alarms(times, labels.labels, states)
         at = np.searchsorted(times, [alarm.time for alarm in match.false_alarms])
@@ -151,7 +157,12 @@ class FalseAlarmRanges(NamedTuple):
 
     @classmethod
     def of(cls, scores: Scores, labels: AlarmLabels) -> Self:
-        """Return the ranges of the false alarms under a stable label."""
+        """Return the ranges of the false alarms under a stable label.
+
+        Args:
+            scores: held as long as those at which the chosen threshold is used.
+            labels: of the same samples.
+        """
         times, stable = scores.times, labels.labels == STABLE
         match = match_alarms(times, labels.labels, labels.labels)
         spans = np.array([(event.onset, event.end) for event in match.events]).reshape(-1, 2)

@@ -68,7 +68,12 @@ class ErrorBreakdown(msgspec.Struct, frozen=True):
 
 
 def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdown:
-    """Return the errors of a recording; empty if the truth is not known."""
+    """Return the errors of a recording.
+
+    Args:
+        truth: with the phases and the outside force, else the breakdown is empty.
+        decisions: of each finger; of a whole-hand method, of `HAND`, which has no grip.
+    """
     if truth is None or not {"phase", "outside_force"} <= set(truth.hand):
         return ErrorBreakdown()
     phase = truth.hand["phase"]
@@ -120,13 +125,11 @@ class GlitchCount(msgspec.Struct, frozen=True):
     """Glitches of the hand's controller in one recording, while the hand holds the object.
 
     Attributes:
-        n: number of glitches.
         distances: for each glitch, how far the object slides until the effect of the glitch and
             the sliding that began in it are over [m].
         grasped_seconds: time for which the hand holds the object [s].
     """
 
-    n: int = 0
     distances: list[float] = []
     grasped_seconds: float = 0.0
 
@@ -144,7 +147,7 @@ def count_glitches(truth: Truth | None) -> GlitchCount:
         begun = sliding[(sliding[:, 0] >= start) & (sliding[:, 0] < end)]
         last = max([end, *begun[:, 1].tolist()])
         distances.append(float((speed * steps)[start:last].sum()))
-    return GlitchCount(len(distances), distances, float(steps[grasped].sum()))
+    return GlitchCount(distances, float(steps[grasped].sum()))
 
 
 def _sliding_speed(truth: Truth) -> Array:

@@ -124,9 +124,9 @@ def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
 
 def test_without_a_truth_there_are_no_glitches_and_no_phases(evaluations):
     others = evaluations["others"]
-    assert all(glitches.n == 0 for glitches in others.glitches)
+    assert all(not glitches.distances for glitches in others.glitches)
     assert all(not each.phases for each in others.breakdown)
-    assert all(glitches.n == 1 for glitches in evaluations["recording"].glitches)
+    assert all(len(glitches.distances) == 1 for glitches in evaluations["recording"].glitches)
 
 
 def test_events_are_counted_by_exact_labels(evaluations, corpus):
