@@ -46,10 +46,9 @@ from holdfast_lab.study.comparison.slip_table import (
     slip_table,
 )
 from holdfast_lab.study.evaluation.cause_counts import cause_table, count_causes
-from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
+from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
 from holdfast_lab.study.evaluation.evaluate_slips import (
     SlipEvaluation,
-    SlipJob,
     evaluate_slips,
     summarise_slips,
 )
@@ -79,7 +78,10 @@ def method_rows(
     """Yield the rows of the methods."""
     training, tested = scan_corpus("train", train), scan_corpus("test", test)
     for name in names:
-        job = SlipJob(name, training, (tested,), effort, seed, tuple(names))
+        job = EvaluationJob(
+            name, training, ("object", "recording"), (tested,), effort=effort, seed=seed,
+            compared=tuple(names), slips=True,
+        )  # fmt: skip
         evaluations = evaluate_slips(job)
         if "test" in evaluations:
             yield from slip_rows({**method_keys(name), THRESHOLD: CHOSEN}, evaluations["test"])
@@ -110,8 +112,7 @@ def model_rows(name: str, train: Path, test: Path, seed: int) -> Iterator[Row]:
         shipped = SlipEvaluation("", len(by_recording), summary)
         yield from slip_rows({**keys, THRESHOLD: SHIPPED}, shipped)
     training = count_model(model, train)
-    summary = summarise_slips(tested.curves, seed, training=training.curves)
-    chosen = SlipEvaluation("", len(by_recording), summary)
+    chosen = summarise_slips(tested.curves, seed, training=training.curves)
     yield from slip_rows({**keys, THRESHOLD: CHOSEN}, chosen)
 
 

@@ -16,6 +16,7 @@ from holdfast.metrics.slip_thresholds import (
     slip_curve,
     slip_intervals,
     slip_summary,
+    summarise_choice,
 )
 from holdfast.metrics.slip_truth import (
     CREEPING,
@@ -259,6 +260,22 @@ class TestThresholds:
         raised = [counts.raised_seconds / counts.quiet_seconds for counts in total]
         assert rates[place] <= 1.0
         assert rates[place - 1] > 1.0 or raised[place - 1] > 0.02
+
+    def test_a_summary_has_the_threshold_of_other_recordings_or_of_other_groups(self):
+        tested, training = (
+            [{"thumb": c} for c in part] for part in (self.curves[:4], self.curves[4:])
+        )
+        for choice in (ThresholdChoice(1.0), ThresholdChoice(-1.0)):  # the second allows nothing
+            place = choose_threshold(SlipCurve.total(self.curves[4:]), choice.false_alarms)
+            summary = summarise_choice(tested, choice, training=training)
+            assert summary.threshold_chosen and summary.intervals is not None
+            counts = SlipCurve.total(self.curves[:4])[-1 if place is None else place]
+            assert summary.pooled == summary.fingers["thumb"] == slip_metrics(counts)
+        groups = [0, 0, 1, 1]
+        places = held_out_places(self.curves[:4], groups, ThresholdChoice(1.0))
+        counts = SlipCounts.total(c[k] for c, k in zip(self.curves, places, strict=False))
+        summary = summarise_choice(tested, ThresholdChoice(1.0), groups=groups)
+        assert summary.pooled == slip_metrics(counts)
 
     def test_a_curve_is_the_counts_at_each_threshold(self):
         slips = [slip(), slip(8.0, 8.3, gross=8.1, reached=(8.05, math.nan))]

@@ -261,11 +261,11 @@ def validation_rows(samples: Samples, seed: int) -> npt.NDArray[np.bool_]:
     """
     names = np.unique(samples.groups)
     groups = names[shuffled(len(names), seed)]
-    n_held = max(1, round(VALIDATION_SHARE * len(groups)))
-    for start in range(len(groups) if len(groups) > n_held else 0):
-        held = np.isin(samples.groups, np.roll(groups, -start)[:n_held])
-        if not samples.take(held).one_class and not samples.take(~held).one_class:
-            return held
+    n_left_out = max(1, round(VALIDATION_SHARE * len(groups)))
+    for start in range(len(groups) if len(groups) > n_left_out else 0):
+        left_out = np.isin(samples.groups, np.roll(groups, -start)[:n_left_out])
+        if not samples.take(left_out).one_class and not samples.take(~left_out).one_class:
+            return left_out
     return np.zeros(len(samples.positive), dtype=np.bool_)
 
 
@@ -281,8 +281,8 @@ def _train(
     rng = np.random.default_rng(seed)
     dropout = partial(_drop_channels, fraction=parameters["dropout"], generator=generator)
     patience = parameters.get("patience", 0)
-    held = validation_rows(samples, seed) if patience else np.zeros(len(samples.positive), bool)
-    fitted, stopping = np.flatnonzero(~held), EarlyStopping(patience)
+    left_out = validation_rows(samples, seed) if patience else np.zeros(len(samples.positive), bool)
+    fitted, stopping = np.flatnonzero(~left_out), EarlyStopping(patience)
     best = _copied(weights)
     for _ in range(parameters["n_epochs"]):
         order = torch.from_numpy(fitted[_balanced_rows(samples.positive[fitted], rng)])
@@ -291,9 +291,9 @@ def _train(
             scores = forward(windows[rows], weights, dropout)
             torch.nn.functional.cross_entropy(scores, classes[rows]).backward()
             optimiser.step()
-        if not held.any() or stopping.update(_loss(torch, windows, classes, weights, held)):
+        if not left_out.any() or stopping.update(_loss(torch, windows, classes, weights, left_out)):
             best = _copied(weights)
-        if held.any() and stopping.is_over:
+        if left_out.any() and stopping.is_over:
             break
     return best
 
@@ -307,10 +307,10 @@ def _loss(
     windows: Tensor,
     classes: Tensor,
     weights: Mapping[str, Tensor],
-    held: npt.NDArray[np.bool_],
+    left_out: npt.NDArray[np.bool_],
 ) -> float:
-    """Return the mean cross entropy of the held-out windows, with both classes weighing alike."""
-    rows = torch.from_numpy(np.flatnonzero(held))
+    """Return the mean cross entropy of the left-out windows, with both classes weighing alike."""
+    rows = torch.from_numpy(np.flatnonzero(left_out))
     with torch.no_grad():
         scores = torch.cat(
             [forward(windows[part], weights) for part in rows.split(PREDICTION_CHUNK_SIZE)]

@@ -82,11 +82,11 @@ def values_of(marked: Marked) -> Iterator[FingerValues]:
         own = dict(zip(names, extracted[name].features.T, strict=True))
         own |= family_features(finger_of(module, recording.rate))
         for situation, mask in marked.masks[name].items():
-            places = np.flatnonzero(mask & np.isfinite(own[names[0]]))
-            if len(places) > MAX_SAMPLES_SHOWN:
-                places = places[np.linspace(0, len(places) - 1, MAX_SAMPLES_SHOWN).astype(int)]
-            if len(places):
-                values = {feature: column[places] for feature, column in own.items()}
+            indices = np.flatnonzero(mask & np.isfinite(own[names[0]]))
+            if len(indices) > MAX_SAMPLES_SHOWN:
+                indices = indices[np.linspace(0, len(indices) - 1, MAX_SAMPLES_SHOWN).astype(int)]
+            if len(indices):
+                values = {feature: column[indices] for feature, column in own.items()}
                 yield FingerValues(f"{recording.name}/{name}", situation, values)
 
 
@@ -130,8 +130,8 @@ def twin_holds(folder: Path, largest: int | None = None) -> Iterator[Marked]:
             if (cut := _between(module, start, stop)).n_samples > MIN_HOLD_SAMPLES
         }
         if modules:
-            held = replace(recording, modules=modules)
-            yield Marked(held, {name: _twin_masks(held, truth, name) for name in modules})
+            kept = replace(recording, modules=modules)
+            yield Marked(kept, {name: _twin_masks(kept, truth, name) for name in modules})
 
 
 def twin_grasps(folder: Path, largest: int | None = None) -> Iterator[Marked]:
@@ -151,8 +151,8 @@ def _with_truth(folder: Path, largest: int | None) -> Iterator[tuple[Recording, 
 
 def _hold(truth: Truth) -> tuple[float, float]:
     """Return the time from the lock to the release, or to the loss of the object [s]."""
-    held = truth.times[np.isin(truth.hand["phase"], HELD_PHASES)]
-    return (float(held[0]) + SETTLED, float(held[-1])) if len(held) else (0.0, 0.0)
+    grasped = truth.times[np.isin(truth.hand["phase"], HELD_PHASES)]
+    return (float(grasped[0]) + SETTLED, float(grasped[-1])) if len(grasped) else (0.0, 0.0)
 
 
 def _between(module: Tactile, start: float, stop: float) -> Tactile:
@@ -165,8 +165,8 @@ def _twin_masks(recording: Recording, truth: Truth, finger: str) -> dict[str, Fl
     slips = slip_truth(recording, finger, times)
     if slips is None:
         raise ValueError(f"{recording.name} has no truth of slips")
-    place = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
-    moves = _gravity_changes(truth.hand["gravity"], recording.rate)[place]
+    index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
+    moves = _gravity_changes(truth.hand["gravity"], recording.rate)[index]
     still = slips.codes == STILL
     masks = {
         "quiet": _settled(slips.quiet & ~moves, recording.rate),

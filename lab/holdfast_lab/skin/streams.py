@@ -82,10 +82,10 @@ def finger_streams(recordings: Iterable[Marked], model: Model) -> Iterator[Finge
 
 
 def _held(masks: dict[str, Flags], n: int) -> Flags:
-    held = np.zeros(n, dtype=bool)
+    grasped = np.zeros(n, dtype=bool)
     for name in HANDLED:
-        held |= masks.get(name, False)
-    return held
+        grasped |= masks.get(name, False)
+    return grasped
 
 
 def _parts(module: Tactile, mask: Flags, seconds: float) -> list[Array]:
@@ -100,11 +100,11 @@ def _parts(module: Tactile, mask: Flags, seconds: float) -> list[Array]:
 def _changes(module: Tactile, quiet: Flags) -> Array:
     parts = _parts(module, quiet, MIN_RUN_SECONDS)
     rms = np.full(len(CHANGE_TIMES), math.nan)
-    for place, time in enumerate(CHANGE_TIMES):
+    for index, time in enumerate(CHANGE_TIMES):
         lag = max(1, round(time / module.period))
         long = [part[lag:] - part[:-lag] for part in parts if len(part) > 1.5 * lag]
         if long:
-            rms[place] = math.sqrt(float(np.mean(np.concatenate(long) ** 2)))
+            rms[index] = math.sqrt(float(np.mean(np.concatenate(long) ** 2)))
     return np.asarray(rms / rms[0] if rms[0] > 0 else np.full(len(rms), math.nan))
 
 
@@ -119,18 +119,18 @@ def _noise_in_steps(module: Tactile, quiet: Flags) -> Array:
     return np.asarray(np.sqrt(squares.mean(axis=0) / 2).ravel() / step)
 
 
-def _bands(module: Tactile, held: Flags) -> tuple[float, float]:
+def _bands(module: Tactile, grasped: Flags) -> tuple[float, float]:
     """Return the share of tremor in motion, and the motion over the noise, of the force."""
     force = fingertip_force(module.readings, module.sensor, "none")
     powers, noise, n = np.zeros(2), 0.0, 0
-    for a, b in runs(held):
+    for a, b in runs(grasped):
         if b - a < MIN_BAND_SECONDS / module.period:
             continue
         rates = np.fft.rfftfreq(b - a, module.period)
         middle = force[a:b] - force[a:b].mean(axis=0)
         power = 2 * (np.abs(np.fft.rfft(middle, axis=0)) ** 2).sum(axis=1) / (b - a)
-        for place, (low, high) in enumerate((HAND_TREMOR_BAND, HAND_MOTION_BAND)):
-            powers[place] += power[(rates >= low) & (rates < high)].sum()
+        for index, (low, high) in enumerate((HAND_TREMOR_BAND, HAND_MOTION_BAND)):
+            powers[index] += power[(rates >= low) & (rates < high)].sum()
         noise += float((np.diff(force[a:b], axis=0) ** 2).sum() / 2)
         n += b - a
     if not (n and noise and powers[1]):

@@ -118,10 +118,10 @@ def draw_courses(courses: Mapping[str, TrialCourse]) -> Figure:
     """
     figure, grid = panels(2 * len(courses), len(courses), 1.7)
     upper, lower = grid[: len(courses)], grid[len(courses) :]
-    for place, (title, course) in enumerate(courses.items()):
-        add_title(upper[place], title)
-        _draw_force(upper[place], course)
-        _draw_slip(lower[place], course)
+    for index, (title, course) in enumerate(courses.items()):
+        add_title(upper[index], title)
+        _draw_force(upper[index], course)
+        _draw_slip(lower[index], course)
     for row in (upper, lower):
         _share_limits(row)
     if courses:

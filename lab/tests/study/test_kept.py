@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from holdfast_lab.study.evaluation.recording_features import prepared_recordings
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation, prepared_recordings
 from holdfast_lab.study.kept import KeptValues, recording_bytes, usable_memory
 from holdfast_lab.study.plan import scan_corpus
 
@@ -71,7 +70,7 @@ def test_a_recording_is_prepared_once(corpus):
     first, again = (list(prepared_recordings(corpus)) for _ in range(2))
     assert len(first) == 2
     assert all(a is b for a, b in zip(first, again, strict=True))
-    assert first[0].recording is corpus.load()[0]
+    assert first[0].hand.recording is corpus.load()[0]
 
 
 def test_a_varied_recording_is_not_taken_for_the_recording(corpus):
@@ -87,4 +86,4 @@ def test_a_changed_corpus_is_read_again(corpus, tmp_path):
         path.unlink()
     save_synthetic(tmp_path, [3, 4])
     after = next(prepared_recordings(scan_corpus("main", tmp_path)))
-    assert before.recording.digest != after.recording.digest
+    assert before.hand.recording.digest != after.hand.recording.digest

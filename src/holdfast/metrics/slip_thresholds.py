@@ -362,3 +362,41 @@ def slip_summary(
         intervals,
         threshold_chosen,
     )
+
+
+def summarise_choice(
+    curves: Sequence[Mapping[str, SlipCurve]],
+    choice: ThresholdChoice,
+    *,
+    groups: Sequence[int] = (),
+    training: Sequence[Mapping[str, SlipCurve]] = (),
+    seed: int = 0,
+) -> SlipSummary | None:
+    """Return the metrics of recordings, each at a threshold that is chosen without it.
+
+    Args:
+        curves: of each finger, of each recording.
+        choice: of the threshold; if no threshold fits, the highest is taken.
+        groups: of each recording; its threshold is chosen from the other groups.
+        training: curves of other recordings, from which it is chosen instead.
+        seed: of the bootstrap, which draws from `training` too.
+
+    Returns:
+        The metrics; None if no slips are known.
+    """
+    pooled, others = (
+        [SlipCurve.total(list(fingers.values())) for fingers in recordings]
+        for recordings in (curves, training)
+    )
+    if others:
+        total = SlipCurve.total(others)
+        index = choose_threshold(total, choice.false_alarms, choice.counted_in)
+        indices = [len(total) - 1 if index is None else index] * len(curves)
+    else:
+        indices = held_out_places(pooled, groups, choice).tolist()
+    counts = [
+        {finger: curve[index] for finger, curve in fingers.items()}
+        for fingers, index in zip(curves, indices, strict=True)
+    ]
+    intervals = slip_intervals(pooled, choice, groups=groups, training=others, seed=seed)
+    return slip_summary(counts, intervals, threshold_chosen=True)

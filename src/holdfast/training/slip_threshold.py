@@ -8,9 +8,8 @@ from holdfast.metrics.slip_thresholds import (
     SlipSummary,
     ThresholdChoice,
     choose_threshold,
-    held_out_places,
-    slip_intervals,
     slip_summary,
+    summarise_choice,
 )
 from holdfast.metrics.slips import SlipCounts, SlipCurve, slip_metrics
 from holdfast.model import Model
@@ -70,28 +69,23 @@ def choose_slip_threshold(
     Returns:
         The threshold; None if no recording has decisions about known slips.
     """
-    used = [(curve, group) for curve, group in zip(curves, groups, strict=True) if curve]
+    used = [(fingers, unit) for fingers, unit in zip(curves, groups, strict=True) if fingers]
     if not used:
         return None
-    by_recording = [SlipCurve.total(list(fingers.values())) for fingers, _ in used]
-    own = [group for _, group in used]
-    pooled, highest = SlipCurve.total(by_recording), len(SLIP_THRESHOLDS) - 1
+    known, units = [fingers for fingers, _ in used], [unit for _, unit in used]
+    pooled = SlipCurve.total([SlipCurve.total(list(fingers.values())) for fingers in known])
     index = choose_threshold(pooled, SLIP_FALSE_ALARMS)
-    indices, intervals = [highest if index is None else index] * len(used), None
-    if has_others := len(set(own)) > 1:
+    shown = len(SLIP_THRESHOLDS) - 1 if index is None else index
+    if len(set(units)) > 1:
         choice = ThresholdChoice(SLIP_FALSE_ALARMS)
-        indices = held_out_places(by_recording, own, choice).tolist()
-        intervals = slip_intervals(by_recording, choice, groups=own, seed=seed)
-    counts = [
-        {name: curve[index] for name, curve in fingers.items()}
-        for (fingers, _), index in zip(used, indices, strict=True)
-    ]
-    metrics = slip_summary(counts, intervals, threshold_chosen=has_others)
+        metrics = summarise_choice(known, choice, groups=units, seed=seed)
+    else:
+        counts = [{name: curve[shown] for name, curve in fingers.items()} for fingers in known]
+        metrics = slip_summary(counts)
     if metrics is None:
         return None
     supported = _supports(pooled[0], SLIP_FALSE_ALARMS)
-    shown = pooled[highest if index is None else index]
-    return ChosenThreshold(index if supported else None, shown, metrics)
+    return ChosenThreshold(index if supported else None, pooled[shown], metrics)
 
 
 def _supports(counts: SlipCounts, false_alarms: float) -> bool:

@@ -15,9 +15,8 @@ from holdfast.sensors.types import Array
 from holdfast.training.finger_samples import contact_threshold
 from holdfast_lab.study.benchmark.submission import COLUMN_TYPES, FingerScores
 from holdfast_lab.study.evaluation.evaluate_slips import score_slips
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training, probability_of
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.scores import probability_of
 from holdfast_lab.study.methods import Method
 from holdfast_lab.study.plan import Corpus
 
@@ -74,7 +73,7 @@ class BothTargets(NamedTuple):
             ValueError: a finger has no estimate at all: the method does not fit the sensor.
         """
         stable = self._for(self.stable, recording).scores(recording).fingers
-        slips = score_slips(self._for(self.slip, recording), recording)
+        slips = score_slips(recording, self._for(self.slip, recording).scores(recording))
         scored = {}
         for finger in recording.slips:
             own = stable[finger]

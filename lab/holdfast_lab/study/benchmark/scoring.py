@@ -43,13 +43,12 @@ from holdfast_lab.study.evaluation.alarms import (
 from holdfast_lab.study.evaluation.evaluate_method import HOLD_TIME
 from holdfast_lab.study.evaluation.evaluate_slips import (
     SLIP_RATE,
-    SlipEvaluation,
     SlipScores,
     slip_curves,
     still_ranks,
     summarise_slips,
 )
-from holdfast_lab.study.evaluation.scores import Scores
+from holdfast_lab.study.evaluation.fitted_method import Scores
 
 EVENT_BUDGETS = (1.0, 5.0)
 """Rates of false alarms of a finger under a stable label that events are scored at [1/min]."""
@@ -257,8 +256,8 @@ def _slips_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
     rows: list[Row] = []
     for split, recordings in scored.items():
         curves = [slip_curves(fingers, ranks) for fingers in _slip_scores(recordings)]
-        summary = summarise_slips(curves, BOOTSTRAP_SEED, training=chosen_from)
-        rows += slip_rows({"on": split}, SlipEvaluation("", len(curves), summary))
+        evaluation = summarise_slips(curves, BOOTSTRAP_SEED, training=chosen_from)
+        rows += slip_rows({"on": split}, evaluation)
     return ResultTable(
         "slips", "Slips of fingers", SLIPS_NOTE, rows, ("on",), digits_of=SLIP_DIGITS,
         has_paper=False,

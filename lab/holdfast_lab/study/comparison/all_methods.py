@@ -30,6 +30,7 @@ from holdfast_lab.study.comparison.jobs import (
 )
 from holdfast_lab.study.evaluation.alarms import AlarmStatistics
 from holdfast_lab.study.evaluation.evaluate_method import (
+    BY_RATE,
     COMPARED_RATE,
     FALSE_ALARM_RATES,
     MethodEvaluation,
@@ -136,7 +137,7 @@ def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
 
 def _alarm_curve(evaluation: MethodEvaluation) -> PlottedCurve:
     """Return missed events over false alarms under a stable label."""
-    by_rate = evaluation.alarms.by_rate
+    by_rate = [evaluation.alarms[name] for name in BY_RATE]
     rates = np.array([_false_alarms_per_minute(alarms) for alarms in by_rate])
     missed = np.array([_missed_share(alarms) for alarms in by_rate])
     return PlottedCurve(rates, missed, chosen=FALSE_ALARM_RATES.index(COMPARED_RATE))

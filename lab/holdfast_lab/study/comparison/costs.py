@@ -159,8 +159,8 @@ def _fingers(recording: Recording, corpus: Corpus) -> list[str]:
 
 def _select(names: Sequence[str]) -> tuple[str, ...]:
     """Return `N_RECORDINGS` of the names, at even steps."""
-    places = np.linspace(0, len(names) - 1, min(N_RECORDINGS, len(names))).round().astype(int)
-    return tuple(names[place] for place in np.unique(places))
+    indices = np.linspace(0, len(names) - 1, min(N_RECORDINGS, len(names))).round().astype(int)
+    return tuple(names[index] for index in np.unique(indices))
 
 
 def _shortest(work: Callable[[], object]) -> float:

@@ -1,6 +1,6 @@
 """Tables of the comparison by event: detection delay, false alarms and glitches."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,16 +17,16 @@ from holdfast_lab.study.comparison.jobs import (
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.alarms import READINGS, AlarmStatistics
 from holdfast_lab.study.evaluation.error_breakdown import GlitchCount
-from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME, ReadingAlarms
+from holdfast_lab.study.evaluation.evaluate_method import (
+    COMPARED,
+    COMPARED_RATE,
+    HOLD_TIME,
+    LASTING,
+    OWN,
+)
 from holdfast_lab.study.plan import StudyPlan
 
-COMPARED = f"for {COMPARED_RATE:g}/min"
-LASTING = f"own, held {HOLD_TIME:g} s"
-ALARMS_BY_THRESHOLD: dict[str, Callable[[ReadingAlarms], list[AlarmStatistics]]] = {
-    "own": lambda alarms: alarms.own,
-    LASTING: lambda alarms: alarms.lasting,
-    COMPARED: lambda alarms: alarms.compared,
-}
+SHOWN_THRESHOLDS = (OWN, LASTING, COMPARED)
 READING = "a glitch is"
 """Key of the tables: how glitches of the hand's controller count."""
 FALSE_ALARMS = "false alarms per minute"
@@ -58,7 +58,7 @@ Keys = dict[str, Key]
 def events(plan: StudyPlan, results: Results) -> ResultTable:
     """Return the table of events: missed, delay and false alarms."""
     rows: list[Row] = []
-    for keys, alarms in _lines(plan, results, tuple(ALARMS_BY_THRESHOLD), _event_splits(plan)):
+    for keys, alarms in _lines(plan, results, SHOWN_THRESHOLDS, _event_splits(plan)):
         rows += event_rows(keys, alarms, plan.seed)
     note = (
         "Of the hand, by labels without margin. An event is the end of a hold of at least half a "
@@ -153,7 +153,7 @@ def _lines(
                 for reading in READINGS:
                     keys: Keys = {"on": SPLIT_TITLES[key], "threshold": threshold}
                     keys |= {READING: reading, "method": title}
-                    yield keys, ALARMS_BY_THRESHOLD[threshold](evaluation.readings[reading])
+                    yield keys, evaluation.readings[reading][threshold]
 
 
 def _event_splits(plan: StudyPlan) -> tuple[str, ...]:
@@ -174,7 +174,7 @@ def _false_alarm_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) 
 
 
 def _glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:
-    n = [count.n for count in counts]
+    n = [len(count.distances) for count in counts]
     minutes = [count.grasped_seconds / 60 for count in counts]
     yield ratio_row(keys | {"figure": "glitches per minute held"}, n, minutes, seed, scale=1.0)
     for figure, least in (("object slides [%]", 0.0), ("by 0.1 mm or more [%]", 1e-4)):

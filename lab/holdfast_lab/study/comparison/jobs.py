@@ -11,7 +11,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     MethodEvaluation,
     evaluate_method,
 )
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import METHODS, PAPER_FAMILY
 from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.tasks import Task

@@ -121,8 +121,8 @@ def count_recordings(
         estimates: of the same recordings, by method.
     """
     common = [
-        common_samples([estimate[place] for estimate in estimates.values()])
-        for place in range(len(labels))
+        common_samples([estimate[index] for estimate in estimates.values()])
+        for index in range(len(labels))
     ]
     return {
         method: [_count(*each) for each in zip(labels, own, common, strict=True)]

@@ -4,7 +4,6 @@ Each recording is estimated by a fit that did not use it. The estimates are kept
 that all methods can be scored on the samples at which every one of them has an estimate.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause
-from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Recording, Tactile, label_states
@@ -25,6 +23,8 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     ScoredRecording,
     score_splits,
 )
+from holdfast_lab.study.evaluation.recording_features import label_hand
+from holdfast_lab.study.methods import HAND
 from holdfast_lab.study.plan import Corpus
 
 MAX_REAL_FOLDS = 20
@@ -156,6 +156,7 @@ def _estimates(scored: ScoredRecording) -> RecordingEstimates:
         {
             name: unit_estimates(f.stable_probability, f.states)
             for name, f in decided.fingers.items()
+            if name != HAND
         },
         unit_estimates(hand.probability, hand.states()),
         Column.of(hand.hold(HOLD_TIME).states()),
@@ -172,9 +173,10 @@ def _labels(recording: Recording) -> RecordingLabels:
     modules = recording.modules
     codes = {name: label_states(module.labels, module.times) for name, module in modules.items()}
     slip = {name: _slip_samples(module) for name, module in modules.items()}
-    hand = _of_hand(modules, codes)
+    times = {name: module.times for name, module in modules.items()}
+    hand = label_hand(times, codes)
     sliding = {name: np.where(mask, UNSTABLE, STABLE) for name, mask in slip.items()}
-    hand_slip = _of_hand(modules, sliding).labels == UNSTABLE
+    hand_slip = label_hand(times, sliding).labels == UNSTABLE
     fingers = {n: _unit_labels(m.times, codes[n], slip[n]) for n, m in modules.items()}
     return RecordingLabels(
         recording.name, fingers, _unit_labels(hand.times, hand.labels, hand_slip)
@@ -185,20 +187,6 @@ def _slip_samples(module: Tactile) -> Mask:
     """Return the (n,) samples that are labelled as slip; an unstable label without cause counts."""
     slips = [label for label in module.labels if label.cause in (Cause.SLIP, None)]
     return np.asarray(label_states(slips, module.times) == UNSTABLE)
-
-
-def _of_hand(modules: Mapping[str, Tactile], codes: Mapping[str, Codes]) -> FingerDecisions:
-    """Return the hand with the labels that follow from those of its fingers."""
-    fingers = {
-        name: FingerDecisions(
-            module.times,
-            codes[name],
-            np.full(module.n_samples, UNKNOWN),
-            np.full(module.n_samples, np.nan),
-        )
-        for name, module in modules.items()
-    }
-    return hand_decisions(fingers, len(fingers))
 
 
 def _unit_labels(times: Array, codes: Codes, slip: Mask) -> UnitLabels:

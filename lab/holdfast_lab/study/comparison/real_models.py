@@ -50,17 +50,17 @@ def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEs
     """
     recordings = load_fingers(real)
     estimates: dict[int, RecordingEstimates] = {}
-    for held in _folds(recordings, real, seed):
-        others = [recording for place, recording in enumerate(recordings) if place not in held]
-        model = _model(making, others, seed + min(held))
-        estimates |= {place: _estimates(model, recordings[place]) for place in held}
-    return [estimates[place] for place in sorted(estimates)]
+    for left_out in _folds(recordings, real, seed):
+        others = [recording for index, recording in enumerate(recordings) if index not in left_out]
+        model = _model(making, others, seed + min(left_out))
+        estimates |= {index: _estimates(model, recordings[index]) for index in left_out}
+    return [estimates[index] for index in sorted(estimates)]
 
 
 def _folds(recordings: Sequence[Recording], real: Corpus, seed: int) -> Iterator[frozenset[int]]:
     """Yield the folds, which are those of all other methods."""
     objects = [recording.metadata.get("object") for recording in recordings]
-    names = [None if held is None else str(held) for held in objects]
+    names = [None if name is None else str(name) for name in objects]
     return held_out_folds(names, "recording", n_folds(real), seed)
 
 
@@ -125,9 +125,9 @@ def _latest(decided: FingerDecisions | None, times: Array) -> FingerDecisions:
     unlabelled = np.full(len(times), UNKNOWN, dtype=np.int8)
     if decided is None:
         return FingerDecisions(times, unlabelled, unlabelled, np.full(len(times), np.nan))
-    place = np.searchsorted(decided.times, times + TIME_TOLERANCE, side="right")
-    states = np.append(np.int8(UNKNOWN), decided.states)[place]
-    probability = np.append(np.nan, decided.stable_probability)[place]
+    at = np.searchsorted(decided.times, times + TIME_TOLERANCE, side="right")
+    states = np.append(np.int8(UNKNOWN), decided.states)[at]
+    probability = np.append(np.nan, decided.stable_probability)[at]
     return FingerDecisions(times, unlabelled, states, probability)
 
 
@@ -140,6 +140,6 @@ def _hand_probability(fingers: Sequence[FingerDecisions]) -> Array:
     probability = np.array([finger.stable_probability for finger in fingers])
     states = np.array([finger.states for finger in fingers])
     in_contact = (states == STABLE) | (states == UNSTABLE)
-    held = enough_contacts(in_contact.sum(axis=0), len(fingers))
-    counted = np.where(held, in_contact, states != UNKNOWN)
+    grasped = enough_contacts(in_contact.sum(axis=0), len(fingers))
+    counted = np.where(grasped, in_contact, states != UNKNOWN)
     return np.asarray(np.where(counted, probability, 1.0).min(axis=0))

@@ -183,7 +183,7 @@ def calibration_row(keys: RowKeys, evaluation: MethodEvaluation, seed: int) -> R
     The error is the mean over samples.
     """
     table = np.array(evaluation.calibration, dtype=np.float64)
-    table = table.reshape(len(evaluation.names), -1, 3)
+    table = table.reshape(len(evaluation.calibration), -1, 3)
     table = table[table[:, :, 2].sum(axis=1) > 0]
 
     def statistic(draws: Array) -> Array:

@@ -24,11 +24,12 @@ from holdfast_lab.study.comparison.jobs import (
 )
 from holdfast_lab.study.comparison.rows import DIGITS, difference_row, ratio_row, sample_rows
 from holdfast_lab.study.evaluation.evaluate_method import (
+    COMPARED,
     COMPARED_RATE,
     EvaluationJob,
     MethodEvaluation,
 )
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.methods.wavelets import CUTS
 from holdfast_lab.study.plan import StudyPlan
@@ -253,7 +254,7 @@ def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
 
 def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
     yield from sample_rows(keys, evaluation.metrics, SAMPLE_FIGURES)
-    alarms = evaluation.alarms.compared
+    alarms = evaluation.alarms[COMPARED]
     minutes = [alarm.stable_seconds / 60 for alarm in alarms]
     n_false = [alarm.n_under_stable for alarm in alarms]
     figure = keys | {"figure": FALSE_ALARMS_UNDER_STABLE}

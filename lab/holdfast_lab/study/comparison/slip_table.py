@@ -18,10 +18,10 @@ from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
 from holdfast_lab.study.comparison.rows import RowKeys
+from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob
 from holdfast_lab.study.evaluation.evaluate_slips import (
     SLIP_RATE,
     SlipEvaluation,
-    SlipJob,
     evaluate_slips,
 )
 from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
@@ -72,17 +72,24 @@ SLIP_NOTE = (
 def tasks(plan: StudyPlan) -> list[Task]:
     """Return the tasks that evaluate each method."""
     names = slip_methods(plan)
-    tests = tuple(plan.corpora[role] for role in TESTED_ROLES if role in plan.corpora)
     return [
         Task(
             f"slips/{name}",
             evaluate_slips,
-            (SlipJob(name, plan.main, tests, method_effort(plan, name), plan.seed, names),),
+            (_job(plan, name, names),),
             dict[str, SlipEvaluation],
             cost=TASK_SECONDS.get(name, OTHER_SECONDS) * (0.5 if plan.quick else 1.0),
         )
         for name in names
     ]
+
+
+def _job(plan: StudyPlan, name: str, compared: tuple[str, ...]) -> EvaluationJob:
+    tests = tuple(plan.corpora[role] for role in TESTED_ROLES if role in plan.corpora)
+    return EvaluationJob(
+        name, plan.main, ("object", "recording"), tests, effort=method_effort(plan, name),
+        seed=plan.seed, compared=compared, slips=True,
+    )  # fmt: skip
 
 
 def slip_methods(plan: StudyPlan) -> tuple[str, ...]:

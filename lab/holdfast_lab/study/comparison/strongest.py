@@ -27,7 +27,11 @@ from holdfast_lab.study.evaluation.alarms import (
     LEFT_OUT,
     AlarmStatistics,
 )
-from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, MethodEvaluation
+from holdfast_lab.study.evaluation.evaluate_method import (
+    COMPARED,
+    COMPARED_RATE,
+    MethodEvaluation,
+)
 from holdfast_lab.study.methods import PAPER_FAMILY
 from holdfast_lab.study.plan import StudyPlan
 
@@ -116,7 +120,7 @@ def _measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterat
         yield quotient_row(keys | {"figure": RATIO}, base, ours, plan.seed)
         if measure.reading:
             for who, name in (("holdfast", OURS), ("baseline", best)):
-                alarms = evaluations[name].readings[measure.reading].compared
+                alarms = evaluations[name].readings[measure.reading][COMPARED]
                 figure = f"{who}, {FALSE_ALARMS_UNDER_STABLE}"
                 yield _false_alarm_row(keys | {"figure": figure}, alarms, plan.seed)
 
@@ -159,15 +163,15 @@ def _held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
         return None
     counts = []
     for breakdown in evaluation.breakdown:
-        held = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
-        counts.append((sum(wrong for _, wrong in held), sum(n for n, _ in held)))
+        grasped = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
+        counts.append((sum(wrong for _, wrong in grasped), sum(n for n, _ in grasped)))
     return counts
 
 
 def _missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
     return lambda evaluation: [
         (alarms.n_missed(POST_DURATIONS[0]), len(alarms.delays))
-        for alarms in evaluation.readings[reading].compared
+        for alarms in evaluation.readings[reading][COMPARED]
     ]
 
 

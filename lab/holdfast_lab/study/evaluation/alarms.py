@@ -11,15 +11,15 @@ from typing import NamedTuple, Self
 import msgspec
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE
+from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
-from holdfast_lab.study.evaluation.scores import Scores
+from holdfast_lab.study.evaluation.fitted_method import Scores
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, label_hand
 
 EVENT = "an event"
 FALSE_ALARM = "a false alarm"
@@ -53,11 +53,8 @@ def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
 
     In an event a glitch is unstable; otherwise it is stable, unless something else happens.
     """
-    stable = {
-        name: np.where(recording.glitches[name] & (codes != UNKNOWN), STABLE, codes)
-        for name, codes in recording.exact_labels.items()
-    }
-    event, other = (recording.hand_labels(labels) for labels in (recording.exact_labels, stable))
+    event = label_hand(recording.times, recording.exact_labels)
+    other = label_hand(recording.times, recording.calm_labels)
     glitch = runs(event.labels != other.labels)
     ends = event.times + sample_durations(event.times)
     near = _near(event.times, event.times[glitch[:, 0]], ends[glitch[:, 1] - 1])
@@ -100,7 +97,13 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, scores: Scores, labels: AlarmLabels, shift: float = 0.0) -> Self:
-        """Return the statistics of a hand, or a finger, at a shifted threshold."""
+        """Return the statistics of a hand, or a finger, in one recording.
+
+        Args:
+            scores: of the same samples as the labels.
+            labels: in which events and false alarms are found.
+            shift: of the threshold [log odds].
+        """
         times, states = scores.times, scores.states(shift)
         match = match_alarms(times, labels.labels, states)
         at = np.searchsorted(times, [alarm.time for alarm in match.false_alarms])
@@ -154,7 +157,12 @@ class FalseAlarmRanges(NamedTuple):
 
     @classmethod
     def of(cls, scores: Scores, labels: AlarmLabels) -> Self:
-        """Return the ranges of the false alarms under a stable label."""
+        """Return the ranges of the false alarms under a stable label.
+
+        Args:
+            scores: held as long as those at which the chosen threshold is used.
+            labels: of the same samples.
+        """
         times, stable = scores.times, labels.labels == STABLE
         match = match_alarms(times, labels.labels, labels.labels)
         spans = np.array([(event.onset, event.end) for event in match.events]).reshape(-1, 2)
@@ -181,12 +189,12 @@ def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> fl
         The shift [log odds]; minus infinity if the alarms by loss of contact alone are too many,
         0 if there is no false alarm at any threshold.
     """
-    lower = np.sort(np.concatenate([of_one.lower for of_one in ranges]))
-    upper = np.sort(np.concatenate([of_one.upper for of_one in ranges]))
+    lower = np.sort(np.concatenate([interval.lower for interval in ranges]))
+    upper = np.sort(np.concatenate([interval.upper for interval in ranges]))
     edges = np.unique(np.concatenate([upper, lower]))
     if not len(edges):
         return 0.0
     n_alarms = np.searchsorted(lower, edges, "right") - np.searchsorted(upper, edges, "right")
-    too_many = n_alarms > per_minute * sum(of_one.minutes for of_one in ranges)
+    too_many = n_alarms > per_minute * sum(interval.minutes for interval in ranges)
     last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
     return float(edges[last])

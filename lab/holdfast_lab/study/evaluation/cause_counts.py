@@ -1,23 +1,19 @@
 """Estimated against true causes of a model, sample by sample, while a hand holds the object."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
 from holdfast.contact import CAUSES, CONTACT_FORCE, SLIP_CODE, UNSTABLE, Cause
 from holdfast.detector import detect
-from holdfast.metrics.slip_truth import (
-    NOT_HELD,
-    SLIDING,
-    STILL,
-    has_slip_truth,
-    slip_truth,
-)
+from holdfast.metrics.slip_truth import NOT_HELD, SLIDING, STILL, has_slip_truth, slip_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Integers
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast_lab.study.comparison.rows import ratio_row
+from holdfast_lab.study.comparison.rows import count_row, ratio_row
+from holdfast_lab.study.evaluation.error_breakdown import latest_rows
 
 TRUE_CAUSES = (Cause.SLIP.value, Cause.DISTURBANCE.value, "neither")
 """True causes of a sample that is held: the finger slides; an outside force acts and the finger
@@ -49,12 +45,8 @@ def count_causes(model: Model, recording: Recording) -> Integers:
         known = slip_truth(recording, finger, trace.times)
         if known is None or not has_slip_truth(truth, finger):
             continue
-        place = np.clip(np.searchsorted(truth.times, trace.times, side="right") - 1, 0, None)
-        causes = np.select(
-            [known.codes == SLIDING, (known.codes == STILL) & pushed[place], known.codes == STILL],
-            [0, 1, 2],
-            default=NOT_HELD,
-        )
+        still, now = known.codes == STILL, pushed[latest_rows(truth, trace.times)]
+        causes = np.select([known.codes == SLIDING, still & now, still], [0, 1, 2], NOT_HELD)
         raised = (trace.state == UNSTABLE) | (trace.cause == SLIP_CODE)
         counted = raised & (causes != NOT_HELD)
         np.add.at(counts, (causes[counted], trace.cause[counted]), 1)
@@ -74,16 +66,13 @@ def cause_table(models: dict[str, Sequence[Integers]], seed: int = 0) -> ResultT
         for name, recordings in models.items()
     }
     is_given = np.any([table.any(axis=(0, 1)) for table in tables.values()], axis=0)
-    for name, table in tables.items():
-        for k, true_cause in enumerate(TRUE_CAUSES):
-            keys: dict[str, Key] = {"model": name, "true cause": true_cause}
-            whole = table[:, k].sum(axis=1)
-            for j, estimated in enumerate(ESTIMATED):
-                if is_given[j]:
-                    figure = {"figure": f"{estimated} [%]"}
-                    rows.append(ratio_row(keys | figure, table[:, k, j], whole, seed))
-            n_samples = Row(keys | {"figure": "samples"}, float(whole.sum()), None, len(whole))
-            rows.append(n_samples)
+    for (name, table), (k, true_cause) in product(tables.items(), enumerate(TRUE_CAUSES)):
+        keys: dict[str, Key] = {"model": name, "true cause": true_cause}
+        n_samples = table[:, k].sum(axis=1)
+        for j in np.flatnonzero(is_given):
+            figure = keys | {"figure": f"{ESTIMATED[j]} [%]"}
+            rows.append(ratio_row(figure, table[:, k, j], n_samples, seed))
+        rows.append(count_row(keys | {"figure": "samples"}, n_samples.tolist()))
     note = (
         "Of single fingers that hold the object, at samples whose state is UNSTABLE or whose slip "
         "decision is raised: share of each estimated cause. Slip: the finger slides at over "
@@ -91,7 +80,5 @@ def cause_table(models: dict[str, Sequence[Integers]], seed: int = 0) -> ResultT
         "Neither: the finger is still and nothing acts on the object, as after a disturbance and "
         "in glitches of the hand's controller."
     )
-    digits = {"samples": 0}
-    return ResultTable(
-        "causes", "Causes by sample", note, rows, ("model", "true cause"), digits_of=digits
-    )
+    lines = ("model", "true cause")
+    return ResultTable("causes", "Causes by sample", note, rows, lines, digits_of={"samples": 0})

@@ -1,6 +1,5 @@
 """The errors of one recording by phase, grip force and direction, and the glitches of its hand."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import msgspec
@@ -21,7 +20,6 @@ from holdfast.metrics.slip_truth import sample_durations
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast_lab.study.methods import HAND
 
 PULL_DIRECTIONS = {
     "down": (0.0, 0.0, -1.0),
@@ -70,24 +68,24 @@ class ErrorBreakdown(msgspec.Struct, frozen=True):
 
 
 def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdown:
-    """Return the errors of a recording by phase, finger and disturbance.
+    """Return the errors of a recording.
 
-    A method that decides for the whole hand has the errors of the hand. The breakdown is empty
-    if the truth is not known.
+    Args:
+        truth: with the phases and the outside force, else the breakdown is empty.
+        decisions: of each finger; of a whole-hand method, of `HAND`, which has no grip.
     """
-    units = decided_units(decisions)
-    if truth is None or not {"phase", "outside_force"} <= set(truth.hand) or not units:
+    if truth is None or not {"phase", "outside_force"} <= set(truth.hand):
         return ErrorBreakdown()
     phase = truth.hand["phase"]
     locked = phase == Phase.LOCKED
     disturbed = runs(np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)))
     phases = {str(name): (0, 0) for name in Phase}
     pushes, grips = [(0, 0)] * len(disturbed), []
-    for name, unit in units.items():
+    for name, unit in decisions.fingers.items():
         now = phase[latest_rows(truth, unit.times)]
         stable = unit.labels == STABLE
-        for each, count in phases.items():
-            phases[each] = _added(count, unit, now == each)
+        for phase_name, count in phases.items():
+            phases[phase_name] = _added(count, unit, now == phase_name)
         for k, (start, end) in enumerate(disturbed):
             inside = np.zeros(len(now), dtype=np.bool_)
             inside[slice(*np.searchsorted(unit.times, truth.times[[start, end - 1]]))] = True
@@ -99,7 +97,7 @@ def break_down_errors(truth: Truth | None, decisions: Decisions) -> ErrorBreakdo
             grips.append(GripErrors(float(force[locked].mean()), *counts))
     forces = (truth.hand["outside_force"][start:end].mean(axis=0) for start, end in disturbed)
     return ErrorBreakdown(
-        {each: count for each, count in phases.items() if count[0]},
+        {name: count for name, count in phases.items() if count[0]},
         grips,
         list(zip(map(_direction, forces), pushes, strict=True)),
     )
@@ -118,13 +116,6 @@ def _direction(force: Array) -> str:
     return best if along[best] >= MIN_DIRECTION_COSINE * float(np.linalg.norm(force)) else OBLIQUE
 
 
-def decided_units(decisions: Decisions) -> Mapping[str, FingerDecisions]:
-    """Return what a method decides for: the fingers, or the hand under the name `HAND`."""
-    if decisions.fingers or decisions.hand is None:
-        return decisions.fingers
-    return {HAND: decisions.hand}
-
-
 def latest_rows(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
     """Return the latest row of the truth at each time."""
     return np.maximum(np.searchsorted(truth.times, times + TIME_TOLERANCE, side="right") - 1, 0)
@@ -134,13 +125,11 @@ class GlitchCount(msgspec.Struct, frozen=True):
     """Glitches of the hand's controller in one recording, while the hand holds the object.
 
     Attributes:
-        n: number of glitches.
         distances: for each glitch, how far the object slides until the effect of the glitch and
             the sliding that began in it are over [m].
         grasped_seconds: time for which the hand holds the object [s].
     """
 
-    n: int = 0
     distances: list[float] = []
     grasped_seconds: float = 0.0
 
@@ -158,7 +147,7 @@ def count_glitches(truth: Truth | None) -> GlitchCount:
         begun = sliding[(sliding[:, 0] >= start) & (sliding[:, 0] < end)]
         last = max([end, *begun[:, 1].tolist()])
         distances.append(float((speed * steps)[start:last].sum()))
-    return GlitchCount(len(distances), distances, float(steps[grasped].sum()))
+    return GlitchCount(distances, float(steps[grasped].sum()))
 
 
 def _sliding_speed(truth: Truth) -> Array:

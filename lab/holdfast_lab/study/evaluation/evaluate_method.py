@@ -5,18 +5,23 @@ not on the contact thresholds, and not on the thresholds for a rate of false ala
 chosen on the training recordings, each scored by a fit without it.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from functools import lru_cache
+from typing import Literal, NamedTuple, Self
 
 import msgspec
 import numpy as np
 
 from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.contact import UNKNOWN
-from holdfast.metrics import Decisions, FingerDecisions, Metrics, calibration_sums, summarise
+from holdfast.features import Tare
+from holdfast.metrics import Decisions, Metrics, calibration_sums, summarise
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.samples import score_samples
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
 from holdfast.training.splits import RANDOM_FOLDS
 from holdfast_lab.study.evaluation.alarms import (
     EVENT,
@@ -26,34 +31,81 @@ from holdfast_lab.study.evaluation.alarms import (
     labels_by_reading,
     threshold_shift,
 )
-from holdfast_lab.study.evaluation.common_samples import find_method, longest_warm_up
 from holdfast_lab.study.evaluation.error_breakdown import (
     CountPair,
     ErrorBreakdown,
     GlitchCount,
     break_down_errors,
     count_glitches,
-    decided_units,
 )
 from holdfast_lab.study.evaluation.fitted_method import FittedMethod, RecordingScores, Training
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.methods import HAND
+from holdfast_lab.study.evaluation.recording_features import (
+    RecordingFeatures,
+    Variation,
+    corpus_features,
+)
+from holdfast_lab.study.methods import HAND, METHODS, Method, hand_signal
+from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
+from holdfast_lab.study.methods.wavelets import CUTS
 from holdfast_lab.study.plan import Corpus
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Rates of false alarms that thresholds are chosen for, per minute of stable label [1/min]."""
 COMPARED_RATE = 1.0
 """The rate of false alarms at which methods are compared [1/min]."""
+PROBE_DURATION = 3.0
+"""Duration of the random recording on which the history of a method is measured [s]."""
+PROBE_FINGERS = ("thumb", "index")
 HOLD_TIME = 0.1
 """Time for which a hand stays not stable at the chosen thresholds [s].
 
 So one disturbance is one alarm, whatever the method.
 """
 
+OWN, LASTING = "own", f"own, held {HOLD_TIME:g} s"
+"""Names of a method's own threshold, and of the same with states held for `HOLD_TIME`."""
+BY_RATE = {f"for {rate:g}/min": rate for rate in FALSE_ALARM_RATES}
+"""Rates by the names of the thresholds that are chosen for them; states are held."""
+COMPARED = f"for {COMPARED_RATE:g}/min"
+"""Name of the threshold at which methods are compared."""
+
 GroupSplit = Literal["recording", "object"]
-Shifts = Mapping[str, Sequence[float]]
-"""Shifts of the threshold for each of `FALSE_ALARM_RATES`, for each of `READINGS`."""
+Shifts = Mapping[str, Mapping[str, float]]
+"""Shift of each threshold of `BY_RATE`, for each of `READINGS`."""
+
+
+def find_method(name: str) -> Method:
+    """Return the method of that name, of `METHODS`, `CUTS` or `SLIP_METHODS`."""
+    return METHODS.get(name) or CUTS.get(name) or SLIP_METHODS[name].method
+
+
+@lru_cache
+def warm_up(method: str, rate: float) -> float:
+    """Return the time from the start of a stretch until a method has an estimate [s].
+
+    Methods need histories of different lengths: one sample, a window of 14, a second. It is
+    measured: on a random recording of two fingers, it is the time of the first sample with
+    features; 0 if there is none within `PROBE_DURATION`.
+
+    Args:
+        method: name.
+        rate: samples per second [Hz].
+
+    Example:
+        >>> round(150 * warm_up("logreg", 150.0)), round(150 * warm_up("difference", 150.0))
+        (13, 1)
+    """
+    generator = np.random.default_rng(0)
+    times = np.arange(math.ceil(PROBE_DURATION * rate)) / rate
+    kind = replace(sensor("uskin-4x4"), rate=rate, range=None)  # of small readings
+    modules = {
+        name: Tactile(kind, times, generator.normal(100.0, 10.0, (len(times), kind.n_taxels, 3)))
+        for name in PROBE_FINGERS
+    }
+    hand = hand_signal(Recording("probe", modules), Tare.parse("none"), PROBE_FINGERS)
+    features = find_method(method).features(hand)
+    known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
+    return int(np.argmax(known)) / rate
 
 
 class EvaluationEffort(msgspec.Struct, frozen=True):
@@ -76,7 +128,7 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     """One method and the recordings that it is evaluated on.
 
     Attributes:
-        method: its name.
+        method: its name, see `find_method`.
         train: corpus that the method is fitted to.
         splits: of that corpus. A fold leaves out recordings, or all recordings of one object.
         tests: other corpora, evaluated with a fit to all of `train`.
@@ -84,6 +136,8 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         effort: size of the evaluation.
         seed: of all random numbers.
         compared: names of the methods that must have an estimate too where this one is scored.
+        slips: whether it decides about slips: only recordings whose slips are known are used, in
+            the first split that is possible, and no thresholds are chosen for events.
     """
 
     method: str
@@ -94,60 +148,43 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     effort: EvaluationEffort = EvaluationEffort()
     seed: int = 0
     compared: tuple[str, ...] = ()
+    slips: bool = False
 
     def features(self, corpus: Corpus) -> list[RecordingFeatures]:
         """Return the features of the recordings of a corpus."""
-        warm_up = longest_warm_up(self.compared, self.train.rate / self.variation.every)
-        method = find_method(self.method)
-        return corpus_features(method, corpus, self.variation, self.effort.stride, warm_up)
+        compared, rate = (self.method, *self.compared), self.train.rate / self.variation.every
+        longest = max(warm_up(name, rate) for name in compared)
+        method, stride = find_method(self.method), self.effort.stride
+        featured = corpus_features(method, corpus, self.variation, stride, longest)
+        return [recording for recording in featured if recording.slips or not self.slips]
 
     def training(self, recordings: Sequence[RecordingFeatures]) -> Training:
         """Return the samples of recordings, from which the method is fitted."""
-        method = find_method(self.method)
-        return Training.of(method, recordings, self.effort.max_samples, self.seed)
-
-
-class ReadingAlarms(msgspec.Struct, frozen=True):
-    """Alarms of the hand under one reading of glitches. Lists have one entry per recording.
-
-    Attributes:
-        own: at the method's own threshold.
-        lasting: the same, with states held for `HOLD_TIME`.
-        by_rate: the same, held, at the threshold chosen for each of `FALSE_ALARM_RATES`.
-    """
-
-    own: list[AlarmStatistics]
-    lasting: list[AlarmStatistics]
-    by_rate: list[list[AlarmStatistics]]
-
-    @property
-    def compared(self) -> list[AlarmStatistics]:
-        """Alarms at the threshold at which methods are compared."""
-        return self.by_rate[FALSE_ALARM_RATES.index(COMPARED_RATE)]
+        sliding = self.slips and SLIP_METHODS[self.method].target == "sliding"
+        method, most = find_method(self.method), self.effort.max_samples
+        return Training.of(method, recordings, most, self.seed, sliding=sliding)
 
 
 class MethodEvaluation(msgspec.Struct, frozen=True):
     """Results of one method on one split or corpus. Lists have one entry per recording.
 
     Attributes:
-        names: of the evaluated recordings.
         fingers: metrics by sample at the method's own threshold; None for a whole-hand method.
         hand: the same for the hand.
         without_estimate: labelled samples of what the method decides for, and those of them
             that have no estimate; before the samples are restricted to those of all methods.
         hand_without_estimate: the same for the hand.
-        readings: alarms of the hand, by exact labels, for each of `READINGS`.
+        readings: alarms of the hand by exact labels, for each of `READINGS` and each threshold.
         glitches: of the hand's controller.
         breakdown: of the errors at the method's own threshold.
         calibration: (10, 3) sum of probabilities, stable samples and all samples of each bin.
     """
 
-    names: list[str]
     fingers: Metrics | None
     hand: Metrics
     without_estimate: list[CountPair]
     hand_without_estimate: list[CountPair]
-    readings: dict[str, ReadingAlarms]
+    readings: dict[str, dict[str, list[AlarmStatistics]]]
     glitches: list[GlitchCount]
     breakdown: list[ErrorBreakdown]
     calibration: list[list[list[float]]]
@@ -158,17 +195,32 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         return self.fingers or self.hand
 
     @property
-    def alarms(self) -> ReadingAlarms:
-        """Alarms in the paper's reading: a glitch is an event."""
+    def alarms(self) -> dict[str, list[AlarmStatistics]]:
+        """Alarms at each threshold in the paper's reading: a glitch is an event."""
         return self.readings[EVENT]
 
 
 class ScoredRecording(NamedTuple):
-    """A recording, its scores, and the shifts of the threshold, chosen without it."""
+    """A recording that did not train its scores.
+
+    Attributes:
+        recording: without its features, to save memory.
+        scores: by a fit to other recordings.
+        shifts: of the threshold, chosen on the same recordings.
+        fold: number of the fold that leaves it out.
+    """
 
     recording: RecordingFeatures
     scores: RecordingScores
     shifts: Shifts
+    fold: int
+
+    @classmethod
+    def of(
+        cls, recording: RecordingFeatures, fitted: FittedMethod, shifts: Shifts, fold: int = 0
+    ) -> Self:
+        """Score a recording by a fit to others."""
+        return cls(replace(recording, features={}), fitted.scores(recording), shifts, fold)
 
     def decide(self, labels: Mapping[str, Codes]) -> Decisions:
         """Return the decisions at the own threshold, with labels of the fingers."""
@@ -194,20 +246,20 @@ def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording
     training = job.training(job.features(job.train))
     everything = frozenset(range(len(training.recordings)))
 
-    def scored_by(fitted: FittedMethod, shifts: Shifts, one: RecordingFeatures) -> ScoredRecording:
-        # Features are dropped to save memory.
-        return ScoredRecording(replace(one, features={}), fitted.scores(one), shifts)
-
     for split in job.splits:
         scored: dict[int, ScoredRecording] = {}
-        for left_out in held_out_folds(training.objects, split, job.effort.folds, job.seed):
+        folds = held_out_folds(training.objects, split, job.effort.folds, job.seed)
+        for number, left_out in enumerate(folds):
             fold = _fit_fold(job, training, everything - left_out)
-            scored |= {k: scored_by(*fold, training.recordings[k]) for k in left_out}
+            for index in left_out:
+                scored[index] = ScoredRecording.of(training.recordings[index], *fold, number)
         yield split, [scored[index] for index in sorted(scored)]
+        if job.slips and scored:
+            break
     if job.tests:
         fold = _fit_fold(job, training, everything)
         for corpus in job.tests:
-            yield corpus.name, [scored_by(*fold, tested) for tested in job.features(corpus)]
+            yield corpus.name, [ScoredRecording.of(r, *fold) for r in job.features(corpus)]
 
 
 def held_out_folds(
@@ -242,7 +294,7 @@ def _fit_fold(
 ) -> tuple[FittedMethod, Shifts]:
     """Fit the method to some recordings, and choose its thresholds on them."""
     chosen = sorted(indices)
-    n_inner = min(job.effort.inner, len(chosen))
+    n_inner = 0 if job.slips else min(job.effort.inner, len(chosen))
     objects = [training.objects[index] for index in chosen]
     ranges: dict[str, list[FalseAlarmRanges]] = {reading: [] for reading in READINGS}
     for fold in held_out_folds(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ():
@@ -252,55 +304,60 @@ def _fit_fold(
             for reading, labels in labels_by_reading(recording).items():
                 ranges[reading].append(FalseAlarmRanges.of(scores, labels))
     shifts = {
-        reading: [threshold_shift(own, rate) if own else 0.0 for rate in FALSE_ALARM_RATES]
-        for reading, own in ranges.items()
+        reading: {
+            name: threshold_shift(of_recordings, rate) if of_recordings else 0.0
+            for name, rate in BY_RATE.items()
+        }
+        for reading, of_recordings in ranges.items()
     }
     return training.fit(chosen), shifts
 
 
 def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     """Return the results of a method on scored recordings."""
-    truths = [each.recording.truth for each in scored]
-    decided = [each.decide(each.recording.scored_labels) for each in scored]
-    every = [each.decide(each.recording.labels) for each in scored]
-    hands = [Decisions(d.name, {HAND: d.hand}, d.hand) for d in decided if d.hand is not None]
-    alarms, readings = [_alarms(each) for each in scored], {}
-    for reading in READINGS:
-        by_threshold = zip(*(of_recording[reading] for of_recording in alarms), strict=True)
-        own, lasting, *by_rate = map(list, by_threshold)
-        readings[reading] = ReadingAlarms(own, lasting, by_rate)
+    truths = [recording.truth for recording, *_ in scored]
+    decided = [case.decide(case.recording.scored_labels) for case in scored]
+    every = [case.decide(case.recording.labels) for case in scored]
+    whole_hand = scored[0].scores.whole_hand
+    alarms = [_alarms(case) for case in scored]
     return MethodEvaluation(
-        names=[each.recording.name for each in scored],
-        fingers=summarise(decided) if any(each.fingers for each in decided) else None,
-        hand=summarise(hands),
-        without_estimate=[_n_without_estimate(decided_units(each).values()) for each in every],
-        hand_without_estimate=[_n_without_estimate([d.hand]) for d in every if d.hand is not None],
-        readings=readings,
+        fingers=None if whole_hand else summarise(decided),
+        hand=summarise(map(_as_hand, decided)),
+        without_estimate=[_n_without_estimate(decisions) for decisions in every],
+        hand_without_estimate=[_n_without_estimate(_as_hand(decisions)) for decisions in every],
+        readings={
+            reading: {
+                name: [by[reading][name] for by in alarms] for name in (OWN, LASTING, *BY_RATE)
+            }
+            for reading in READINGS
+        },
         glitches=[count_glitches(truth) for truth in truths],
         breakdown=list(map(break_down_errors, truths, decided)),
-        calibration=[
-            calibration_sums([*decided_units(each).values()]).tolist() for each in decided
-        ],
+        calibration=[calibration_sums(list(d.fingers.values())).tolist() for d in decided],
     )
 
 
-def _n_without_estimate(units: Iterable[FingerDecisions]) -> CountPair:
+def _as_hand(decisions: Decisions) -> Decisions:
+    """Return the hand as the one finger of its recording."""
+    hand = {} if decisions.hand is None else {HAND: decisions.hand}
+    return Decisions(decisions.name, hand, decisions.hand)
+
+
+def _n_without_estimate(decisions: Decisions) -> CountPair:
     """Return the number of labelled samples, and of those of them without an estimate."""
-    labelled = [unit.states[unit.labels != UNKNOWN] for unit in units]
+    labelled = [unit.states[unit.labels != UNKNOWN] for unit in decisions.fingers.values()]
     return sum(map(len, labelled)), sum(int((states == UNKNOWN).sum()) for states in labelled)
 
 
-def _alarms(scored: ScoredRecording) -> dict[str, list[AlarmStatistics]]:
-    """Return the alarms for each reading: at the own threshold, held at it, at each chosen one."""
+def _alarms(scored: ScoredRecording) -> dict[str, dict[str, AlarmStatistics]]:
+    """Return the alarms for each reading, at each threshold."""
     hand = scored.scores.hand
-    lasting = hand.hold(HOLD_TIME)
-    return {
-        reading: [
-            AlarmStatistics.of(hand, labels),
-            *(AlarmStatistics.of(lasting, labels, s) for s in (0.0, *scored.shifts[reading])),
-        ]
-        for reading, labels in labels_by_reading(scored.recording).items()
-    }
+    lasting, alarms = hand.hold(HOLD_TIME), {}
+    for reading, labels in labels_by_reading(scored.recording).items():
+        alarms[reading] = {OWN: AlarmStatistics.of(hand, labels)}
+        for name, shift in {LASTING: 0.0, **scored.shifts[reading]}.items():
+            alarms[reading][name] = AlarmStatistics.of(lasting, labels, shift)
+    return alarms
 
 
 def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
@@ -310,32 +367,26 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
     else is as in the other splits, so that the difference is due to the split alone.
 
     Args:
-        job: gives the method, the training corpus, the variation, the effort and the seed.
+        job: gives a method for fingers, the training corpus, the variation, effort and seed.
     """
     recordings = job.features(job.train)
     generator = np.random.default_rng(job.seed)
     folds = [
-        {u: random_folds(len(rows), RANDOM_FOLDS, generator) for u, rows in one.features.items()}
-        for one in recordings
+        {f: random_folds(len(rows), RANDOM_FOLDS, generator) for f, rows in r.features.items()}
+        for r in recordings
     ]
-
-    def part(fold: int, *, left_out: bool) -> list[RecordingFeatures]:
-        """Return the recordings with NaN as the features of the other samples."""
-        parts = []
-        for one, own in zip(recordings, folds, strict=True):
-            features = {
-                unit: np.where(((own[unit] == fold) == left_out)[:, None], rows, np.nan)
-                for unit, rows in one.features.items()
-            }
-            parts.append(replace(one, features=features))
-        return parts
-
     counts = np.zeros((len(recordings), 4), dtype=np.int64)
     for fold in range(RANDOM_FOLDS):
-        fitted = job.training(part(fold, left_out=False)).fit()
-        for index, tested in enumerate(part(fold, left_out=True)):
-            decided = fitted.scores(tested).decide(tested.name, tested.scored_labels)
-            for unit in decided_units(decided).values():
-                samples = score_samples(unit.labels, unit.states, unit.stable_probability)
-                counts[index] += samples.confusion.ravel()
+        trained = []
+        for recording, fold_of in zip(recordings, folds, strict=True):
+            labels = recording.labels.items()
+            kept = {name: np.where(fold_of[name] == fold, UNKNOWN, codes) for name, codes in labels}
+            trained.append(replace(recording, labels=kept))
+        fitted = job.training(trained).fit()
+        for row, recording, fold_of in zip(counts, recordings, folds, strict=True):
+            for name, scores in fitted.scores(recording).fingers.items():
+                codes = recording.scored_labels[name]
+                finger = scores.decide(np.where(fold_of[name] == fold, codes, UNKNOWN))
+                samples = score_samples(finger.labels, finger.states, finger.stable_probability)
+                row[:] += samples.confusion.ravel()
     return [[int(n) for n in row] for row in counts]

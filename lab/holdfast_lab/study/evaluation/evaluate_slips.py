@@ -18,23 +18,16 @@ from holdfast.metrics.slip_thresholds import (
     SLIP_THRESHOLD_LOG_ODDS,
     SlipSummary,
     ThresholdChoice,
-    choose_threshold,
-    held_out_places,
     slip_curve,
-    slip_intervals,
-    slip_summary,
+    summarise_choice,
 )
 from holdfast.metrics.slip_truth import STILL, SlipDecisions, SlipTruth
 from holdfast.metrics.slips import SlipCurve
 from holdfast.sensors.types import Array
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
-from holdfast_lab.study.evaluation.common_samples import longest_warm_up
-from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, held_out_folds
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.scores import probability_of
-from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
-from holdfast_lab.study.plan import Corpus
+from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob, score_splits
+from holdfast_lab.study.evaluation.fitted_method import RecordingScores, probability_of
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
 
 SLIP_RATE = 1.0
 """False alarms per minute of a finger for which thresholds are chosen [1/min]."""
@@ -45,35 +38,6 @@ QUIET_CHOICE = ThresholdChoice(SLIP_RATE, "quiet")
 
 Curves = Sequence[Mapping[str, SlipCurve]]
 """Counts of slips of each finger, at each threshold, of each recording."""
-
-
-class SlipJob(msgspec.Struct, frozen=True):
-    """A method for the slip of fingers, and the recordings that it is evaluated on.
-
-    Attributes:
-        method: its name, of `SLIP_METHODS`.
-        train: corpus that the method is fitted to, evaluated out of fold, by object where there
-            are objects.
-        tests: other corpora, evaluated with a fit to all of `train`.
-        effort: number of folds by recording, and of training samples.
-        seed: of all random numbers.
-        compared: names of the methods that must have an estimate too where this one is scored.
-    """
-
-    method: str
-    train: Corpus
-    tests: tuple[Corpus, ...] = ()
-    effort: EvaluationEffort = EvaluationEffort()
-    seed: int = 0
-    compared: tuple[str, ...] = ()
-
-    def features(self, corpus: Corpus) -> list[RecordingFeatures]:
-        """Return the features of the recordings in which the slips of a finger are known."""
-        history = (SLIP_METHODS[name].history for name in (self.method, *self.compared))
-        warm_up = longest_warm_up(history, self.train.rate)
-        method = SLIP_METHODS[self.method].method
-        recordings = corpus_features(method, corpus, warm_up=warm_up)
-        return [recording for recording in recordings if recording.slips]
 
 
 class SlipEvaluation(msgspec.Struct, frozen=True):
@@ -93,58 +57,34 @@ class SlipEvaluation(msgspec.Struct, frozen=True):
     quiet_budget: SlipSummary | None = None
 
 
-def evaluate_slips(job: SlipJob) -> dict[str, SlipEvaluation]:
+def evaluate_slips(job: EvaluationJob) -> dict[str, SlipEvaluation]:
     """Return the results of a method out of fold, and on each other corpus.
 
     The threshold of a recording of `train` is chosen from the recordings of the other folds; that
     of other corpora from all recordings of `train`, each scored out of fold.
 
+    Args:
+        job: about slips.
+
     Returns:
         By name of each corpus with slips; empty if `train` trains no classifier.
     """
-    chosen = SLIP_METHODS[job.method]
-    recordings = job.features(job.train)
-    training = Training.of(
-        chosen.method, recordings, job.effort.max_samples, job.seed,
-        sliding=chosen.target == "sliding",
-    )  # fmt: skip
-    for split in ("object", "recording"):
-        folds = list(held_out_folds(training.objects, split, job.effort.folds, job.seed))
-        if folds:
-            break
-    scores: dict[int, Mapping[str, SlipScores]] = {}
-    groups: dict[int, int] = {}
-    for group, left_out in enumerate(folds):
-        fitted = training.fit(set(range(len(recordings))) - left_out)
-        scores |= {index: score_slips(fitted, recordings[index]) for index in sorted(left_out)}
-        groups |= dict.fromkeys(left_out, group)
-    ranks = still_ranks(scores.values())
-    if not len(ranks):
-        return {}
-    curves = [slip_curves(scores[index], ranks) for index in sorted(scores)]
-    by_fold = [groups[index] for index in sorted(scores)]
-    results = {
-        job.train.name: SlipEvaluation(
-            split,
-            len(curves),
-            *(
-                summarise_slips(curves, job.seed, choice, groups=by_fold)
-                for choice in (CHOICE, QUIET_CHOICE)
-            ),
-        )
+    scored = {name: recordings for name, recordings in score_splits(job) if recordings}
+    scores = {
+        name: [score_slips(case.recording, case.scores) for case in cases]
+        for name, cases in scored.items()
     }
-    fitted = training.fit()
-    for corpus in job.tests:
-        tested = [slip_curves(score_slips(fitted, one), ranks) for one in job.features(corpus)]
-        if tested:
-            results[corpus.name] = SlipEvaluation(
-                "",
-                len(tested),
-                *(
-                    summarise_slips(tested, job.seed, choice, training=curves)
-                    for choice in (CHOICE, QUIET_CHOICE)
-                ),
-            )
+    split = next((name for name in job.splits if name in scored), "")
+    ranks = still_ranks(scores.get(split, []))
+    results: dict[str, SlipEvaluation] = {}
+    training: Curves = []
+    for name, fingers in scores.items() if len(ranks) else ():
+        curves = [slip_curves(of_recording, ranks) for of_recording in fingers]
+        if name == split:
+            training, folds = curves, [case.fold for case in scored[split]]
+            results[job.train.name] = summarise_slips(curves, job.seed, groups=folds, split=split)
+        else:
+            results[name] = summarise_slips(curves, job.seed, training=training)
     return {name: result for name, result in results.items() if result.summary.pooled.n}
 
 
@@ -163,21 +103,19 @@ class SlipScores(NamedTuple):
     truth: SlipTruth
 
 
-def score_slips(fitted: FittedMethod, recording: RecordingFeatures) -> dict[str, SlipScores]:
-    """Return the scores of the fingers of a recording; every finger has those of its hand.
+def score_slips(recording: RecordingFeatures, scores: RecordingScores) -> dict[str, SlipScores]:
+    """Return the scores of the fingers whose slips are known.
 
     Args:
-        fitted: to other recordings.
-        recording: to be scored.
+        recording: with the truth.
+        scores: of the recording.
     """
-    scores = fitted.scores(recording).fingers
     made = {}
     for finger, truth in recording.slips.items():
-        own = scores[finger]
-        score = smoothed(own.times, np.where(own.known & own.grasped, -own.margin, np.nan))
-        made[finger] = SlipScores(
-            own.times, np.where(own.known & ~own.grasped, -np.inf, score), truth
-        )
+        finger_scores = scores.fingers[finger]
+        times, known, touches = finger_scores.times, finger_scores.known, finger_scores.grasped
+        score = smoothed(times, np.where(known & touches, -finger_scores.margin, np.nan))
+        made[finger] = SlipScores(times, np.where(known & ~touches, -np.inf, score), truth)
     return made
 
 
@@ -202,7 +140,7 @@ def smoothed(times: Array, log_odds: Array) -> Array:
 
 def still_ranks(scores: Iterable[Mapping[str, SlipScores]]) -> Array:
     """Return the sorted scores of all samples of some recordings that are still, in contact."""
-    every = [own for fingers in scores for own in fingers.values()]
+    every = [finger for fingers in scores for finger in fingers.values()]
     still = [s.score[np.isfinite(s.score) & (s.truth.codes == STILL)] for s in every]
     return np.sort(np.concatenate([np.empty(0), *still]))
 
@@ -248,35 +186,22 @@ def slip_curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, Sli
 def summarise_slips(
     curves: Curves,
     seed: int,
-    choice: ThresholdChoice = CHOICE,
     *,
     groups: Sequence[int] = (),
     training: Curves = (),
-) -> SlipSummary:
-    """Return the metrics of recordings, each at a threshold that is chosen without it.
+    split: str = "",
+) -> SlipEvaluation:
+    """Return the metrics of recordings at the thresholds of both budgets.
 
-    Args:
-        curves: of the recordings.
-        seed: of the bootstrap, which draws from `training` too.
-        choice: of the threshold.
-        groups: of each recording; the threshold is that of the other groups.
-        training: of other recordings, from which the threshold is chosen instead.
+    The arguments are those of `summarise_choice`.
+
+    Raises:
+        ValueError: no slips are known.
     """
-    pooled, others = (
-        [SlipCurve.total(list(fingers.values())) for fingers in recordings]
-        for recordings in (curves, training)
+    summary, quiet_budget = (
+        summarise_choice(curves, choice, groups=groups, training=training, seed=seed)
+        for choice in (CHOICE, QUIET_CHOICE)
     )
-    if others:
-        index = choose_threshold(SlipCurve.total(others), choice.false_alarms, choice.counted_in)
-        indices = [len(others[0]) - 1 if index is None else index] * len(curves)
-    else:
-        indices = held_out_places(pooled, groups, choice).tolist()
-    counts = [
-        {finger: curve[index] for finger, curve in fingers.items()}
-        for fingers, index in zip(curves, indices, strict=True)
-    ]
-    intervals = slip_intervals(pooled, choice, groups=groups, training=others, seed=seed)
-    summary = slip_summary(counts, intervals, threshold_chosen=True)
     if summary is None:
         raise ValueError("recordings with known slips expected")
-    return summary
+    return SlipEvaluation(split, len(curves), summary, quiet_budget)

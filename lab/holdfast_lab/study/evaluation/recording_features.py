@@ -1,11 +1,13 @@
 """The features that a method computes from the recordings of a corpus, with their labels."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple, Self
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -23,71 +25,53 @@ from holdfast.metrics.slip_truth import (
     truth_without,
 )
 from holdfast.metrics.truth_labels import LabelRule, relabel
-from holdfast.recordings import Recording, Truth, label_states
+from holdfast.recordings import Recording, Tactile, Truth, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
-from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.kept import WORKER_MEMORY
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
 
-UNCHANGED = Variation()
 
-
-@dataclass(frozen=True, eq=False)
-class PreparedRecording:
-    """What every method uses of one recording: its signals, and its labels at each sample.
+class Variation(msgspec.Struct, frozen=True):
+    """A variation of recordings before training and testing. The default changes nothing.
 
     Attributes:
-        hand: signals of the fingers.
-        labels: label codes of each finger.
-        exact_labels: the same without margin, if the truth is known.
-        glitches: (n,) samples of each finger whose exact label has the cause glitch.
-        slips: truth of each finger whose slips are known.
-        at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
+        noise: standard deviation of white noise added to every reading [unit of the readings].
+            Counts stay integers.
+        every: keep only every n-th sample, as a slower sensor of the same kind gives them.
+        margin: time by which labels made from the truth extend disturbances at both ends [s].
+            None keeps the labels of the recording.
     """
 
-    hand: HandSignal
-    labels: Mapping[str, Codes]
-    exact_labels: Mapping[str, Codes]
-    glitches: Mapping[str, Mask]
-    slips: Mapping[str, SlipTruth]
-    at_rest: Mapping[str, tuple[int, float, float]]
+    noise: float = 0.0
+    every: int = 1
+    margin: float | None = None
 
-    @classmethod
-    def of(cls, recording: Recording, tare: Tare, fingers: Sequence[str]) -> "PreparedRecording":
-        """Prepare some fingers of a recording."""
-        hand = hand_signal(recording, tare, tuple(fingers))
-        modules = {name: recording.modules[name] for name in fingers}
-        exact = relabel(recording, LabelRule(margin=0.0)).modules
-        exact_labels = {name: exact[name].label_states for name in fingers}
-        glitches, slips = {}, {}
-        for name, module in modules.items():
-            of_glitch = [label for label in exact[name].labels if label.cause is Cause.GLITCH]
-            glitches[name] = label_states(of_glitch, module.times) != UNKNOWN
-            slips[name] = slip_truth(recording, name, module.times, exact_labels[name] == STABLE)
-        rest = modules if tare.without_contact else {}
-        return cls(
-            hand,
-            {name: module.label_states for name, module in modules.items()},
-            exact_labels,
-            glitches,
-            {name: truth for name, truth in slips.items() if truth is not None},
-            {name: rest_moments(module, tare, hand.rate) for name, module in rest.items()},
-        )
+    def apply(self, recording: Recording) -> Recording:
+        """Return the varied recording. The same recording always gets the same noise."""
+        if self.margin is not None:
+            recording = relabel(recording, LabelRule(margin=self.margin))
+        if self == Variation(margin=self.margin):
+            return recording
+        modules: dict[str, Tactile] = {}
+        for index, (name, module) in enumerate(recording.modules.items()):
+            readings = np.asarray(module.readings, dtype=np.float64)
+            if self.noise:
+                seed = [zlib.crc32(recording.name.encode()), index]
+                noise = np.random.default_rng(seed).normal(0.0, self.noise, size=readings.shape)
+                readings = readings + noise
+                readings = np.rint(readings) if module.unit == "count" else readings
+            modules[name] = replace(
+                module,
+                times=module.times[:: self.every],
+                readings=readings[:: self.every],
+                sensor=replace(module.sensor, rate=module.sensor.rate / self.every),
+            )
+        return replace(recording, modules=modules)
 
-    @property
-    def recording(self) -> Recording:
-        """The recording."""
-        return self.hand.recording
 
-    @property
-    def n_bytes(self) -> int:
-        """Size of the arrays that it adds to those of the recording [byte]."""
-        codes = (self.labels, self.exact_labels, self.glitches)
-        n_bytes = sum(array.nbytes for arrays in codes for array in arrays.values())
-        n_bytes += sum(truth.codes.nbytes + truth.quiet.nbytes for truth in self.slips.values())
-        return n_bytes + sum(finger.force.nbytes for finger in self.hand.fingers.values())
+UNCHANGED = Variation()
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +90,11 @@ class RecordingFeatures:
         labels: label codes of each finger.
         scored_labels: the same, UNKNOWN at samples that are not scored.
         exact_labels: the same without margin, if the truth is known.
-        glitches: (n,) samples of each finger whose exact label has the cause glitch.
+        calm_labels: the exact ones, with glitches of the hand's controller labelled stable.
         slips: truth of the scored samples, of each finger whose slips are known.
         at_rest: moments of F_a of each finger in the tare interval, see `rest_moments`.
-        features: (n, n_features) of each unit. Those of `HAND` are at the times of the first
-            finger.
+        features: (n, n_features) of each unit; empty until a method computes them. Those of
+            `HAND` are at the times of the first finger.
     """
 
     name: str
@@ -121,24 +105,70 @@ class RecordingFeatures:
     labels: Mapping[str, Codes]
     scored_labels: Mapping[str, Codes]
     exact_labels: Mapping[str, Codes]
-    glitches: Mapping[str, Mask]
+    calm_labels: Mapping[str, Codes]
     slips: Mapping[str, SlipTruth]
     at_rest: Mapping[str, tuple[int, float, float]]
     features: Mapping[str, npt.NDArray[Any]]
 
-    def hand_labels(self, labels: Mapping[str, Codes]) -> FingerDecisions:
-        """Return the hand with the label that follows from these finger labels."""
-        fingers = {
-            name: FingerDecisions(times, labels[name], labels[name], np.full(len(times), np.nan))
-            for name, times in self.times.items()
+    @classmethod
+    def of(cls, hand: HandSignal) -> "RecordingFeatures":
+        """Return the labels and the truth of the fingers of a hand, all samples scored."""
+        recording, fingers = hand.recording, hand.fingers
+        modules = {name: recording.modules[name] for name in fingers}
+        exact = relabel(recording, LabelRule(margin=0.0)).modules
+        labels = {name: module.label_states for name, module in modules.items()}
+        exact_labels = {name: exact[name].label_states for name in fingers}
+        calm_labels, slips = {}, {}
+        for name, module in modules.items():
+            codes = exact_labels[name]
+            of_glitch = [label for label in exact[name].labels if label.cause is Cause.GLITCH]
+            glitch = label_states(of_glitch, module.times) != UNKNOWN
+            calm_labels[name] = np.where(glitch & (codes != UNKNOWN), STABLE, codes)
+            slips[name] = slip_truth(recording, name, module.times, codes == STABLE)
+        grasped_object = recording.metadata.get("object")
+        return cls(
+            name=recording.name,
+            object=None if grasped_object is None else str(grasped_object),
+            truth=recording.truth,
+            times={name: finger.times for name, finger in fingers.items()},
+            amplitude={name: finger.amplitude for name, finger in fingers.items()},
+            labels=labels,
+            scored_labels=labels,
+            exact_labels=exact_labels,
+            calm_labels=calm_labels,
+            slips={name: truth for name, truth in slips.items() if truth is not None},
+            at_rest={
+                name: rest_moments(module, hand.tare, hand.rate)
+                for name, module in modules.items()
+                if hand.tare.without_contact
+            },
+            features={},
+        )
+
+    def scored_at(self, scored: Mapping[str, Mask], stride: int) -> "RecordingFeatures":
+        """Return every n-th sample of the fingers, scored where a mask is True."""
+        changed: dict[str, Any] = {
+            field: {name: array[::stride] for name, array in getattr(self, field).items()}
+            for field in ("times", "amplitude", "labels")
         }
-        return hand_decisions(fingers, len(fingers))
+        for field in ("scored_labels", "exact_labels", "calm_labels"):
+            changed[field] = {
+                name: np.where(scored[name], codes, UNKNOWN)[::stride]
+                for name, codes in getattr(self, field).items()
+            }
+        changed["slips"] = {}
+        for name, truth in self.slips.items():
+            known = truth_without(self.times[name], truth, ~scored[name])
+            changed["slips"][name] = replace(
+                known, codes=known.codes[::stride], quiet=known.quiet[::stride]
+            )
+        return replace(self, **changed)
 
     def unit_labels(self, unit: str) -> Codes:
         """Return the labels that train a unit: for the hand, at the times of the first finger."""
         if unit != HAND:
             return self.labels[unit]
-        hand = self.hand_labels(self.labels)
+        hand = label_hand(self.times, self.labels)
         return hand.labels[np.searchsorted(hand.times, next(iter(self.times.values())))]
 
     def slip_labels(self, unit: str) -> Codes | None:
@@ -159,6 +189,43 @@ class RecordingFeatures:
         return states.astype(np.int8)
 
 
+def label_hand(times: Mapping[str, Array], labels: Mapping[str, Codes]) -> FingerDecisions:
+    """Return the labels of a hand that follow from those of its fingers, as its decisions.
+
+    Args:
+        times: (n,) of each finger [s].
+        labels: (n,) codes of each finger.
+    """
+    fingers = {
+        name: FingerDecisions(own, labels[name], labels[name], np.full(len(own), np.nan))
+        for name, own in times.items()
+    }
+    return hand_decisions(fingers, len(fingers))
+
+
+class PreparedRecording(NamedTuple):
+    """What every method uses of one recording: its signals, and its labels at each sample."""
+
+    hand: HandSignal
+    labelled: RecordingFeatures
+
+    @classmethod
+    def of(cls, recording: Recording, tare: Tare, fingers: tuple[str, ...]) -> Self:
+        """Prepare some fingers of a recording."""
+        hand = hand_signal(recording, tare, fingers)
+        return cls(hand, RecordingFeatures.of(hand))
+
+    @property
+    def n_bytes(self) -> int:
+        """Size of the arrays that it adds to those of the recording [byte]."""
+        own = self.labelled
+        arrays: list[npt.NDArray[Any]] = [finger.force for finger in self.hand.fingers.values()]
+        for by_finger in (own.amplitude, own.labels, own.exact_labels, own.calm_labels):
+            arrays += by_finger.values()
+        arrays += [array for truth in own.slips.values() for array in (truth.codes, truth.quiet)]
+        return sum(array.nbytes for array in arrays)
+
+
 def corpus_features(
     method: Method,
     corpus: Corpus,
@@ -175,8 +242,24 @@ def corpus_features(
         stride: keep the features of every n-th sample. They are computed from all samples.
         warm_up: time at the start of every unbroken stretch that is not scored [s].
     """
-    prepared = prepared_recordings(corpus, variation)
-    return [recording_features(method, each, stride, warm_up) for each in prepared]
+    featured = []
+    for hand, labelled in prepared_recordings(corpus, variation):
+        scored = {name: _scored(hand, name, warm_up) for name in hand.fingers}
+        features = {
+            unit: np.asarray(rows[::stride], dtype=np.float32)
+            for unit, rows in method.features(hand).items()
+        }
+        featured.append(replace(labelled.scored_at(scored, stride), features=features))
+    return featured
+
+
+def _scored(hand: HandSignal, name: str, warm_up: float) -> Mask:
+    """Return the samples of a finger that come at least `warm_up` [s] after a stretch begins."""
+    times = hand.fingers[name].times
+    scored = np.full(len(times), not warm_up)
+    for rows in hand.fingers[name].stretches if warm_up else ():
+        scored[rows] = times[rows] >= times[rows.start] + warm_up - 0.5 / hand.rate
+    return scored
 
 
 def prepared_recordings(
@@ -197,58 +280,9 @@ def prepared_recordings(
         fingers = tuple(f for f in corpus.fingers if f in modules and modules[f].n_samples)
         if not fingers:
             continue
+        prepare = partial(PreparedRecording.of, variation.apply(recording), tare, fingers)
         if variation != UNCHANGED:
-            yield PreparedRecording.of(variation.apply(recording), tare, fingers)
-            continue
-        prepare = partial(PreparedRecording.of, recording, tare, fingers)
-        key = (*corpus.identity, recording.name, fingers, corpus.tare)
-        yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
-
-
-def recording_features(
-    method: Method, prepared: PreparedRecording, stride: int = 1, warm_up: float = 0.0
-) -> RecordingFeatures:
-    """Return the features of a recording; the arguments are those of `corpus_features`."""
-    hand, recording = prepared.hand, prepared.recording
-    grasped_object = recording.metadata.get("object")
-    kept = slice(None, None, stride)
-    times = {name: finger.times[kept] for name, finger in hand.fingers.items()}
-    scored = {name: _scored(hand, name, warm_up)[kept] for name in hand.fingers}
-    labels = {name: codes[kept] for name, codes in prepared.labels.items()}
-    exact = {name: codes[kept] for name, codes in prepared.exact_labels.items()}
-    slips = {
-        name: replace(truth, codes=truth.codes[kept], quiet=truth.quiet[kept])
-        for name, truth in prepared.slips.items()
-    }
-    return RecordingFeatures(
-        name=recording.name,
-        object=None if grasped_object is None else str(grasped_object),
-        truth=recording.truth,
-        times=times,
-        amplitude={name: finger.amplitude[kept] for name, finger in hand.fingers.items()},
-        labels=labels,
-        scored_labels={
-            name: np.where(scored[name], codes, UNKNOWN) for name, codes in labels.items()
-        },
-        exact_labels={
-            name: np.where(scored[name], codes, UNKNOWN) for name, codes in exact.items()
-        },
-        glitches={name: mask[kept] for name, mask in prepared.glitches.items()},
-        slips={
-            name: truth_without(times[name], truth, ~scored[name]) for name, truth in slips.items()
-        },
-        at_rest=prepared.at_rest,
-        features={
-            unit: np.asarray(rows[kept], dtype=np.float32)
-            for unit, rows in method.features(hand).items()
-        },
-    )
-
-
-def _scored(hand: HandSignal, name: str, warm_up: float) -> Mask:
-    """Return the samples of a finger that come at least `warm_up` [s] after a stretch begins."""
-    times = hand.fingers[name].times
-    scored = np.full(len(times), not warm_up)
-    for rows in hand.fingers[name].stretches if warm_up else ():
-        scored[rows] = times[rows] >= times[rows.start] + warm_up - 0.5 / hand.rate
-    return scored
+            yield prepare()
+        else:
+            key = (*corpus.identity, recording.name, fingers, corpus.tare)
+            yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))

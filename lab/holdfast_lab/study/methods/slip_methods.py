@@ -30,17 +30,10 @@ class SlipMethod:
     Attributes:
         method: features and classifier.
         target: what it is fitted to.
-        based_on: name of the method in `METHODS` that has the same features; empty for its own.
     """
 
     method: Method
     target: Target = "sliding"
-    based_on: str = ""
-
-    @property
-    def history(self) -> str:
-        """Name of the method in `METHODS` that needs the same time before its first estimate."""
-        return self.based_on or self.method.name
 
 
 TREES_OF_OURS = replace(
@@ -55,7 +48,7 @@ TREES_OF_OURS = replace(
 SLIP_METHODS: dict[str, SlipMethod] = {
     "holdfast": SlipMethod(HOLDFAST),
     "holdfast_stability": SlipMethod(HOLDFAST, "stability"),
-    "holdfast_trees": SlipMethod(TREES_OF_OURS, based_on="holdfast"),
+    "holdfast_trees": SlipMethod(TREES_OF_OURS),
     **{name: SlipMethod(METHODS[name]) for name in RIVALS},
 }
 """All of them by name, in the order of the table."""

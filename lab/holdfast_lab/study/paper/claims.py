@@ -196,8 +196,8 @@ def sliding_samples(signal: FingerSignal, truth: Truth, finger: str) -> tuple[Ar
     """
     at = _truth_rows(truth, signal.times)
     force = np.linalg.norm(truth.fingers[finger]["contact_force"], axis=1)[at]
-    held = np.isin(truth.hand["phase"], HELD_PHASES)[at]
-    whole = _whole_window(held & (force > MIN_CONTACT), DEFAULT_WINDOW)
+    grasped = np.isin(truth.hand["phase"], HELD_PHASES)[at]
+    whole = _whole_window(grasped & (force > MIN_CONTACT), DEFAULT_WINDOW)
     force = window_mean(force, DEFAULT_WINDOW)
     speed = window_mean(np.asarray(truth.fingers[finger]["slip_speed"])[at], DEFAULT_WINDOW)
     energy = np.full(len(signal.times), np.nan)

@@ -56,11 +56,13 @@ def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recordin
 
 def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:
     """Return a module in which a held contact is unstable only while it slides."""
-    held, sliding = held_and_sliding(truth, finger)
+    grasped, sliding = grasped_and_sliding(truth, finger)
     at_sample = np.clip(
         np.searchsorted(truth.times, module.times, side="right") - 1, 0, len(truth.times) - 1
     )
-    quiet = (held & ~sliding)[at_sample] & (label_states(module.labels, module.times) == UNSTABLE)
+    quiet = (grasped & ~sliding)[at_sample] & (
+        label_states(module.labels, module.times) == UNSTABLE
+    )
     labels = iter(module.labels)
     label = next(labels, None)
     states: list[tuple[ContactState, Cause | None] | None] = []
@@ -78,7 +80,9 @@ def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:
     return replace(module, labels=made)
 
 
-def held_and_sliding(truth: Truth, finger: str) -> tuple[Mask, Mask]:
+def grasped_and_sliding(truth: Truth, finger: str) -> tuple[Mask, Mask]:
     """Return (n,) where the hand holds the object, and where it slides on the finger."""
-    held = np.isin(truth.hand["phase"], HELD_PHASES)
-    return np.asarray(held), np.asarray(held & (truth.fingers[finger]["slip_speed"] > SLIP_SPEED))
+    grasped = np.isin(truth.hand["phase"], HELD_PHASES)
+    return np.asarray(grasped), np.asarray(
+        grasped & (truth.fingers[finger]["slip_speed"] > SLIP_SPEED)
+    )

@@ -7,8 +7,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions, Metrics, summarise
+from holdfast.metrics.samples import score_samples
 from holdfast.recordings import Recording
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
@@ -156,10 +156,7 @@ def _confusion(exact: RecordingFeatures, drawn: RecordingFeatures) -> list[int]:
     """Return TN, FP, FN, TP of one recording, with the drawn labels as decisions."""
     counts = np.zeros(4, dtype=np.int64)
     for finger, truth in exact.labels.items():
-        decided = drawn.labels[finger]
-        known = (truth != UNKNOWN) & (decided != UNKNOWN)
-        place = 2 * (truth == STABLE) + (decided == STABLE)
-        counts += np.bincount(place[known], minlength=4)
+        counts += score_samples(truth, drawn.labels[finger], np.zeros(len(truth))).confusion.ravel()
     return [int(n) for n in counts]
 
 
@@ -240,9 +237,9 @@ def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Itera
         n = [count.samples.get(kind, 0) for count in counts]
         hidden = [count.hidden.get(kind, 0) for count in counts]
         yield from _cause_rows(keys | {"cause": kind}, hidden, n, seed)
-    held = [cause.value for cause in HELD_CAUSES]
-    n = [sum(count.samples.get(kind, 0) for kind in held) for count in counts]
-    hidden = [sum(count.hidden.get(kind, 0) for kind in held) for count in counts]
+    in_grasp = [cause.value for cause in HELD_CAUSES]
+    n = [sum(count.samples.get(kind, 0) for kind in in_grasp) for count in counts]
+    hidden = [sum(count.hidden.get(kind, 0) for kind in in_grasp) for count in counts]
     yield from _cause_rows(keys | {"cause": HELD_LABELS}, hidden, n, seed)
     n_all = [count.n_labelled for count in counts]
     yield from _cause_rows(keys | {"cause": ALL_SAMPLES}, hidden, n_all, seed)

@@ -20,7 +20,7 @@ from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Integers
 from holdfast.training.finger_samples import concatenate, labelled_samples, usable_rows
 from holdfast.training.training_samples import resample_if_needed
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import FingerSignal, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy
 from holdfast_lab.study.paper.label_sources import LabelSource, relabelled

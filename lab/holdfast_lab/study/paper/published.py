@@ -24,7 +24,7 @@ _WINDOW = {
     "accuracy": (93.0, 93.7, 94.2, 94.6, 94.9, 95.0, 95.2, 95.3),
 }
 PUBLISHED_WINDOW: dict[int, PublishedValues] = {
-    n: {rate: values[place] for rate, values in _WINDOW.items()} for place, n in enumerate(WINDOWS)
+    n: {rate: values[index] for rate, values in _WINDOW.items()} for index, n in enumerate(WINDOWS)
 }
 """Table II, by N_w."""
 

@@ -214,8 +214,10 @@ class _Fit:
     ) -> Integers:
         """Return the counts of each fold, by a classifier that is fitted to the other folds."""
         counts = np.zeros((n_recordings, 4), dtype=np.int64)
-        for held in folds:
-            counts += confusion_counts(self(samples.take(~held)), samples.take(held), n_recordings)
+        for left_out in folds:
+            counts += confusion_counts(
+                self(samples.take(~left_out)), samples.take(left_out), n_recordings
+            )
         return counts
 
 
@@ -247,8 +249,8 @@ def _evaluate(
     if thorough:
         counts[TRAINING] = confusion_counts(classifier, train, n)
         counts[VALIDATED] = fit.out_of_fold(train, (folds == k for k in range(N_FOLDS)), n)
-    for on, held in _substitute_folds(main, tests, seed, thorough).items():
-        counts[on] = fit.out_of_fold(samples, held, n)
+    for on, left_out in _substitute_folds(main, tests, seed, thorough).items():
+        counts[on] = fit.out_of_fold(samples, left_out, n)
     return VariantResult(
         name,
         tuple(features),

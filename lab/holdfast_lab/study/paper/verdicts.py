@@ -27,9 +27,12 @@ from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.error_breakdown import latest_rows
-from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
+from holdfast_lab.study.evaluation.evaluate_method import (
+    EvaluationEffort,
+    EvaluationJob,
+    ScoredRecording,
+    score_splits,
+)
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
@@ -142,19 +145,8 @@ def grasp_verdicts(
         max_samples: of a finger, that train a classifier.
         seed: of folds and fits.
     """
-    method = METHODS[name]
-    main = corpus_features(method, corpora["main"])
     cases = {role: _cases(corpus) for role, corpus in corpora.items()}
-    training = Training.of(method, main, max_samples, seed)
-    everything = set(range(len(main)))
-    by_index: dict[int, GraspVerdict] = {}
-    for left_out in held_out_folds(training.objects, "recording", n_folds, seed):
-        fitted = training.fit(everything - left_out)
-        for index in left_out:
-            case = cases["main"][main[index].name]
-            by_index[index] = _verdict("main", case, main[index], fitted)
-    verdicts = [by_index[index] for index in sorted(by_index)]
-    fitted = training.fit()
+    others: dict[str, Corpus] = {}
     for role, corpus in corpora.items():
         names = tuple(
             recording
@@ -162,22 +154,24 @@ def grasp_verdicts(
             if role not in ONLY_FAILED or cases[role][recording] == "failed"
         )
         if role != "main" and names:
-            chosen = msgspec.structs.replace(corpus, recordings=names)
-            verdicts += [
-                _verdict(role, cases[role][corpus_feature.name], corpus_feature, fitted)
-                for corpus_feature in corpus_features(method, chosen)
-            ]
-    return verdicts
+            others[role] = msgspec.structs.replace(corpus, recordings=names)
+    effort = EvaluationEffort(n_folds, inner=1, max_samples=max_samples)
+    tests = tuple(others.values())
+    job = EvaluationJob(name, corpora["main"], ("recording",), tests, effort=effort, seed=seed)
+    return [
+        _verdict(role, cases[role][scored.recording.name], scored)
+        for role, (_, recordings) in zip(("main", *others), score_splits(job), strict=True)
+        for scored in recordings
+    ]
 
 
 def _cases(corpus: Corpus) -> dict[str, str]:
     return {recording.name: str(recording.metadata.get("case", "")) for recording in corpus.load()}
 
 
-def _verdict(
-    role: str, case: str, recording: RecordingFeatures, fitted: FittedMethod
-) -> GraspVerdict:
-    decisions = fitted.scores(recording).decide(recording.name, recording.exact_labels)
+def _verdict(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
+    recording = scored.recording
+    decisions = scored.decide(recording.exact_labels)
     contact, unstable = _contact_counts(decisions, recording.truth)
     stable_after = [
         stable_after_lock(finger.times, finger.states, recording.truth)
@@ -234,12 +228,14 @@ def stable_after_lock(
     """
     if truth is None:
         return None
-    held = np.isin(truth.hand["phase"], HELD_PHASES)
-    if not held.any():
+    grasped = np.isin(truth.hand["phase"], HELD_PHASES)
+    if not grasped.any():
         return None
-    locked_at = float(truth.times[np.argmax(held)])
+    locked_at = float(truth.times[np.argmax(grasped)])
     stable = (
-        (times >= locked_at - TIME_TOLERANCE) & held[latest_rows(truth, times)] & (states == STABLE)
+        (times >= locked_at - TIME_TOLERANCE)
+        & grasped[latest_rows(truth, times)]
+        & (states == STABLE)
     )
     first, lasting = math.inf, math.inf
     for start, end in runs(stable):

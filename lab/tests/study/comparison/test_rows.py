@@ -90,9 +90,9 @@ def test_the_calibration_error_by_hand():
     """One bin is off by 0.1 on 30 samples, one by 0.2 on 10."""
     table = [[0.0, 0.0, 0.0]] * 8 + [[24.0, 21.0, 30.0], [9.0, 7.0, 10.0]]
     metrics = metrics_of(RIGHT)
-    evaluation = MethodEvaluation(["a"], None, metrics, [], [], [], [], [], [table])
+    evaluation = MethodEvaluation(None, metrics, [], [], [], [], [], [table])
     assert calibration_row({}, evaluation, seed=0).ours == pytest.approx((3 + 2) / 40)
-    both = MethodEvaluation(["a", "b"], None, metrics, [], [], [], [], [], [table, table])
+    both = MethodEvaluation(None, metrics, [], [], [], [], [], [table, table])
     assert calibration_row({}, both, seed=0).interval == pytest.approx((0.125, 0.125))
 
 

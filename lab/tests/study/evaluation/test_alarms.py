@@ -16,7 +16,7 @@ from holdfast_lab.study.evaluation.alarms import (
     labels_by_reading,
     threshold_shift,
 )
-from holdfast_lab.study.evaluation.scores import Scores
+from holdfast_lab.study.evaluation.fitted_method import Scores
 from study.evaluation.test_fitted_method import recording_at
 from study.example_recordings import GLITCH
 
@@ -44,8 +44,9 @@ def readings(*spans):
     glitch = inside((GLITCH, GLITCH + 0.1))
     labels = np.where(glitch, UNSTABLE, where(*spans)).astype(np.int8)
     recording = recording_at({"thumb": TIMES})
+    calm = np.where(glitch, STABLE, labels).astype(np.int8)
     return labels_by_reading(
-        replace(recording, exact_labels={"thumb": labels}, glitches={"thumb": glitch})
+        replace(recording, exact_labels={"thumb": labels}, calm_labels={"thumb": calm})
     )
 
 

@@ -7,6 +7,7 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
 from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, count_glitches
+from holdfast_lab.study.methods import HAND
 from study.example_recordings import GLITCH, PUSH, truth_of
 
 TIMES = np.arange(1725) / 150
@@ -57,7 +58,7 @@ def test_directions(force, direction):
 
 
 def test_a_whole_hand_method_has_phases_and_disturbances_but_no_grips():
-    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=())
+    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=(HAND,))
     assert found.phases["disturbed"] == (180, 180)
     assert found.disturbances == [("down", (179, 179))]
     assert found.grips == []
@@ -92,9 +93,9 @@ def test_nothing_slides_that_is_not_held_or_not_touched():
 
 def test_glitches_are_counted_with_the_distance_that_the_object_slides():
     calm = count_glitches(sliding())
-    assert (calm.n, calm.distances) == (1, [0.0])
+    assert calm.distances == [0.0]
     assert calm.grasped_seconds == pytest.approx(7.2, abs=0.01)
     moved = count_glitches(sliding((5.6, 5.9), (GLITCH + 0.05, GLITCH + 0.25)))
     assert moved.distances == [pytest.approx(2e-3, rel=0.01)]
     assert count_glitches(sliding((GLITCH + 0.2, GLITCH + 0.3))).distances == [0.0]
-    assert count_glitches(None).n == 0
+    assert count_glitches(None).distances == []

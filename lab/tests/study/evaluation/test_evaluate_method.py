@@ -9,7 +9,10 @@ from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
 from holdfast_lab.study.evaluation.alarms import READINGS
 from holdfast_lab.study.evaluation.evaluate_method import (
+    BY_RATE,
     FALSE_ALARM_RATES,
+    LASTING,
+    OWN,
     EvaluationEffort,
     EvaluationJob,
     MethodEvaluation,
@@ -18,8 +21,9 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     find_method,
     held_out_folds,
     score_splits,
+    warm_up,
 )
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation, label_hand
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
@@ -111,23 +115,25 @@ def evaluations(corpus, tmp_path_factory):
 
 def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
     assert set(evaluations) == {"recording", "object", "others"}
-    assert evaluations["object"].names == evaluations["recording"].names == list(corpus.recordings)
-    assert len(evaluations["others"].names) == 3
+    for split in ("object", "recording"):
+        names = [recording.name for recording in evaluations[split].hand.recordings]
+        assert names == list(corpus.recordings)
+    assert len(evaluations["others"].breakdown) == 3
     assert evaluations["recording"].fingers.pooled.accuracy > 75
 
 
 def test_without_a_truth_there_are_no_glitches_and_no_phases(evaluations):
     others = evaluations["others"]
-    assert all(glitches.n == 0 for glitches in others.glitches)
+    assert all(not glitches.distances for glitches in others.glitches)
     assert all(not each.phases for each in others.breakdown)
-    assert all(glitches.n == 1 for glitches in evaluations["recording"].glitches)
+    assert all(len(glitches.distances) == 1 for glitches in evaluations["recording"].glitches)
 
 
 def test_events_are_counted_by_exact_labels(evaluations, corpus):
     """Equal to `event_metrics` of the hand, by labels without margin."""
     _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
-    for case, alarms in zip(scored, evaluations["recording"].alarms.own, strict=True):
-        labels = case.recording.hand_labels(case.recording.exact_labels).labels
+    for case, alarms in zip(scored, evaluations["recording"].alarms[OWN], strict=True):
+        labels = label_hand(case.recording.times, case.recording.exact_labels).labels
         score = case.scores.hand
         known = event_metrics(score.times, labels, score.states())
         assert len(alarms.delays) == known.n_events
@@ -136,7 +142,7 @@ def test_events_are_counted_by_exact_labels(evaluations, corpus):
 
 
 def test_more_false_alarms_call_less_stable(evaluations):
-    curve = evaluations["recording"].alarms.by_rate
+    curve = [evaluations["recording"].alarms[name] for name in BY_RATE]
     assert len(curve) == len(FALSE_ALARM_RATES)
     not_stable = [sum(alarms.n_events_not_stable for alarms in point) for point in curve]
     assert not_stable == sorted(not_stable)
@@ -146,7 +152,7 @@ def test_glitches_are_counted_in_three_ways(evaluations):
     """The jump of the recordings is an event, a false alarm if detected, or left out."""
     readings = evaluations["recording"].readings
     assert tuple(readings) == READINGS
-    own = {name: each.own for name, each in readings.items()}
+    own = {name: each[OWN] for name, each in readings.items()}
     for event, false, left_out in zip(*(own[name] for name in READINGS), strict=True):
         assert len(event.delays) == len(false.delays) + 1 == len(left_out.delays) + 1
         assert event.stable_seconds == pytest.approx(false.stable_seconds - 0.1, abs=0.02)
@@ -157,7 +163,7 @@ def test_glitches_are_counted_in_three_ways(evaluations):
 
 def test_held_states_give_fewer_alarms(evaluations):
     alarms = evaluations["recording"].alarms
-    n_false = [sum(a.n_false_alarms for a in each) for each in (alarms.own, alarms.lasting)]
+    n_false = [sum(a.n_false_alarms for a in each) for each in (alarms[OWN], alarms[LASTING])]
     assert n_false[1] <= n_false[0]
 
 
@@ -176,7 +182,7 @@ def test_recordings_of_one_class_are_evaluated_too(tmp_path, recordings):
     found = evaluate_method(EvaluationJob("zhang", scan_corpus("main", folder), effort=EFFORT))[
         "recording"
     ]
-    assert len(found.names) == 4
+    assert len(found.breakdown) == 4
 
 
 def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
@@ -241,3 +247,15 @@ def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
     ):
         assert n == n_paper
         assert n_without < n_without_paper
+
+
+@pytest.mark.parametrize(
+    ("method", "samples"),
+    [("friction", 0), ("difference", 1), ("logreg", 13), ("sigma_cut", 13), ("spectrum", 29)],
+)
+def test_the_history_of_a_method_in_samples(method, samples):
+    assert warm_up(method, 150.0) == pytest.approx(samples / 150)
+
+
+def test_the_network_needs_a_second():
+    assert warm_up("tcn", 100.0) == pytest.approx(0.99)

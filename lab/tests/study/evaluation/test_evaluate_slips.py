@@ -6,15 +6,15 @@ import pytest
 
 from holdfast.classifiers.linear import smooth
 from holdfast.contact import UNKNOWN, UNSTABLE
+from holdfast.metrics import slip_thresholds
 from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS, ThresholdChoice
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
 from holdfast.model import Head
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
-from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
+from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
 from holdfast_lab.study.evaluation.evaluate_slips import (
     SlipEvaluation,
-    SlipJob,
     SlipScores,
     evaluate_slips,
     log_odds_of,
@@ -22,9 +22,8 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     smoothed,
     still_ranks,
 )
-from holdfast_lab.study.evaluation.fitted_method import Training
+from holdfast_lab.study.evaluation.fitted_method import Training, probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
-from holdfast_lab.study.evaluation.scores import probability_of
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -166,9 +165,15 @@ def corpora(tmp_path_factory):
     }
 
 
+def job(name, main, tests=(), compared=()):
+    splits = ("object", "recording")
+    return EvaluationJob(name, main, splits, tests, effort=EFFORT, compared=compared, slips=True)
+
+
 def evaluated(corpora, name, compared=()):
-    job = SlipJob(name, corpora["main"], (corpora["others"],), EFFORT, 0, compared)
-    data = msgspec.msgpack.encode(evaluate_slips(job))
+    data = msgspec.msgpack.encode(
+        evaluate_slips(job(name, corpora["main"], (corpora["others"],), compared))
+    )
     return msgspec.msgpack.decode(data, type=dict[str, SlipEvaluation])
 
 
@@ -198,16 +203,19 @@ def test_methods_are_scored_on_the_same_samples(corpora):
 def test_without_known_slips_there_are_no_results(tmp_path):
     corpus = scan_corpus("main", save_synthetic(tmp_path / "main", range(3)))
     for name in ("holdfast", "holdfast_stability"):
-        assert evaluate_slips(SlipJob(name, corpus, effort=EFFORT)) == {}
+        assert evaluate_slips(job(name, corpus)) == {}
 
 
 def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
     """What is tested does not change the choice."""
     seen = []
-    choose = module.choose_threshold
-    monkeypatch.setattr(
-        module, "choose_threshold", lambda curve, *rest: seen.append(curve) or choose(curve, *rest)
-    )
+    choose = slip_thresholds.choose_threshold
+
+    def noted(curve, *rest):
+        seen.append(curve)
+        return choose(curve, *rest)
+
+    monkeypatch.setattr(slip_thresholds, "choose_threshold", noted)
     evaluated(corpora, "holdfast")
     assert len(seen) == 2  # for each budget
     for curve in seen:

@@ -5,9 +5,8 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, hand_decisions
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Scores, Training
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast_lab.study.evaluation.scores import Scores
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
@@ -17,8 +16,7 @@ pytestmark = pytest.mark.slow
 
 def recording_at(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
-    nothing = [dict(empty) for _ in range(4)]
-    return RecordingFeatures("one", None, None, times, {}, *nothing, {}, {}, {})
+    return RecordingFeatures("one", None, None, times, {}, *[empty] * 4, {}, {}, {})
 
 
 def state_of_finger(margin, in_contact, shift):
@@ -73,7 +71,7 @@ def test_a_whole_hand_method_decides_for_no_finger():
     )
     scores = FittedMethod({HAND: Fixed()}, {"a": 0.5, "b": 0.5}).scores(recording)
     decided = scores.decide("one", recording.labels)
-    assert not decided.fingers
+    assert decided.fingers == {HAND: decided.hand}
     assert scores.fingers["b"].known.tolist() == [False, True, True]
     assert scores.fingers["b"].margin == pytest.approx([np.inf, np.log(4), np.inf])
     assert scores.fingers["b"].grasped.tolist() == [True, True, False]
@@ -173,3 +171,42 @@ def test_one_class_gives_no_classifier_and_no_scores(corpus):
     decided = fitted.scores(one).decide("one", one.labels)
     assert (decided.hand.states == UNKNOWN).all()
     assert all((finger.states == UNKNOWN).all() for finger in decided.fingers.values())
+
+
+def hand_scores(margin, known=None, grasped=None, rate=100.0):
+    margin = np.array(margin, dtype=float)
+    n = len(margin)
+    return Scores(
+        times=np.arange(n) / rate,
+        margin=margin,
+        known=np.ones(n, dtype=bool) if known is None else np.array(known, dtype=bool),
+        grasped=np.ones(n, dtype=bool) if grasped is None else np.array(grasped, dtype=bool),
+        probability=np.full(n, 0.5),
+    )
+
+
+def test_an_unstable_sample_is_held():
+    found = hand_scores([1, 1, -1, 1, 1, 1, 1, 1]).hold(0.03).states()
+    assert found.tolist() == [STABLE] * 2 + [UNSTABLE] * 3 + [STABLE] * 3
+
+
+def test_no_state_is_held_without_a_grasped_object_or_with_an_unknown_finger():
+    grasped, known = [1, 1, 1, 0, 1, 1], [1, 1, 1, 1, 0, 1]
+    found = hand_scores([1, 1, -1, np.inf, 1, 1], known, grasped).hold(0.04).states()
+    assert found.tolist() == [STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, UNSTABLE]
+
+
+def test_a_hold_time_of_zero_changes_nothing():
+    bare = hand_scores([1, -1, 1, -1, 1])
+    assert bare.hold(0.0).states().tolist() == bare.states().tolist()
+
+
+@pytest.mark.parametrize("shift", [-0.5, 0.0, 0.5])
+def test_holding_the_scores_equals_holding_the_states(shift):
+    rng = np.random.default_rng(0)
+    bare = hand_scores(rng.normal(1.0, 1.0, size=300))
+    states, expected = bare.states(shift), []
+    for k in range(len(states)):
+        recent = states[max(0, k - 4) : k + 1]
+        expected.append(UNSTABLE if (recent == UNSTABLE).any() else states[k])
+    assert bare.hold(0.05).states(shift).tolist() == expected

@@ -7,7 +7,7 @@ from holdfast.contact import UNSTABLE
 from holdfast.metrics.truth_labels import LabelRule, relabel
 from holdfast.recordings import label_states
 from holdfast.synthetic import synthetic_recording
-from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.evaluation.recording_features import Variation
 from study.example_recordings import recording_with_truth
 
 RECORDING = synthetic_recording("grasp", 3, ("thumb", "index"))
