@@ -7,13 +7,13 @@ import time
 from pathlib import Path
 
 import msgspec
-import numba
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
+from holdfast.kernel.batch import max_threads
 from holdfast.parallel import Engine
 from holdfast_lab import tasks as work
 from holdfast_lab.tasks import Task, TaskRunner
@@ -33,8 +33,8 @@ def figure(place, seed):
 
 
 def n_threads():
-    """Of the compiled kernels, and of each library that has threads of its own."""
-    return [numba.get_num_threads(), *(info["num_threads"] for info in threadpool_info())]
+    """Of the C kernel, and of each library that has threads of its own."""
+    return [max_threads(), *(info["num_threads"] for info in threadpool_info())]
 
 
 def noted(place, folder):

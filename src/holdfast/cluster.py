@@ -84,21 +84,17 @@ def package_digest() -> str:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Make NumPy and compiled kernels use one thread.
+    """Make NumPy and the C kernel use one thread.
 
     Workers would compete for processors otherwise, and a sum over several threads is rounded
     differently.
     """
-    import numba
     from threadpoolctl import threadpool_limits
 
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
-        with threadpool_limits(1):
-            yield
-    finally:
-        numba.set_num_threads(before)
+    from holdfast.kernel.batch import thread_limit
+
+    with threadpool_limits(1), thread_limit(1):
+        yield
 
 
 def _call(source: str, function: Callable[..., T], *arguments: object) -> T:

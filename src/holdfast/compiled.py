@@ -29,7 +29,6 @@ class _CompilationLog(event.Listener):
 event.register("numba:compile", _CompilationLog())  # type: ignore[no-untyped-call]
 
 compiled = numba.njit(cache=True, error_model="numpy")
-compiled_parallel = numba.njit(cache=True, error_model="numpy", parallel=True)
 compiled_inside = numba.njit(cache=True, error_model="numpy", forceinline=True)
 """Compile a step into the loops that call it: a call costs as much as the step."""
 inlined = numba.njit(error_model="numpy", inline="always")

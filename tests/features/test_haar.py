@@ -8,14 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.features import FEATURE_NAMES, haar_features
-from holdfast.features.haar import (
-    N_SUMS,
-    append_pair,
-    fill_features,
-    fill_features_alone,
-    n_levels,
-    newest_moments,
-)
+from holdfast.features.haar import N_SUMS, append_pair, n_levels, newest_moments
 
 from . import naive
 
@@ -153,15 +146,6 @@ def test_any_chunking_gives_the_same_bits(n, half, cuts, seed):
         origin = max(start - window + 1, 0)
         pieces.append(haar_features(force[origin:stop], window)[start - origin :])
     assert np.array_equal(np.concatenate(pieces), haar_features(force, window), equal_nan=True)
-
-
-@pytest.mark.parametrize("n", [0, 13, 14, 1037, 1038, 5000])
-def test_one_thread_gives_the_same_bits(n):
-    force = walk(n)
-    several, one = np.empty((n, 6)), np.empty((n, 6))
-    fill_features(force, 14, several)
-    fill_features_alone(force, 14, one)
-    assert np.array_equal(several, one, equal_nan=True)
 
 
 @pytest.mark.parametrize("longest", [2, 14, 34, 64])

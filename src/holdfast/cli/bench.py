@@ -18,7 +18,7 @@ from holdfast.detector import Detector
 from holdfast.errors import is_installed
 from holdfast.features import DEFAULT_WINDOW as WINDOW
 from holdfast.features import DEPLOYED_FEATURES, haar_features, parse_features
-from holdfast.features.haar import fill_features
+from holdfast.kernel.batch import fill_haar_features
 from holdfast.model import FingerModel, Head, Model
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -119,7 +119,7 @@ def batch(n_samples: int) -> dict[str, Any]:
     target = np.empty_like(source)
     seconds = _measure(
         {
-            "features": lambda: fill_features(force, WINDOW, out),
+            "features": lambda: fill_haar_features(force, WINDOW, out),
             "allocating": lambda: haar_features(force, WINDOW),
             "copy": lambda: np.copyto(target, source),
         }

@@ -107,7 +107,9 @@ def _packages() -> dict[str, dict[str, str | None]]:
         if match is not None and match["package"] != "holdfast":
             group = versions.setdefault(match["extra"] or "", {})
             group[match["package"]] = _version(match["package"])
-    return versions
+    # "all" requires other extras of this package, not packages
+    others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra not in ("all", "deep"))
+    return versions | {"all": {name: found for group in others for name, found in group.items()}}
 
 
 def _version(package: str) -> str | None:

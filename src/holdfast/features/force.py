@@ -1,23 +1,20 @@
 """Fingertip force of recordings: the taxel readings less the tare, rotated and summed."""
 
-import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_parallel, compiled_step, joined_step, sums_in_any_order
+from holdfast.compiled import joined_step, sums_in_any_order
 from holdfast.errors import RecordingError
 from holdfast.features.tare import Tare, TareArgument, baseline_of, offline_tare
+from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.recordings import Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
 BLOCK_SAMPLES = 16_384
 """Samples that are converted to float64 at a time: bounds the memory of offline work."""
-SERIAL_READINGS = 100_000
-"""Readings up to which one thread is faster than several, which wait for each other."""
 
 
 def fingertip_force(
@@ -177,26 +174,5 @@ def _forces(
     for start in range(first, len(readings), BLOCK_SAMPLES):
         block = slice(start, start + BLOCK_SAMPLES)
         values = np.ascontiguousarray(readings[block], dtype=np.float64)
-        fill = _fill_forces if values.size > SERIAL_READINGS else _fill_forces_alone
-        fill(values, baseline, sensor.rotations, force[block])
+        fill_fingertip_force(values, baseline, sensor.rotations, force[block])
     return force
-
-
-@compiled_parallel
-def _fill_forces(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
-    for k in numba.prange(len(values)):
-        _fill_force(values[k], baseline, rotations, force[k])
-
-
-@compiled_step
-def _fill_forces_alone(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
-    for k in range(len(values)):
-        _fill_force(values[k], baseline, rotations, force[k])
-
-
-@compiled_step
-def _fill_force(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
-    # F_tip(k); the row stays NaN where a reading is not finite.
-    x, y, z, _ = sum_taxels(values, baseline, rotations, 0, len(baseline))
-    if math.isfinite(x + y + z):
-        force[0], force[1], force[2] = x, y, z

@@ -1,0 +1,37 @@
+/* Features of whole arrays: the fingertip force of many samples, and the paper's features of it.
+ *
+ * Rows are computed by themselves: a caller may cut an array into parts, in any order and in
+ * several threads, and gets the same bits. The caller owns all memory; nothing is allocated.
+ */
+#ifndef HOLDFAST_BATCH_H
+#define HOLDFAST_BATCH_H
+
+#include <stddef.h>
+
+enum { HOLDFAST_N_HAAR = 6 }; /* F_a, F_x, F_y, F_z, m, sigma */
+
+/* The number of doubles that `holdfast_haar_features` needs as scratch memory. */
+size_t holdfast_haar_scratch(size_t window);
+
+/* Compute the paper's features at samples first <= k < stop.
+ *
+ * force: (stop or more, 3) F_tip [count or N].
+ * window: N_w; even, at least 2.
+ * out: (stop or more, 6); row k is NaN if the window that ends at sample k is not full or not
+ *     finite.
+ * scratch: is overwritten.
+ */
+void holdfast_haar_features(const double *force, size_t window, size_t first, size_t stop,
+                            double *out, double *scratch);
+
+/* Compute F_tip = sum_i R_i (f_i - b_i) at n samples.
+ *
+ * readings: (n, n_taxels, 3) in taxel frames [count or N].
+ * baseline: (n_taxels, 3) b_i, readings without contact.
+ * rotations: (n_taxels, 3, 3) R_i, from the taxel frame to the fingertip frame.
+ * force: (n, 3) in the fingertip frame; NaN where the force is not finite.
+ */
+void holdfast_fingertip_force(const double *readings, const double *baseline,
+                              const double *rotations, size_t n, size_t n_taxels, double *force);
+
+#endif

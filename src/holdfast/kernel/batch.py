@@ -1,0 +1,115 @@
+"""Features of whole arrays, computed in C by several threads.
+
+The functions of the extension release the GIL and compute rows by themselves, so the result does
+not depend on the number of threads.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.kernel import _extension
+
+Floats = npt.NDArray[np.float64]
+
+SERIAL_BYTES = 3 << 20
+"""Less is read by one thread, in about a millisecond: on a machine with other work, threads wait
+for each other for several."""
+PARTS_PER_THREAD = 4
+"""The slower thread of two computes fewer parts."""
+
+
+_limit: ContextVar[int | None] = ContextVar("limit", default=None)
+
+
+def max_threads() -> int:
+    """Return how many threads a call may use: by the limit, OMP_NUM_THREADS, or the processors."""
+    limit = _limit.get()
+    given = os.environ.get("OMP_NUM_THREADS", "")  # joblib sets it for the processes it starts
+    if limit or given.isdigit():
+        return limit or max(int(given), 1)
+    usable = getattr(os, "sched_getaffinity", None)
+    return len(usable(0)) if usable else os.cpu_count() or 1
+
+
+@contextmanager
+def thread_limit(n: int) -> Iterator[None]:
+    """Let the calls of this thread use at most n threads."""
+    before = _limit.set(n)
+    try:
+        yield
+    finally:
+        _limit.reset(before)
+
+
+def fill_haar_features(
+    force: Floats, window: int, out: Floats, n_threads: int | None = None
+) -> None:
+    """Fill `out` with the paper's features of a force; see `haar_features`.
+
+    Args:
+        force: (n, 3) F_tip, contiguous.
+        window: N_w; even, at least 2.
+        out: (n, 6), contiguous.
+        n_threads: by default as many as pay off.
+
+    Raises:
+        TypeError: an array is not float64.
+        ValueError: an array has another shape or order in memory; a window that is no pairs.
+    """
+    _in_parts(
+        lambda first, stop: _extension.haar_features(force, window, first, stop, out),
+        len(force),
+        force.nbytes,
+        n_threads,
+    )
+
+
+def fill_fingertip_force(
+    readings: Floats,
+    baseline: Floats,
+    rotations: Floats,
+    out: Floats,
+    n_threads: int | None = None,
+) -> None:
+    """Fill `out` with the fingertip force of readings; see `fingertip_force`.
+
+    Args:
+        readings: (n, n_taxels, 3) in taxel frames, contiguous.
+        baseline: (n_taxels, 3) readings without contact.
+        rotations: (n_taxels, 3, 3) from the taxel frame to the fingertip frame.
+        out: (n, 3), contiguous.
+        n_threads: by default as many as pay off.
+
+    Raises:
+        TypeError: an array is not float64.
+        ValueError: an array has another shape or order in memory.
+    """
+    _in_parts(
+        lambda first, stop: _extension.fingertip_force(
+            readings, baseline, rotations, first, stop, out
+        ),
+        len(readings),
+        readings.nbytes,
+        n_threads,
+    )
+
+
+def _in_parts(
+    call: Callable[[int, int], None], n: int, n_bytes: int, n_threads: int | None
+) -> None:
+    """Call a function for all parts of n samples, in threads if there is enough to do."""
+    if n_threads is None:
+        n_threads = max_threads() if n_bytes > SERIAL_BYTES else 1
+    if n_threads == 1:
+        call(0, n)
+        return
+    bounds = np.linspace(0, n, n_threads * PARTS_PER_THREAD + 1).astype(int).tolist()
+    # A pool of its own: starting it takes 0.1 ms, and one that is kept breaks in a forked process.
+    with ThreadPoolExecutor(n_threads) as pool:
+        list(pool.map(call, bounds[:-1], bounds[1:]))

@@ -1,0 +1,286 @@
+"""The functions of the extension on whole arrays: threads, and arrays that do not fit."""
+
+import array
+import ctypes
+
+import numpy as np
+import pytest
+
+from holdfast.features import haar_features
+from holdfast.kernel import _extension, batch
+
+N = 5000
+WINDOW = 14
+FORCE = np.random.default_rng(0).normal(size=(N, 3))
+READINGS = np.random.default_rng(1).normal(size=(40, 5, 3))
+BASELINE = np.random.default_rng(2).normal(size=(5, 3))
+ROTATIONS = np.random.default_rng(3).normal(size=(5, 3, 3))
+
+
+def features(force=FORCE, out=None, window=WINDOW, first=0, stop=None):
+    last = len(force) if stop is None else stop
+    out = np.zeros((N if stop is not None else last, 6)) if out is None else out
+    _extension.haar_features(force, window, first, last, out)
+    return out
+
+
+def forces(readings=READINGS, baseline=BASELINE, rotations=ROTATIONS, out=None, first=0, stop=None):
+    out = np.zeros((len(readings), 3)) if out is None else out
+    last = len(readings) if stop is None else stop
+    _extension.fingertip_force(readings, baseline, rotations, first, last, out)
+    return out
+
+
+@pytest.mark.parametrize("window", [2, 6, 14, 32, 64])
+@pytest.mark.parametrize("n", [0, 1, 13, 14, 1023, 1024, 1037, 1038, N])
+def test_any_number_of_threads_gives_the_same_features(n, window):
+    expected = np.full((n, 6), 7.0)
+    batch.fill_haar_features(FORCE[:n], window, expected, n_threads=1)
+    for n_threads in (2, 3, 5):
+        found = np.full((n, 6), 8.0)
+        batch.fill_haar_features(FORCE[:n], window, found, n_threads)
+        assert np.array_equal(found, expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("n", [0, 1, 7, 40])
+def test_any_number_of_threads_gives_the_same_force(n):
+    expected = np.einsum("ijk,nik->nj", ROTATIONS, READINGS[:n] - BASELINE)
+    for n_threads in (1, 2, 3):
+        found = np.empty((n, 3))
+        batch.fill_fingertip_force(READINGS[:n], BASELINE, ROTATIONS, found, n_threads)
+        assert np.allclose(found, expected, rtol=1e-12, atol=1e-12)
+        assert np.array_equal(found, forces(READINGS[:n]))
+
+
+def test_large_arrays_are_computed_in_threads(monkeypatch):
+    calls = []
+    monkeypatch.setattr(batch, "SERIAL_BYTES", 24 * 100)
+    monkeypatch.setattr(batch, "ThreadPoolExecutor", lambda n: calls.append(n) or POOL(n))
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    out = np.empty((101, 6))
+    batch.fill_haar_features(FORCE[:100], WINDOW, out[:100])
+    assert calls == []
+    batch.fill_haar_features(FORCE[:101], WINDOW, out)
+    assert calls == [3]
+    with batch.thread_limit(1):
+        batch.fill_haar_features(FORCE[:101], WINDOW, out)
+    assert calls == [3]
+
+
+POOL = batch.ThreadPoolExecutor
+
+
+@pytest.mark.parametrize(("given", "expected"), [("1", 1), ("0", 1), ("5", 5)])
+def test_the_limit_of_threads(monkeypatch, given, expected):
+    monkeypatch.setenv("OMP_NUM_THREADS", given)
+    assert batch.max_threads() == expected
+    with batch.thread_limit(2):
+        assert batch.max_threads() == 2
+    assert batch.max_threads() == expected
+    monkeypatch.setenv("OMP_NUM_THREADS", "4,2")
+    assert batch.max_threads() >= 1
+
+
+def test_only_the_rows_of_the_part_are_written():
+    found = features(out=np.full((N, 6), 7.0), first=20, stop=2000)
+    assert (found[:20] == 7.0).all()
+    assert (found[2000:] == 7.0).all()
+    assert np.array_equal(found[20:2000], haar_features(FORCE, WINDOW)[20:2000])
+
+
+def read_only(values):
+    values = values.copy()
+    values.flags.writeable = False
+    return values
+
+
+SAME_NUMBERS = {
+    "read-only": read_only(FORCE),
+    "a memoryview": memoryview(FORCE),
+    "a native byte order by name": FORCE.astype("=f8"),
+    "a part of an array": np.vstack([FORCE, FORCE])[N:],
+}
+
+
+@pytest.mark.parametrize("name", SAME_NUMBERS)
+def test_gives_the_same_numbers(name):
+    assert np.array_equal(features(SAME_NUMBERS[name]), features(), equal_nan=True)
+
+
+class Liar:
+    """An object that says of itself that it is an array."""
+
+    shape = (N, 3)
+    dtype = np.dtype(float)
+
+    @property
+    def __array_interface__(self):
+        return {"shape": (N, 3), "typestr": "<f8", "data": (8, False), "version": 3}
+
+    def __len__(self):
+        return N
+
+
+unaligned = np.empty(N * 24 + 1, dtype=np.uint8)[1:].view(np.float64).reshape(N, 3)
+unaligned[:] = FORCE
+REFUSED = {
+    "float32": (FORCE.astype(np.float32), TypeError, "force: float64 expected, the format f given"),
+    "int64": (FORCE.astype(np.int64), TypeError, "force: float64 expected, the format l given"),
+    "objects": (FORCE.astype(object), TypeError, "force: float64 expected, the format O given"),
+    "complex": (FORCE.astype(complex), TypeError, "force: float64 expected, the format Zd given"),
+    "long double": (FORCE.astype("g"), TypeError, "force: float64 expected, the format g given"),
+    "bytes in the other order": (
+        FORCE.astype(FORCE.dtype.newbyteorder()),
+        TypeError,
+        "force: float64 expected, the format >d given",
+    ),
+    "bytes": (b"\0" * 24, TypeError, "force: float64 expected, the format B given"),
+    "records": (
+        np.zeros((N, 3), dtype=[("x", "f8")]),
+        TypeError,
+        "force: float64 expected, the format T{d:x:} given",
+    ),
+    "every second row": (np.vstack([FORCE] * 2)[::2], ValueError, "not C-contiguous"),
+    "columns first": (np.asfortranarray(FORCE), ValueError, "not C-contiguous"),
+    "backwards": (FORCE[::-1], ValueError, "not C-contiguous"),
+    "one row again and again": (np.broadcast_to(FORCE[0], (N, 3)), ValueError, "not C-contiguous"),
+    "one axis": (array.array("d", [1.0] * 3), ValueError, "force: 2 axes expected, 1 given"),
+    "three axes": (FORCE[None], ValueError, "force: 2 axes expected, 3 given"),
+    "a number": (np.array(1.0), ValueError, "force: 2 axes expected, 0 given"),
+    "two columns": (
+        FORCE[:, :2].copy(),
+        ValueError,
+        "force: axis 1 has the length 2, 3 expected",
+    ),
+    "not aligned": (unaligned, ValueError, "force: its numbers are not aligned in memory"),
+    "a list": (FORCE.tolist(), TypeError, "a bytes-like object is required, not 'list'"),
+    "None": (None, TypeError, "a bytes-like object is required, not 'NoneType'"),
+    "an object that lies": (Liar(), TypeError, "a bytes-like object is required, not 'Liar'"),
+    "numbers of C": ((ctypes.c_double * 3 * 2)(), ValueError, "out: axis 0 has the length 5000"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_an_array_that_does_not_fit_is_refused(name):
+    given, error, message = REFUSED[name]
+    with pytest.raises(error) as raised:
+        features(given, out=np.zeros((N, 6)), stop=1)
+    assert message in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("out", "error", "message"),
+    [
+        (read_only(np.zeros((N, 6))), ValueError, "read-only"),
+        (np.zeros((N, 5)), ValueError, "out: axis 1 has the length 5, 6 expected"),
+        (np.zeros((N - 1, 6)), ValueError, f"out: axis 0 has the length {N - 1}, {N} expected"),
+        (np.zeros((N, 12))[:, ::2], ValueError, "not C-contiguous"),
+        (
+            np.zeros((N, 6), dtype=np.float32),
+            TypeError,
+            "out: float64 expected, the format f given",
+        ),
+    ],
+)
+def test_a_result_that_does_not_fit_is_refused(out, error, message):
+    with pytest.raises(error) as raised:
+        features(out=out)
+    assert message in str(raised.value)
+
+
+def test_arrays_that_share_memory_are_refused():
+    memory = np.zeros(N * 8)
+    force, out = memory[: 3 * N].reshape(N, 3), memory[2 * N :].reshape(N, 6)
+    with pytest.raises(ValueError) as raised:
+        features(force, out)
+    assert str(raised.value) == "force and out share memory"
+
+
+@pytest.mark.parametrize(
+    ("window", "first", "stop"),
+    [(0, 0, 1), (-2, 0, 1), (3, 0, 1), (14, -1, 1), (14, 2, 1), (14, 0, N + 1)],
+)
+def test_numbers_out_of_range_are_refused(window, first, stop):
+    with pytest.raises(ValueError) as raised:
+        features(window=window, first=first, stop=stop)
+    expected = f"window {window}, samples {first} to {stop} of {N} given"
+    assert str(raised.value) == expected
+
+
+@pytest.mark.parametrize(("first", "stop"), [(-1, 1), (2, 1), (0, 41)])
+def test_parts_out_of_range_are_refused(first, stop):
+    with pytest.raises(ValueError) as raised:
+        forces(first=first, stop=stop)
+    assert str(raised.value) == f"samples {first} to {stop} of 40 given"
+
+
+@pytest.mark.parametrize("window", [2**62, 2**31, 10_000_000])
+def test_a_window_longer_than_the_data_needs_no_memory(window):
+    assert np.isnan(features(window=window)).all()
+
+
+@pytest.mark.parametrize("number", [2**70, 1.5, "14", None])
+def test_other_types_of_numbers_are_refused(number):
+    for name in ("window", "first", "stop"):
+        if name == "stop" and number is None:
+            continue  # the default of this test
+        with pytest.raises((TypeError, OverflowError)):
+            features(**{name: number})
+
+
+@pytest.mark.parametrize("n", [0, 1, 4, 6])
+def test_the_number_of_arguments_is_checked(n):
+    arguments = (FORCE, WINDOW, 0, N, np.zeros((N, 6)), None)
+    with pytest.raises(TypeError) as raised:
+        _extension.haar_features(*arguments[:n])
+    assert str(raised.value) == f"5 arguments expected, {n} given"
+    with pytest.raises(TypeError) as raised:
+        _extension.fingertip_force(*arguments[: n - 1])
+    assert str(raised.value) == f"6 arguments expected, {len(arguments[: n - 1])} given"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"baseline": BASELINE[:4]}, "baseline: axis 0 has the length 4, 5 expected"),
+        ({"baseline": BASELINE[:, :2].copy()}, "baseline: axis 1 has the length 2, 3 expected"),
+        ({"rotations": ROTATIONS[:4]}, "rotations: axis 0 has the length 4, 5 expected"),
+        ({"rotations": ROTATIONS[:, :2].copy()}, "rotations: axis 1 has the length 2, 3 expected"),
+        ({"rotations": ROTATIONS[..., :1].copy()}, "rotations: axis 2 has the length 1, 3"),
+        ({"readings": READINGS[..., :1].copy()}, "readings: axis 2 has the length 1, 3 expected"),
+        ({"readings": READINGS[0]}, "readings: 3 axes expected, 2 given"),
+        ({"out": np.zeros((40, 4))}, "out: axis 1 has the length 4, 3 expected"),
+        ({"out": READINGS.reshape(-1, 3)[:40]}, "readings and out share memory"),
+        ({"out": np.zeros((39, 3))}, "out: axis 0 has the length 39, 40 expected"),
+    ],
+)
+def test_taxels_that_do_not_fit_are_refused(arguments, message):
+    with pytest.raises(ValueError) as raised:
+        forces(**arguments)
+    assert message in str(raised.value)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_force_that_is_not_finite_is_nan(bad):
+    readings = READINGS.copy()
+    readings[3, 2, 1] = bad
+    found = forces(readings)
+    assert np.isnan(found[3]).all()
+    assert np.array_equal(np.delete(found, 3, axis=0), np.delete(forces(), 3, axis=0))
+
+
+def test_a_sensor_without_taxels_has_no_force():
+    empty = forces(np.zeros((4, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+    assert (empty == 0).all()
+
+
+def test_buffers_are_released():
+    force, out = bytearray(FORCE[:20].tobytes()), bytearray(20 * 48)
+    views = memoryview(force).cast("d", (20, 3)), memoryview(out).cast("d", (20, 6))
+    _extension.haar_features(views[0], WINDOW, 0, 20, views[1])
+    with pytest.raises(ValueError):
+        _extension.haar_features(views[0], 3, 0, 20, views[1])
+    for view in views:
+        view.release()
+    force.clear()  # is refused while a buffer is in use
+    out.clear()
