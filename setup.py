@@ -19,7 +19,13 @@ from setuptools.build_meta import *  # noqa: F403 (the hooks of a backend)
 from setuptools.command.build_ext import build_ext
 
 KERNEL = Path("src/holdfast/kernel")  # backends run in the folder of pyproject.toml
-SOURCES = ("module.c", "haar.c", "force.c")
+SOURCES = ("module.c", "haar.c", "force.c", "kernel.c")
+DEFINITIONS = {
+    "Py_LIMITED_API": "0x030B0000",
+    "HOLDFAST_API": "extern",
+    # sums over taxels in the order of the compiled Python, until the live step is in C as well
+    "HF_LANES": "1",
+}
 COMPILER_PACKAGE = "ziglang==0.15.2"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 """The same bits by every compiler: no fused multiply-add, and sums in the order of the source. A
@@ -90,7 +96,7 @@ if __name__ == "__main__":
     kernel = Extension(
         "holdfast.kernel._extension",
         [str(KERNEL / name) for name in SOURCES],
-        define_macros=[("Py_LIMITED_API", "0x030B0000"), ("HOLDFAST_SOURCES", f'"{digest}"')],
+        define_macros=[*DEFINITIONS.items(), ("HOLDFAST_SOURCES", f'"{digest}"')],
         py_limited_api=True,
     )
     # setuptools packs whatever an earlier build left in its folder: each build has its own

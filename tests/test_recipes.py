@@ -58,6 +58,18 @@ class Copy:
         for kernel in self.folder.rglob("*.nb[ic]"):
             kernel.unlink()
 
+    def build(self):
+        """Build the C kernel of the copy, as `uv run` does after a change of it."""
+        root = self.folder / "clone"
+        root.mkdir()
+        for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+            shutil.copy(CONTRIBUTING.with_name(name), root)
+        (root / "src").mkdir()
+        (root / "src" / "holdfast").symlink_to(self.folder / "holdfast")
+        command = (sys.executable, "-c", "import setup; setup.build_editable('.')")
+        ended = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+        assert ended.returncode == 0, ended.stderr
+
     def run(self, *arguments, exit_code=0):
         """Run Python with the copy, and return its output, or its errors if it is to fail."""
         environment = {**os.environ, "PYTHONPATH": str(self.folder)}
@@ -268,6 +280,22 @@ RANGE = """    if kind == OF_RANGE:
         return float(most - least)
 """
 
+C_FEATURES = (
+    "    const hf_real *const newest = hf_history(f, 0);\n",
+    """    if (kind == HOLDFAST_SHEAR) { /* |F_tip - (F_tip . z) z| of the newest sample */
+        return hf_sqrt(newest[1] * newest[1] + newest[2] * newest[2]);
+    }
+    if (kind == HOLDFAST_RANGE) { /* max F_a - min F_a over the window */
+        hf_real least = newest[0], most = newest[0];
+        for (size_t back = 1; back < window; ++back) {
+            least = hf_min(least, hf_history(f, back)[0]);
+            most = hf_max(most, hf_history(f, back)[0]);
+        }
+        return most - least;
+    }
+""",
+)
+
 CHECK_FEATURES = """
 import sys
 import numpy as np
@@ -320,7 +348,19 @@ def test_add_a_feature(copy_of, tmp_path):
         ("    # m or sigma of F_a: equations 1 and 2.\n",
          f"{SHEAR}{RANGE}    # m or sigma of F_a: equations 1 and 2.\n"),
     )  # fmt: skip
+    copy.change(
+        "holdfast/kernel/kernel.h",
+        ("HOLDFAST_FIRST_RELATIVE = 8,",
+         "HOLDFAST_SHEAR = 8, HOLDFAST_RANGE = 9, HOLDFAST_FIRST_RELATIVE = 10,"),
+    )  # fmt: skip
+    copy.change("holdfast/kernel/stream.c", (C_FEATURES[0], "".join(C_FEATURES)))
+    copy.change(
+        "holdfast/kernel/tables.c",
+        ("feature->kind >= HOLDFAST_M && !has_lag;",
+         "feature->kind >= HOLDFAST_M && feature->kind != HOLDFAST_SHEAR && !has_lag;"),
+    )  # fmt: skip
     copy.delete_kernels()
+    copy.build()
     data, model = labelled_recordings(tmp_path / "data"), tmp_path / "model.json"
     copy.run(
         *VERB, "train", data, "-o", model, "--features", "F_a,shear,range", "--trials", "0",

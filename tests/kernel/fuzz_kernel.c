@@ -47,12 +47,17 @@ static double take_number(input *in)
     return (double)take(in, 2) - 100.0 * kind;
 }
 
-/* Change some bytes of a value, as the input says. */
-static void spoil(input *in, void *value, size_t size)
+/* Change one of some sizes, by a little or to anything. */
+static void spoil(input *in, size_t *const *sizes, size_t n)
 {
-    const size_t start = (size_t)take(in, 1) % size, n_bytes = 1 + (size_t)take(in, 1) % 8;
-    for (size_t i = start; i < size && i < start + n_bytes; ++i) {
-        ((unsigned char *)value)[i] = (unsigned char)take(in, 1);
+    size_t *const size = sizes[(size_t)take(in, 1) % n];
+    const size_t how = (size_t)take(in, 1) % 4;
+    if (how == 0) {
+        *size = (size_t)take(in, 8);
+    } else if (how == 1) {
+        *size = (size_t)take(in, 1);
+    } else {
+        *size += how == 2 ? 1 + (size_t)take(in, 1) % 8 : (size_t)-1;
     }
 }
 
@@ -177,7 +182,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     const size_t n_made = hand.n_fingers, n_spoilt = (size_t)take(&in, 1) % 6;
     if (n_spoilt == 1) {
-        spoil(&in, &hand, offsetof(holdfast_hand, alike)); /* not its bools: 2 is none */
+        size_t *const sizes[] = {
+            &hand.n_fingers, &hand.n_lanes, &hand.n_features, &hand.n_lags,
+            &hand.n_history, &hand.n_channels, &hand.n_levels, &hand.n_track};
+        spoil(&in, sizes, sizeof sizes / sizeof *sizes);
     }
     const bool is_small = hand.n_fingers <= MAX_LENGTH && hand.n_lanes <= MAX_LENGTH &&
                           hand.n_features <= MAX_LENGTH && hand.n_lags <= MAX_LENGTH &&
@@ -217,16 +225,26 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         make_feature(&in, &features[i], i % hand.n_features, &hand);
     }
     if (n_spoilt == 2 && hand.n_fingers > 0) {
-        spoil(&in, f, hand.n_fingers * sizeof *f - 8); /* the last bytes hold a bool */
-        for (size_t i = 0; i < hand.n_fingers; ++i) {
-            memset(&f[i].bridges, hand.n_lags > 0, 1); /* another value than 0 or 1 is no bool */
-        }
+        holdfast_finger *const finger = &f[(size_t)take(&in, 1) % hand.n_fingers];
+        size_t *const sizes[] = {
+            &finger->first_taxel, &finger->n_taxels, &finger->first, &finger->sigma_window,
+            &finger->ready_window};
+        spoil(&in, sizes, sizeof sizes / sizeof *sizes);
     } else if (n_spoilt == 3 && n_features > 0) {
         holdfast_feature *const feature = &features[(size_t)take(&in, 1) % n_features];
-        spoil(&in, &feature->window, sizeof *feature - offsetof(holdfast_feature, window));
-        spoil(&in, &feature->kind, sizeof feature->kind);
-    } else if (n_spoilt == 4 && hand.n_lags > 0) {
-        spoil(&in, &lags[0].samples, sizeof lags[0].samples + sizeof lags[0].seconds);
+        size_t *const sizes[] = {&feature->window, &feature->lag, &feature->same_as};
+        spoil(&in, sizes, sizeof sizes / sizeof *sizes);
+    } else if (n_spoilt == 4) {
+        hand.period = (hf_real)take_number(&in);
+        hand.tare_kind = (int32_t)take(&in, 4);
+        for (size_t i = 0; i < n_features; ++i) {
+            features[i].kind += (int32_t)take(&in, 1) % 16;
+            features[i].transform += (int32_t)take(&in, 1) % 2;
+        }
+        for (size_t i = 0; i < hand.n_lags; ++i) {
+            lags[i].samples = (size_t)take(&in, 8);
+            lags[i].seconds = take_number(&in);
+        }
     } else if (n_spoilt == 5 && hand.n_lanes > 0) {
         used[(size_t)take(&in, 1) % hand.n_lanes] = (hf_real)take_number(&in);
         rotations[(size_t)take(&in, 1) % (9 * hand.n_lanes)] = (hf_real)take_number(&in);

@@ -10,14 +10,15 @@ import pytest
 KERNEL = Path(__file__).parents[2] / "src" / "holdfast" / "kernel"
 FLAGS = (
     *("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"),
-    *("-ffp-contract=off", "-DPy_LIMITED_API=0x030B0000", '-DHOLDFAST_SOURCES=""'),
+    *("-ffp-contract=off", "-DPy_LIMITED_API=0x030B0000", "-DHOLDFAST_API=extern"),
+    '-DHOLDFAST_SOURCES=""',
     *("-isystem", sysconfig.get_path("include")),
 )
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
-@pytest.mark.parametrize("name", ["module.c", "haar.c", "force.c"])
+@pytest.mark.parametrize("name", ["module.c", "haar.c", "force.c", "kernel.c"])
 def test_no_warning(compiler, level, name, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} here")

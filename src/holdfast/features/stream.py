@@ -8,9 +8,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.compiled import compiled_step
 from holdfast.features import arrays as at
-from holdfast.features import kernel, untrue
+from holdfast.features import untrue
 from holdfast.features.arrays import Layout, Memory, Output
 from holdfast.features.faults import WEIGHT_Y, WEIGHT_Z
 from holdfast.features.haar import N_SUMS, n_levels
@@ -31,6 +30,7 @@ from holdfast.features.specs import (
     FeatureSpec,
     spec_codes,
 )
+from holdfast.features.tables import c_stream
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.features.untrue import END_SHARE, OFFSET_SHARE
 from holdfast.recordings import Recording
@@ -122,7 +122,7 @@ class HandSamples(NamedTuple):
 
 
 class FeatureStream:
-    """Feature stream of a hand: from samples to features, by `kernel.advance`.
+    """Feature stream of a hand: its plan as arrays, for `kernel.advance` and for the C kernel.
 
     Args:
         plan: fingers, features, tare and rate.
@@ -237,15 +237,13 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
         ValueError: a tare by interval finds no samples.
     """
     stream = FeatureStream.for_recording(plan, recording)
+    kernel = c_stream(stream.layout, stream.memory)
     width = stream.layout.specs.shape[1]
     chunks: dict[str, list[FingerFeatures]] = {finger: [] for finger in plan.fingers}
     for times, present, readings in stream.samples_of(recording):
         features = np.full((*present.shape, width), np.nan)
         amplitude = np.full(present.shape, np.nan)
-        _extract(
-            stream.layout, stream.memory, stream.output,
-            readings, present, times, features, amplitude,
-        )  # fmt: skip
+        kernel.advance(readings, present, times, features, amplitude)
         for place, finger in enumerate(plan.fingers):
             rows, n_features = present[:, place], len(plan.features[finger])
             own = FingerFeatures(features[rows, place, :n_features], amplitude[rows, place])
@@ -254,25 +252,6 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
         finger: FingerFeatures(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
         for finger, found in chunks.items()
     }
-
-
-@compiled_step
-def _extract(
-    layout: Layout,
-    memory: Memory,
-    output: Output,
-    readings: Array,
-    present: Flags,
-    times: Array,
-    features: Array,
-    amplitude: Array,
-) -> None:
-    for k in range(len(times)):
-        kernel.advance(layout, memory, output, readings[k], present[k], times[k])
-        for f in range(features.shape[1]):
-            amplitude[k, f] = output.values[f, at.AMPLITUDE]
-            for place in range(features.shape[2]):
-                features[k, f, place] = output.features[f, place]
 
 
 def _layout(plan: StreamPlan) -> Layout:

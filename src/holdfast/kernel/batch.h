@@ -8,7 +8,7 @@
 
 #include <stddef.h>
 
-enum { HOLDFAST_N_FEATURES = 6 }; /* F_a, F_x, F_y, F_z, m, sigma */
+enum { HOLDFAST_N_HAAR = 6 }; /* F_a, F_x, F_y, F_z, m, sigma */
 
 /* The number of doubles that `holdfast_haar_features` needs as scratch memory. */
 size_t holdfast_haar_scratch(size_t window);

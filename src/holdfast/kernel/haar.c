@@ -79,7 +79,7 @@ static void amplitudes(const double *restrict force, double *restrict amplitude,
 static void write_forces(const double *restrict force, double *restrict amplitude,
                          double *restrict rows, size_t n)
 {
-    for (size_t k = 0; k < n; ++k, force += 3, rows += HOLDFAST_N_FEATURES) {
+    for (size_t k = 0; k < n; ++k, force += 3, rows += HOLDFAST_N_HAAR) {
         const double x = force[0], y = force[1], z = force[2];
         amplitude[k] = sqrt(x * x + y * y + z * z);
         rows[0] = amplitude[k];
@@ -167,11 +167,11 @@ static void moments(const sums *older, size_t n_older, const sums *newer, size_t
 static void write_moments(const double *restrict m, const double *restrict sigma,
                           double *restrict rows, size_t n)
 {
-    for (size_t k = 0; k < n; ++k, rows += HOLDFAST_N_FEATURES) {
+    for (size_t k = 0; k < n; ++k, rows += HOLDFAST_N_HAAR) {
         rows[4] = m[k];
         rows[5] = sigma[k];
         if (!isfinite(m[k] + sigma[k])) {
-            fill(rows, (double)NAN, HOLDFAST_N_FEATURES);
+            fill(rows, (double)NAN, HOLDFAST_N_HAAR);
         }
     }
 }
@@ -225,12 +225,12 @@ void holdfast_haar_features(const double *force, size_t window, size_t first, si
                             double *out, double *scratch)
 {
     for (; first < stop && first < window - 1; ++first) {
-        fill(out + HOLDFAST_N_FEATURES * first, (double)NAN, HOLDFAST_N_FEATURES);
+        fill(out + HOLDFAST_N_HAAR * first, (double)NAN, HOLDFAST_N_HAAR);
     }
     while (first < stop) {
         const size_t n = stop - first < BLOCK_SAMPLES ? stop - first : BLOCK_SAMPLES;
         features_of_block(force + 3 * (first - (window - 1)), window, n,
-                          out + HOLDFAST_N_FEATURES * first, scratch);
+                          out + HOLDFAST_N_HAAR * first, scratch);
         first += n;
     }
 }

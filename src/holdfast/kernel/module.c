@@ -2,20 +2,25 @@
  *
  * Only the limited API of Python 3.11 is used, so that one build serves all later versions.
  * Arrays come in by the buffer protocol and are checked here: type, shape, order in memory. The
- * C functions trust their arguments. While they run, the GIL is released: the buffers cannot go
- * away, but a caller who changes the numbers in another thread gets either of them.
+ * C functions trust their arguments. While they run on many samples, the GIL is released: the
+ * buffers cannot go away, but a caller who changes the numbers in another thread gets either of
+ * them. A stream that another thread is using raises an error.
  */
 #include <Python.h>
 
+#include <float.h>
+#include <string.h>
+
 #include "batch.h"
+#include "kernel.h"
 
 /* The size of the scratch memory of a longer window could overflow. */
 #define MAX_WINDOW (PY_SSIZE_T_MAX / 1024)
 
-/* An array of float64 in C order, and its buffer. */
+/* An array in C order, and its buffer. */
 typedef struct {
     Py_buffer view;
-    double *data;
+    double *data;     /* the same as view.buf */
     const char *name; /* in messages */
 } array;
 
@@ -29,7 +34,7 @@ static void release(array *arrays, size_t n)
 /* Return 0 if the buffer of an array has exactly the bytes that its shape says. */
 static int check_size(const array *a)
 {
-    Py_ssize_t n_bytes = (Py_ssize_t)sizeof(double);
+    Py_ssize_t n_bytes = a->view.itemsize;
     int empty = 0;
     for (int axis = 0; axis < a->view.ndim; ++axis) {
         empty |= a->view.shape[axis] == 0;
@@ -45,10 +50,13 @@ static int check_size(const array *a)
 
 /* Fill `a` with the buffer of an object, or set an exception and return -1.
  *
- * The buffer must be float64 of this machine's byte order, contiguous, with `n_axes` axes.
+ * The buffer must be contiguous, with `n_axes` axes, of the type 'd' (float64 of this machine's byte
+ * order) or '?' (bool).
  */
-static int get_array(PyObject *object, const char *name, int n_axes, int flags, array *a)
+static int get_array_of(char type, PyObject *object, const char *name, int n_axes, int flags,
+                        array *a)
 {
+    const size_t size = type == 'd' ? sizeof(double) : 1;
     a->name = name;
     if (PyObject_GetBuffer(object, &a->view, flags | PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0) {
         return -1;
@@ -57,8 +65,9 @@ static int get_array(PyObject *object, const char *name, int n_axes, int flags, 
     if (format[0] == '@' || format[0] == '=' || format[0] == (PY_LITTLE_ENDIAN ? '<' : '>')) {
         ++format;
     }
-    if (format[0] != 'd' || format[1] != '\0' || a->view.itemsize != (Py_ssize_t)sizeof(double)) {
-        PyErr_Format(PyExc_TypeError, "%s: float64 expected, the format %s given", name, format);
+    if (format[0] != type || format[1] != '\0' || a->view.itemsize != (Py_ssize_t)size) {
+        PyErr_Format(PyExc_TypeError, "%s: %s expected, the format %s given", name,
+                     type == 'd' ? "float64" : "bool", format);
         return -1;
     }
     if (a->view.ndim != n_axes || a->view.shape == NULL) {
@@ -66,12 +75,21 @@ static int get_array(PyObject *object, const char *name, int n_axes, int flags, 
                      a->view.ndim);
         return -1;
     }
-    if (check_size(a) < 0 || (uintptr_t)a->view.buf % sizeof(double) != 0) {
+    if (check_size(a) < 0) {
+        PyErr_Format(PyExc_ValueError, "%s: a buffer of another size than its shape", name);
+        return -1;
+    }
+    if ((uintptr_t)a->view.buf % size != 0) {
         PyErr_Format(PyExc_ValueError, "%s: its numbers are not aligned in memory", name);
         return -1;
     }
     a->data = a->view.buf;
     return 0;
+}
+
+static int get_array(PyObject *object, const char *name, int n_axes, int flags, array *a)
+{
+    return get_array_of('d', object, name, n_axes, flags, a);
 }
 
 /* Return 0 if an axis has this length, else set an exception and return -1. */
@@ -123,7 +141,7 @@ static PyObject *haar_features(PyObject *module, PyObject *const *args, Py_ssize
     if (get_array(args[0], "force", 2, PyBUF_SIMPLE, force) < 0 ||
         get_array(args[4], "out", 2, PyBUF_WRITABLE, out) < 0 || check_axis(force, 1, 3) < 0 ||
         check_axis(out, 0, force->view.shape[0]) < 0 ||
-        check_axis(out, 1, HOLDFAST_N_FEATURES) < 0 || check_apart(force, out) < 0) {
+        check_axis(out, 1, HOLDFAST_N_HAAR) < 0 || check_apart(force, out) < 0) {
         goto done;
     }
     const Py_ssize_t n = force->view.shape[0];
@@ -195,6 +213,325 @@ done:
     return result;
 }
 
+/* A feature stream of a hand: its tables, its memory, and who uses it. */
+typedef struct {
+    PyObject_HEAD
+    holdfast_hand hand;
+    holdfast_memory memory;
+    void *blocks[8]; /* all that was allocated for this stream */
+    size_t n_blocks;
+    bool *present;    /* (n_fingers) of one sample */
+    size_t n_taxels;  /* of all fingers */
+    double last_time; /* of the newest sample [s] */
+    bool is_in_use;   /* a call without the GIL is running */
+} stream;
+
+/* The fields of the tables, which Python gives by name in dictionaries. */
+typedef enum { SIZE, CODE, FLAG, REAL, REALS_3 } field_type;
+
+typedef struct {
+    const char *name;
+    field_type type;
+    size_t offset;
+} field;
+
+#define OF_HAND(type, name) {#name, type, offsetof(holdfast_hand, name)}
+#define OF_FINGER(type, name) {#name, type, offsetof(holdfast_finger, name)}
+#define OF_FEATURE(type, name) {#name, type, offsetof(holdfast_feature, name)}
+#define OF_LAG(type, name) {#name, type, offsetof(holdfast_lag, name)}
+
+static const field hand_fields[] = {
+    OF_HAND(SIZE, n_fingers),      OF_HAND(SIZE, n_lanes),       OF_HAND(SIZE, n_features),
+    OF_HAND(SIZE, n_lags),         OF_HAND(SIZE, n_history),     OF_HAND(SIZE, n_channels),
+    OF_HAND(SIZE, n_levels),       OF_HAND(SIZE, n_track),       OF_HAND(REAL, period),
+    OF_HAND(CODE, tare_kind),      OF_HAND(REAL, tare_seconds),  OF_HAND(REAL, noise_seconds),
+    OF_HAND(REAL, average_gain),   OF_HAND(FLAG, alike),         OF_HAND(FLAG, has_centres),
+    OF_HAND(FLAG, has_ratios),     {NULL, SIZE, 0},
+};
+
+static const field finger_fields[] = {
+    OF_FINGER(SIZE, first_taxel),  OF_FINGER(SIZE, n_taxels),    OF_FINGER(SIZE, first),
+    OF_FINGER(REAL, n_used),       OF_FINGER(REAL, low),         OF_FINGER(REAL, high),
+    OF_FINGER(REAL, low_end),      OF_FINGER(REAL, high_end),    OF_FINGER(REAL, max_offset),
+    OF_FINGER(REAL, min_noise),    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step),
+    OF_FINGER(REALS_3, normal),    OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window),
+    OF_FINGER(FLAG, bridges),      {NULL, SIZE, 0},
+};
+
+static const field feature_fields[] = {
+    OF_FEATURE(CODE, kind), OF_FEATURE(CODE, transform), OF_FEATURE(FLAG, of_hand),
+    OF_FEATURE(SIZE, window), OF_FEATURE(SIZE, lag), OF_FEATURE(SIZE, same_as),
+    OF_FEATURE(REAL, floor), {NULL, SIZE, 0},
+};
+
+static const field lag_fields[] = {
+    OF_LAG(SIZE, samples), OF_LAG(REAL, seconds), OF_LAG(FLAG, has_changes),
+    OF_LAG(FLAG, has_seconds), OF_LAG(FLAG, has_means), OF_LAG(FLAG, has_ratios),
+    {NULL, SIZE, 0},
+};
+
+/* Store the value of a field, or set an exception. */
+static void store(PyObject *value, field_type type, void *target)
+{
+    if (type == SIZE) {
+        *(size_t *)target = PyLong_AsSize_t(value);
+    } else if (type == REAL) {
+        *(double *)target = PyFloat_AsDouble(value);
+    } else if (type == FLAG) {
+        *(bool *)target = PyObject_IsTrue(value) == 1;
+    } else if (type == CODE) {
+        const long code = PyLong_AsLong(value);
+        if (code < INT32_MIN || code > INT32_MAX) {
+            PyErr_Format(PyExc_OverflowError, "%ld has more than 32 bits", code);
+        }
+        *(int32_t *)target = (int32_t)code;
+    } else {
+        for (Py_ssize_t i = 0; i < 3 && !PyErr_Occurred(); ++i) {
+            PyObject *const item = PySequence_GetItem(value, i);
+            if (item != NULL) {
+                store(item, REAL, (double *)target + i);
+                Py_DECREF(item);
+            }
+        }
+    }
+}
+
+/* Fill a struct from a dictionary with exactly its fields, or set an exception and return -1. */
+static int read_struct(PyObject *dictionary, const field *fields, void *target)
+{
+    Py_ssize_t n = 0;
+    if (!PyDict_Check(dictionary)) {
+        PyErr_Format(PyExc_TypeError, "a dictionary expected, %R given", dictionary);
+        return -1;
+    }
+    for (; fields[n].name != NULL; ++n) {
+        PyObject *const value = PyMapping_GetItemString(dictionary, fields[n].name);
+        if (value == NULL) {
+            return -1;
+        }
+        store(value, fields[n].type, (char *)target + fields[n].offset);
+        Py_DECREF(value);
+        if (PyErr_Occurred()) {
+            return -1;
+        }
+    }
+    if (PyDict_Size(dictionary) != n) {
+        PyErr_Format(PyExc_ValueError, "%zd fields expected, %zd given", n,
+                     PyDict_Size(dictionary));
+        return -1;
+    }
+    return 0;
+}
+
+/* Allocate zeros that live as long as the stream; NULL with an exception. */
+static void *allocate(stream *s, size_t n, size_t size)
+{
+    void *const block = PyMem_Calloc(n ? n : 1, size);
+    if (block == NULL) {
+        PyErr_NoMemory();
+    } else {
+        s->blocks[s->n_blocks++] = block;
+    }
+    return block;
+}
+
+/* Return n structs of a list of dictionaries; NULL with an exception. */
+static void *read_structs(stream *s, PyObject *list, size_t n, const field *fields, size_t size)
+{
+    if ((size_t)PyList_Size(list) != n) {
+        PyErr_Format(PyExc_ValueError, "%zu dictionaries with the field %s expected, %zd given", n,
+                     fields[0].name, PyList_Size(list));
+        return NULL;
+    }
+    char *const block = allocate(s, n, size);
+    for (size_t i = 0; i < n && block != NULL; ++i) {
+        if (read_struct(PyList_GetItem(list, (Py_ssize_t)i), fields, block + i * size) < 0) {
+            return NULL;
+        }
+    }
+    return block;
+}
+
+/* Return a copy of n numbers of an array; NULL with an exception. */
+static double *read_numbers(stream *s, PyObject *object, const char *name, size_t n)
+{
+    array a = {0};
+    double *copy = NULL;
+    if (get_array(object, name, 1, PyBUF_SIMPLE, &a) == 0 &&
+        check_axis(&a, 0, (Py_ssize_t)n) == 0) {
+        copy = allocate(s, n, sizeof(double));
+        if (copy != NULL) {
+            memcpy(copy, a.data, n * sizeof(double));
+        }
+    }
+    PyBuffer_Release(&a.view);
+    return copy;
+}
+
+/* Fill the tables of a stream, or set an exception and return -1. */
+static int read_tables(stream *s, PyObject *args)
+{
+    PyObject *hand, *fingers, *features, *lags, *used, *rotations, *places, *baseline;
+    holdfast_hand *const h = &s->hand;
+    if (!PyArg_ParseTuple(args, "O!O!O!O!OOOO:Stream", &PyDict_Type, &hand, &PyList_Type, &fingers,
+                          &PyList_Type, &features, &PyList_Type, &lags, &used, &rotations, &places,
+                          &baseline) ||
+        read_struct(hand, hand_fields, h) < 0) {
+        return -1;
+    }
+    /* `holdfast_check` has the same limits, but reads the tables; here no product overflows. */
+    if (h->n_fingers > HF_MAX_TAXELS || h->n_lanes > HF_MAX_TAXELS ||
+        h->n_features > HF_MAX_FEATURES || h->n_lags > HF_MAX_FEATURES) {
+        PyErr_SetString(PyExc_ValueError, "n_fingers, n_lanes, n_features or n_lags is too large");
+        return -1;
+    }
+    const size_t n = h->n_fingers;
+    if (!(h->fingers = read_structs(s, fingers, n, finger_fields, sizeof *h->fingers)) ||
+        !(h->features = read_structs(s, features, n * h->n_features, feature_fields,
+                                     sizeof *h->features)) ||
+        !(h->lags = read_structs(s, lags, h->n_lags, lag_fields, sizeof *h->lags)) ||
+        !(h->used = read_numbers(s, used, "used", h->n_lanes)) ||
+        !(h->rotations = read_numbers(s, rotations, "rotations", 9 * h->n_lanes)) ||
+        !(h->places = read_numbers(s, places, "places", 3 * h->n_lanes))) {
+        return -1;
+    }
+    const char *const wrong = holdfast_check(h);
+    if (wrong != NULL) {
+        PyErr_Format(PyExc_ValueError, "tables that do not fit: %s", wrong);
+        return -1;
+    }
+    for (size_t i = 0; i < n; ++i) {
+        s->n_taxels += h->fingers[i].n_taxels;
+    }
+    void *const block = allocate(s, holdfast_memory_size(h), 1);
+    s->present = allocate(s, n, sizeof(bool));
+    if (block == NULL || s->present == NULL) {
+        return -1;
+    }
+    holdfast_place(h, &s->memory, block);
+    array a = {0};
+    const int result = get_array(baseline, "baseline", 2, PyBUF_SIMPLE, &a) < 0 ||
+                               check_axis(&a, 0, (Py_ssize_t)s->n_taxels) < 0 ||
+                               check_axis(&a, 1, 3) < 0
+                           ? -1
+                           : 0;
+    if (result == 0) {
+        holdfast_begin(h, &s->memory, a.data);
+    }
+    PyBuffer_Release(&a.view);
+    return result;
+}
+
+static PyObject *stream_new(PyTypeObject *type, PyObject *args, PyObject *names)
+{
+    if (names != NULL && PyDict_Size(names) > 0) {
+        PyErr_SetString(PyExc_TypeError, "Stream takes no arguments by name");
+        return NULL;
+    }
+    stream *const s = (stream *)PyType_GenericAlloc(type, 0); /* all bytes are 0 */
+    if (s != NULL) {
+        s->last_time = -DBL_MAX;
+        if (read_tables(s, args) < 0) {
+            Py_DECREF(s);
+            return NULL;
+        }
+    }
+    return (PyObject *)s;
+}
+
+static void stream_dealloc(PyObject *self)
+{
+    stream *const s = (stream *)self;
+    PyTypeObject *const type = Py_TYPE(self);
+    while (s->n_blocks > 0) {
+        PyMem_Free(s->blocks[--s->n_blocks]);
+    }
+    PyObject_Free(self);
+    Py_DECREF(type); /* an object of a heap type owns its type */
+}
+
+/* Process n samples, and copy their features and amplitudes. */
+static void advance_all(stream *s, const array *readings, const array *present, const array *times,
+                        const array *features, const array *amplitude)
+{
+    const size_t n = (size_t)times->view.shape[0], n_fingers = s->hand.n_fingers;
+    const size_t width = n_fingers * s->hand.n_features;
+    const unsigned char *is_present = present->view.buf; /* bytes: any but 0 is true */
+    for (size_t k = 0; k < n; ++k) {
+        for (size_t f = 0; f < n_fingers; ++f) {
+            s->present[f] = *is_present++ != 0;
+        }
+        holdfast_advance(&s->hand, &s->memory, readings->data + 3 * s->n_taxels * k, s->present,
+                         times->data[k]);
+        memcpy(features->data + width * k, s->memory.features, width * sizeof(double));
+        for (size_t f = 0; f < n_fingers; ++f) {
+            amplitude->data[n_fingers * k + f] = s->memory.values[f].amplitude;
+        }
+    }
+}
+
+/* Return 0 if each time is finite and later than the one before, else set an exception. */
+static int check_times(const array *times, double last)
+{
+    for (Py_ssize_t k = 0; k < times->view.shape[0]; last = times->data[k++]) {
+        if (!(times->data[k] > last && times->data[k] <= DBL_MAX)) {
+            PyErr_Format(PyExc_ValueError, "times: number %zd is not finite, or not later than "
+                         "the one before", k);
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+{
+    stream *const s = (stream *)self;
+    if (check_count(n_args, 5) < 0) {
+        return NULL;
+    }
+    if (s->is_in_use) {
+        PyErr_SetString(PyExc_RuntimeError, "another thread is using this stream");
+        return NULL;
+    }
+    array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
+    array *const times = &arrays[2], *const features = &arrays[3], *const amplitude = &arrays[4];
+    PyObject *result = NULL;
+    if (get_array(args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
+        get_array_of('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
+        get_array(args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
+        get_array(args[3], "features", 3, PyBUF_WRITABLE, features) < 0 ||
+        get_array(args[4], "amplitude", 2, PyBUF_WRITABLE, amplitude) < 0) {
+        goto done;
+    }
+    const Py_ssize_t n = times->view.shape[0], n_fingers = (Py_ssize_t)s->hand.n_fingers;
+    if (check_axis(readings, 0, n) < 0 || check_axis(readings, 1, (Py_ssize_t)s->n_taxels) < 0 ||
+        check_axis(readings, 2, 3) < 0 || check_axis(present, 0, n) < 0 ||
+        check_axis(present, 1, n_fingers) < 0 || check_axis(features, 0, n) < 0 ||
+        check_axis(features, 1, n_fingers) < 0 ||
+        check_axis(features, 2, (Py_ssize_t)s->hand.n_features) < 0 ||
+        check_axis(amplitude, 0, n) < 0 || check_axis(amplitude, 1, n_fingers) < 0 ||
+        check_apart(readings, features) < 0 || check_apart(readings, amplitude) < 0 ||
+        check_apart(features, amplitude) < 0 || check_times(times, s->last_time) < 0) {
+        goto done;
+    }
+    if (n > 0) {
+        s->last_time = times->data[n - 1];
+    }
+    if (n <= 1) { /* to release the GIL takes longer than some samples */
+        advance_all(s, readings, present, times, features, amplitude);
+    } else {
+        s->is_in_use = true;
+        Py_BEGIN_ALLOW_THREADS
+        advance_all(s, readings, present, times, features, amplitude);
+        Py_END_ALLOW_THREADS
+        s->is_in_use = false;
+    }
+    result = Py_NewRef(Py_None);
+done:
+    release(arrays, 5);
+    return result;
+}
+
 /* Pointers to functions of other types go through `void (*)(void)`, as Python's own modules do. */
 #define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
 
@@ -204,11 +541,6 @@ static PyMethodDef functions[] = {
     {NULL, NULL, 0, NULL},
 };
 
-static int add_constants(PyObject *module)
-{
-    return PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
-}
-
 /* ISO C has no cast from a function to an object pointer; every compiler of Python has one. */
 #if defined(__GNUC__)
 #define SLOT(function) (__extension__(void *)(function))
@@ -216,8 +548,34 @@ static int add_constants(PyObject *module)
 #define SLOT(function) ((void *)(function))
 #endif
 
+static PyMethodDef stream_methods[] = {
+    {"advance", (PyCFunction)(void (*)(void))stream_advance, METH_FASTCALL, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+static PyType_Slot stream_slots[] = {
+    {Py_tp_new, SLOT(stream_new)},
+    {Py_tp_dealloc, SLOT(stream_dealloc)},
+    {Py_tp_methods, stream_methods},
+    {0, NULL},
+};
+
+static PyType_Spec stream_spec = {
+    "holdfast.kernel._extension.Stream", sizeof(stream), 0, Py_TPFLAGS_DEFAULT, stream_slots,
+};
+
+static int add_contents(PyObject *module)
+{
+    PyObject *const type = PyType_FromModuleAndSpec(module, &stream_spec, NULL);
+    const int result = type == NULL ? -1 : PyModule_AddObjectRef(module, "Stream", type);
+    Py_XDECREF(type);
+    return result < 0 || PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
+               ? -1
+               : PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
+}
+
 static PyModuleDef_Slot module_slots[] = {
-    {Py_mod_exec, SLOT(add_constants)},
+    {Py_mod_exec, SLOT(add_contents)},
     {0, NULL},
 };
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Check the C kernel without Python: recorded vectors by every compiler, sanitizers, a fuzzer.
 #
-#     benchmarks/kernel_check [SECONDS]      fuzz for an hour by default; CI takes 20 s
+#     benchmarks/kernel_check/kernel.sh [SECONDS]      fuzz for an hour by default; CI takes 20 s
 #
 # Compilers that are not installed are left out, and named. All that compute in double precision
 # with one libm must get the same bits: the digest of check_vectors is compared.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 seconds=${1:-3600}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -2,9 +2,9 @@
 # Runs the tests of the binding with an extension that has gcc's sanitizers of addresses and of
 # undefined behaviour. Works in a copy: the extension of the clone stays as it is.
 #
-#     benchmarks/sanitized_binding.sh [more tests of pytest]
+#     benchmarks/kernel_check/sanitized_binding.sh [more tests of pytest]
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 python=$PWD/.venv/bin/python
 copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
