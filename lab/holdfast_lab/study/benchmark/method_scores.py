@@ -73,7 +73,7 @@ class BothTargets(NamedTuple):
             ValueError: a finger has no estimate at all: the method does not fit the sensor.
         """
         stable = self._for(self.stable, recording).scores(recording).fingers
-        slips = score_slips(recording, self._for(self.slip, recording).scores(recording))
+        slips = score_slips(self._for(self.slip, recording).scores(recording))
         scored = {}
         for finger in recording.slips:
             own = stable[finger]

@@ -20,9 +20,9 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     HOLD_TIME,
     EvaluationEffort,
     EvaluationJob,
-    ScoredRecording,
     score_splits,
 )
+from holdfast_lab.study.evaluation.fitted_method import ScoredRecording
 from holdfast_lab.study.evaluation.recording_features import label_hand
 from holdfast_lab.study.methods import HAND
 from holdfast_lab.study.plan import Corpus
@@ -150,7 +150,7 @@ def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEsti
 
 def _estimates(scored: ScoredRecording) -> RecordingEstimates:
     recording = scored.recording
-    decided, hand = scored.decide(recording.labels), scored.scores.hand
+    decided, hand = scored.decide(recording.labels), scored.hand
     return RecordingEstimates(
         recording.name,
         {

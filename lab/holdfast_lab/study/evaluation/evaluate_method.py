@@ -6,10 +6,10 @@ chosen on the training recordings, each scored by a fit without it.
 """
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, NamedTuple, Self
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -18,7 +18,6 @@ from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.contact import UNKNOWN
 from holdfast.features import Tare
 from holdfast.metrics import Decisions, Metrics, calibration_sums, summarise
-from holdfast.metrics.decisions import Codes
 from holdfast.metrics.samples import score_samples
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -38,7 +37,7 @@ from holdfast_lab.study.evaluation.error_breakdown import (
     break_down_errors,
     count_glitches,
 )
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, RecordingScores, Training
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, ScoredRecording, Training
 from holdfast_lab.study.evaluation.recording_features import (
     RecordingFeatures,
     Variation,
@@ -70,8 +69,6 @@ COMPARED = f"for {COMPARED_RATE:g}/min"
 """Name of the threshold at which methods are compared."""
 
 GroupSplit = Literal["recording", "object"]
-Shifts = Mapping[str, Mapping[str, float]]
-"""Shift of each threshold of `BY_RATE`, for each of `READINGS`."""
 
 
 def find_method(name: str) -> Method:
@@ -200,33 +197,6 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         return self.readings[EVENT]
 
 
-class ScoredRecording(NamedTuple):
-    """A recording that did not train its scores.
-
-    Attributes:
-        recording: without its features, to save memory.
-        scores: by a fit to other recordings.
-        shifts: of the threshold, chosen on the same recordings.
-        fold: number of the fold that leaves it out.
-    """
-
-    recording: RecordingFeatures
-    scores: RecordingScores
-    shifts: Shifts
-    fold: int
-
-    @classmethod
-    def of(
-        cls, recording: RecordingFeatures, fitted: FittedMethod, shifts: Shifts, fold: int = 0
-    ) -> Self:
-        """Score a recording by a fit to others."""
-        return cls(replace(recording, features={}), fitted.scores(recording), shifts, fold)
-
-    def decide(self, labels: Mapping[str, Codes]) -> Decisions:
-        """Return the decisions at the own threshold, with labels of the fingers."""
-        return self.scores.decide(self.recording.name, labels)
-
-
 def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
     """Return the results of a method on each split and on each other corpus.
 
@@ -250,16 +220,15 @@ def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording
         scored: dict[int, ScoredRecording] = {}
         folds = held_out_folds(training.objects, split, job.effort.folds, job.seed)
         for number, left_out in enumerate(folds):
-            fold = _fit_fold(job, training, everything - left_out)
-            for index in left_out:
-                scored[index] = ScoredRecording.of(training.recordings[index], *fold, number)
+            fitted = _fit_fold(job, training, everything - left_out, number)
+            scored |= {index: fitted.scores(training.recordings[index]) for index in left_out}
         yield split, [scored[index] for index in sorted(scored)]
         if job.slips and scored:
             break
     if job.tests:
-        fold = _fit_fold(job, training, everything)
+        fitted = _fit_fold(job, training, everything)
         for corpus in job.tests:
-            yield corpus.name, [ScoredRecording.of(r, *fold) for r in job.features(corpus)]
+            yield corpus.name, list(map(fitted.scores, job.features(corpus)))
 
 
 def held_out_folds(
@@ -290,8 +259,8 @@ def held_out_folds(
 
 
 def _fit_fold(
-    job: EvaluationJob, training: Training, indices: Collection[int]
-) -> tuple[FittedMethod, Shifts]:
+    job: EvaluationJob, training: Training, indices: Collection[int], number: int = 0
+) -> FittedMethod:
     """Fit the method to some recordings, and choose its thresholds on them."""
     chosen = sorted(indices)
     n_inner = 0 if job.slips else min(job.effort.inner, len(chosen))
@@ -310,7 +279,7 @@ def _fit_fold(
         }
         for reading, of_recordings in ranges.items()
     }
-    return training.fit(chosen), shifts
+    return replace(training.fit(chosen), shifts=shifts, fold=number)
 
 
 def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
@@ -318,10 +287,9 @@ def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     truths = [recording.truth for recording, *_ in scored]
     decided = [case.decide(case.recording.scored_labels) for case in scored]
     every = [case.decide(case.recording.labels) for case in scored]
-    whole_hand = scored[0].scores.whole_hand
     alarms = [_alarms(case) for case in scored]
     return MethodEvaluation(
-        fingers=None if whole_hand else summarise(decided),
+        fingers=None if scored[0].whole_hand else summarise(decided),
         hand=summarise(map(_as_hand, decided)),
         without_estimate=[_n_without_estimate(decisions) for decisions in every],
         hand_without_estimate=[_n_without_estimate(_as_hand(decisions)) for decisions in every],
@@ -351,10 +319,9 @@ def _n_without_estimate(decisions: Decisions) -> CountPair:
 
 def _alarms(scored: ScoredRecording) -> dict[str, dict[str, AlarmStatistics]]:
     """Return the alarms for each reading, at each threshold."""
-    hand = scored.scores.hand
-    lasting, alarms = hand.hold(HOLD_TIME), {}
+    lasting, alarms = scored.hand.hold(HOLD_TIME), {}
     for reading, labels in labels_by_reading(scored.recording).items():
-        alarms[reading] = {OWN: AlarmStatistics.of(hand, labels)}
+        alarms[reading] = {OWN: AlarmStatistics.of(scored.hand, labels)}
         for name, shift in {LASTING: 0.0, **scored.shifts[reading]}.items():
             alarms[reading][name] = AlarmStatistics.of(lasting, labels, shift)
     return alarms

@@ -26,8 +26,7 @@ from holdfast.metrics.slips import SlipCurve
 from holdfast.sensors.types import Array
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob, score_splits
-from holdfast_lab.study.evaluation.fitted_method import RecordingScores, probability_of
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
+from holdfast_lab.study.evaluation.fitted_method import ScoredRecording, probability_of
 
 SLIP_RATE = 1.0
 """False alarms per minute of a finger for which thresholds are chosen [1/min]."""
@@ -70,10 +69,7 @@ def evaluate_slips(job: EvaluationJob) -> dict[str, SlipEvaluation]:
         By name of each corpus with slips; empty if `train` trains no classifier.
     """
     scored = {name: recordings for name, recordings in score_splits(job) if recordings}
-    scores = {
-        name: [score_slips(case.recording, case.scores) for case in cases]
-        for name, cases in scored.items()
-    }
+    scores = {name: list(map(score_slips, recordings)) for name, recordings in scored.items()}
     split = next((name for name in job.splits if name in scored), "")
     ranks = still_ranks(scores.get(split, []))
     results: dict[str, SlipEvaluation] = {}
@@ -103,16 +99,11 @@ class SlipScores(NamedTuple):
     truth: SlipTruth
 
 
-def score_slips(recording: RecordingFeatures, scores: RecordingScores) -> dict[str, SlipScores]:
-    """Return the scores of the fingers whose slips are known.
-
-    Args:
-        recording: with the truth.
-        scores: of the recording.
-    """
+def score_slips(scored: ScoredRecording) -> dict[str, SlipScores]:
+    """Return the scores of slip of the fingers of a recording whose slips are known."""
     made = {}
-    for finger, truth in recording.slips.items():
-        finger_scores = scores.fingers[finger]
+    for finger, truth in scored.recording.slips.items():
+        finger_scores = scored.fingers[finger]
         times, known, touches = finger_scores.times, finger_scores.known, finger_scores.grasped
         score = smoothed(times, np.where(known & touches, -finger_scores.margin, np.nan))
         made[finger] = SlipScores(times, np.where(known & ~touches, -np.inf, score), truth)

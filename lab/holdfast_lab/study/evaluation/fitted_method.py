@@ -7,7 +7,7 @@ margin of the fingers in contact.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,8 @@ from holdfast_lab.study.methods import HAND, Method
 MAX_FITTED_SAMPLES = 20_000
 """Maximum samples of a unit that train a classifier. All samples are evaluated."""
 
+Shifts = Mapping[str, Mapping[str, float]]
+"""Shifts of a threshold [log odds], by reading of glitches and name of the threshold."""
 MIN_PROBABILITY = 1e-12
 """Minimum distance of a probability from 0 and 1, so that log odds are finite."""
 
@@ -209,31 +211,36 @@ def probability_of(log_odds: Array) -> Array:
     return np.asarray(1.0 / (1.0 + np.exp(-np.clip(log_odds, -50, 50))))
 
 
-class RecordingScores(NamedTuple):
-    """Scores of one recording by a fitted method.
+class ScoredRecording(NamedTuple):
+    """A recording and its scores by a fitted method.
 
     Attributes:
+        recording: without its features, to save memory.
         fingers: those of a whole-hand method have the latest margin of the hand.
         hand: at every time of any finger.
         whole_hand: whether the method decides for the hand only.
+        shifts: of the fitted method.
+        fold: of the fitted method.
     """
 
+    recording: RecordingFeatures
     fingers: Mapping[str, Scores]
     hand: Scores
     whole_hand: bool
+    shifts: Shifts
+    fold: int
 
-    def decide(self, name: str, labels: Mapping[str, Codes]) -> Decisions:
+    def decide(self, labels: Mapping[str, Codes]) -> Decisions:
         """Return the decisions for fingers and hand with these labels, at the own thresholds.
 
         A whole-hand method has one finger, `HAND`.
 
         Args:
-            name: of the recording.
             labels: (n,) codes of each finger.
         """
         fingers = {name: scores.decide(labels[name]) for name, scores in self.fingers.items()}
         hand = self.hand.decide(hand_decisions(fingers, len(fingers)).labels)
-        return Decisions(name, {HAND: hand} if self.whole_hand else fingers, hand)
+        return Decisions(self.recording.name, {HAND: hand} if self.whole_hand else fingers, hand)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,12 +250,17 @@ class FittedMethod:
     Attributes:
         classifiers: of each unit whose training samples had both classes.
         contact_thresholds: F_a of each finger below which there is no contact; None if unknown.
+        shifts: of the threshold, for each of `READINGS` and each threshold of `BY_RATE`; chosen on
+            the same recordings.
+        fold: number of the fold that is left out.
     """
 
     classifiers: Mapping[str, Classifier]
     contact_thresholds: Mapping[str, float | None]
+    shifts: Shifts = field(default_factory=dict)
+    fold: int = 0
 
-    def scores(self, recording: RecordingFeatures) -> RecordingScores:
+    def scores(self, recording: RecordingFeatures) -> ScoredRecording:
         """Return the scores of a recording; NaN for a unit without a matching classifier."""
         margins = {unit: self._margins(unit, rows) for unit, rows in recording.features.items()}
         first = next(iter(recording.times.values()))
@@ -267,7 +279,8 @@ class FittedMethod:
         hand = Scores.of_hand(fingers.values())
         if HAND in margins:
             hand = score(HAND, hand.times, hand.grasped)
-        return RecordingScores(fingers, hand, HAND in margins)
+        scored = replace(recording, features={})
+        return ScoredRecording(scored, fingers, hand, HAND in margins, self.shifts, self.fold)
 
     def _margins(self, unit: str, rows: npt.NDArray[Any]) -> tuple[Array, float]:
         """Return the margins of a unit, and the threshold of its classifier [log odds]."""

@@ -122,8 +122,8 @@ def evaluate_labels(
             for index in left_out:
                 for tested in SOURCES:
                     recording = by_source[tested][index]
-                    scores = fitted.scores(recording)
-                    decided[tested][index] = scores.decide(recording.name, recording.labels)
+                    scored = fitted.scores(recording)
+                    decided[tested][index] = scored.decide(recording.labels)
         for tested, of_recording in decided.items():
             ordered = [of_recording[index] for index in sorted(of_recording)]
             metrics[f"{trained}/{tested}"] = summarise(ordered, seed=seed)

@@ -30,9 +30,9 @@ from holdfast_lab.study.evaluation.error_breakdown import latest_rows
 from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationEffort,
     EvaluationJob,
-    ScoredRecording,
     score_splits,
 )
+from holdfast_lab.study.evaluation.fitted_method import ScoredRecording
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan

@@ -93,8 +93,8 @@ def _other(state):
 
 
 def same(case, twin):
-    pairs = [(own, twin.scores.fingers[name]) for name, own in case.scores.fingers.items()]
-    pairs.append((case.scores.hand, twin.scores.hand))
+    pairs = [(own, twin.fingers[name]) for name, own in case.fingers.items()]
+    pairs.append((case.hand, twin.hand))
     equal = [
         np.array_equal(getattr(own, name), getattr(other, name), equal_nan=True)
         for own, other in pairs
@@ -134,7 +134,7 @@ def test_events_are_counted_by_exact_labels(evaluations, corpus):
     _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
     for case, alarms in zip(scored, evaluations["recording"].alarms[OWN], strict=True):
         labels = label_hand(case.recording.times, case.recording.exact_labels).labels
-        score = case.scores.hand
+        score = case.hand
         known = event_metrics(score.times, labels, score.states())
         assert len(alarms.delays) == known.n_events
         assert alarms.n_under_stable == known.false_alarms["STABLE"]

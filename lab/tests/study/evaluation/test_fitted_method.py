@@ -70,7 +70,7 @@ def test_a_whole_hand_method_decides_for_no_finger():
         features={HAND: np.array([[np.nan], [0.8], [0.9]])},
     )
     scores = FittedMethod({HAND: Fixed()}, {"a": 0.5, "b": 0.5}).scores(recording)
-    decided = scores.decide("one", recording.labels)
+    decided = scores.decide(recording.labels)
     assert decided.fingers == {HAND: decided.hand}
     assert scores.fingers["b"].known.tolist() == [False, True, True]
     assert scores.fingers["b"].margin == pytest.approx([np.inf, np.log(4), np.inf])
@@ -129,7 +129,7 @@ def test_a_missing_finger_is_not_evaluated(corpus):
     recordings = corpus_features(method, corpus)
     lacking = without(recordings[3], "index")
     fitted = Training.of(method, [*recordings[:3], lacking]).fit()
-    decided = fitted.scores(lacking).decide("one", lacking.labels)
+    decided = fitted.scores(lacking).decide(lacking.labels)
     assert set(decided.fingers) == {"thumb"}
     assert (decided.hand.states == STABLE).any()
 
@@ -141,8 +141,8 @@ def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
     narrow = {HAND: lacking.features[HAND][:, :36]}
     lacking = replace(lacking, features=narrow)
     fitted = Training.of(method, [*recordings[:3], lacking]).fit()
-    assert (fitted.scores(lacking).decide("one", lacking.labels).hand.states == UNKNOWN).all()
-    known = fitted.scores(recordings[0]).decide("one", recordings[0].labels).hand
+    assert (fitted.scores(lacking).decide(lacking.labels).hand.states == UNKNOWN).all()
+    known = fitted.scores(recordings[0]).decide(recordings[0].labels).hand
     assert (known.states == STABLE).any()
 
 
@@ -168,7 +168,7 @@ def test_one_class_gives_no_classifier_and_no_scores(corpus):
     one = replace(recordings[0], labels=stable)
     fitted = Training.of(method, [one]).fit()
     assert not fitted.classifiers
-    decided = fitted.scores(one).decide("one", one.labels)
+    decided = fitted.scores(one).decide(one.labels)
     assert (decided.hand.states == UNKNOWN).all()
     assert all((finger.states == UNKNOWN).all() for finger in decided.fingers.values())
 
