@@ -79,14 +79,14 @@ typedef double hf_real;
 
 /* Sizes: macros where HOLDFAST_N_FINGERS is one (an exported header), else fields of the tables. */
 #ifdef HOLDFAST_N_FINGERS
-#define HF_N_FINGERS(hand) ((size_t)HOLDFAST_N_FINGERS)
-#define HF_N_LANES(hand) ((size_t)HOLDFAST_N_LANES)
-#define HF_N_FEATURES(hand) ((size_t)HOLDFAST_N_FEATURES)
-#define HF_N_LAGS(hand) ((size_t)HOLDFAST_N_LAGS)
-#define HF_N_HISTORY(hand) ((size_t)HOLDFAST_N_HISTORY)
-#define HF_N_CHANNELS(hand) ((size_t)HOLDFAST_N_CHANNELS)
-#define HF_N_LEVELS(hand) ((size_t)HOLDFAST_N_LEVELS)
-#define HF_N_TRACK(hand) ((size_t)HOLDFAST_N_TRACK)
+#define HF_N_FINGERS(hand) ((void)(hand), (size_t)HOLDFAST_N_FINGERS)
+#define HF_N_LANES(hand) ((void)(hand), (size_t)HOLDFAST_N_LANES)
+#define HF_N_FEATURES(hand) ((void)(hand), (size_t)HOLDFAST_N_FEATURES)
+#define HF_N_LAGS(hand) ((void)(hand), (size_t)HOLDFAST_N_LAGS)
+#define HF_N_HISTORY(hand) ((void)(hand), (size_t)HOLDFAST_N_HISTORY)
+#define HF_N_CHANNELS(hand) ((void)(hand), (size_t)HOLDFAST_N_CHANNELS)
+#define HF_N_LEVELS(hand) ((void)(hand), (size_t)HOLDFAST_N_LEVELS)
+#define HF_N_TRACK(hand) ((void)(hand), (size_t)HOLDFAST_N_TRACK)
 #define HF_ARRAY(type, name, length) type name[length]
 #else
 #define HF_N_FINGERS(hand) ((hand)->n_fingers)

@@ -1,0 +1,19 @@
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from kernel.c_kernel import SOURCES, WARNINGS
+
+PROGRAM = Path(__file__).with_name("check_vectors.c")
+
+
+@pytest.mark.parametrize("sizes", [(), ("-DHOLDFAST_VECTORS_FIXED",)], ids=["fields", "macros"])
+@pytest.mark.parametrize("real", [(), ("-DHOLDFAST_SINGLE",)], ids=["double", "single"])
+def test_the_program_without_python(tmp_path, sizes, real):
+    words = ["cc", "-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *sizes, *real]
+    run = tmp_path / "check"
+    subprocess.run([*words, "-I", SOURCES, PROGRAM, "-o", run, "-lm"], check=True)
+    done = subprocess.run([run], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stdout
+    assert "260 samples, 0 wrong" in done.stdout
