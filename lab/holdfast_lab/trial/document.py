@@ -14,7 +14,7 @@ from holdfast_lab.trial.run import LIMITS, TrialResult
 from holdfast_lab.trial.summary import Summary, compare, summarize
 from holdfast_lab.trial.trials import GRIP_MULTIPLE
 
-OWN, BASELINE_LAW = "holdfast", "fixed"
+OWN_LAW, BASELINE_LAW = "holdfast", "fixed"
 """The law of holdfast, and the hand without control; each other law is compared with both."""
 GOALS = {
     "dropped": 5.0,
@@ -44,7 +44,7 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
         "by_fingers": {str(n): _summaries(results, _of("n_fingers", n)) for n in (3, 4)},
         "paired": {
             other: {law: compare(results[law], results[other]) for law in results if law != other}
-            for other in (BASELINE_LAW, OWN)
+            for other in (BASELINE_LAW, OWN_LAW)
             if other in results
         },
         "example": None if example is None else _example(results, example),
@@ -67,7 +67,7 @@ def example_of(results: TrialResults) -> int | None:
     Returns:
         The number; None if there is no such trial, or one of the two laws was not run.
     """
-    pairs = zip(results.get(BASELINE_LAW, ()), results.get(OWN, ()), strict=False)
+    pairs = zip(results.get(BASELINE_LAW, ()), results.get(OWN_LAW, ()), strict=False)
     saved = (one.number for lost, one in pairs if lost.held and lost.dropped and _is_saved(one))
     return next(saved, None)
 
@@ -111,10 +111,10 @@ def _of(field: str, value: object) -> Callable[[TrialResult], bool]:
 
 
 def _example(results: TrialResults, number: int) -> dict[str, Any]:
-    one = next(one for one in results[OWN] if one.number == number)
+    one = next(one for one in results[OWN_LAW] if one.number == number)
     return {
         "number": number, "object": one.object, "kind": one.kind, "n_fingers": one.n_fingers,
-        "lost_by": BASELINE_LAW, "held_by": OWN,
+        "lost_by": BASELINE_LAW, "held_by": OWN_LAW,
     }  # fmt: skip
 
 

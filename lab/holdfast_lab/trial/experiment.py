@@ -13,7 +13,7 @@ from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import (
     BASELINE_LAW,
-    OWN,
+    OWN_LAW,
     TrialResults,
     document_of,
     example_of,
@@ -92,7 +92,7 @@ def _results(plan: TrialPlan, runner: TaskRunner) -> TrialResults:
 
 def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
     """Return courses and film of a trial; the film is made in this process."""
-    laws = (BASELINE_LAW, OWN)
+    laws = (BASELINE_LAW, OWN_LAW)
     tasks = {law: plan.course_task(number, law) for law in laws}
     done = runner.run(list(tasks.values()))
     courses = {law: done[task.name] for law, task in tasks.items()}

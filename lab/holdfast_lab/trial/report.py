@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section, join_lines
 from holdfast_lab.report.result_tables import number_text
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import BASELINE_LAW, OWN, TrialResults
+from holdfast_lab.trial.document import BASELINE_LAW, OWN_LAW, TrialResults
 from holdfast_lab.trial.figures import (
     course_figure,
     distribution_figure,
@@ -140,7 +140,7 @@ def _plant(document: Mapping[str, Any]) -> str:
 def summary_text(document: Mapping[str, Any]) -> str:
     """Return the main results: one sentence on all, then the goals, as a list."""
     laws = document["laws"]
-    law = OWN if OWN in laws else next(iter(laws))
+    law = OWN_LAW if OWN_LAW in laws else next(iter(laws))
     goals = _goals(laws[law], law, document["unseen_objects"][law], document["goals"])
     lines = [_main(document, law), *goals]
     return "\n".join(f"- {line}" for line in lines)
@@ -189,7 +189,8 @@ def _text(row: Summary, column: LawColumn) -> str:
 def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
     """Return text, tables and figures of the section of the example."""
     rule = (
-        f"It is chosen by a rule: the first of the set that {BASELINE_LAW} loses and {OWN} holds."
+        "It is chosen by a rule: the first of the set that "
+        f"{BASELINE_LAW} loses and {OWN_LAW} holds."
     )
     if example is None:
         return (
@@ -201,7 +202,7 @@ def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
     if not example.film:
         return f"{example.what} {rule}\n\n{NO_FILM.format(reason=example.reason)}", [], figures
     caption = (
-        f"The same trial with {BASELINE_LAW} (above) and {OWN} (below), in real time. "
+        f"The same trial with {BASELINE_LAW} (above) and {OWN_LAW} (below), in real time. "
         f"{example.what} "
         "Red arrows: forces of the fingertips on the object. Violet arrow: the load."
     )

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from holdfast.parallel import Engine
     from holdfast.training import Setting, Trained
 
-LEFT_OUT = {
+LEFT_OUT_UNIT = {
     "recording": "one recording at a time",
     "object": "one object at a time",
     "time": "one fifth of the time of every recording",
@@ -252,7 +252,7 @@ def _print(trained: "Trained", model: Path, n_recordings: int, *, as_json: bool)
     print_line()
     print_line(
         f"{model}: trained on {n_recordings} recordings; "
-        f"cross-validation leaves out {LEFT_OUT[trained.split]}"
+        f"cross-validation leaves out {LEFT_OUT_UNIT[trained.split]}"
     )
 
 

@@ -15,7 +15,7 @@ from holdfast.sensors.types import Array
 from holdfast.training.finger_samples import contact_threshold
 from holdfast_lab.study.benchmark.submission import COLUMN_TYPES, FingerScores
 from holdfast_lab.study.evaluation.evaluate_slips import score_slips
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Training, probability_of
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, MethodTraining, probability_of
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast_lab.study.methods import Method
 from holdfast_lab.study.plan import Corpus
@@ -57,8 +57,8 @@ class BothTargets(NamedTuple):
         Raises:
             TrainingError: no finger has samples of both classes.
         """
-        stable = Training.of(method, recordings, seed=seed).fit()
-        slip = Training.of(method, recordings, seed=seed, sliding=True).fit()
+        stable = MethodTraining.of(method, recordings, seed=seed).fit()
+        slip = MethodTraining.of(method, recordings, seed=seed, sliding=True).fit()
         if not (stable.classifiers and slip.classifiers):
             raise TrainingError(f"{method.name}: no finger with samples of both classes given")
         return cls(stable, slip, own_rest)

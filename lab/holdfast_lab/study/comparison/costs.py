@@ -14,7 +14,7 @@ from holdfast.model import FingerModel, Head, Model
 from holdfast.recordings import Recording
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import Results, method_titles
-from holdfast_lab.study.evaluation.fitted_method import Training
+from holdfast_lab.study.evaluation.fitted_method import MethodTraining
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import METHODS, hand_signal
 from holdfast_lab.study.plan import Corpus, StudyPlan
@@ -112,7 +112,7 @@ def table(plan: StudyPlan, results: Results) -> ResultTable:
 def _measure_method(name: str, corpus: Corpus, seed: int) -> MethodCost:
     method = METHODS[name]
     recordings = corpus_features(method, corpus)
-    fitted = Training.of(method, recordings, MAX_TIMED_SAMPLES, seed).fit()
+    fitted = MethodTraining.of(method, recordings, MAX_TIMED_SAMPLES, seed).fit()
     first = recordings[0]
     hand = hand_signal(corpus.load()[0], Tare.parse(corpus.tare), tuple(first.times))
     n = sum(len(rows) for rows in first.features.values())

@@ -35,7 +35,7 @@ COUNT_DIGITS = {AUC: 2, AUC_OF_HAND: 2, MEAN_AUC: 2, SLIP_COUNT: 0}
 """Digits after the decimal point, where they are not 1."""
 
 
-class Scores(NamedTuple):
+class SlipAgainstStable(NamedTuple):
     """Probabilities of stability of the samples labelled stable, and of those labelled slip."""
 
     stable: Array
@@ -67,7 +67,7 @@ class UnitCounts(NamedTuple):
     n_correct: int
     n_stable: int
     n_called_stable: int
-    scores: Scores
+    scores: SlipAgainstStable
 
 
 class RealAlarmCounts(NamedTuple):
@@ -104,8 +104,8 @@ class ScorePair(NamedTuple):
     """Scores of two methods on one recording, on the samples at which both have an estimate."""
 
     name: str
-    first: Scores
-    second: Scores
+    first: SlipAgainstStable
+    second: SlipAgainstStable
 
 
 def count_recordings(
@@ -221,7 +221,7 @@ def mean_auc_row(keys: RowKeys, counts: Sequence[RecordingCounts], seed: int) ->
     return _with_interval_if_enough(row)
 
 
-def auc_row(keys: RowKeys, scores: Sequence[Scores], seed: int) -> Row:
+def auc_row(keys: RowKeys, scores: Sequence[SlipAgainstStable], seed: int) -> Row:
     """Return the AUC of stable against slip, pooled over recordings, with its interval.
 
     Args:
@@ -237,10 +237,10 @@ def auc_row(keys: RowKeys, scores: Sequence[Scores], seed: int) -> Row:
     return Row(dict(keys), pool(known).auc, None, len(known), interval)
 
 
-def pool(scores: Sequence[Scores]) -> Scores:
+def pool(scores: Sequence[SlipAgainstStable]) -> SlipAgainstStable:
     """Return all scores together."""
     stable, slip = ([np.empty(0), *(score[k] for score in scores)] for k in range(2))
-    return Scores(np.concatenate(stable), np.concatenate(slip))
+    return SlipAgainstStable(np.concatenate(stable), np.concatenate(slip))
 
 
 def _sample_row(
@@ -298,7 +298,7 @@ def _count_unit(
         n_correct=int((scored & (stable == called)).sum()),
         n_stable=int(stable.sum()),
         n_called_stable=int((stable & called).sum()),
-        scores=Scores(probability[stable], probability[slip]),
+        scores=SlipAgainstStable(probability[stable], probability[slip]),
     )
 
 

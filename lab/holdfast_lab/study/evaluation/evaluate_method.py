@@ -37,7 +37,11 @@ from holdfast_lab.study.evaluation.error_breakdown import (
     break_down_errors,
     count_glitches,
 )
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, ScoredRecording, Training
+from holdfast_lab.study.evaluation.fitted_method import (
+    FittedMethod,
+    MethodTraining,
+    ScoredRecording,
+)
 from holdfast_lab.study.evaluation.recording_features import (
     RecordingFeatures,
     Variation,
@@ -155,11 +159,11 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         featured = corpus_features(method, corpus, self.variation, stride, longest)
         return [recording for recording in featured if recording.slips or not self.slips]
 
-    def training(self, recordings: Sequence[RecordingFeatures]) -> Training:
+    def training(self, recordings: Sequence[RecordingFeatures]) -> MethodTraining:
         """Return the samples of recordings, from which the method is fitted."""
         sliding = self.slips and SLIP_METHODS[self.method].target == "sliding"
         method, most = find_method(self.method), self.effort.max_samples
-        return Training.of(method, recordings, most, self.seed, sliding=sliding)
+        return MethodTraining.of(method, recordings, most, self.seed, sliding=sliding)
 
 
 class MethodEvaluation(msgspec.Struct, frozen=True):
@@ -259,7 +263,7 @@ def held_out_folds(
 
 
 def _fit_fold(
-    job: EvaluationJob, training: Training, indices: Collection[int], number: int = 0
+    job: EvaluationJob, training: MethodTraining, indices: Collection[int], number: int = 0
 ) -> FittedMethod:
     """Fit the method to some recordings, and choose its thresholds on them."""
     chosen = sorted(indices)

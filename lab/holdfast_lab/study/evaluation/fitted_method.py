@@ -39,7 +39,7 @@ MIN_PROBABILITY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Training:
+class MethodTraining:
     """The recordings that a method can be fitted to, and their samples.
 
     Attributes:
@@ -63,7 +63,7 @@ class Training:
         seed: int = 0,
         *,
         sliding: bool = False,
-    ) -> "Training":
+    ) -> "MethodTraining":
         """Gather the labelled samples of recordings, thinned evenly over the recordings.
 
         A recording without one of the fingers gives no samples to a whole-hand method.

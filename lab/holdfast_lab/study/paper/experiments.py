@@ -15,7 +15,7 @@ from holdfast.plots.time_series import FingerSeries, StateCodes, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable
-from holdfast_lab.study.evaluation.fitted_method import Training
+from holdfast_lab.study.evaluation.fitted_method import MethodTraining
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.paper_tables import first_finger
@@ -100,7 +100,7 @@ def predict_examples(
     examples = list(_choose(corpora, finger))
     for name in TITLES:
         features = corpus_features(METHODS[name], _select(main, finger))
-        training = Training.of(METHODS[name], features, seed=seed)
+        training = MethodTraining.of(METHODS[name], features, seed=seed)
         for example in examples:
             states = _predict(training, corpora, example)
             example.states[name] = states.tolist()
@@ -132,7 +132,7 @@ def _first(corpus: Corpus, finger: str, case: str) -> str | None:
 
 
 def _predict(
-    training: Training, corpora: Mapping[str, Corpus], example: ExampleRecording
+    training: MethodTraining, corpora: Mapping[str, Corpus], example: ExampleRecording
 ) -> StateCodes:
     """Return states (n,) of a recording, by a fit to all other main recordings."""
     own = (example.role, example.recording)

@@ -14,7 +14,7 @@ from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.rows import DIGITS, ratio_row, sample_rows
 from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
-from holdfast_lab.study.evaluation.fitted_method import Training
+from holdfast_lab.study.evaluation.fitted_method import MethodTraining
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper.label_sources import LabelSource, has_truth, relabelled
@@ -114,7 +114,7 @@ def evaluate_labels(
     by_source = _features_by_source(corpus, corpus_features(method, corpus))
     metrics = {}
     for trained in SOURCES:
-        training = Training.of(method, by_source[trained], max_samples, seed)
+        training = MethodTraining.of(method, by_source[trained], max_samples, seed)
         everything = set(range(len(training.recordings)))
         decided: dict[LabelSource, dict[int, Decisions]] = {source: {} for source in SOURCES}
         for left_out in held_out_folds(training.objects, "recording", n_folds, seed):

@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast_lab.study.comparison.real_counts import (
-    Scores,
+    SlipAgainstStable,
     auc_row,
     common_samples,
     count_pairs,
@@ -183,8 +183,11 @@ class TestIntervals:
 
 
 def test_the_auc_of_recordings_is_that_of_all_their_samples():
-    scores = [Scores(np.array([0.9, 0.4]), np.array([0.5])), Scores(np.array([0.6]), np.empty(0))]
-    row = auc_row({"figure": "AUC"}, [*scores, Scores(np.empty(0), np.empty(0))], 0)
+    scores = [
+        SlipAgainstStable(np.array([0.9, 0.4]), np.array([0.5])),
+        SlipAgainstStable(np.array([0.6]), np.empty(0)),
+    ]
+    row = auc_row({"figure": "AUC"}, [*scores, SlipAgainstStable(np.empty(0), np.empty(0))], 0)
     assert (row.ours, row.n, row.interval) == (pytest.approx(2 / 3), 2, None)
 
 

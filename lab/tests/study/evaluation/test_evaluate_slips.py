@@ -22,7 +22,7 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     smoothed,
     still_ranks,
 )
-from holdfast_lab.study.evaluation.fitted_method import Training, probability_of
+from holdfast_lab.study.evaluation.fitted_method import MethodTraining, probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
@@ -79,7 +79,7 @@ def test_a_hand_slides_if_one_of_its_fingers_slides(recordings):
 
 
 def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
-    training = Training.of(METHODS["difference"], recordings, 200, sliding=True)
+    training = MethodTraining.of(METHODS["difference"], recordings, 200, sliding=True)
     thumb = training.samples["thumb"]
     n_sliding = sum(int((r.slips["thumb"].codes == SLIDING).sum()) for r in recordings)
     assert (~thumb.positive).sum() == n_sliding
@@ -89,7 +89,7 @@ def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
 
 def test_a_finger_without_known_slips_does_not_train(recordings):
     without = [replace(r, slips={"thumb": r.slips["thumb"]}) for r in recordings]
-    training = Training.of(METHODS["difference"], without, 200, sliding=True)
+    training = MethodTraining.of(METHODS["difference"], without, 200, sliding=True)
     assert list(training.samples) == ["thumb"]
 
 

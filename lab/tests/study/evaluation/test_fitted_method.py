@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, hand_decisions
-from holdfast_lab.study.evaluation.fitted_method import FittedMethod, Scores, Training
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, MethodTraining, Scores
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -94,7 +94,7 @@ def corpus(tmp_path_factory):
 
 
 def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
-    training = Training.of(
+    training = MethodTraining.of(
         METHODS["logreg"], corpus_features(METHODS["logreg"], corpus), max_samples=100
     )
     for samples in training.samples.values():
@@ -107,10 +107,12 @@ def test_a_fit_does_not_depend_on_other_recordings(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus)
     other = [*recordings[:3], scrambled(recordings[3])]
-    fitted_methods = [Training.of(method, each).fit({0, 1, 2}) for each in (recordings, other)]
+    fitted_methods = [
+        MethodTraining.of(method, each).fit({0, 1, 2}) for each in (recordings, other)
+    ]
     assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
     assert fitted_methods[0].contact_thresholds == fitted_methods[1].contact_thresholds
-    late = [Training.of(method, each).fit({1, 2, 3}) for each in (recordings, other)]
+    late = [MethodTraining.of(method, each).fit({1, 2, 3}) for each in (recordings, other)]
     assert late[0].classifiers != late[1].classifiers
 
 
@@ -128,7 +130,7 @@ def test_a_missing_finger_is_not_evaluated(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus)
     lacking = without(recordings[3], "index")
-    fitted = Training.of(method, [*recordings[:3], lacking]).fit()
+    fitted = MethodTraining.of(method, [*recordings[:3], lacking]).fit()
     decided = fitted.scores(lacking).decide(lacking.labels)
     assert set(decided.fingers) == {"thumb"}
     assert (decided.hand.states == STABLE).any()
@@ -140,7 +142,7 @@ def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
     lacking = without(recordings[3], "index")
     narrow = {HAND: lacking.features[HAND][:, :36]}
     lacking = replace(lacking, features=narrow)
-    fitted = Training.of(method, [*recordings[:3], lacking]).fit()
+    fitted = MethodTraining.of(method, [*recordings[:3], lacking]).fit()
     assert (fitted.scores(lacking).decide(lacking.labels).hand.states == UNKNOWN).all()
     known = fitted.scores(recordings[0]).decide(recordings[0].labels).hand
     assert (known.states == STABLE).any()
@@ -166,7 +168,7 @@ def test_one_class_gives_no_classifier_and_no_scores(corpus):
     recordings = corpus_features(method, corpus)
     stable = {f: np.full(len(t), STABLE, dtype=np.int8) for f, t in recordings[0].times.items()}
     one = replace(recordings[0], labels=stable)
-    fitted = Training.of(method, [one]).fit()
+    fitted = MethodTraining.of(method, [one]).fit()
     assert not fitted.classifiers
     decided = fitted.scores(one).decide(one.labels)
     assert (decided.hand.states == UNKNOWN).all()
