@@ -303,7 +303,8 @@ class TestCluster:
             with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):
                 list(engine.map_ordered(power, [(1, 1)]))
 
-    def test_a_scheduler_that_is_killed(self):
+    @pytest.mark.parametrize("sent", ["SIGKILL", "SIGSTOP"])
+    def test_a_scheduler_that_is_killed_or_frozen(self, monkeypatch, sent):
         pytest.importorskip("distributed")
         config = pytest.importorskip("dask.config")
         process = subprocess.Popen(
@@ -316,8 +317,8 @@ class TestCluster:
                     abs, [(k,) for k in range(99)]
                 )
                 next(results)
-                process.kill()
-                process.wait()
+                monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 1.0)
+                process.send_signal(getattr(signal, sent))
                 with pytest.raises(EngineError, match=r"^the Dask scheduler is gone$"):
                     list(results)
             finally:

@@ -11,7 +11,7 @@ import pytest
 
 import holdfast
 from holdfast.classifiers import recipe, recipe_names
-from holdfast.cli import main
+from holdfast.cli import doctor, main
 from holdfast.devices.hands import open_hand
 from holdfast.devices.uri import open_source, parse
 from holdfast.errors import RecordingError
@@ -26,6 +26,7 @@ TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
 PROGRAM = "import sys; from holdfast.cli import main; sys.exit(main())"
 
 PARTS = '''
+import os, time
 from pathlib import Path
 from holdfast.classifiers import LogisticRegression
 from holdfast.devices.hands.local import LogFile
@@ -51,6 +52,12 @@ class Mute(Exception):
 def __getattr__(name):
     if name == "mute":
         raise Mute
+    if name == "odd":
+        raise GeneratorExit
+    if name == "end":
+        os._exit(0)
+    if name == "hang":
+        time.sleep(600)
     raise AttributeError(name)
 
 def not_a_hand(uri):
@@ -65,6 +72,7 @@ POINTS = {
         "gone": "no_such_module:source",
         "number": "parts:__name__",
         "mute": "parts:mute",
+        "odd": "parts:odd",
     },
     "holdfast.importers": {"broken": "broken", "half": "parts"},
 }
@@ -129,6 +137,7 @@ def test_nothing_is_imported_before_it_is_used(parts):
         (lambda: open_source("number:"), "number (sources of acme 1.2) is skipped: TypeError: a "
          "function source(address) expected for number:, 'parts' given"),
         (lambda: open_source("mute:"), "mute (sources of acme 1.2) is skipped: Mute"),
+        (lambda: open_source("odd:"), "odd (sources of acme 1.2) is skipped: GeneratorExit"),
     ],
 )  # fmt: skip
 def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason):
@@ -162,7 +171,7 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     group = PluginGroup("things", (), lambda name, loaded: loaded)
     with on_the_path(tmp_path, monkeypatch):
         assert (group.load("thing"), group.load("thing")) == ("alpha", "alpha")
-        states = [(plugin.package, plugin.error) for plugin in group.states()]
+        states = [(plugin.package, plugin.error) for plugin in group.states(lambda *_: "")]
     refusal = "alpha 1.2 has thing as well; another name expected"
     assert sorted(states) == [("alpha 1.2", ""), ("zeta 1.2", refusal)]
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
@@ -178,6 +187,23 @@ def test_doctor_lists_them(parts, capsys):
     out = capsys.readouterr().out
     assert "plug-in" in out
     assert "SKIPPED: RuntimeError: no device" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("hang", "its import takes longer than 3 s"),
+        ("end", "its import ends the process"),
+        ("odd", "GeneratorExit"),
+    ],
+)
+def test_doctor_outlives_a_plug_in(parts, monkeypatch, name, error):
+    monkeypatch.setattr(doctor, "PLUGIN_TIMEOUT", 3.0, raising=False)
+    points = {"holdfast.laws": {name: f"parts:{name}"}}
+    install(parts / "more", "bad", {}, points)
+    monkeypatch.syspath_prepend(str(parts / "more"))
+    found = {plugin.name: plugin.error for plugin in doctor._plugins()}
+    assert error in found[name]
 
 
 def test_help_does_not_look_for_plug_ins():

@@ -1,13 +1,17 @@
 """Calls on a Dask cluster: few at a time, repeated if a worker dies, of one version of holdfast."""
 
 import logging
+from asyncio import run, wait_for
 from collections.abc import Callable, Hashable, Iterable, Iterator
+from concurrent.futures import Future as Result
+from concurrent.futures import wait
 from contextlib import contextmanager, suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from threading import Thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from holdfast.errors import EngineError, MissingExtra
@@ -54,7 +58,11 @@ def call_on_cluster(
     """
     with _client(scheduler) as client:
         _check_workers(client)
-        copies = client.scatter(list(shared), broadcast=True, hash=False) if shared else []
+        copies: list[Future] = []
+        if shared:
+            copies = _watched(
+                client, lambda: client.scatter(list(shared), broadcast=True, hash=False)
+            )
         common = (package_digest(), function, *copies)
         suspects: list[Call[K]] = []
         yield from _submit(client, common, calls, suspects)
@@ -120,7 +128,7 @@ def _submit(
     waiting: dict[str, tuple[Call[K], Future]] = {}
     rest = iter(calls)
     while True:
-        n_free = CALLS_PER_THREAD * max(sum(client.nthreads().values()), 1) - len(waiting)
+        n_free = CALLS_PER_THREAD * max(_n_threads(client), 1) - len(waiting)
         for call in islice(rest, max(n_free, 0)):
             future = client.submit(_call, *common, *call[1], pure=False)
             waiting[future.key] = call, future
@@ -129,7 +137,7 @@ def _submit(
             return
         call, future = waiting.pop(_next_done(done, client).key)
         try:
-            result = _result(future)
+            result = _watched(client, partial(_result, future))
         except KilledWorker:
             suspects.append(call)
         else:
@@ -168,14 +176,10 @@ def _silent_log() -> Iterator[None]:
 
 
 def _connect(scheduler: str) -> "Client":
-    from asyncio import run, wait_for
-    from concurrent.futures import ThreadPoolExecutor
-
     from distributed import Client
 
     try:
-        with ThreadPoolExecutor(1) as thread:  # the calling thread may have an event loop
-            thread.submit(run, wait_for(_connect_once(scheduler), SCHEDULER_TIMEOUT)).result()
+        _in_thread(lambda: run(_connect_once(scheduler))).result()
         return Client(scheduler, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as cause:  # a server of any other kind may answer there
         raise EngineError(
@@ -188,8 +192,43 @@ async def _connect_once(scheduler: str) -> None:
     """Test the connection: a `Client` that cannot connect leaves threads and delays the exit."""
     from distributed.comm import connect
 
-    comm = await connect(scheduler)
+    comm = await wait_for(connect(scheduler), SCHEDULER_TIMEOUT)
     await comm.close()
+
+
+def _watched(client: "Client", call: Callable[[], T]) -> T:
+    """Return what a call of a client returns; end it if the scheduler no longer answers.
+
+    A scheduler that is frozen keeps its connections, and most calls of a client have no timeout.
+
+    Raises:
+        EngineError: it does not answer a new connection in time.
+    """
+    result = _in_thread(call)
+    while not wait([result], SCHEDULER_TIMEOUT).done:
+        try:
+            _in_thread(lambda: run(_connect_once(client.scheduler.address))).result()
+        except (OSError, TimeoutError) as cause:
+            raise EngineError(_GONE) from cause
+    return result.result()
+
+
+def _in_thread(call: Callable[[], T]) -> "Result[T]":
+    """Make a call in a thread that can be left, and that has no event loop."""
+    result: Result[T] = Result()
+
+    def make() -> None:
+        try:
+            result.set_result(call())
+        except BaseException as cause:  # raised where the result is read
+            result.set_exception(cause)
+
+    Thread(target=make, daemon=True).start()
+    return result
+
+
+def _n_threads(client: "Client") -> int:
+    return sum(_watched(client, client.nthreads).values())
 
 
 def _check_workers(client: "Client") -> None:
@@ -197,11 +236,12 @@ def _check_workers(client: "Client") -> None:
     from distributed import TimeoutError as NoWorker
 
     try:
-        client.wait_for_workers(1, timeout=NO_WORKER_TIMEOUT)
+        _watched(client, lambda: client.wait_for_workers(1, timeout=NO_WORKER_TIMEOUT))
     except NoWorker:
         raise _without_workers(client) from None
     expected = package_digest()
-    for address, digest in client.run(package_digest, on_error="return").items():
+    digests = _watched(client, lambda: client.run(package_digest, on_error="return"))
+    for address, digest in digests.items():
         if isinstance(digest, Exception) and ModuleNotFoundError.__name__ in repr(digest):
             raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from digest
         if not isinstance(digest, OSError) and digest != expected:  # OSError: it died meanwhile
@@ -213,7 +253,7 @@ def _next_done(done: "SimpleQueue[Future]", client: "Client") -> "Future":
     while True:
         with suppress(Empty):
             return done.get(timeout=NO_WORKER_TIMEOUT)
-        if not client.nthreads():
+        if not _n_threads(client):
             raise _without_workers(client)
 
 

@@ -68,7 +68,9 @@ class PluginGroup(Generic[T]):
             return None
         try:
             return self._convert(name, point.load())
-        except (Exception, SystemExit) as cause:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as cause:  # a plug-in may raise any
             self._report(point, _reason(cause))
             return None
 
@@ -77,17 +79,24 @@ class PluginGroup(Generic[T]):
         loaded = (self.load(name) for name in self.names())
         return [plugin for plugin in loaded if plugin is not None]
 
-    def states(self) -> list[Plugin]:
-        """Load all plug-ins, and return each with the reason why it is skipped, if it is."""
+    def states(self, error: Callable[[str, str], str]) -> list[Plugin]:
+        """Return all plug-ins, each with the reason why it is skipped, if it is.
+
+        Args:
+            error: returns that reason for a kind and a name; `doctor` loads them elsewhere.
+        """
         return [
-            Plugin(self.kind, point.name, _package(point), refusal or self._error(point))
+            Plugin(self.kind, point.name, _package(point), refusal or error(self.kind, point.name))
             for point, refusal in self._points()
         ]
 
-    def _error(self, point: "EntryPoint") -> str:
+    def error(self, name: str) -> str:
+        """Load a plug-in, and return the reason why it is skipped; empty if it can be used."""
         try:
-            self._convert(point.name, point.load())
-        except (Exception, SystemExit) as cause:
+            self._convert(name, self._usable_points()[name].load())
+        except KeyboardInterrupt:
+            raise
+        except BaseException as cause:  # a plug-in may raise any
             return _reason(cause)
         return ""
 

@@ -25,7 +25,7 @@ CRASHES = {
     "loop": ("exec('while True: pass')", r"takes too long to read: 1 s of the processor"),
     "bomb": (
         "numpy.ones(10**9)",
-        r"needs more memory than the 200\S* MB that a file of \S* MB may take; set HOLDFAST_MAX_B",
+        r"needs more memory than the 200\S* MB that a file of \S* MB may take; cut it",
     ),
     "error": ("[][1]", r"a\.h5 is damaged: list index out of range"),
     "print": ("print('{}') or [][1]", r"a\.h5 is damaged: list index out of range"),
@@ -153,6 +153,28 @@ PARTS = {
     "csv": ["a.csv"],
 }
 """Names of files that an importer would open in a folder."""
+
+
+@pytest.mark.parametrize("name", ["uskin-pick-move", "eflesh", "xela-log", "csv"])
+def test_every_format_is_read_in_the_child(tmp_path, monkeypatch, name, file):
+    for part in PARTS[name]:
+        (tmp_path / part).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / part).write_text("a,b\n1,2\n")
+    program = f"import os; from holdfast.io.importers import importer\nimporter({name!r}).read = "
+    program += "lambda *_: os.abort()\n"
+    monkeypatch.setattr(foreign, "_PROGRAM", program + foreign._PROGRAM)
+    with pytest.raises(RecordingError, match=r"it ended the process that read it \(SIGABRT\)"):
+        list(import_recordings(tmp_path, name))
+
+
+def test_reports_of_the_child_precede_its_error(tmp_path, file):
+    path = tmp_path / "a.csv"
+    path.write_text("time,x1,y1,z1\n0,1,2,3\n0.01,1,2,3\n")
+    reports = []
+    with pytest.raises(RecordingError, match="the sensor of finger1"):
+        list(import_recordings(path, report=reports.append))
+    assert reports[0].startswith("a.csv: the columns are a guess: 100 Hz")
+    assert reports[1].startswith("  the same as --columns 'time=time:s,taxels=")
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -10,7 +10,7 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io import load_recording, read_chunks, save_labels, save_recording
+from holdfast.io import load_recording, read_chunks, safe_reading, save_labels, save_recording
 from holdfast.io.header import encode_header
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.labelling.server.workspace import summary_of
@@ -231,10 +231,23 @@ def test_the_size_in_memory_is_limited(make_recording, tmp_path, monkeypatch, su
     monkeypatch.setenv("HOLDFAST_MAX_BYTES", "100000")
     with pytest.raises(RecordingError) as refused:
         load_recording(path)
-    expected = r"MB in memory, 0.1 MB are allowed for a file of \S+ MB; set HOLDFAST_MAX_BYTES to"
+    expected = r"MB in memory, 0.1 MB are allowed for a file of \S+ MB; cut it into shorter files"
     refused.match(expected)
     monkeypatch.setenv("HOLDFAST_MAX_BYTES", "1000000")
     assert load_recording(path).complete
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_a_small_file_has_little_memory(make_recording, tmp_path, monkeypatch, suffix):
+    one = make_recording(n=20_000)
+    modules = {name: replace(m, readings=0 * m.readings) for name, m in one.modules.items()}
+    path = tmp_path / f"a.{suffix}"
+    save_recording(replace(one, modules=modules, truth=None), path)
+    monkeypatch.setattr(safe_reading, "FREE_MEMORY", 200_000, raising=False)
+    monkeypatch.setattr(safe_reading, "MEMORY_PER_BYTE", 1, raising=False)
+    with pytest.raises(RecordingError, match=r"are allowed for a file of .* cut it into"):
+        load_recording(path)
+    assert len(list(read_chunks(path, 1000))) >= 20
 
 
 @pytest.mark.parametrize("suffix", ["parquet", "mcap"])
@@ -246,7 +259,7 @@ def test_texts_count_as_long_as_the_longest(make_recording, tmp_path, monkeypatc
     monkeypatch.setenv("HOLDFAST_MAX_BYTES", "4700000")
     with pytest.raises(RecordingError, match=r"MB in memory, 4.7 MB are allowed"):
         load_recording(path)
-    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "6000000")
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "11000000")
     assert load_recording(path).truth.hand["a"][-1] == "x" * 4000
 
 

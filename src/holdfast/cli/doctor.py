@@ -4,6 +4,7 @@ import os
 import platform
 import re
 import socket
+import subprocess
 import time
 from contextlib import suppress
 from importlib import metadata
@@ -12,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from holdfast.children import python_command
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_table
 from holdfast.errors import install_command, is_installed
 
 if TYPE_CHECKING:
     from holdfast.cli.config import Config
-    from holdfast.plugins import Plugin
+    from holdfast.plugins import Plugin, PluginGroup
 
 EXTRA_PURPOSES = {
     "all": "all of the others but deep",
@@ -41,6 +43,15 @@ EXTRA_PURPOSES = {
 PROBE_TIMEOUT = 0.3
 """Time in which a server must accept a connection [s]."""
 
+PLUGIN_TIMEOUT = 20.0
+"""Time in which a plug-in must be imported [s]."""
+
+_ANSWER = "error of the plug-in: "
+_LOAD_PLUGIN = (
+    "from holdfast.cli.doctor import plugin_groups\n"
+    "(group,) = (group for group in plugin_groups() if group.kind == sys.argv[1])\n"
+    f"print({_ANSWER!r} + group.error(sys.argv[2]), end='')"
+)
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
 
@@ -86,7 +97,25 @@ def _report(context: typer.Context) -> dict[str, Any]:
 
 
 def _plugins() -> "list[Plugin]":
-    """Load the plug-ins of other packages, and return why some of them are skipped."""
+    """Return the plug-ins of other packages, and why some of them are skipped."""
+    return [plugin for group in plugin_groups() for plugin in group.states(_plugin_error)]
+
+
+def _plugin_error(kind: str, name: str) -> str:
+    """Return why a plug-in is skipped; a child process loads it, which it may end or block."""
+    try:
+        done = subprocess.run(
+            python_command(_LOAD_PLUGIN, kind, name), stdin=subprocess.DEVNULL,
+            capture_output=True, text=True, errors="replace", timeout=PLUGIN_TIMEOUT, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return f"its import takes longer than {PLUGIN_TIMEOUT:.0f} s"
+    _, answered, error = done.stdout.rpartition(_ANSWER)
+    return error if answered else f"its import ends the process (exit code {done.returncode})"
+
+
+def plugin_groups() -> "tuple[PluginGroup[Any], ...]":
+    """Return the groups of plug-ins."""
     from holdfast.classifiers import CLASSIFIER_PLUGINS
     from holdfast.devices.hands import HAND_PLUGINS
     from holdfast.devices.uri import SOURCE_PLUGINS
@@ -95,8 +124,7 @@ def _plugins() -> "list[Plugin]":
     from holdfast.sensors import SENSOR_PLUGINS
 
     device_groups = (SENSOR_PLUGINS, SOURCE_PLUGINS, HAND_PLUGINS)
-    groups = (*device_groups, IMPORTER_PLUGINS, CLASSIFIER_PLUGINS, LAW_PLUGINS)
-    return [plugin for group in groups for plugin in group.states()]
+    return (*device_groups, IMPORTER_PLUGINS, CLASSIFIER_PLUGINS, LAW_PLUGINS)
 
 
 def _packages() -> dict[str, dict[str, str | None]]:

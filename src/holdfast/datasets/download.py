@@ -9,6 +9,7 @@ import errno
 import os
 import shutil
 import stat
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -36,6 +37,8 @@ SERVER_TIMEOUTS = (10.0, 60.0)
 """Times after which a server that does not connect, or is silent, is given up [s]."""
 ANSWER_LIMIT = 60.0
 """Maximum time of an answer's headers and of each `DOWNLOAD_CHUNK` [s]: at least 1 kB/s."""
+FREE_TIME, MIN_RATE = 600.0, 20_000
+"""Time for a file besides that of its bytes [s], and the lowest rate of these [bytes/s]."""
 MAX_REDIRECTS = 10
 """Number of times that a server may name another address."""
 MAX_DOWNLOAD_TRIES = 3
@@ -178,6 +181,7 @@ class _Download:
         self._part, self._file, self._report = part, file, report
         self._max_size = MAX_UNKNOWN_SIZE if file.size is None else file.size
         self._size = file.size
+        self._deadline = time.monotonic() + FREE_TIME + self._max_size / MIN_RATE
 
     def __call__(self, url: str, output_file: str, _: object) -> None:
         """Load a file from a URL into `output_file`."""
@@ -244,6 +248,11 @@ class _Download:
                     break
                 file.write(chunk)
                 self._report(len(chunk))
+                if time.monotonic() > self._deadline:
+                    raise SourceError(
+                        f"{answer.url} sends less than {MIN_RATE} bytes a second; what was loaded "
+                        "is kept, and the same command continues"
+                    )
         if n_bytes > self._max_size:
             self._part.unlink()
             raise SourceError(

@@ -1,7 +1,7 @@
 """Files of other programs, read in a child process with limits of time and memory.
 
-A library that reads a container (rosbags, h5py, pyarrow) can abort, hang, or take all memory for
-a file that is damaged or made by an attacker. The child ends then, and this process has one line.
+What reads them can abort (h5py, pyarrow), hang, or take all memory for a file that is damaged or
+made by an attacker. The child ends then, and this process has one line.
 One child reads all files of an import, one at a time: while nothing is read, it waits.
 
 Requests and answers are lines of JSON on its pipes. Values come in a file of a private folder:
@@ -22,7 +22,7 @@ from queue import SimpleQueue
 from shutil import rmtree
 from tempfile import mkdtemp
 from threading import Thread, Timer
-from typing import Any, BinaryIO, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import msgspec
 import numpy as np
@@ -32,7 +32,7 @@ from holdfast.children import python_command
 from holdfast.errors import EXTRA_MODULES, RecordingError
 from holdfast.io.header import decode_header, encode_header, header_of
 from holdfast.io.safe_reading import (
-    LIMIT_VARIABLE,
+    WAY_OUT,
     ReadBudget,
     given_limit,
     megabytes,
@@ -42,12 +42,11 @@ from holdfast.io.safe_reading import (
 )
 from holdfast.io.timed_arrays import array_specs, arrays_of, recording_from
 from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
 
-FREE_MEMORY = 200_000_000
-MEMORY_PER_BYTE = 10
-MAX_MEMORY = 1 << 30
-"""Memory that reading may take: 200 MB and ten times the size of the file, at most 1 GiB [bytes].
-`HOLDFAST_MAX_BYTES` replaces it."""
+if TYPE_CHECKING:
+    from holdfast.io.importers.csv_columns import Columns
+
 FREE_SECONDS = 20.0
 """Time of the processor that a file may take, however small it is [s]."""
 SECONDS_PER_BYTE = 4e-6
@@ -80,7 +79,6 @@ class _Request(msgspec.Struct, frozen=True):
     options: dict[str, Any]
     folder: bytes
     memory: int
-    written: int
     seconds: float
 
 
@@ -91,17 +89,31 @@ class _Answer(msgspec.Struct, frozen=True):
     text: str = ""
 
 
-def read_foreign(path: Path, name: str) -> Iterator[Recording]:
+def read_foreign(
+    path: Path,
+    name: str,
+    sensors: Mapping[str, Sensor] | None = None,
+    columns: "Columns | None" = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> Iterator[Recording]:
     """Yield the recordings in a file or folder of a format, which a child process reads.
 
     Args:
         path: path of the part.
-        name: name of the format, one of `importers.EXTRAS`.
+        name: name of the format, one of `importers.FORMATS`.
+        sensors: as in `importers.generic_csv.read`; for `csv` only.
+        columns: the same.
+        report: the same.
 
     Raises:
         RecordingError: the child refuses it, ends, or takes more time or memory than it may.
     """
-    for document, arrays in _values("import", path, {"format": name}):
+    given = {key: one.to_dict() for key, one in (sensors or {}).items()}
+    options = {"format": name, "sensors": given, "columns": columns}
+    for document, arrays in _values("import", path, options):
+        if not arrays:
+            report(os.fsdecode(document))
+            continue
         header = decode_header(document, path)
         pairs = zip(arrays[::2], arrays[1::2], strict=True)
         topics = (spec.topic for spec in array_specs(header))
@@ -137,11 +149,10 @@ def _values(task: str, path: Path, options: dict[str, Any]) -> Iterator[tuple[by
     What is left of an iterator costs a child: it is ended with whatever it reads.
     """
     size = stored_size(path)
-    given = given_limit()
-    memory = given or min(FREE_MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY)
-    seconds = FREE_SECONDS + SECONDS_PER_BYTE * max(size, given or 0)
+    memory = size_limit(path)
+    seconds = FREE_SECONDS + SECONDS_PER_BYTE * max(size, given_limit() or 0)
     names = os.fsencode(path), os.fsencode(Path.cwd())
-    request = _Request(task, names[0], options, names[1], memory, size_limit(path), seconds)
+    request = _Request(task, names[0], options, names[1], memory, seconds)
     budget = ReadBudget(path)
     child = _idle.pop() if _idle else _Child()
     try:
@@ -156,7 +167,7 @@ def _values(task: str, path: Path, options: dict[str, Any]) -> Iterator[tuple[by
         child.end()  # what it could not use may be in pieces
         raise RecordingError(
             f"{path} needs more memory than the {megabytes(memory)} that a file of "
-            f"{megabytes(size)} may take; set {LIMIT_VARIABLE} to read it anyway"
+            f"{megabytes(size)} may take; {WAY_OUT}"
         )
     _idle.append(child)
     if answer.kind == "error":
@@ -210,7 +221,7 @@ class _Child:
     def value(self, budget: ReadBudget) -> tuple[bytes, Arrays]:
         """Return the document and the arrays that the child wrote, which count in a budget."""
         path = Path(self._folder, _VALUE_FILE)
-        budget.keep(path.stat().st_size)
+        budget.unpack(path.stat().st_size)
         arrays: Arrays = []
         with path.open("rb") as file:
             while file.peek(1):
@@ -323,16 +334,34 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     from holdfast.io.importers import EXTRAS, importer
+    from holdfast.io.importers.csv_columns import Columns
 
     name = str(request.options["format"])
     source = importer(name)
-    for module in EXTRA_MODULES[EXTRAS[name]]:  # of an idle process
+    for module in EXTRA_MODULES.get(EXTRAS.get(name, ""), ()):  # of an idle process
         import_module(module)
     _limit_memory(request)
-    for recording in source.read(path):
-        header = header_of(recording, path.stem)
-        pairs = arrays_of(recording).values()
-        yield encode_header(header), [array for pair in pairs for array in pair]
+    lines: list[str] = []
+    more: tuple[object, ...] = ()
+    if name == "csv":
+        sensors = {key: Sensor.from_dict(one) for key, one in request.options["sensors"].items()}
+        columns = msgspec.convert(request.options["columns"], Columns | None)
+        more = sensors, columns, lines.append
+    try:
+        for recording in source.read(path, *more):
+            yield from _texts(lines)
+            header = header_of(recording, path.stem)
+            pairs = arrays_of(recording).values()
+            yield encode_header(header), [array for pair in pairs for array in pair]
+    except Exception:  # reports precede it
+        yield from _texts(lines)
+        raise
+
+
+def _texts(lines: list[str]) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield texts for the parent, and remove them; a value without arrays is a text."""
+    while lines:
+        yield os.fsencode(lines.pop(0)), []
 
 
 def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
@@ -364,7 +393,7 @@ _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]]
 def _limit_memory(request: _Request) -> None:
     """Limit the memory of this process to what it has and that of the request, and its files."""
     _limit("CORE", 0)
-    _limit("FSIZE", request.written)
+    _limit("FSIZE", request.memory)
     with suppress(OSError):  # there is no such file: only Linux has this limit
         status = Path("/proc/self/status").read_text()
         (used,) = re.findall(r"^VmData:\s+(\d+) kB", status, re.MULTILINE)

@@ -238,7 +238,10 @@ class _Channels:
 
 
 class _JoinedSize:
-    """Size in memory of arrays that are read in parts; texts are as long as the longest."""
+    """Size in memory of arrays that are read in parts; texts are as long as the longest.
+
+    All count twice: the parts, and the arrays that are joined of them.
+    """
 
     def __init__(self, budget: ReadBudget) -> None:
         self._budget = budget
@@ -257,7 +260,7 @@ class _JoinedSize:
             widest = max(width, values.itemsize)
             self._texts[topic] = n + values.size, widest
             n_bytes += (n + values.size) * widest - n * width - values.nbytes
-        self._budget.keep(n_bytes, 1)
+        self._budget.keep(2 * n_bytes, 1)
 
 
 def _decoded(path: Path, message: _McapMessage, spec: ArraySpec | None) -> TimedArray:

@@ -8,20 +8,24 @@ from pathlib import Path
 
 from holdfast.errors import HoldfastError, RecordingError
 
-MIN_SIZE_LIMIT = 1 << 30
-"""Size in memory that every file may have [bytes]."""
-MAX_EXPANSION = 50
-"""Size in memory that a large file may have, as a multiple of its own size."""
+FREE_MEMORY = 200_000_000
+MEMORY_PER_BYTE = 10
+MAX_MEMORY = 1 << 30
+"""Memory for reading: 200 MB and ten times the size of the file, at most 1 GiB [bytes]."""
 LIMIT_VARIABLE = "HOLDFAST_MAX_BYTES"
-"""Environment variable that replaces both [bytes]."""
+"""Environment variable that replaces it [bytes]."""
+MAX_EXPANSION = 50
+"""Size of the content of a large file that is read in parts, as a multiple of its own size."""
 MAX_WORK = 4
-"""Bytes that may be unpacked in all while a file is read, as a multiple of its size in memory."""
+"""Bytes that may be unpacked in all while a file is read, as a multiple of its content."""
 ITEM_SIZE = 512
 """Size in memory that an object counts besides its bytes, such as a message [bytes]."""
 STEP_WORK = 2048
 """Work that a record counts, however short it is [bytes that are unpacked]."""
 JSON_EXPANSION = 32
 """Size in memory of a decoded JSON text, as a multiple of its length; an empty list has 21."""
+WAY_OUT = f"cut it into shorter files, or set {LIMIT_VARIABLE} to read it anyway"
+"""End of the message about a file that needs too much memory."""
 MAX_CAUSE_LENGTH = 200
 """Number of characters of a foreign error that are shown."""
 
@@ -66,15 +70,14 @@ def stored_size(path: Path) -> int:
 
 
 def size_limit(path: Path) -> int:
-    """Return the maximum size in memory of the content of a file or folder [bytes].
+    """Return the memory that reading a file or folder may take [bytes].
 
-    It is 1 GiB, or 50 times the size of the file if that is more: real recordings shrink to a
-    third or a tenth when they are compressed. `HOLDFAST_MAX_BYTES` replaces it.
+    Real recordings shrink to a third or a tenth when they are compressed.
 
     Raises:
         RecordingError: the variable is not a whole number of at least 1.
     """
-    return given_limit() or max(MIN_SIZE_LIMIT, MAX_EXPANSION * stored_size(path))
+    return given_limit() or min(FREE_MEMORY + MEMORY_PER_BYTE * stored_size(path), MAX_MEMORY)
 
 
 def given_limit() -> int | None:
@@ -100,15 +103,15 @@ def check_size(path: Path, n_bytes: int) -> None:
     if n_bytes > (limit := size_limit(path)):
         raise RecordingError(
             f"{path} takes {megabytes(n_bytes)} in memory, {megabytes(limit)} are allowed for a "
-            f"file of {megabytes(stored_size(path))}; set {LIMIT_VARIABLE} to read it anyway"
+            f"file of {megabytes(stored_size(path))}; {WAY_OUT}"
         )
 
 
 class ReadBudget:
     """Memory and work that one file may cost while it is read.
 
-    Every reader has one for each file. Memory is limited by `size_limit`, work by `MAX_WORK`
-    times as much, so that a reader that forgets what it has read also ends.
+    Every reader has one for each file. Memory is limited by `size_limit`, and work by the size
+    of the file, so that a reader that forgets what it has read also ends.
 
     Args:
         path: path of the file or folder.
@@ -122,6 +125,8 @@ class ReadBudget:
         self._limit = size_limit(path)
         self._kept = 0
         self._work = 0
+        content = given_limit() or max(MAX_MEMORY, MAX_EXPANSION * stored_size(path))
+        self._max_work = MAX_WORK * content
         size = path.stat().st_size
         if not path.is_dir() and size > max(self._limit, stored_size(path)):
             raise RecordingError(
@@ -174,11 +179,11 @@ class ReadBudget:
 
     def _add_work(self, n_bytes: int) -> None:
         self._work += n_bytes
-        if self._work > MAX_WORK * self._limit:
+        if self._work > self._max_work:
             raise RecordingError(
                 f"{self._path} takes too long to read: a file of "
                 f"{megabytes(stored_size(self._path))} has records of more than "
-                f"{megabytes(MAX_WORK * self._limit)} when it is unpacked, where a short record "
+                f"{megabytes(self._max_work)} when it is unpacked, where a short record "
                 f"counts {STEP_WORK} bytes; set {LIMIT_VARIABLE} to read it anyway"
             )
 

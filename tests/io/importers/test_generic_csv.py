@@ -416,4 +416,4 @@ def test_a_folder_that_fails_has_the_reason_of_its_first_file(tmp_path, header, 
 
 def test_a_folder_without_csv_files(tmp_path):
     with pytest.raises(RecordingError, match=r"no CSV file in .*; files NAME\.csv expected"):
-        import_recordings(tmp_path, sensors=ANY)
+        next(import_recordings(tmp_path, sensors=ANY))

@@ -1,5 +1,4 @@
 import os
-import re
 
 import pytest
 
@@ -51,14 +50,3 @@ def test_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "a.csv")
     with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
         import_recordings(tmp_path / "a.csv")
-
-
-def test_an_importer_may_raise_any_error(tmp_path, monkeypatch):
-    def broken(*given):
-        raise KeyError("x\ny")
-        yield
-
-    monkeypatch.setattr("holdfast.io.importers.generic_csv.read", broken)
-    (tmp_path / "a.csv").write_text("a")
-    with pytest.raises(RecordingError, match=re.escape(f"{tmp_path / 'a.csv'} is damaged: 'x")):
-        list(import_recordings(tmp_path / "a.csv", "csv"))

@@ -89,12 +89,13 @@ def import_recordings(
     recordings: Iterator[Recording]
     with recording_errors(place):
         source = importer(name)
-        if name in EXTRAS:  # another library reads it
+        if name in EXTRAS:
             require_extras(EXTRAS[name])
+        if name == "csv":
+            recordings = read_foreign(place, name, sensors, given, report)
+        elif name in FORMATS:
             recordings = _named_apart(source.parts(place), partial(read_foreign, name=name))
-        elif name == "csv":
-            recordings = source.read(place, sensors, given, report)
-        else:
+        else:  # code of a plug-in is not kept apart
             recordings = _named_apart(source.parts(place), source.read)
     return _guarded(place, recordings, labels=labels)
 

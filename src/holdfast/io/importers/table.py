@@ -19,7 +19,9 @@ from holdfast.sensors.types import Array
 MAX_CELL_LENGTH = 1 << 20
 """Maximum length of a cell [characters]; the csv module itself stops at 131,072."""
 MAX_ROW_SIZE = 1 << 26
-"""Maximum size of a row with long cells, and of all lines before the first row [bytes]."""
+"""Maximum size of a row with long cells [bytes]."""
+MAX_HEAD_SIZE = 1 << 20
+"""Maximum size of all lines before the first row [characters]."""
 COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
 SEPARATORS = ",;"
@@ -336,16 +338,16 @@ def _is_sample(names: Sequence[str]) -> bool:
 
 
 def _first_lines(file: TextIO) -> Iterator[str]:
-    """Yield the lines of a file; those before the first row must not be longer than a row.
+    """Yield the lines of a file, which must not be long before the first row.
 
     Raises:
         csv.Error: they are.
     """
-    n_left = MAX_ROW_SIZE
+    n_left = MAX_HEAD_SIZE
     while line := file.readline(n_left + 1):
         n_left -= len(line)
         if n_left < 0:
-            raise csv.Error(f"more than {MAX_ROW_SIZE} characters before the first row")
+            raise csv.Error(f"more than {MAX_HEAD_SIZE} characters before the first row")
         yield line
 
 
