@@ -42,8 +42,8 @@ static void check_numbers(const holdfast_memory *memory, size_t sample, const do
     }
     for (size_t f = 0; f < N_FINGERS; ++f) {
         const holdfast_values *const v = &memory->values[f];
-        const hf_real values[N_VALUES] = {
-            v->force[0], v->force[1], v->force[2], v->amplitude, v->m, v->sigma};
+        const hf_real values[N_VALUES] = {v->force[0],  v->force[1], v->force[2],
+                                          v->amplitude, v->m,        v->sigma};
         for (size_t i = 0; i < N_VALUES; ++i) {
             add_to_digest(values[i]);
             check("a value", sample, (double)values[i], *expected++, 1e-9);

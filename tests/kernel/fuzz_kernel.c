@@ -32,8 +32,8 @@ static uint64_t take(input *in, size_t n_bytes)
 /* Return a number that may be special, or any at all. */
 static double take_number(input *in)
 {
-    static const double special[] = {
-        0.0, -0.0, NAN, INFINITY, -INFINITY, 1e-320, 1e308, -1e308, 1.0, -1.0, 65535.0, 0.005};
+    static const double special[] = {0.0,   -0.0,   NAN, INFINITY, -INFINITY, 1e-320,
+                                     1e308, -1e308, 1.0, -1.0,     65535.0,   0.005};
     const uint8_t kind = (uint8_t)take(in, 1);
     if (kind < sizeof special / sizeof *special) {
         return special[kind];
@@ -137,7 +137,8 @@ static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
         holdfast_begin(hand, &memory, take(in, 1) % 2 ? readings : NULL);
         double time = take_number(in);
         while (in->size > 0) {
-            const size_t n_changed = (size_t)take(in, 1) % 16, n_times = 1 + (size_t)take(in, 1) % 32;
+            const size_t n_changed = (size_t)take(in, 1) % 16,
+                         n_times = 1 + (size_t)take(in, 1) % 32;
             for (size_t i = 0; i < n_changed; ++i) {
                 readings[(size_t)take(in, 2) % (3 * n_taxels)] = (hf_real)take_number(in);
             }
@@ -182,9 +183,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     const size_t n_made = hand.n_fingers, n_spoilt = (size_t)take(&in, 1) % 6;
     if (n_spoilt == 1) {
-        size_t *const sizes[] = {
-            &hand.n_fingers, &hand.n_lanes, &hand.n_features, &hand.n_lags,
-            &hand.n_history, &hand.n_channels, &hand.n_levels, &hand.n_track};
+        size_t *const sizes[] = {&hand.n_fingers, &hand.n_lanes,   &hand.n_features,
+                                 &hand.n_lags,    &hand.n_history, &hand.n_channels,
+                                 &hand.n_levels,  &hand.n_track};
         spoil(&in, sizes, sizeof sizes / sizeof *sizes);
     }
     const bool is_small = hand.n_fingers <= MAX_LENGTH && hand.n_lanes <= MAX_LENGTH &&

@@ -18,7 +18,7 @@ typedef struct {
     holdfast_finger_memory *state;
     holdfast_values *values;
     size_t n_taxels;
-    size_t n; /* lanes: n_taxels rounded up */
+    size_t n;                 /* lanes: n_taxels rounded up */
     const hf_real *used;      /* (n) 1 for taxels that contribute, else 0 */
     const hf_real *rotations; /* (9, n) */
     const hf_real *places;    /* (3, n) */

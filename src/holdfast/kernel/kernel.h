@@ -48,6 +48,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #if defined(__FAST_MATH__) || __FINITE_MATH_ONLY__ + 0 || defined(_M_FP_FAST)
 #error "holdfast needs arithmetic with NaN: compile without -ffast-math or /fp:fast"
@@ -100,8 +101,8 @@ typedef double hf_real;
 #define HF_ARRAY(type, name, length) type *name
 #endif
 
-/* Partial sums of which a sum over taxels consists (finger.h); the taxels of a finger are padded to a
- * multiple of it. Tests also compile with 1: all taxels one after the other, as in Python. */
+/* Partial sums of which a sum over taxels consists (finger.h); the taxels of a finger are padded to
+ * a multiple of it. Tests also compile with 1: all taxels one after the other, as in Python. */
 #ifndef HF_LANES
 #define HF_LANES 4
 #endif
@@ -130,15 +131,15 @@ enum {
 
 /* How the baseline is found. */
 enum {
-    HOLDFAST_TARE_SECONDS = 0,  /* mean over the first `tare_seconds` */
-    HOLDFAST_TARE_FIRST = 1,    /* first valid sample */
-    HOLDFAST_TARE_NONE = 2,     /* none, or that given to `holdfast_begin` */
-    HOLDFAST_TARE_INTERVAL = 3  /* that given to `holdfast_begin` */
+    HOLDFAST_TARE_SECONDS = 0, /* mean over the first `tare_seconds` */
+    HOLDFAST_TARE_FIRST = 1,   /* first valid sample */
+    HOLDFAST_TARE_NONE = 2,    /* none, or that given to `holdfast_begin` */
+    HOLDFAST_TARE_INTERVAL = 3 /* that given to `holdfast_begin` */
 };
 
 /* Kinds of features, from the force (equations 1 and 2 of the paper) ... */
 enum {
-    HOLDFAST_F_A = 0,       /* |F_tip| */
+    HOLDFAST_F_A = 0, /* |F_tip| */
     HOLDFAST_F_X = 1,
     HOLDFAST_F_Y = 2,
     HOLDFAST_F_Z = 3,
@@ -187,7 +188,7 @@ enum {
 
 /* Constants of a finger. */
 typedef struct {
-    size_t first_taxel;     /* its first row of the readings of a sample */
+    size_t first_taxel; /* its first row of the readings of a sample */
     size_t n_taxels;
     size_t first;           /* its first lane in the arrays of taxels; a multiple of HF_LANES */
     hf_real n_used;         /* number of taxels that are not ignored */
@@ -207,37 +208,37 @@ typedef struct {
 
 /* A feature of a finger. */
 typedef struct {
-    int32_t kind;     /* HOLDFAST_F_A, ...; -1 is padding, whose value is 0 */
+    int32_t kind; /* HOLDFAST_F_A, ...; -1 is padding, whose value is 0 */
     int32_t transform;
-    bool of_hand;     /* the largest value of all fingers */
-    size_t window;    /* N_w [samples], of kinds with a window; else 0 */
-    size_t lag;       /* index of the lag, of relative kinds; else 0 */
-    size_t same_as;   /* first feature of the finger that is the same but for `of_hand` */
-    hf_real floor;    /* of HOLDFAST_LOG [unit of the readings] */
+    bool of_hand;   /* the largest value of all fingers */
+    size_t window;  /* N_w [samples], of kinds with a window; else 0 */
+    size_t lag;     /* index of the lag, of relative kinds; else 0 */
+    size_t same_as; /* first feature of the finger that is the same but for `of_hand` */
+    hf_real floor;  /* of HOLDFAST_LOG [unit of the readings] */
 } holdfast_feature;
 
 /* A lag of relative features. */
 typedef struct {
-    size_t samples;    /* at even times */
+    size_t samples; /* at even times */
     double seconds;
-    bool has_changes;  /* some feature needs HF_FORCE_CHANGE to HF_LOAD_TO_NOISE at this lag */
-    bool has_seconds;  /* some feature needs second differences, or their averages */
-    bool has_means;    /* their averages */
-    bool has_ratios;   /* HF_SHEAR_GAIN to HF_RATIO_GAIN */
+    bool has_changes; /* some feature needs HF_FORCE_CHANGE to HF_LOAD_TO_NOISE at this lag */
+    bool has_seconds; /* some feature needs second differences, or their averages */
+    bool has_means;   /* their averages */
+    bool has_ratios;  /* HF_SHEAR_GAIN to HF_RATIO_GAIN */
 } holdfast_lag;
 
 /* Tables: constants of a hand. Values of taxels stand in lanes: for each finger all x, then all y,
  * then all z, of `n` lanes each, where n is n_taxels rounded up to HF_LANES. */
 typedef struct {
     size_t n_fingers;
-    size_t n_lanes;      /* of all fingers */
-    size_t n_features;   /* of the finger that has most */
-    size_t n_lags;       /* 0 without relative features */
-    size_t n_history;    /* samples of the longest window */
-    size_t n_channels;   /* with Haar windows: 1 (F_a), or 4 (its components too) */
-    size_t n_levels;     /* sizes of blocks in the longest window, see window.c */
-    size_t n_track;      /* samples of the ring of relative features; at least 1 */
-    hf_real period;      /* of the samples [s] */
+    size_t n_lanes;    /* of all fingers */
+    size_t n_features; /* of the finger that has most */
+    size_t n_lags;     /* 0 without relative features */
+    size_t n_history;  /* samples of the longest window */
+    size_t n_channels; /* with Haar windows: 1 (F_a), or 4 (its components too) */
+    size_t n_levels;   /* sizes of blocks in the longest window, see window.c */
+    size_t n_track;    /* samples of the ring of relative features; at least 1 */
+    hf_real period;    /* of the samples [s] */
     int32_t tare_kind;
     hf_real tare_seconds;
     hf_real noise_seconds; /* time over which the noise is measured */
@@ -291,41 +292,41 @@ typedef struct {
 
 /* Load and noise of a finger with relative features (motion.c). */
 typedef struct {
-    int64_t n_samples;          /* since the last gap that is not bridged */
-    hf_real least_normal;       /* normal force of the reference: the least so far, at most 0 */
-    hf_real reference[3];       /* F_tip at the least normal force */
-    hf_real load;               /* force beyond the reference */
-    hf_real peak_load;          /* the largest so far, slowly forgotten */
-    hf_real taxel_load;         /* root of the sum of squares of the taxel forces beyond it */
-    hf_real peak_taxel_load;    /* the largest so far, slowly forgotten */
-    hf_real noise;              /* of F_tip, standard deviation of the norm */
-    hf_real taxel_noise;        /* of all taxels, standard deviation of the norm */
-    hf_real least_noise;        /* of the blocks that are complete; infinite before */
+    int64_t n_samples;       /* since the last gap that is not bridged */
+    hf_real least_normal;    /* normal force of the reference: the least so far, at most 0 */
+    hf_real reference[3];    /* F_tip at the least normal force */
+    hf_real load;            /* force beyond the reference */
+    hf_real peak_load;       /* the largest so far, slowly forgotten */
+    hf_real taxel_load;      /* root of the sum of squares of the taxel forces beyond it */
+    hf_real peak_taxel_load; /* the largest so far, slowly forgotten */
+    hf_real noise;           /* of F_tip, standard deviation of the norm */
+    hf_real taxel_noise;     /* of all taxels, standard deviation of the norm */
+    hf_real least_noise;     /* of the blocks that are complete; infinite before */
     hf_real least_taxel_noise;
-    hf_real block_squares;      /* of the steps of F_tip in the block that is not complete */
+    hf_real block_squares; /* of the steps of F_tip in the block that is not complete */
     hf_real block_taxel_squares;
-    int64_t block_steps;        /* their number */
-    double block_start;         /* [s]; NaN before the first sample */
-    double moved_at;            /* when the force last moved by much more than its noise [s] */
-    hf_real moved_by;           /* change of the force over HF_MOVE_SECONDS */
-    hf_real pressure;           /* sum of |h_i . n| over the taxels */
-    hf_real pressure_squares;   /* sum of their squares */
-    hf_real normal_floor;       /* |normal force| beyond the reference and 10 times its noise */
-    hf_real tangent[3];         /* direction of the tangential force */
-    hf_real contact_zero[3];    /* F_tip without contact: of the tare, or of a release since */
-    hf_real contact_load;       /* force beyond contact_zero */
-    hf_real peak_contact_load;  /* the largest so far, slowly forgotten */
+    int64_t block_steps;       /* their number */
+    double block_start;        /* [s]; NaN before the first sample */
+    double moved_at;           /* when the force last moved by much more than its noise [s] */
+    hf_real moved_by;          /* change of the force over HF_MOVE_SECONDS */
+    hf_real pressure;          /* sum of |h_i . n| over the taxels */
+    hf_real pressure_squares;  /* sum of their squares */
+    hf_real normal_floor;      /* |normal force| beyond the reference and 10 times its noise */
+    hf_real tangent[3];        /* direction of the tangential force */
+    hf_real contact_zero[3];   /* F_tip without contact: of the tare, or of a release since */
+    hf_real contact_load;      /* force beyond contact_zero */
+    hf_real peak_contact_load; /* the largest so far, slowly forgotten */
 } holdfast_motion;
 
 /* Memory of a finger. */
 typedef struct {
     /* Time and stretches (stream.c). */
-    double first_time;     /* of the first valid sample [s]; NaN before */
-    double last_time;      /* of the last sample [s]; NaN before */
-    int64_t n_seen;        /* valid samples so far */
-    int64_t n_stretch;     /* forces in the present stretch */
-    bool after_gap;        /* a stretch after a gap warms up */
-    size_t row;            /* of the newest force in the rings of history and blocks */
+    double first_time; /* of the first valid sample [s]; NaN before */
+    double last_time;  /* of the last sample [s]; NaN before */
+    int64_t n_seen;    /* valid samples so far */
+    int64_t n_stretch; /* forces in the present stretch */
+    bool after_gap;    /* a stretch after a gap warms up */
+    size_t row;        /* of the newest force in the rings of history and blocks */
     /* Tare and noise (tare.c). */
     bool is_tared;         /* the baseline is frozen */
     int64_t n_tared;       /* samples in the baseline so far */
@@ -335,30 +336,30 @@ typedef struct {
     hf_real max_amplitude; /* largest F_a so far, of samples without a serious fault */
     int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
     /* Changes and faulty taxels (faults.c). */
-    int64_t n_unchanged;   /* samples since the readings last changed */
-    int64_t n_changes;     /* samples that changed the readings */
-    int64_t longest_rest;  /* most samples without a change, if long and not by a fault */
-    uint32_t taxel_faults; /* faults of single taxels at the last sample that changed a reading */
+    int64_t n_unchanged;    /* samples since the readings last changed */
+    int64_t n_changes;      /* samples that changed the readings */
+    int64_t longest_rest;   /* most samples without a change, if long and not by a fault */
+    uint32_t taxel_faults;  /* faults of single taxels at the last sample that changed a reading */
     uint64_t faulty_taxels; /* bits of those taxels */
     uint64_t noisy_taxels;  /* bits of the noisy ones among them */
     /* Taxels that are left out (masks.c). */
-    int64_t n_refused;     /* successive samples of the tare with a reading that is not valid */
-    uint64_t lost;         /* bits of the taxels that have no tare */
-    uint32_t lost_faults;  /* their faults */
-    uint64_t masked;       /* bits of the taxels that are left out */
-    bool too_many;         /* the others carry too little of the load */
-    bool load_known;       /* the load was known when the mask last changed */
-    bool unloaded;         /* this load has gone */
-    bool fading;           /* the value of a taxel that came back still fades */
-    hf_real fill_squares;  /* sum of the squares of last_healthy, of the healthy taxels */
-    hf_real fill_ratio;    /* load of the healthy taxels, beside that when the mask changed */
+    int64_t n_refused;    /* successive samples of the tare with a reading that is not valid */
+    uint64_t lost;        /* bits of the taxels that have no tare */
+    uint32_t lost_faults; /* their faults */
+    uint64_t masked;      /* bits of the taxels that are left out */
+    bool too_many;        /* the others carry too little of the load */
+    bool load_known;      /* the load was known when the mask last changed */
+    bool unloaded;        /* this load has gone */
+    bool fading;          /* the value of a taxel that came back still fades */
+    hf_real fill_squares; /* sum of the squares of last_healthy, of the healthy taxels */
+    hf_real fill_ratio;   /* load of the healthy taxels, beside that when the mask changed */
     /* Samples that cannot be true (untrue.c). */
-    hf_real rest_sum;      /* weighted sum of the readings at rest, see hf_scan; NaN before */
-    uint64_t n_frames;     /* samples without an invalid reading */
-    uint64_t ring_period;  /* of the ring of samples that is followed; 0 without one */
-    uint64_t ring_length;  /* successive samples with the sum of that a period before */
-    uint64_t ring_age;     /* samples since the ring is followed */
-    bool ring_varies;      /* enough readings and samples of the ring differ */
+    hf_real rest_sum;     /* weighted sum of the readings at rest, see hf_scan; NaN before */
+    uint64_t n_frames;    /* samples without an invalid reading */
+    uint64_t ring_period; /* of the ring of samples that is followed; 0 without one */
+    uint64_t ring_length; /* successive samples with the sum of that a period before */
+    uint64_t ring_age;    /* samples since the ring is followed */
+    bool ring_varies;     /* enough readings and samples of the ring differ */
     holdfast_motion motion;
 } holdfast_finger_memory;
 
@@ -376,7 +377,7 @@ typedef struct {
 /* Memory of a stream. */
 typedef struct {
     HF_ARRAY(holdfast_values, values, HOLDFAST_N_FINGERS);
-    HF_ARRAY(hf_real, features, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES);
+    HF_ARRAY(hf_real, features, HOLDFAST_N_FINGERS *HOLDFAST_N_FEATURES);
     HF_ARRAY(holdfast_finger_memory, fingers, HOLDFAST_N_FINGERS);
     HF_ARRAY(holdfast_taxel, taxels, HOLDFAST_N_LANES);
     HF_ARRAY(holdfast_mask, masks, HOLDFAST_N_LANES);
@@ -386,19 +387,19 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
-    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS * HF_N_RING_SUMS); /* of samples, a ring */
+    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS *HF_N_RING_SUMS); /* of samples, a ring */
     /* (n_fingers, n_history, 4) and (n_fingers, n_history, n_channels, n_levels, 3): rings. */
-    HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HF_N_COMPONENTS);
-    HF_ARRAY(hf_real, blocks,
-             HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HOLDFAST_N_CHANNELS * HOLDFAST_N_LEVELS *
-                 HF_N_SUMS);
+    HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS *HOLDFAST_N_HISTORY *HF_N_COMPONENTS);
+    HF_ARRAY(
+        hf_real, blocks,
+        HOLDFAST_N_FINGERS *HOLDFAST_N_HISTORY *HOLDFAST_N_CHANNELS *HOLDFAST_N_LEVELS *HF_N_SUMS);
     /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
-    HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
+    HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS *HOLDFAST_N_TRACK);
     HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
     /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_SECONDS). */
-    HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
-    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
-    HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES); /* before the hand's maximum */
+    HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS *(HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
+    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS *(HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
+    HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS *HOLDFAST_N_FEATURES); /* before the hand's maximum */
     HF_ARRAY(hf_real, of_hand, HOLDFAST_N_FEATURES); /* that maximum, if the fingers are alike */
 } holdfast_memory;
 

@@ -21,7 +21,7 @@
 /* A taxel without a valid reading for this long in the tare is left out until the next [s]. */
 #define HF_LOST_SECONDS ((hf_real)0.5)
 
-/* Let the taxels of some bits, which are at a limit at this sample, count for their last reading. */
+/* Let the taxels of some bits, which are at a limit now, count for their last reading. */
 static void hf_note_saturated(const hf_finger *f, uint64_t bits)
 {
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -97,8 +97,8 @@ static void hf_load_of(const hf_finger *f, size_t i, hf_real load[3])
         hf_beyond_rest(f, i, load);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
-        load[axis] = is_filled ? s->fill_ratio * mask->last_healthy[axis]
-                               : load[axis] + mask->fade[axis];
+        load[axis] =
+            is_filled ? s->fill_ratio * mask->last_healthy[axis] : load[axis] + mask->fade[axis];
     }
 }
 

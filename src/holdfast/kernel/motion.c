@@ -185,14 +185,11 @@ static void hf_update_load(const hf_finger *f, size_t now, hf_real keep)
     /* The reference: F and g_i at the least F . n so far. */
     const hf_real normal = hf_dot(force, f->finger->normal);
     if (normal < m->least_normal) {
-        const hf_real *const taxel_forces = hf_forces_at(f, now);
         m->least_normal = normal;
         for (size_t axis = 0; axis < 3; ++axis) {
             m->reference[axis] = force[axis];
         }
-        for (size_t i = 0; i < 3 * f->n; ++i) {
-            f->reference[i] = taxel_forces[i];
-        }
+        memcpy(f->reference, hf_forces_at(f, now), 3 * f->n * sizeof(hf_real));
         m->taxel_load = 0;
     }
     /* load = |F - F_ref|, peak(k) = max(load(k), exp(-step / tau) peak(k-1)); the same for

@@ -133,8 +133,7 @@ static int32_t hf_process(const hf_finger *f, double time)
     holdfast_finger_memory *const s = f->state;
     holdfast_values *const v = f->values;
     const hf_real low = f->finger->low, high = f->finger->high;
-    const bool after_gap =
-        (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
+    const bool after_gap = (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
     hf_clear_values(v);
     s->last_time = time;
     if (after_gap) {
@@ -231,8 +230,8 @@ static hf_real hf_force_feature(const hf_finger *f, int32_t kind, size_t window)
 static hf_real hf_feature(const hf_finger *f, const holdfast_feature *feature)
 {
     if (feature->kind >= HOLDFAST_FIRST_RELATIVE) {
-        return f->relative[feature->lag * HOLDFAST_N_RELATIVE +
-                           (size_t)(feature->kind - HOLDFAST_FIRST_RELATIVE)];
+        const hf_real *const relative = f->relative + feature->lag * HOLDFAST_N_RELATIVE;
+        return relative[feature->kind - HOLDFAST_FIRST_RELATIVE];
     }
     const size_t n_needed = feature->window > 1 ? feature->window : 1;
     if (f->state->n_stretch < (int64_t)n_needed) {
@@ -299,13 +298,13 @@ static void hf_fill_features(const holdfast_hand *hand, holdfast_memory *memory,
     const size_t width = HF_N_FEATURES(hand);
     const holdfast_feature *const features = hand->features + index * width;
     hf_real *const out = memory->features + index * width;
-    hf_real total = 0;
+    bool is_known = true;
     for (size_t j = 0; j < width; ++j) {
         out[j] = features[j].of_hand ? hf_largest(hand, memory, index, j)
                                      : memory->own[index * width + j];
-        total += out[j];
+        is_known = is_known && !isnan(out[j]);
     }
-    if (isnan(total)) {
+    if (!is_known) {
         memory->values[index].reason = HOLDFAST_TARE; /* the noise is not known yet */
     }
 }

@@ -1,8 +1,6 @@
 /* Tables and memory of a stream: what is checked once, and the state before the first sample. */
 #include "finger.h"
 
-#include <string.h>
-
 static bool hf_are_finite(const hf_real *values, size_t n)
 {
     bool are_finite = true;
@@ -113,7 +111,8 @@ static const char *hf_check_finger(
 }
 
 /* Return NULL if feature j of a finger has what it needs, else what is wrong. */
-static const char *hf_check_feature(const holdfast_hand *hand, const holdfast_feature *features, size_t j)
+static const char *hf_check_feature(
+    const holdfast_hand *hand, const holdfast_feature *features, size_t j)
 {
     const holdfast_feature *const feature = &features[j];
     if (feature->kind < -1 || feature->kind >= HOLDFAST_FIRST_RELATIVE + HOLDFAST_N_RELATIVE) {

@@ -48,9 +48,7 @@ static bool hf_update_tare(const hf_finger *f, hf_real elapsed)
     if (isnan(s->noise)) {
         hf_measure_noise(f, elapsed >= f->hand->noise_seconds);
     }
-    for (size_t i = 0; i < 3 * f->n; ++i) {
-        f->previous[i] = f->readings[i];
-    }
+    memcpy(f->previous, f->readings, 3 * f->n * sizeof(hf_real));
     if (!s->is_tared) {
         s->n_refused = 0;
         /* One sample at least. */

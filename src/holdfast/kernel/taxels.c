@@ -89,8 +89,12 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
         }
     }
     const hf_taxel_sums sums = {
-        {hf_total(fx), hf_total(fy), hf_total(fz)}, hf_total(normal), hf_total(weight),
-        hf_total(pressure_squares), hf_total(squares), hf_total(moved)};
+        {hf_total(fx), hf_total(fy), hf_total(fz)},
+        hf_total(normal),
+        hf_total(weight),
+        hf_total(pressure_squares),
+        hf_total(squares),
+        hf_total(moved)};
     return sums;
 }
 
@@ -110,8 +114,8 @@ static hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
             cx.lane[l] += p[i] * rx;
             cy.lane[l] += p[i] * ry;
             cz.lane[l] += p[i] * rz;
-            moment.lane[l] += (ry * gz - rz * gy) * nx + (rz * gx - rx * gz) * ny +
-                              (rx * gy - ry * gx) * nz;
+            moment.lane[l] +=
+                (ry * gz - rz * gy) * nx + (rz * gx - rx * gz) * ny + (rx * gy - ry * gx) * nz;
         }
     }
     centre[0] = hf_total(cx);
@@ -127,7 +131,8 @@ typedef struct {
 } hf_residual;
 
 /* Return the motion of the taxels from one place of the ring to another, against `mean`. */
-static hf_residual hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3])
+static hf_residual hf_residual_of(
+    const hf_finger *f, size_t now, size_t then, const hf_real mean[3])
 {
     /* sum |u_i|^2 and sum (u_i . n)^2, with u_i = dg_i - mean dg. */
     const size_t n = f->n;
@@ -197,7 +202,9 @@ static hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
         }
     }
     const hf_second_sums sums = {
-        hf_total(squares), hf_total(shared), hf_total(along),
+        hf_total(squares),
+        hf_total(shared),
+        hf_total(along),
         {hf_total(px), hf_total(py), hf_total(pz)},
         hf_max(hf_max(top.lane[0], top.lane[1]), hf_max(top.lane[2], top.lane[3]))};
     return sums;
