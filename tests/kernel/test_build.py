@@ -50,8 +50,10 @@ def python(folder, code):
 def test_after_an_edit_of_c_one_line_names_the_command_that_builds(clone):
     version = "import holdfast.kernel as k; print(k._extension.SOURCES)"
     before = python(clone, version).stdout
-    source = clone / "src" / "holdfast" / "kernel" / "module.c"
-    source.write_text(re.sub(r"\b16\b", "17", source.read_text()) + "\n")
+    source = clone / "src" / "holdfast" / "kernel" / "haar.c"
+    text = source.read_text()
+    assert text.count("BLOCK_SAMPLES = 384,") == 1
+    source.write_text(text.replace("BLOCK_SAMPLES = 384,", "BLOCK_SAMPLES = 256,"))
     failed = python(clone, version)
     expected = f"the C kernel was built from other sources; build it again: {BUILD}"
     assert failed.stderr.splitlines()[-1].endswith(expected)

@@ -219,6 +219,21 @@ def test_tables_that_do_not_fit_are_refused(name, monkeypatch):
     assert message in str(raised.value)
 
 
+@pytest.mark.parametrize("which", [1, 2])
+def test_a_number_that_cuts_the_list_it_is_in_is_refused(which, monkeypatch):
+    arguments = tables_of(made()[0], monkeypatch)
+    field = {1: "low", 2: "floor"}[which]
+
+    class Cutting:
+        def __float__(self):
+            arguments[which].clear()
+            return 1.0
+
+    arguments[which][0][field] = Cutting()
+    with pytest.raises(IndexError, match="list index out of range"):
+        _extension.Stream(*arguments)
+
+
 def test_a_stream_takes_no_names():
     with pytest.raises(TypeError) as raised:
         _extension.Stream(hand={})

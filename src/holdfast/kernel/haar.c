@@ -18,8 +18,8 @@
 #include <math.h>
 
 enum {
-    BLOCK_SAMPLES = 1024, /* computed at a time: their scratch memory stays in the cache */
-    CACHE_LINE = 8        /* doubles; rows begin at a multiple, so that no vector lies in two */
+    BLOCK_SAMPLES = 384, /* computed at a time: their scratch memory stays in the L1 cache */
+    CACHE_LINE = 8       /* doubles; rows begin at a multiple, so that no vector lies in two */
 };
 
 /* gcc compiles a function and all that it calls twice, and the processor chooses at run time: with

@@ -345,7 +345,14 @@ static void *read_structs(stream *s, PyObject *list, size_t n, const field *fiel
     }
     char *const block = allocate(s, n, size);
     for (size_t i = 0; i < n && block != NULL; ++i) {
-        if (read_struct(PyList_GetItem(list, (Py_ssize_t)i), fields, block + i * size) < 0) {
+        PyObject *const item = PyList_GetItem(list, (Py_ssize_t)i);
+        if (item == NULL) { /* a number of the item before, which is any object, cut the list */
+            return NULL;
+        }
+        Py_INCREF(item);
+        const int result = read_struct(item, fields, block + i * size);
+        Py_DECREF(item);
+        if (result < 0) {
             return NULL;
         }
     }
