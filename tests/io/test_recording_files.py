@@ -247,7 +247,6 @@ def test_a_small_file_has_little_memory(make_recording, tmp_path, monkeypatch, s
     monkeypatch.setattr(safe_reading, "MEMORY_PER_BYTE", 1, raising=False)
     with pytest.raises(RecordingError, match=r"are allowed for a file of .* cut it into"):
         load_recording(path)
-    assert len(list(read_chunks(path, 1000))) >= 20
 
 
 @pytest.mark.parametrize("suffix", ["parquet", "mcap"])

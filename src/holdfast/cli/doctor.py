@@ -7,7 +7,7 @@ import socket
 import subprocess
 import time
 from contextlib import suppress
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,14 +43,22 @@ EXTRA_PURPOSES = {
 PROBE_TIMEOUT = 0.3
 """Time in which a server must accept a connection [s]."""
 
-PLUGIN_TIMEOUT = 20.0
+PLUGIN_GROUPS = {
+    "sensors": ("sensors", "SENSOR_PLUGINS"),
+    "sources": ("devices.uri", "SOURCE_PLUGINS"),
+    "hands": ("devices.hands", "HAND_PLUGINS"),
+    "importers": ("io.importers", "IMPORTER_PLUGINS"),
+    "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
+    "laws": ("grip.laws", "LAW_PLUGINS"),
+}
+"""Module and name of each group of plug-ins, by kind; a child imports one of them."""
+PLUGIN_TIMEOUT = 60.0
 """Time in which a plug-in must be imported [s]."""
 
 _ANSWER = "error of the plug-in: "
 _LOAD_PLUGIN = (
-    "from holdfast.cli.doctor import plugin_groups\n"
-    "(group,) = (group for group in plugin_groups() if group.kind == sys.argv[1])\n"
-    f"print({_ANSWER!r} + group.error(sys.argv[2]), end='')"
+    "from holdfast.cli.doctor import plugin_group\n"
+    f"print({_ANSWER!r} + plugin_group(sys.argv[1]).error(sys.argv[2]), end='')"
 )
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
@@ -98,7 +106,7 @@ def _report(context: typer.Context) -> dict[str, Any]:
 
 def _plugins() -> "list[Plugin]":
     """Return the plug-ins of other packages, and why some of them are skipped."""
-    return [plugin for group in plugin_groups() for plugin in group.states(_plugin_error)]
+    return [plugin for kind in PLUGIN_GROUPS for plugin in plugin_group(kind).states(_plugin_error)]
 
 
 def _plugin_error(kind: str, name: str) -> str:
@@ -114,17 +122,11 @@ def _plugin_error(kind: str, name: str) -> str:
     return error if answered else f"its import ends the process (exit code {done.returncode})"
 
 
-def plugin_groups() -> "tuple[PluginGroup[Any], ...]":
-    """Return the groups of plug-ins."""
-    from holdfast.classifiers import CLASSIFIER_PLUGINS
-    from holdfast.devices.hands import HAND_PLUGINS
-    from holdfast.devices.uri import SOURCE_PLUGINS
-    from holdfast.grip.laws import LAW_PLUGINS
-    from holdfast.io.importers import IMPORTER_PLUGINS
-    from holdfast.sensors import SENSOR_PLUGINS
-
-    device_groups = (SENSOR_PLUGINS, SOURCE_PLUGINS, HAND_PLUGINS)
-    return (*device_groups, IMPORTER_PLUGINS, CLASSIFIER_PLUGINS, LAW_PLUGINS)
+def plugin_group(kind: str) -> "PluginGroup[Any]":
+    """Return the plug-ins of a kind."""
+    module, name = PLUGIN_GROUPS[kind]
+    group: PluginGroup[Any] = getattr(import_module(f"holdfast.{module}"), name)
+    return group
 
 
 def _packages() -> dict[str, dict[str, str | None]]:
