@@ -21,8 +21,8 @@ size_t holdfast_haar_scratch(size_t window);
  *     finite.
  * scratch: is overwritten.
  */
-void holdfast_haar_features(const double *force, size_t window, size_t first, size_t stop,
-                            double *out, double *scratch);
+void holdfast_haar_features(
+    const double *force, size_t window, size_t first, size_t stop, double *out, double *scratch);
 
 /* Compute F_tip = sum_i R_i (f_i - b_i) at n samples.
  *
@@ -31,7 +31,8 @@ void holdfast_haar_features(const double *force, size_t window, size_t first, si
  * rotations: (n_taxels, 3, 3) R_i, from the taxel frame to the fingertip frame.
  * force: (n, 3) in the fingertip frame; NaN where the force is not finite.
  */
-void holdfast_fingertip_force(const double *readings, const double *baseline,
-                              const double *rotations, size_t n, size_t n_taxels, double *force);
+void holdfast_fingertip_force(
+    const double *readings, const double *baseline, const double *rotations, size_t n,
+    size_t n_taxels, double *force);
 
 #endif

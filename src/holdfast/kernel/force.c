@@ -3,8 +3,9 @@
 
 #include <math.h>
 
-void holdfast_fingertip_force(const double *readings, const double *baseline,
-                              const double *rotations, size_t n, size_t n_taxels, double *force)
+void holdfast_fingertip_force(
+    const double *readings, const double *baseline, const double *rotations, size_t n,
+    size_t n_taxels, double *force)
 {
     for (size_t k = 0; k < n; ++k) {
         const double *f = readings + 3 * n_taxels * k;

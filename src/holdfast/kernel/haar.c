@@ -76,8 +76,8 @@ static void amplitudes(const double *restrict force, double *restrict amplitude,
 /* Compute F_a of n samples, and write it and the force to their rows.
  *
  * The rows are written while the square roots are computed: the processor waits for both. */
-static void write_forces(const double *restrict force, double *restrict amplitude,
-                         double *restrict rows, size_t n)
+static void write_forces(
+    const double *restrict force, double *restrict amplitude, double *restrict rows, size_t n)
 {
     for (size_t k = 0; k < n; ++k, force += 3, rows += HOLDFAST_N_HAAR) {
         const double x = force[0], y = force[1], z = force[2];
@@ -164,8 +164,8 @@ static void moments(const sums *older, size_t n_older, const sums *newer, size_t
 }
 
 /* Write m and sigma to n rows; a row whose window has a value that is not finite becomes NaN. */
-static void write_moments(const double *restrict m, const double *restrict sigma,
-                          double *restrict rows, size_t n)
+static void write_moments(
+    const double *restrict m, const double *restrict sigma, double *restrict rows, size_t n)
 {
     for (size_t k = 0; k < n; ++k, rows += HOLDFAST_N_HAAR) {
         rows[4] = m[k];
@@ -178,8 +178,8 @@ static void write_moments(const double *restrict m, const double *restrict sigma
 
 /* Fill n rows, at most BLOCK_SAMPLES, from the n + window - 1 forces of their windows. */
 FOR_EACH_PROCESSOR
-static void features_of_block(const double *force, size_t window, size_t n, double *rows,
-                              double *scratch)
+static void features_of_block(
+    const double *force, size_t window, size_t n, double *rows, double *scratch)
 {
     const size_t n_pairs = window / 2, n_before = window - 1, row = row_length(window);
     double *const amplitude = scratch;
@@ -221,16 +221,16 @@ static void features_of_block(const double *force, size_t window, size_t n, doub
     write_moments(newer.p, newer.s, rows, n);
 }
 
-void holdfast_haar_features(const double *force, size_t window, size_t first, size_t stop,
-                            double *out, double *scratch)
+void holdfast_haar_features(
+    const double *force, size_t window, size_t first, size_t stop, double *out, double *scratch)
 {
     for (; first < stop && first < window - 1; ++first) {
         fill(out + HOLDFAST_N_HAAR * first, (double)NAN, HOLDFAST_N_HAAR);
     }
     while (first < stop) {
         const size_t n = stop - first < BLOCK_SAMPLES ? stop - first : BLOCK_SAMPLES;
-        features_of_block(force + 3 * (first - (window - 1)), window, n,
-                          out + HOLDFAST_N_HAAR * first, scratch);
+        features_of_block(
+            force + 3 * (first - (window - 1)), window, n, out + HOLDFAST_N_HAAR * first, scratch);
         first += n;
     }
 }

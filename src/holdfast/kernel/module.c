@@ -35,26 +35,22 @@ static void release(array *arrays, size_t n)
 static int check_size(const array *a)
 {
     Py_ssize_t n_bytes = a->view.itemsize;
-    int empty = 0;
     for (int axis = 0; axis < a->view.ndim; ++axis) {
-        empty |= a->view.shape[axis] == 0;
-    }
-    for (int axis = 0; axis < a->view.ndim && !empty; ++axis) {
-        if (a->view.shape[axis] < 0 || n_bytes > PY_SSIZE_T_MAX / a->view.shape[axis]) {
+        const Py_ssize_t length = a->view.shape[axis];
+        if (length < 0 || (length > 0 && n_bytes > PY_SSIZE_T_MAX / length)) {
             return -1;
         }
-        n_bytes *= a->view.shape[axis];
+        n_bytes *= length;
     }
-    return a->view.len == (empty ? 0 : n_bytes) ? 0 : -1;
+    return a->view.len == n_bytes ? 0 : -1;
 }
 
 /* Fill `a` with the buffer of an object, or set an exception and return -1.
  *
- * The buffer must be contiguous, with `n_axes` axes, of the type 'd' (float64 of this machine's byte
- * order) or '?' (bool).
+ * The buffer must be contiguous, with `n_axes` axes, of the type 'd' (float64 of this machine's
+ * byte order) or '?' (bool).
  */
-static int get_array_of(char type, PyObject *object, const char *name, int n_axes, int flags,
-                        array *a)
+static int get_array(char type, PyObject *object, const char *name, int n_axes, int flags, array *a)
 {
     const size_t size = type == 'd' ? sizeof(double) : 1;
     a->name = name;
@@ -66,13 +62,14 @@ static int get_array_of(char type, PyObject *object, const char *name, int n_axe
         ++format;
     }
     if (format[0] != type || format[1] != '\0' || a->view.itemsize != (Py_ssize_t)size) {
-        PyErr_Format(PyExc_TypeError, "%s: %s expected, the format %s given", name,
-                     type == 'd' ? "float64" : "bool", format);
+        PyErr_Format(
+            PyExc_TypeError, "%s: %s expected, the format %s given", name,
+            type == 'd' ? "float64" : "bool", format);
         return -1;
     }
     if (a->view.ndim != n_axes || a->view.shape == NULL) {
-        PyErr_Format(PyExc_ValueError, "%s: %d axes expected, %d given", name, n_axes,
-                     a->view.ndim);
+        PyErr_Format(
+            PyExc_ValueError, "%s: %d axes expected, %d given", name, n_axes, a->view.ndim);
         return -1;
     }
     if (check_size(a) < 0) {
@@ -87,21 +84,20 @@ static int get_array_of(char type, PyObject *object, const char *name, int n_axe
     return 0;
 }
 
-static int get_array(PyObject *object, const char *name, int n_axes, int flags, array *a)
+/* Return 0 if an array has this shape, else set an exception and return -1. */
+static int check_shape(const array *a, const Py_ssize_t *expected)
 {
-    return get_array_of('d', object, name, n_axes, flags, a);
-}
-
-/* Return 0 if an axis has this length, else set an exception and return -1. */
-static int check_axis(const array *a, int axis, Py_ssize_t expected)
-{
-    if (a->view.shape[axis] == expected) {
-        return 0;
+    for (int axis = 0; axis < a->view.ndim; ++axis) {
+        if (a->view.shape[axis] != expected[axis]) {
+            PyErr_Format(
+                PyExc_ValueError, "%s: axis %d has the length %zd, %zd expected", a->name, axis,
+                a->view.shape[axis], expected[axis]);
+            return -1;
+        }
     }
-    PyErr_Format(PyExc_ValueError, "%s: axis %d has the length %zd, %zd expected", a->name, axis,
-                 a->view.shape[axis], expected);
-    return -1;
+    return 0;
 }
+#define SHAPE(...) ((const Py_ssize_t[]){__VA_ARGS__})
 
 /* Return 0 if two arrays share no memory, else set an exception and return -1. */
 static int check_apart(const array *a, const array *out)
@@ -123,9 +119,9 @@ static int check_count(Py_ssize_t n_args, Py_ssize_t expected)
     return -1;
 }
 
-static PyObject *haar_features(PyObject *module, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *haar_features(
+    PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
 {
-    (void)module;
     if (check_count(n_args, 5) < 0) {
         return NULL;
     }
@@ -138,16 +134,19 @@ static PyObject *haar_features(PyObject *module, PyObject *const *args, Py_ssize
     array arrays[2] = {0}, *const force = &arrays[0], *const out = &arrays[1];
     double *scratch = NULL;
     PyObject *result = NULL;
-    if (get_array(args[0], "force", 2, PyBUF_SIMPLE, force) < 0 ||
-        get_array(args[4], "out", 2, PyBUF_WRITABLE, out) < 0 || check_axis(force, 1, 3) < 0 ||
-        check_axis(out, 0, force->view.shape[0]) < 0 ||
-        check_axis(out, 1, HOLDFAST_N_HAAR) < 0 || check_apart(force, out) < 0) {
+    if (get_array('d', args[0], "force", 2, PyBUF_SIMPLE, force) < 0 ||
+        get_array('d', args[4], "out", 2, PyBUF_WRITABLE, out) < 0) {
         goto done;
     }
     const Py_ssize_t n = force->view.shape[0];
+    if (check_shape(force, SHAPE(n, 3)) < 0 || check_shape(out, SHAPE(n, HOLDFAST_N_HAAR)) < 0 ||
+        check_apart(force, out) < 0) {
+        goto done;
+    }
     if (window < 2 || window % 2 || first < 0 || first > stop || stop > n) {
-        PyErr_Format(PyExc_ValueError, "window %zd, samples %zd to %zd of %zd given", window, first,
-                     stop, n);
+        PyErr_Format(
+            PyExc_ValueError, "window %zd, samples %zd to %zd of %zd given", window, first, stop,
+            n);
         goto done;
     }
     if (window <= n) { /* a longer one has no sample with features, and no scratch memory */
@@ -160,8 +159,8 @@ static PyObject *haar_features(PyObject *module, PyObject *const *args, Py_ssize
         }
     }
     Py_BEGIN_ALLOW_THREADS
-    holdfast_haar_features(force->data, (size_t)window, (size_t)first, (size_t)stop, out->data,
-                           scratch);
+    holdfast_haar_features(
+        force->data, (size_t)window, (size_t)first, (size_t)stop, out->data, scratch);
     Py_END_ALLOW_THREADS
     result = Py_NewRef(Py_None);
 done:
@@ -170,9 +169,9 @@ done:
     return result;
 }
 
-static PyObject *fingertip_force(PyObject *module, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *fingertip_force(
+    PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
 {
-    (void)module;
     if (check_count(n_args, 6) < 0) {
         return NULL;
     }
@@ -184,18 +183,18 @@ static PyObject *fingertip_force(PyObject *module, PyObject *const *args, Py_ssi
     array arrays[4] = {0}, *const readings = &arrays[0], *const baseline = &arrays[1];
     array *const rotations = &arrays[2], *const out = &arrays[3];
     PyObject *result = NULL;
-    if (get_array(args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array(args[1], "baseline", 2, PyBUF_SIMPLE, baseline) < 0 ||
-        get_array(args[2], "rotations", 3, PyBUF_SIMPLE, rotations) < 0 ||
-        get_array(args[5], "out", 2, PyBUF_WRITABLE, out) < 0) {
+    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
+        get_array('d', args[1], "baseline", 2, PyBUF_SIMPLE, baseline) < 0 ||
+        get_array('d', args[2], "rotations", 3, PyBUF_SIMPLE, rotations) < 0 ||
+        get_array('d', args[5], "out", 2, PyBUF_WRITABLE, out) < 0) {
         goto done;
     }
     const Py_ssize_t n = readings->view.shape[0], n_taxels = readings->view.shape[1];
-    if (check_axis(readings, 2, 3) < 0 || check_axis(baseline, 0, n_taxels) < 0 ||
-        check_axis(baseline, 1, 3) < 0 || check_axis(rotations, 0, n_taxels) < 0 ||
-        check_axis(rotations, 1, 3) < 0 || check_axis(rotations, 2, 3) < 0 ||
-        check_axis(out, 0, n) < 0 || check_axis(out, 1, 3) < 0 || check_apart(readings, out) < 0 ||
-        check_apart(baseline, out) < 0 || check_apart(rotations, out) < 0) {
+    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
+        check_shape(baseline, SHAPE(n_taxels, 3)) < 0 ||
+        check_shape(rotations, SHAPE(n_taxels, 3, 3)) < 0 || check_shape(out, SHAPE(n, 3)) < 0 ||
+        check_apart(readings, out) < 0 || check_apart(baseline, out) < 0 ||
+        check_apart(rotations, out) < 0) {
         goto done;
     }
     if (first < 0 || first > stop || stop > n) {
@@ -203,9 +202,9 @@ static PyObject *fingertip_force(PyObject *module, PyObject *const *args, Py_ssi
         goto done;
     }
     Py_BEGIN_ALLOW_THREADS
-    holdfast_fingertip_force(readings->data + 3 * n_taxels * first, baseline->data,
-                             rotations->data, (size_t)(stop - first), (size_t)n_taxels,
-                             out->data + 3 * first);
+    holdfast_fingertip_force(
+        readings->data + 3 * n_taxels * first, baseline->data, rotations->data,
+        (size_t)(stop - first), (size_t)n_taxels, out->data + 3 * first);
     Py_END_ALLOW_THREADS
     result = Py_NewRef(Py_None);
 done:
@@ -235,27 +234,28 @@ typedef struct {
     size_t offset;
 } field;
 
+/* clang-format off */
 #define OF_HAND(type, name) {#name, type, offsetof(holdfast_hand, name)}
 #define OF_FINGER(type, name) {#name, type, offsetof(holdfast_finger, name)}
 #define OF_FEATURE(type, name) {#name, type, offsetof(holdfast_feature, name)}
 #define OF_LAG(type, name) {#name, type, offsetof(holdfast_lag, name)}
 
 static const field hand_fields[] = {
-    OF_HAND(SIZE, n_fingers),      OF_HAND(SIZE, n_lanes),       OF_HAND(SIZE, n_features),
-    OF_HAND(SIZE, n_lags),         OF_HAND(SIZE, n_history),     OF_HAND(SIZE, n_channels),
-    OF_HAND(SIZE, n_levels),       OF_HAND(SIZE, n_track),       OF_HAND(REAL, period),
-    OF_HAND(CODE, tare_kind),      OF_HAND(REAL, tare_seconds),  OF_HAND(REAL, noise_seconds),
-    OF_HAND(REAL, average_gain),   OF_HAND(FLAG, alike),         OF_HAND(FLAG, has_centres),
-    OF_HAND(FLAG, has_ratios),     {NULL, SIZE, 0},
+    OF_HAND(SIZE, n_fingers), OF_HAND(SIZE, n_lanes), OF_HAND(SIZE, n_features),
+    OF_HAND(SIZE, n_lags), OF_HAND(SIZE, n_history), OF_HAND(SIZE, n_channels),
+    OF_HAND(SIZE, n_levels), OF_HAND(SIZE, n_track), OF_HAND(REAL, period),
+    OF_HAND(CODE, tare_kind), OF_HAND(REAL, tare_seconds), OF_HAND(REAL, noise_seconds),
+    OF_HAND(REAL, average_gain), OF_HAND(FLAG, alike), OF_HAND(FLAG, has_centres),
+    OF_HAND(FLAG, has_ratios), {NULL, SIZE, 0},
 };
 
 static const field finger_fields[] = {
-    OF_FINGER(SIZE, first_taxel),  OF_FINGER(SIZE, n_taxels),    OF_FINGER(SIZE, first),
-    OF_FINGER(REAL, n_used),       OF_FINGER(REAL, low),         OF_FINGER(REAL, high),
-    OF_FINGER(REAL, low_end),      OF_FINGER(REAL, high_end),    OF_FINGER(REAL, max_offset),
-    OF_FINGER(REAL, min_noise),    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step),
-    OF_FINGER(REALS_3, normal),    OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window),
-    OF_FINGER(FLAG, bridges),      {NULL, SIZE, 0},
+    OF_FINGER(SIZE, first_taxel), OF_FINGER(SIZE, n_taxels), OF_FINGER(SIZE, first),
+    OF_FINGER(REAL, n_used), OF_FINGER(REAL, low), OF_FINGER(REAL, high), OF_FINGER(REAL, low_end),
+    OF_FINGER(REAL, high_end), OF_FINGER(REAL, max_offset), OF_FINGER(REAL, min_noise),
+    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step), OF_FINGER(REALS_3, normal),
+    OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window), OF_FINGER(FLAG, bridges),
+    {NULL, SIZE, 0},
 };
 
 static const field feature_fields[] = {
@@ -266,9 +266,9 @@ static const field feature_fields[] = {
 
 static const field lag_fields[] = {
     OF_LAG(SIZE, samples), OF_LAG(REAL, seconds), OF_LAG(FLAG, has_changes),
-    OF_LAG(FLAG, has_seconds), OF_LAG(FLAG, has_means), OF_LAG(FLAG, has_ratios),
-    {NULL, SIZE, 0},
+    OF_LAG(FLAG, has_seconds), OF_LAG(FLAG, has_means), OF_LAG(FLAG, has_ratios), {NULL, SIZE, 0},
 };
+/* clang-format on */
 
 /* Store the value of a field, or set an exception. */
 static void store(PyObject *value, field_type type, void *target)
@@ -316,8 +316,8 @@ static int read_struct(PyObject *dictionary, const field *fields, void *target)
         }
     }
     if (PyDict_Size(dictionary) != n) {
-        PyErr_Format(PyExc_ValueError, "%zd fields expected, %zd given", n,
-                     PyDict_Size(dictionary));
+        PyErr_Format(
+            PyExc_ValueError, "%zd fields expected, %zd given", n, PyDict_Size(dictionary));
         return -1;
     }
     return 0;
@@ -339,8 +339,9 @@ static void *allocate(stream *s, size_t n, size_t size)
 static void *read_structs(stream *s, PyObject *list, size_t n, const field *fields, size_t size)
 {
     if ((size_t)PyList_Size(list) != n) {
-        PyErr_Format(PyExc_ValueError, "%zu dictionaries with the field %s expected, %zd given", n,
-                     fields[0].name, PyList_Size(list));
+        PyErr_Format(
+            PyExc_ValueError, "%zu dictionaries with the field %s expected, %zd given", n,
+            fields[0].name, PyList_Size(list));
         return NULL;
     }
     char *const block = allocate(s, n, size);
@@ -364,8 +365,8 @@ static double *read_numbers(stream *s, PyObject *object, const char *name, size_
 {
     array a = {0};
     double *copy = NULL;
-    if (get_array(object, name, 1, PyBUF_SIMPLE, &a) == 0 &&
-        check_axis(&a, 0, (Py_ssize_t)n) == 0) {
+    if (get_array('d', object, name, 1, PyBUF_SIMPLE, &a) == 0 &&
+        check_shape(&a, SHAPE((Py_ssize_t)n)) == 0) {
         copy = allocate(s, n, sizeof(double));
         if (copy != NULL) {
             memcpy(copy, a.data, n * sizeof(double));
@@ -380,9 +381,9 @@ static int read_tables(stream *s, PyObject *args)
 {
     PyObject *hand, *fingers, *features, *lags, *used, *rotations, *places, *baseline;
     holdfast_hand *const h = &s->hand;
-    if (!PyArg_ParseTuple(args, "O!O!O!O!OOOO:Stream", &PyDict_Type, &hand, &PyList_Type, &fingers,
-                          &PyList_Type, &features, &PyList_Type, &lags, &used, &rotations, &places,
-                          &baseline) ||
+    if (!PyArg_ParseTuple(
+            args, "O!O!O!O!OOOO:Stream", &PyDict_Type, &hand, &PyList_Type, &fingers, &PyList_Type,
+            &features, &PyList_Type, &lags, &used, &rotations, &places, &baseline) ||
         read_struct(hand, hand_fields, h) < 0) {
         return -1;
     }
@@ -394,8 +395,8 @@ static int read_tables(stream *s, PyObject *args)
     }
     const size_t n = h->n_fingers;
     if (!(h->fingers = read_structs(s, fingers, n, finger_fields, sizeof *h->fingers)) ||
-        !(h->features = read_structs(s, features, n * h->n_features, feature_fields,
-                                     sizeof *h->features)) ||
+        !(h->features =
+              read_structs(s, features, n * h->n_features, feature_fields, sizeof *h->features)) ||
         !(h->lags = read_structs(s, lags, h->n_lags, lag_fields, sizeof *h->lags)) ||
         !(h->used = read_numbers(s, used, "used", h->n_lanes)) ||
         !(h->rotations = read_numbers(s, rotations, "rotations", 9 * h->n_lanes)) ||
@@ -417,11 +418,10 @@ static int read_tables(stream *s, PyObject *args)
     }
     holdfast_place(h, &s->memory, block);
     array a = {0};
-    const int result = get_array(baseline, "baseline", 2, PyBUF_SIMPLE, &a) < 0 ||
-                               check_axis(&a, 0, (Py_ssize_t)s->n_taxels) < 0 ||
-                               check_axis(&a, 1, 3) < 0
-                           ? -1
-                           : 0;
+    int result = get_array('d', baseline, "baseline", 2, PyBUF_SIMPLE, &a);
+    if (result == 0) {
+        result = check_shape(&a, SHAPE((Py_ssize_t)s->n_taxels, 3));
+    }
     if (result == 0) {
         holdfast_begin(h, &s->memory, a.data);
     }
@@ -458,8 +458,9 @@ static void stream_dealloc(PyObject *self)
 }
 
 /* Process n samples, and copy their features and amplitudes. */
-static void advance_all(stream *s, const array *readings, const array *present, const array *times,
-                        const array *features, const array *amplitude)
+static void advance_all(
+    stream *s, const array *readings, const array *present, const array *times,
+    const array *features, const array *amplitude)
 {
     const size_t n = (size_t)times->view.shape[0], n_fingers = s->hand.n_fingers;
     const size_t width = n_fingers * s->hand.n_features;
@@ -468,8 +469,8 @@ static void advance_all(stream *s, const array *readings, const array *present, 
         for (size_t f = 0; f < n_fingers; ++f) {
             s->present[f] = *is_present++ != 0;
         }
-        holdfast_advance(&s->hand, &s->memory, readings->data + 3 * s->n_taxels * k, s->present,
-                         times->data[k]);
+        holdfast_advance(
+            &s->hand, &s->memory, readings->data + 3 * s->n_taxels * k, s->present, times->data[k]);
         memcpy(features->data + width * k, s->memory.features, width * sizeof(double));
         for (size_t f = 0; f < n_fingers; ++f) {
             amplitude->data[n_fingers * k + f] = s->memory.values[f].amplitude;
@@ -482,8 +483,11 @@ static int check_times(const array *times, double last)
 {
     for (Py_ssize_t k = 0; k < times->view.shape[0]; last = times->data[k++]) {
         if (!(times->data[k] > last && times->data[k] <= DBL_MAX)) {
-            PyErr_Format(PyExc_ValueError, "times: number %zd is not finite, or not later than "
-                         "the one before", k);
+            PyErr_Format(
+                PyExc_ValueError,
+                "times: number %zd is not finite, or not later than "
+                "the one before",
+                k);
             return -1;
         }
     }
@@ -503,36 +507,34 @@ static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_
     array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
     array *const times = &arrays[2], *const features = &arrays[3], *const amplitude = &arrays[4];
     PyObject *result = NULL;
-    if (get_array(args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array_of('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
-        get_array(args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
-        get_array(args[3], "features", 3, PyBUF_WRITABLE, features) < 0 ||
-        get_array(args[4], "amplitude", 2, PyBUF_WRITABLE, amplitude) < 0) {
+    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
+        get_array('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
+        get_array('d', args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
+        get_array('d', args[3], "features", 3, PyBUF_WRITABLE, features) < 0 ||
+        get_array('d', args[4], "amplitude", 2, PyBUF_WRITABLE, amplitude) < 0) {
         goto done;
     }
     const Py_ssize_t n = times->view.shape[0], n_fingers = (Py_ssize_t)s->hand.n_fingers;
-    if (check_axis(readings, 0, n) < 0 || check_axis(readings, 1, (Py_ssize_t)s->n_taxels) < 0 ||
-        check_axis(readings, 2, 3) < 0 || check_axis(present, 0, n) < 0 ||
-        check_axis(present, 1, n_fingers) < 0 || check_axis(features, 0, n) < 0 ||
-        check_axis(features, 1, n_fingers) < 0 ||
-        check_axis(features, 2, (Py_ssize_t)s->hand.n_features) < 0 ||
-        check_axis(amplitude, 0, n) < 0 || check_axis(amplitude, 1, n_fingers) < 0 ||
-        check_apart(readings, features) < 0 || check_apart(readings, amplitude) < 0 ||
-        check_apart(features, amplitude) < 0 || check_times(times, s->last_time) < 0) {
+    const Py_ssize_t n_taxels = (Py_ssize_t)s->n_taxels;
+    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
+        check_shape(present, SHAPE(n, n_fingers)) < 0 ||
+        check_shape(features, SHAPE(n, n_fingers, (Py_ssize_t)s->hand.n_features)) < 0 ||
+        check_shape(amplitude, SHAPE(n, n_fingers)) < 0 || check_apart(readings, features) < 0 ||
+        check_apart(readings, amplitude) < 0 || check_apart(features, amplitude) < 0 ||
+        check_times(times, s->last_time) < 0) {
         goto done;
     }
     if (n > 0) {
         s->last_time = times->data[n - 1];
     }
-    if (n <= 1) { /* to release the GIL takes longer than some samples */
-        advance_all(s, readings, present, times, features, amplitude);
-    } else {
-        s->is_in_use = true;
-        Py_BEGIN_ALLOW_THREADS
-        advance_all(s, readings, present, times, features, amplitude);
-        Py_END_ALLOW_THREADS
-        s->is_in_use = false;
+    s->is_in_use = true;
+    /* To release the GIL takes longer than a sample. */
+    PyThreadState *const released = n > 1 ? PyEval_SaveThread() : NULL;
+    advance_all(s, readings, present, times, features, amplitude);
+    if (released != NULL) {
+        PyEval_RestoreThread(released);
     }
+    s->is_in_use = false;
     result = Py_NewRef(Py_None);
 done:
     release(arrays, 5);
@@ -540,7 +542,10 @@ done:
 }
 
 /* Pointers to functions of other types go through `void (*)(void)`, as Python's own modules do. */
-#define FUNCTION(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
+#define FUNCTION(name)                                                                             \
+    {                                                                                              \
+#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL                              \
+    }
 
 static PyMethodDef functions[] = {
     FUNCTION(haar_features),
@@ -589,8 +594,6 @@ static PyModuleDef_Slot module_slots[] = {
 static struct PyModuleDef module_definition = {
     PyModuleDef_HEAD_INIT, "_extension", NULL, 0, functions, module_slots, NULL, NULL, NULL,
 };
-
-PyMODINIT_FUNC PyInit__extension(void);
 
 PyMODINIT_FUNC PyInit__extension(void)
 {
