@@ -269,8 +269,6 @@ def test_a_server_that_is_slow_all_the_time_is_given_up(server, tmp_path, monkey
     with pytest.raises(SourceError, match=r"a\.bin sends less than 20000 bytes a second; what was"):
         get(public_set(server), tmp_path / "got")
     assert (tmp_path / "got" / "here" / ".a.bin.part").stat().st_size == 1
-    monkeypatch.setattr("holdfast.datasets.download.FREE_TIME", 600.0)
-    get(public_set(server), tmp_path / "got")
 
 
 def test_the_bodies_of_redirections_are_not_read(server, tmp_path):
