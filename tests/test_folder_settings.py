@@ -73,7 +73,7 @@ def run_in(folder, program, *arguments, code=0, **more):
     variables = {name: text for name, text in os.environ.items() if not name.startswith("NUMBA_")}
     command = [sys.executable, "-P", "-c", program, *arguments]
     done = subprocess.run(
-        command, cwd=folder, env=variables | more, capture_output=True, text=True, timeout=300,
+        command, cwd=folder, env=variables | more, capture_output=True, text=True, timeout=600,
         check=False,
     )  # fmt: skip
     assert done.returncode == code, done.stderr
@@ -119,6 +119,7 @@ def test_a_pipe_in_place_of_settings_is_not_opened(tmp_path, settings):
     assert json.loads(run_in(tmp_path, f"import holdfast{SHOW}").stdout) == settings
 
 
+@pytest.mark.timeout(900)  # kernels may be compiled first, and beside other tests
 def test_the_verbs_run_no_code_of_the_folder(folder):
     for k in range(4):
         made = synthetic_recording(f"grasp{k}", k, ("thumb", "index"))
