@@ -264,7 +264,7 @@ def test_a_server_that_sends_a_byte_at_a_time_is_given_up(server, tmp_path, monk
 
 
 def test_a_server_that_is_slow_all_the_time_is_given_up(server, tmp_path, monkeypatch):
-    monkeypatch.setattr("holdfast.datasets.download.FREE_TIME", -1e9, raising=False)
+    monkeypatch.setattr("holdfast.datasets.download.FREE_DOWNLOAD_TIME", -1e9, raising=False)
     monkeypatch.setattr("holdfast.datasets.download.DOWNLOAD_CHUNK", 1)
     with pytest.raises(SourceError, match=r"a\.bin sends less than 20000 bytes a second; what was"):
         get(public_set(server), tmp_path / "got")

@@ -37,7 +37,7 @@ SERVER_TIMEOUTS = (10.0, 60.0)
 """Times after which a server that does not connect, or is silent, is given up [s]."""
 ANSWER_LIMIT = 60.0
 """Maximum time of an answer's headers and of each `DOWNLOAD_CHUNK` [s]: at least 1 kB/s."""
-FREE_TIME, MIN_RATE = 600.0, 20_000
+FREE_DOWNLOAD_TIME, MIN_RATE = 600.0, 20_000
 """Time for a file besides that of its bytes [s], and the lowest rate of these [bytes/s]."""
 MAX_REDIRECTS = 10
 """Number of times that a server may name another address."""
@@ -181,7 +181,7 @@ class _Download:
         self._part, self._file, self._report = part, file, report
         self._max_size = MAX_UNKNOWN_SIZE if file.size is None else file.size
         self._size = file.size
-        self._deadline = time.monotonic() + FREE_TIME + self._max_size / MIN_RATE
+        self._deadline = time.monotonic() + FREE_DOWNLOAD_TIME + self._max_size / MIN_RATE
 
     def __call__(self, url: str, output_file: str, _: object) -> None:
         """Load a file from a URL into `output_file`."""
