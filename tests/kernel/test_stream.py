@@ -148,6 +148,8 @@ def test_results_that_are_read_only_or_share_memory_are_refused():
         ValueError,
     )  # fmt: skip
     assert wrong == "features and amplitude share memory"
+    wrong = refused(lambda a: {"times": a["amplitude"].ravel()[: len(a["times"])]}, ValueError)
+    assert wrong == "times and amplitude share memory"
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, -1e308, "as before"])
