@@ -28,7 +28,7 @@ def _structures():
     for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", text, flags=re.DOTALL):
         fields = []
         for line in filter(None, (" ".join(part.split()) for part in body.split(";"))):
-            if array := re.match(r"HF_ARRAY\(\w+, (\w+),", line):
+            if array := re.match(r"HF_ARRAY\( ?\w+, (\w+),", line):
                 fields.append((array[1], ctypes.c_void_p))
             elif pointer := re.match(r"const \w+ \*(\w+)$", line):
                 fields.append((pointer[1], ctypes.c_void_p))

@@ -251,8 +251,8 @@ typedef struct {
     const holdfast_lag *lags;         /* (n_lags), ascending */
     const hf_real *used;              /* (n_lanes) 1 for taxels that contribute; 0 for ignored
                                          ones, and for lanes without a taxel */
-    const hf_real *rotations;         /* (9 n_lanes) from taxel frame to fingertip frame; 0 of
-                                         ignored taxels. Of each finger R_00 of all lanes, R_01 ... */
+    const hf_real *rotations;         /* (9 n_lanes) from taxel frame to fingertip frame: of each
+                                         finger R_00 of all lanes, R_01, ...; 0 of ignored taxels */
     const hf_real *places;            /* (3 n_lanes) from the centroid, in radii of the patch */
 } holdfast_hand;
 
@@ -374,10 +374,11 @@ typedef struct {
     hf_real sigma;     /* equation 2, over sigma_window */
 } holdfast_values;
 
-/* Memory of a stream. */
+/* Memory of a stream. (clang-format takes the products for pointers.) */
+/* clang-format off */
 typedef struct {
     HF_ARRAY(holdfast_values, values, HOLDFAST_N_FINGERS);
-    HF_ARRAY(hf_real, features, HOLDFAST_N_FINGERS *HOLDFAST_N_FEATURES);
+    HF_ARRAY(hf_real, features, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES);
     HF_ARRAY(holdfast_finger_memory, fingers, HOLDFAST_N_FINGERS);
     HF_ARRAY(holdfast_taxel, taxels, HOLDFAST_N_LANES);
     HF_ARRAY(holdfast_mask, masks, HOLDFAST_N_LANES);
@@ -387,21 +388,21 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
-    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS *HF_N_RING_SUMS); /* of samples, a ring */
+    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS * HF_N_RING_SUMS); /* of samples, a ring */
     /* (n_fingers, n_history, 4) and (n_fingers, n_history, n_channels, n_levels, 3): rings. */
-    HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS *HOLDFAST_N_HISTORY *HF_N_COMPONENTS);
-    HF_ARRAY(
-        hf_real, blocks,
-        HOLDFAST_N_FINGERS *HOLDFAST_N_HISTORY *HOLDFAST_N_CHANNELS *HOLDFAST_N_LEVELS *HF_N_SUMS);
+    HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HF_N_COMPONENTS);
+    HF_ARRAY(hf_real, blocks, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HOLDFAST_N_CHANNELS *
+                                  HOLDFAST_N_LEVELS * HF_N_SUMS);
     /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
-    HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS *HOLDFAST_N_TRACK);
+    HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
     HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
     /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_SECONDS). */
-    HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS *(HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
-    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS *(HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
-    HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS *HOLDFAST_N_FEATURES); /* before the hand's maximum */
+    HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
+    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
+    HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES); /* before `of_hand` */
     HF_ARRAY(hf_real, of_hand, HOLDFAST_N_FEATURES); /* that maximum, if the fingers are alike */
 } holdfast_memory;
+/* clang-format on */
 
 /* Functions of the interface: part of each source file that includes an exported header. */
 #ifndef HOLDFAST_API
