@@ -231,7 +231,7 @@ typedef struct {
 } stream;
 
 /* The fields of the tables, which Python gives by name in dictionaries. */
-typedef enum { SIZE, CODE, FLAG, REAL, REALS_3 } field_type;
+typedef enum { SIZE, CODE, FLAG, REAL } field_type;
 
 typedef struct {
     const char *name;
@@ -258,7 +258,8 @@ static const field finger_fields[] = {
     OF_FINGER(SIZE, first_taxel), OF_FINGER(SIZE, n_taxels), OF_FINGER(SIZE, first),
     OF_FINGER(REAL, n_used), OF_FINGER(REAL, low), OF_FINGER(REAL, high), OF_FINGER(REAL, low_end),
     OF_FINGER(REAL, high_end), OF_FINGER(REAL, max_offset), OF_FINGER(REAL, min_noise),
-    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step), OF_FINGER(REALS_3, normal),
+    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step), OF_FINGER(REAL, normal[0]),
+    OF_FINGER(REAL, normal[1]), OF_FINGER(REAL, normal[2]),
     OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window), OF_FINGER(FLAG, bridges),
     {NULL, SIZE, 0},
 };
@@ -284,20 +285,12 @@ static void store(PyObject *value, field_type type, void *target)
         *(double *)target = PyFloat_AsDouble(value);
     } else if (type == FLAG) {
         *(bool *)target = PyObject_IsTrue(value) == 1;
-    } else if (type == CODE) {
+    } else {
         const long code = PyLong_AsLong(value);
         if (code < INT32_MIN || code > INT32_MAX) {
             PyErr_Format(PyExc_OverflowError, "%ld has more than 32 bits", code);
         }
         *(int32_t *)target = (int32_t)code;
-    } else {
-        for (Py_ssize_t i = 0; i < 3 && !PyErr_Occurred(); ++i) {
-            PyObject *const item = PySequence_GetItem(value, i);
-            if (item != NULL) {
-                store(item, REAL, (double *)target + i);
-                Py_DECREF(item);
-            }
-        }
     }
 }
 
@@ -490,9 +483,7 @@ static int check_times(const array *times, double last)
         if (!(times->data[k] > last && times->data[k] <= DBL_MAX)) {
             PyErr_Format(
                 PyExc_ValueError,
-                "times: number %zd is not finite, or not later than "
-                "the one before",
-                k);
+                "times: number %zd is not finite, or not later than the one before", k);
             return -1;
         }
     }
@@ -546,14 +537,9 @@ done:
 }
 
 /* Pointers to functions of other types go through `void (*)(void)`, as Python's own modules do. */
-#define FUNCTION(name)                                                                             \
-    {                                                                                              \
-#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL                              \
-    }
-
 static PyMethodDef functions[] = {
-    FUNCTION(haar_features),
-    FUNCTION(fingertip_force),
+    {"haar_features", (PyCFunction)(void (*)(void))haar_features, METH_FASTCALL, NULL},
+    {"fingertip_force", (PyCFunction)(void (*)(void))fingertip_force, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
 
