@@ -72,7 +72,7 @@ def _finger(layout: Layout, f: int, first: int) -> Struct:
         "min_noise": constants[at.MIN_NOISE],
         "rounding_noise": constants[at.ROUNDING_NOISE],
         "max_step": constants[at.MAX_STEP],
-        "normal": layout.normals[f].tolist(),
+        **{f"normal[{axis}]": value for axis, value in enumerate(layout.normals[f].tolist())},
         "sigma_window": windows[at.SIGMA_WINDOW],
         "ready_window": windows[at.READY_WINDOW],
         "bridges": windows[at.BRIDGES],

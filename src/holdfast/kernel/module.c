@@ -99,15 +99,21 @@ static int check_shape(const array *a, const Py_ssize_t *expected)
 }
 #define SHAPE(...) ((const Py_ssize_t[]){__VA_ARGS__})
 
-/* Return 0 if two arrays share no memory, else set an exception and return -1. */
-static int check_apart(const array *a, const array *out)
+/* Return 0 if the last n_out of n arrays share no memory with others, else set an exception. */
+static int check_apart(const array *arrays, size_t n, size_t n_out)
 {
-    const char *const start = a->view.buf, *const out_start = out->view.buf;
-    if (start + a->view.len <= out_start || out_start + out->view.len <= start) {
-        return 0;
+    for (size_t i = n - n_out; i < n; ++i) {
+        const char *const out = arrays[i].view.buf;
+        for (size_t j = 0; j < i; ++j) {
+            const char *const other = arrays[j].view.buf;
+            if (other + arrays[j].view.len > out && out + arrays[i].view.len > other) {
+                PyErr_Format(
+                    PyExc_ValueError, "%s and %s share memory", arrays[j].name, arrays[i].name);
+                return -1;
+            }
+        }
     }
-    PyErr_Format(PyExc_ValueError, "%s and %s share memory", a->name, out->name);
-    return -1;
+    return 0;
 }
 
 static int check_count(Py_ssize_t n_args, Py_ssize_t expected)
@@ -140,7 +146,7 @@ static PyObject *haar_features(
     }
     const Py_ssize_t n = force->view.shape[0];
     if (check_shape(force, SHAPE(n, 3)) < 0 || check_shape(out, SHAPE(n, HOLDFAST_N_HAAR)) < 0 ||
-        check_apart(force, out) < 0) {
+        check_apart(arrays, 2, 1) < 0) {
         goto done;
     }
     if (window < 2 || window % 2 || first < 0 || first > stop || stop > n) {
@@ -193,8 +199,7 @@ static PyObject *fingertip_force(
     if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
         check_shape(baseline, SHAPE(n_taxels, 3)) < 0 ||
         check_shape(rotations, SHAPE(n_taxels, 3, 3)) < 0 || check_shape(out, SHAPE(n, 3)) < 0 ||
-        check_apart(readings, out) < 0 || check_apart(baseline, out) < 0 ||
-        check_apart(rotations, out) < 0) {
+        check_apart(arrays, 4, 1) < 0) {
         goto done;
     }
     if (first < 0 || first > stop || stop > n) {
@@ -226,7 +231,7 @@ typedef struct {
 } stream;
 
 /* The fields of the tables, which Python gives by name in dictionaries. */
-typedef enum { SIZE, CODE, FLAG, REAL, REALS_3 } field_type;
+typedef enum { SIZE, CODE, FLAG, REAL } field_type;
 
 typedef struct {
     const char *name;
@@ -253,7 +258,8 @@ static const field finger_fields[] = {
     OF_FINGER(SIZE, first_taxel), OF_FINGER(SIZE, n_taxels), OF_FINGER(SIZE, first),
     OF_FINGER(REAL, n_used), OF_FINGER(REAL, low), OF_FINGER(REAL, high), OF_FINGER(REAL, low_end),
     OF_FINGER(REAL, high_end), OF_FINGER(REAL, max_offset), OF_FINGER(REAL, min_noise),
-    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step), OF_FINGER(REALS_3, normal),
+    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step), OF_FINGER(REAL, normal[0]),
+    OF_FINGER(REAL, normal[1]), OF_FINGER(REAL, normal[2]),
     OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window), OF_FINGER(FLAG, bridges),
     {NULL, SIZE, 0},
 };
@@ -279,20 +285,12 @@ static void store(PyObject *value, field_type type, void *target)
         *(double *)target = PyFloat_AsDouble(value);
     } else if (type == FLAG) {
         *(bool *)target = PyObject_IsTrue(value) == 1;
-    } else if (type == CODE) {
+    } else {
         const long code = PyLong_AsLong(value);
         if (code < INT32_MIN || code > INT32_MAX) {
             PyErr_Format(PyExc_OverflowError, "%ld has more than 32 bits", code);
         }
         *(int32_t *)target = (int32_t)code;
-    } else {
-        for (Py_ssize_t i = 0; i < 3 && !PyErr_Occurred(); ++i) {
-            PyObject *const item = PySequence_GetItem(value, i);
-            if (item != NULL) {
-                store(item, REAL, (double *)target + i);
-                Py_DECREF(item);
-            }
-        }
     }
 }
 
@@ -485,9 +483,7 @@ static int check_times(const array *times, double last)
         if (!(times->data[k] > last && times->data[k] <= DBL_MAX)) {
             PyErr_Format(
                 PyExc_ValueError,
-                "times: number %zd is not finite, or not later than "
-                "the one before",
-                k);
+                "times: number %zd is not finite, or not later than the one before", k);
             return -1;
         }
     }
@@ -519,8 +515,7 @@ static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_
     if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
         check_shape(present, SHAPE(n, n_fingers)) < 0 ||
         check_shape(features, SHAPE(n, n_fingers, (Py_ssize_t)s->hand.n_features)) < 0 ||
-        check_shape(amplitude, SHAPE(n, n_fingers)) < 0 || check_apart(readings, features) < 0 ||
-        check_apart(readings, amplitude) < 0 || check_apart(features, amplitude) < 0 ||
+        check_shape(amplitude, SHAPE(n, n_fingers)) < 0 || check_apart(arrays, 5, 2) < 0 ||
         check_times(times, s->last_time) < 0) {
         goto done;
     }
@@ -542,14 +537,9 @@ done:
 }
 
 /* Pointers to functions of other types go through `void (*)(void)`, as Python's own modules do. */
-#define FUNCTION(name)                                                                             \
-    {                                                                                              \
-#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL                              \
-    }
-
 static PyMethodDef functions[] = {
-    FUNCTION(haar_features),
-    FUNCTION(fingertip_force),
+    {"haar_features", (PyCFunction)(void (*)(void))haar_features, METH_FASTCALL, NULL},
+    {"fingertip_force", (PyCFunction)(void (*)(void))fingertip_force, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
 
