@@ -75,7 +75,7 @@ class Copy:
         environment = {**os.environ, "PYTHONPATH": str(self.folder)}
         command = [sys.executable, *map(str, arguments)]
         ended = subprocess.run(
-            command, capture_output=True, text=True, env=environment, check=False, timeout=540
+            command, capture_output=True, text=True, env=environment, check=False, timeout=1500
         )
         assert ended.returncode == exit_code, ended.stderr
         return ended.stderr if exit_code else ended.stdout
@@ -332,7 +332,7 @@ print(np.isfinite(batch.fingers["thumb"].stable_probability).sum())
 """
 
 
-@pytest.mark.timeout(600)  # it compiles all kernels
+@pytest.mark.timeout(1800)  # it compiles all kernels
 def test_add_a_feature(copy_of, tmp_path):
     copy = copy_of("Add a feature")
     copy.change(
