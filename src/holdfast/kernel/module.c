@@ -6,12 +6,14 @@
  * buffers cannot go away, but a caller who changes the numbers in another thread gets either of
  * them. A stream that another thread is using raises an error.
  */
+#define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
 #include <float.h>
 #include <string.h>
 
 #include "batch.h"
+#include "detector.h"
 #include "kernel.h"
 
 /* The size of the scratch memory of a longer window could overflow. */
@@ -227,7 +229,7 @@ typedef struct {
 } stream;
 
 /* The fields of the tables, which Python gives by name in dictionaries. */
-typedef enum { SIZE, CODE, FLAG, REAL, REALS_3 } field_type;
+typedef enum { SIZE, CODE, FLAG, REAL, REALS_3, CODES_6 } field_type;
 
 typedef struct {
     const char *name;
@@ -286,10 +288,11 @@ static void store(PyObject *value, field_type type, void *target)
         }
         *(int32_t *)target = (int32_t)code;
     } else {
-        for (Py_ssize_t i = 0; i < 3 && !PyErr_Occurred(); ++i) {
+        const bool is_real = type == REALS_3;
+        for (Py_ssize_t i = 0; i < (is_real ? 3 : 6) && !PyErr_Occurred(); ++i) {
             PyObject *const item = PySequence_GetItem(value, i);
             if (item != NULL) {
-                store(item, REAL, (double *)target + i);
+                store(item, is_real ? REAL : CODE, (char *)target + i * (is_real ? 8 : 4));
                 Py_DECREF(item);
             }
         }
@@ -564,12 +567,16 @@ static PyType_Spec stream_spec = {
     "holdfast.kernel._extension.Stream", sizeof(stream), 0, Py_TPFLAGS_DEFAULT, stream_slots,
 };
 
+#include "module_estimates.c"
+
+#include "module_detector.c"
+
 static int add_contents(PyObject *module)
 {
     PyObject *const type = PyType_FromModuleAndSpec(module, &stream_spec, NULL);
     const int result = type == NULL ? -1 : PyModule_AddObjectRef(module, "Stream", type);
     Py_XDECREF(type);
-    return result < 0 || PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
+    return result < 0 || add_detector(module) < 0 || PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
                ? -1
                : PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
 }
