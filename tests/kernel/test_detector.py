@@ -16,7 +16,7 @@ from exporters.models import MODELS, made
 from holdfast.contact import Cause
 from holdfast.detector import Detector, detect
 from holdfast.detector import detector as module
-from holdfast.detector.tables import ESTIMATE, rules_of
+from holdfast.detector.tables import ESTIMATE, estimate_rows, rules_of
 from holdfast.errors import StreamError
 from holdfast.io import import_recordings, load_recording
 from holdfast.kernel import _extension
@@ -65,7 +65,7 @@ def assert_equal(detectors, samples):
 
 @pytest.mark.parametrize("in_contact", [False, True])
 @pytest.mark.parametrize("name", [*MODELS, "causes", "minimum duration"])
-def test_random_samples(monkeypatch, name, in_contact):
+def test_random_samples_as_compiled_python(monkeypatch, name, in_contact):
     if name in MODELS:
         used, sensors, rate = made(name)
     else:
@@ -86,6 +86,37 @@ def test_random_samples(monkeypatch, name, in_contact):
     assert repr(baselines[0]) == repr(baselines[1])
 
 
+@pytest.mark.parametrize("name", ["paper", "twin", "rich"])
+def test_chunks_of_any_length_give_the_estimates_of_updates(monkeypatch, name):
+    used, sensors, rate = made(name)
+    monkeypatch.setattr(module, "USE_C", True)
+    one, many = Detector(used, sensors, rate), Detector(used, sensors, rate)
+    bounds = np.cumsum([0, *(finger.n_taxels for finger in sensors.values())])
+    rng, last, rows = np.random.default_rng(5), -np.inf, []
+    for samples, time in random_samples(rng, sensors, rate, 500):
+        estimate, before = answer(one, samples, time), last
+        last = max(last, time)
+        if before < time < np.inf and not isinstance(estimate, str):
+            readings = np.full((bounds[-1], 3), np.nan)
+            for finger, first, stop in zip(sensors, bounds, bounds[1:], strict=False):
+                if finger in samples:
+                    readings[first:stop] = samples[finger]
+            rows.append((readings, [finger in samples for finger in sensors], time, estimate))
+    readings, present, times = (np.array(column) for column in list(zip(*rows, strict=True))[:3])
+    estimates, numbers = estimate_rows(*present.shape)
+    for start, stop in ((0, 1), (1, 200), (200, 200), (200, len(times))):
+        part, hand = slice(start, stop), np.zeros(stop - start)
+        many._kernel.run(readings[part], present[part], times[part], numbers[part], hand)
+    for (*_, expected), found in zip(rows, estimates, strict=True):
+        for finger, row in zip(expected.fingers.values(), found, strict=True):
+            assert (finger.state.code, repr(finger.time)) == (
+                row["state"],
+                repr(float(row["time"])),
+            )
+            assert repr(finger.stable_probability) == repr(float(row["probability"]))
+            assert repr(finger.force) == repr(tuple(row["force"].tolist()))
+
+
 def recordings(data_folder):
     yield load_recording(Path(holdfast.__file__).parent / "recorded/box-slips.mcap")
     for dataset in ("uskin_pick_move", "gtac"):
@@ -93,7 +124,7 @@ def recordings(data_folder):
 
 
 @pytest.mark.parametrize("name", ["builtin:any", "builtin:noise-floor"])
-def test_recordings(monkeypatch, name, data_folder):
+def test_recordings_as_compiled_python(monkeypatch, name, data_folder):
     used = Model.load(name)
     for recording in recordings(data_folder):
         python, c = both(monkeypatch, lambda recording=recording: detect(used, recording))
