@@ -86,6 +86,20 @@ def test_random_samples_as_compiled_python(monkeypatch, name, in_contact):
     assert repr(baselines[0]) == repr(baselines[1])
 
 
+def test_a_finger_without_the_head_of_causes_has_none(monkeypatch):
+    monkeypatch.setattr(module, "USE_C", True)
+    used = with_causes()
+    index = used.fingers["index"]
+    plain = replace(index, heads=tuple(head for head in index.heads if head.name != "cause"))
+    detector, found = Detector(replace(used, fingers=used.fingers | {"index": plain})), []
+    for k, sample in enumerate(lively(200)):
+        fingers = detector.update({"thumb": sample, "index": sample}, k / 100).fingers
+        found.append((fingers["thumb"].cause, fingers["index"].cause, fingers["index"].state))
+    assert any(state == "UNSTABLE" for *_, state in found)
+    assert any(thumb is not None for thumb, *_ in found)
+    assert {index for _, index, _ in found} == {None}
+
+
 @pytest.mark.parametrize("name", ["paper", "twin", "rich"])
 def test_chunks_of_any_length_give_the_estimates_of_updates(monkeypatch, name):
     used, sensors, rate = made(name)
