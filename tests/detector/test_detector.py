@@ -428,6 +428,11 @@ class TestConstruction:
 
 
 class TestNoiseFloor:
+    @pytest.fixture(autouse=True)
+    def _compiled_python(self, monkeypatch):
+        """The tests read the memory of the compiled Python; tests/kernel holds C equal to it."""
+        monkeypatch.setattr(detector_module, "USE_C", False)
+
     def noisy(self, level, n=1000):
         values = np.random.default_rng(5).normal(scale=level, size=(n, 2, 3))
         values[200:, :, 0] += 500 * level  # in contact
@@ -515,6 +520,7 @@ class TestThresholds:
 
 
 def test_the_plain_way_gives_the_same_estimates(monkeypatch):
+    monkeypatch.setattr(detector_module, "USE_C", False)  # C has no table of types
     values = lively()
     fast = feed(Detector(model(("thumb",))), values)
     monkeypatch.setattr(detector_module, "KNOWN_TYPES", np.zeros_like(KNOWN_TYPES))

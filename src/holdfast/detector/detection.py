@@ -13,6 +13,7 @@ from holdfast.contact import (
     ContactEstimate,
     ContactState,
     Fault,
+    HandEstimate,
     Reason,
     faults_of,
     taxels_of,
@@ -27,8 +28,11 @@ from holdfast.detector.arrays import (
     REPORT_SIGMA,
     REPORT_SLIP,
     REPORT_SPEED,
+    REPORT_TIME,
 )
 from holdfast.detector.decision_rule import TraceRows, estimate_code, split_code
+from holdfast.kernel import _extension
+from holdfast.model import FingerModel
 from holdfast.sensors.types import Array, Integers
 
 STATE_BY_CODE = tuple(ContactState)
@@ -81,6 +85,57 @@ def estimates_of(
                 slip, speed, distance,
             )  # fmt: skip
     return estimates
+
+
+class FingerEstimates(_extension.Estimates, Mapping[str, ContactEstimate]):
+    """Estimates of the fingers of a hand by name: made from a copy of C structs when read."""
+
+    __slots__ = ()
+
+    def __reduce__(self) -> tuple[type, tuple[dict[str, ContactEstimate]]]:
+        return dict, (dict(self),)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+def makers(fingers: Sequence[str], parts: Sequence[FingerModel]) -> tuple[object, ...]:
+    """Return what makes the Python objects of an estimate, in the order of module_detector.c."""
+    places = {finger: place for place, finger in enumerate(fingers)}
+    return (
+        HandEstimate, FingerEstimates, ContactEstimate, STATE_BY_CODE, REASON_BY_CODE,
+        CAUSE_BY_CODE, faults_of, taxels_of, places, _slip_heads(parts),
+    )  # fmt: skip
+
+
+def _slip_heads(parts: Sequence[FingerModel]) -> tuple[int, ...]:
+    """Return how many heads of slips each finger has: `slip`, and then `slip_speed`."""
+    return tuple(
+        0 if part.slip is None else 1 if part.head("slip_speed") is None else 2 for part in parts
+    )
+
+
+def rows_of(
+    estimates: npt.NDArray[np.void], hand: Array, parts: Sequence[FingerModel]
+) -> TraceRows:
+    """Return the rows of estimates (n, n_fingers) and states of the hand that C filled."""
+    rows = TraceRows.empty(*estimates.shape)
+    fields = (estimates[name].astype(np.int64) for name in ("state", "reason", "faults", "cause"))
+    rows.report[..., REPORT_CODE] = estimate_code(*fields)
+    for column, name in (
+        (REPORT_TIME, "time"), (REPORT_PROBABILITY, "probability"), (REPORT_SIGMA, "sigma"),
+        (REPORT_SLIP, "slip"), (REPORT_SPEED, "speed"), (REPORT_DISTANCE, "distance"),
+    ):  # fmt: skip
+        rows.report[..., column] = estimates[name]
+    rows.report[..., REPORT_FORCE : REPORT_FORCE + 3] = estimates["force"]
+    heads = np.array(_slip_heads(parts))
+    has_no_slip, has_no_speed = heads < 1, heads < 2
+    rows.report[:, has_no_slip, REPORT_SLIP] = NO_SLIP_RULE
+    rows.report[:, has_no_speed, REPORT_SPEED] = NO_SPEED_RULE
+    rows.report[:, has_no_speed, REPORT_DISTANCE] = NO_SPEED_RULE
+    rows.taxels[...] = estimates["taxels"]
+    rows.hand[...] = hand
+    return rows
 
 
 class FingerTrace(NamedTuple):

@@ -4,6 +4,7 @@ Offline detection is the same detector, fed with a recording: one kernel compute
 and the probability, and one rule turns them into a state.
 """
 
+import os
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -22,6 +23,7 @@ from holdfast.contact import (
     HandEstimate,
     StateChanges,
 )
+from holdfast.detector import tables
 from holdfast.detector.address_table import table_of
 from holdfast.detector.arrays import REPORT_CODE, REPORT_WIDTH, THRESHOLD
 from holdfast.detector.decision_rule import (
@@ -32,7 +34,14 @@ from holdfast.detector.decision_rule import (
     run,
     split_code,
 )
-from holdfast.detector.detection import STATE_BY_CODE, Detection, detection_of, estimates_of
+from holdfast.detector.detection import (
+    STATE_BY_CODE,
+    Detection,
+    detection_of,
+    estimates_of,
+    makers,
+    rows_of,
+)
 from holdfast.detector.fast_step import CHANGED, UNREADABLE, StepArrays, compiled_fast_step
 from holdfast.detector.head_arrays import rule_of
 from holdfast.detector.sample_arrays import KNOWN_TYPES
@@ -40,6 +49,8 @@ from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS
 from holdfast.features.loaded_start import declared_baselines
 from holdfast.features.stream import FeatureStream, StreamPlan
+from holdfast.features.tables import stream_tables
+from holdfast.kernel import _extension
 from holdfast.model import Model
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import resample, true_updates
@@ -48,6 +59,8 @@ from holdfast.sensors.types import Array, Flags
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
 States = tuple[ContactState, ...]
+USE_C = os.environ.get("HOLDFAST_KERNEL") == "c"
+"""Whether a detector is that of the C kernel; an ONNX file beside a model needs the other one."""
 HAND = "hand"
 """Name of the hand as a whole, beside the fingers of events and metrics."""
 MAX_EVENTS = 1000
@@ -148,7 +161,11 @@ class Detector:
             for place, (finger, taxels) in enumerate(stream.slices.items())
         }
         self._take = itemgetter(*stream.plan.fingers)  # a tuple, unless the finger is single
-        self._step = compiled_fast_step()
+        self._rules = tables.rules_of(model, stream.plan)
+        self._settings = tables.model_table(model, stream.plan, stream.layout.zero_unknown)
+        self._use_c = USE_C and all(isinstance(part.stable.rule, Linear) for part in self._parts)
+        if not self._use_c:
+            self._step = compiled_fast_step()
         self._use(stream)
 
     def _use(self, stream: FeatureStream) -> None:
@@ -161,17 +178,27 @@ class Detector:
             self._n_together = -1  # `update` takes the plain way
         n_causes = self._rule.causes.shape[1]
         self._decision = new_decision_memory(len(self._slots), n_causes, self._rule.slip_limits)
-        arrays = StepArrays(
-            stream.layout, stream.memory, stream.output, self._rule, self._decision,
-            self._readings, self._present, self._report, KNOWN_TYPES,
-        )  # fmt: skip
-        self._table, self._arrays = table_of(arrays)
+        if not self._use_c:
+            arrays = StepArrays(
+                stream.layout, stream.memory, stream.output, self._rule, self._decision,
+                self._readings, self._present, self._report, KNOWN_TYPES,
+            )  # fmt: skip
+            self._table, self._arrays = table_of(arrays)
         self._taxel_masks = stream.output.status[:, TAXELS]
         self._changes = StateChanges(self._names)
         self._states: States = tuple(self._changes.states)
         self._transitions: deque[tuple[float, States, States]] = deque(maxlen=MAX_EVENTS)
         self._last_time = -inf
         self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
+        self._kernel = None
+        if self._use_c:
+            self._makers = makers(stream.plan.fingers, self._parts)
+            self._c_changes: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
+            self._kernel = _extension.Detector(
+                stream_tables(stream.layout, stream.memory),
+                self._settings | {"zero_unknown": stream.layout.zero_unknown},
+                *self._rules, self._makers, ndarray, self._c_changes.append,
+            )  # fmt: skip
 
     def __getstate__(self) -> object:
         # A copy would share memory with this one, by address.
@@ -184,7 +211,14 @@ class Detector:
 
     def baselines(self) -> dict[str, Array]:
         """Return (n_taxels, 3) the tare of each finger whose tare is complete [its unit]."""
-        return self._stream.baselines()
+        if self._kernel is None:
+            return self._stream.baselines()
+        baseline = np.empty_like(self._readings)
+        complete = self._kernel.baselines(baseline)
+        slices = self._stream.slices.items()
+        return {
+            f: baseline[taxels] for (f, taxels), done in zip(slices, complete, strict=True) if done
+        }
 
     def reset(self, *, in_contact: bool | None = None) -> None:
         """Discard all samples, events and the tare.
@@ -216,7 +250,10 @@ class Detector:
                 f"the detector has {', '.join(self._slots)}"
             )
         for finger, threshold in thresholds.items():
-            self._rule.limits[self._slots[finger][0], THRESHOLD] = threshold
+            place = self._slots[finger][0]
+            self._rule.limits[place, THRESHOLD] = threshold
+            self._rules[1][tables.STABLE_HEAD + tables.N_HEADS * place]["threshold"] = threshold
+        self._set_rules()
 
     @property
     def knows_zero(self) -> bool:
@@ -251,6 +288,12 @@ class Detector:
                 "detector; open the source again with it"
             )
         self._parts = parts
+        self._rules = tables.rules_of(model, plan)
+        self._set_rules()
+
+    def _set_rules(self) -> None:
+        if self._kernel is not None:
+            self._kernel.set_rules(*self._rules)
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.
@@ -267,11 +310,16 @@ class Detector:
             StreamError: an unknown finger, another number of taxels or axes, what is no number,
                 or a time that does not increase. The detector has not changed then.
         """
+        if self._kernel is not None:
+            estimate: HandEstimate | None = self._kernel.update(samples, time)
+            if estimate is not None:
+                return estimate
+            self._last_time = self._kernel.last_time()
         time = float(time)
         if not self._last_time < time < inf:
             self._refuse_time(time)
         code = UNREADABLE
-        if len(samples) == self._n_together:
+        if self._kernel is None and len(samples) == self._n_together:
             try:
                 arrays = self._take(samples)
                 code = self._step(self._table, time, id(arrays))
@@ -279,6 +327,8 @@ class Detector:
                 pass  # another finger, which is refused below
         if code == UNREADABLE:
             self._store(samples)
+            if self._kernel is not None:
+                return self._kernel.step(self._readings, self._present, time)
             if self._feeder is not None:
                 self._feeder.update(self._readings, self._present, time)
             code = self._step(self._table, time, 0)
@@ -306,12 +356,13 @@ class Detector:
             StreamError: the recording has no sample of the fingers, another number of taxels,
                 or begins before the last sample.
         """
+        if self._kernel is not None:
+            self._last_time = self._kernel.last_time()
         self._check_recording(recording)
         self._settle_transitions()
         stream, chunks = self._stream, []
         for times, present, readings in stream.samples_of(recording):
-            rows = TraceRows.empty(len(times), present.shape[1])
-            self._run_chunk(readings, present, times, rows)
+            rows = self._run_chunk(readings, present, times)
             states, *_ = split_code(rows.report[:, :, REPORT_CODE].astype(np.int64))
             codes = np.column_stack([states, rows.hand])
             self._events += self._changes.update_chunk(times, codes)
@@ -320,9 +371,15 @@ class Detector:
         self._states = tuple(self._changes.states)
         return detection_of(recording.name, stream.plan.fingers, chunks)
 
-    def _run_chunk(self, readings: Array, present: Flags, times: Array, rows: TraceRows) -> None:
-        """Fill the rows of a chunk; sample by sample, if a classifier is not compiled."""
+    def _run_chunk(self, readings: Array, present: Flags, times: Array) -> TraceRows:
+        """Return the rows of a chunk; sample by sample, if a classifier is not compiled."""
         stream = self._stream
+        if self._kernel is not None:
+            estimates, numbers = tables.estimate_rows(*present.shape)
+            hand = np.empty(len(times))
+            self._kernel.run(readings, present, times, numbers, hand)
+            return rows_of(estimates, hand, self._parts)
+        rows = TraceRows.empty(*present.shape)
         step = len(times) if self._feeder is None else 1
         for k in range(0, len(times), step):
             part = slice(k, k + step)
@@ -333,6 +390,7 @@ class Detector:
                 readings[part], present[part], times[part],
                 TraceRows._make(array[part] for array in rows),
             )  # fmt: skip
+        return rows
 
     def _refuse_time(self, time: float) -> None:
         after = "" if self._last_time == -inf else f" after {self._last_time:.15g} s"
@@ -392,6 +450,11 @@ class Detector:
 
     def _settle_transitions(self) -> None:
         """Turn the changes of state of the last updates into events."""
+        if self._kernel is not None:
+            for time, *states in self._c_changes:
+                old, new = (tuple(STATE_BY_CODE[code] for code in codes) for codes in states)
+                self._transitions.append((time, old, new))
+            self._c_changes.clear()
         for time, before, after in self._transitions:
             self._changes.states = list(before)
             self._events += self._changes.update(after, time)

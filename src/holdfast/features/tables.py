@@ -10,6 +10,7 @@ from holdfast.kernel import _extension
 from holdfast.sensors.types import Array, Integers
 
 Struct = dict[str, object]
+StreamTables = tuple[Struct, list[Struct], list[Struct], list[Struct], Array, Array, Array, Array]
 
 
 def c_stream(layout: Layout, memory: Memory) -> _extension.Stream:
@@ -19,8 +20,13 @@ def c_stream(layout: Layout, memory: Memory) -> _extension.Stream:
         layout: of the stream.
         memory: whose baseline it begins with, and which has the sizes of the rings.
     """
+    return _extension.Stream(*stream_tables(layout, memory))
+
+
+def stream_tables(layout: Layout, memory: Memory) -> StreamTables:
+    """Return the tables of a stream: the arguments of a C stream, and the first of a detector."""
     n_lanes = -(-layout.n_taxels // _extension.LANES) * _extension.LANES
-    return _extension.Stream(
+    return (
         _hand(layout, memory, int(n_lanes.sum())),
         [_finger(layout, f, int(n_lanes[:f].sum())) for f in range(len(layout.windows))],
         [

@@ -1,7 +1,11 @@
 """Functions in C. They release the GIL, and refuse anything but contiguous arrays of float64."""
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import numpy.typing as npt
+
+from holdfast.contact import ContactEstimate, HandEstimate
 
 SOURCES: str
 """The digest of the C files that this extension was built from."""
@@ -58,3 +62,62 @@ class Stream:
         /,
     ) -> None:
         """Process n samples, and fill `features` and `amplitude` of each of them."""
+
+class Estimates:
+    """Estimates of the fingers of a hand, by name; a `Detector` makes them."""
+
+    def __getitem__(self, name: str, /) -> ContactEstimate: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[str]: ...
+
+class Detector:
+    """The detector of a hand; see `detector.h`. It cannot be copied or pickled.
+
+    A call while another thread is inside one raises RuntimeError.
+    """
+
+    def __new__(
+        cls,
+        stream: tuple[object, ...],
+        model: dict[str, object],
+        rules: list[dict[str, object]],
+        heads: list[dict[str, object]],
+        weights: npt.NDArray[np.float64],
+        makers: tuple[object, ...],
+        array_type: type,
+        note: Callable[[tuple[float, bytes, bytes]], None],
+        /,
+    ) -> Detector: ...
+    def update(self, samples: object, time: float, /) -> HandEstimate | None:
+        """Return the estimate; None for samples or a time that Python converts or refuses."""
+
+    def step(
+        self, readings: npt.NDArray[np.float64], present: npt.NDArray[np.bool_], time: float, /
+    ) -> HandEstimate:
+        """Return the estimate of a sample (n_taxels, 3) of the fingers that are present."""
+
+    def run(
+        self,
+        readings: npt.NDArray[np.float64],
+        present: npt.NDArray[np.bool_],
+        times: npt.NDArray[np.float64],
+        estimates: npt.NDArray[np.float64],
+        hand: npt.NDArray[np.float64],
+        /,
+    ) -> None:
+        """Process n samples. Fill (n, n_fingers, 12) C structs and (n,) states of the hand."""
+
+    def set_rules(
+        self,
+        rules: list[dict[str, object]],
+        heads: list[dict[str, object]],
+        weights: npt.NDArray[np.float64],
+        /,
+    ) -> None:
+        """Change rules and heads from the next sample on."""
+
+    def baselines(self, out: npt.NDArray[np.float64], /) -> list[bool]:
+        """Fill (n_taxels, 3) with the tare, and return whether that of each finger is complete."""
+
+    def last_time(self) -> float:
+        """Return the time of the newest sample [s]; -infinity before the first."""

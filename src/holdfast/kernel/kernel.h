@@ -60,6 +60,7 @@ typedef float hf_real;
 #define hf_log logf
 #define hf_exp expf
 #define hf_expm1 expm1f
+#define hf_tanh tanhf
 #define hf_abs fabsf
 #define hf_copysign copysignf
 #define hf_nextafter nextafterf
@@ -70,6 +71,7 @@ typedef double hf_real;
 #define hf_log log
 #define hf_exp exp
 #define hf_expm1 expm1
+#define hf_tanh tanh
 #define hf_abs fabs
 #define hf_copysign copysign
 #define hf_nextafter nextafter

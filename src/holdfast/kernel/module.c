@@ -6,12 +6,14 @@
  * buffers cannot go away, but a caller who changes the numbers in another thread gets either of
  * them. A stream that another thread is using raises an error.
  */
+#define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
 #include <float.h>
 #include <string.h>
 
 #include "batch.h"
+#include "detector.h"
 #include "kernel.h"
 
 /* The size of the scratch memory of a longer window could overflow. */
@@ -231,7 +233,7 @@ typedef struct {
 } stream;
 
 /* The fields of the tables, which Python gives by name in dictionaries. */
-typedef enum { SIZE, CODE, FLAG, REAL } field_type;
+typedef enum { SIZE, CODE, FLAG, REAL, CODES_6 } field_type;
 
 typedef struct {
     const char *name;
@@ -291,6 +293,14 @@ static void store(PyObject *value, field_type type, void *target)
             PyErr_Format(PyExc_OverflowError, "%ld has more than 32 bits", code);
         }
         *(int32_t *)target = (int32_t)code;
+    } else {
+        for (Py_ssize_t i = 0; i < 6 && !PyErr_Occurred(); ++i) {
+            PyObject *const item = PySequence_GetItem(value, i);
+            if (item != NULL) {
+                store(item, CODE, (char *)target + i * 4);
+                Py_DECREF(item);
+            }
+        }
     }
 }
 
@@ -566,12 +576,16 @@ static PyType_Spec stream_spec = {
     "holdfast.kernel._extension.Stream", sizeof(stream), 0, Py_TPFLAGS_DEFAULT, stream_slots,
 };
 
+#include "module_estimates.c"
+
+#include "module_detector.c"
+
 static int add_contents(PyObject *module)
 {
     PyObject *const type = PyType_FromModuleAndSpec(module, &stream_spec, NULL);
     const int result = type == NULL ? -1 : PyModule_AddObjectRef(module, "Stream", type);
     Py_XDECREF(type);
-    return result < 0 || PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
+    return result < 0 || add_detector(module) < 0 || PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
                ? -1
                : PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
 }

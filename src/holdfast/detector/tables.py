@@ -1,0 +1,118 @@
+"""The tables of a detector in C, by the names of the structs in `kernel/detector.h`."""
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers import Linear
+from holdfast.contact import CAUSES, SLIP_CODE
+from holdfast.features.stream import StreamPlan
+from holdfast.features.tables import Struct
+from holdfast.model import ANY_FINGER, FingerModel, Head, Model
+from holdfast.model.heads import HEAD_NAMES
+from holdfast.sensors.types import Array
+
+N_HEADS, STABLE_HEAD = len(HEAD_NAMES), HEAD_NAMES.index("stable")
+ALWAYS_CONTACT, BY_FORCE, BY_NOISE, BY_LOAD = range(4)
+
+Rules = tuple[list[Struct], list[Struct], Array]
+"""Rules of the fingers, four heads for each of them, and the numbers of all heads."""
+
+ESTIMATE = np.dtype(
+    [
+        ("time", np.float64), ("state", np.int32), ("reason", np.int32), ("cause", np.int32),
+        ("faults", np.uint32), ("taxels", np.int64), ("probability", np.float64),
+        ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
+        ("sigma", np.float64), ("force", np.float64, 3),
+    ]
+)  # fmt: skip
+"""`holdfast_finger_estimate`."""
+
+
+def model_table(model: Model, plan: StreamPlan, zero_unknown: bool) -> Struct:
+    """Return the settings of a model that hold for all fingers."""
+    n_fingers = len(plan.fingers) if ANY_FINGER in model.fingers else len(model.fingers)
+    return {
+        "n_model_fingers": n_fingers,
+        "hysteresis": model.debounce.hysteresis,
+        "min_duration": model.debounce.min_duration,
+        "hold": model.debounce.hold,
+        "has_filter": model.debounce.switching_rate > 0,
+        "switching": model.debounce.switching_rate,
+        "zero_unknown": zero_unknown,
+    }
+
+
+def rules_of(model: Model, plan: StreamPlan) -> Rules:
+    """Return the rules of the fingers of a plan, in its order."""
+    parts = [model.finger(name, sensor) for name, sensor in plan.sensors.items()]
+    heads: list[Struct] = []
+    numbers = [np.empty(0)]
+    for part in parts:
+        for name in HEAD_NAMES:
+            rows, squares, causes = _numbers(part, part.head(name))
+            heads.append(
+                _head(part.head(name), plan.rate)
+                | {
+                    "n_outputs": len(rows),
+                    "n_features": rows.shape[1] - 1,
+                    "first": sum(map(len, numbers)),
+                    "has_squares": len(squares) > 0,
+                    "causes": causes + [0] * (len(CAUSES) - len(causes)),
+                }
+            )
+            numbers += [rows.ravel(), squares.ravel()]
+    return [_contact(part) for part in parts], heads, np.concatenate(numbers)
+
+
+def _contact(part: FingerModel) -> Struct:
+    for kind, limit in (
+        (BY_LOAD, part.contact_load),
+        (BY_FORCE, part.contact_threshold),
+        (BY_NOISE, part.contact_noise),
+    ):
+        if limit is not None:
+            return {"contact": kind, "contact_limit": limit}
+    return {"contact": ALWAYS_CONTACT, "contact_limit": 0.0}
+
+
+def _head(head: Head | None, rate: float) -> Struct:
+    """Return the settings of a head; without it they are not read."""
+    if head is None:
+        return {"threshold": 0.0, "gain": 1.0, "hold": 0.0, "highest": 0.0}
+    return {
+        "threshold": head.threshold,
+        "gain": head.gain(rate),
+        "hold": head.hold,
+        "highest": head.highest or 0.0,
+    }
+
+
+def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[int]]:
+    """Return the weights (n_outputs, 1 + n) of the first n features, those of squares, and causes.
+
+    A slip is no likely cause where a head decides about slips.
+    """
+    if head is None:
+        return np.zeros((0, 1)), np.zeros((0, 0)), []
+    if not isinstance(head.rule, Linear):
+        return np.zeros((1, 1)), np.zeros((0, 0)), []  # its z is given from outside
+    columns = part.indices(head)
+    # Features after the last one are read for slips and speeds too, as the compiled Python does.
+    is_slip = head.name in ("slip", "slip_speed")
+    n = len(part.features) if is_slip else int(columns.max(initial=-1)) + 1
+    rows = np.zeros((head.rule.n_outputs, n + 1))
+    rows[:, np.append(0, columns + 1)] = head.rule.raw_weights()
+    squares = np.zeros((3 if head.rule.squares else 0, n))
+    squares[:, columns] = head.rule.raw_squares()[: len(squares)]
+    codes = [CAUSES.index(cause) + 1 for cause in head.classes]
+    order = np.argsort(codes)
+    kept = [k for k in order if part.slip is None or codes[k] != SLIP_CODE]
+    if head.classes:
+        return rows[kept], squares, [codes[k] for k in kept]
+    return rows, squares, []
+
+
+def estimate_rows(n: int, n_fingers: int) -> tuple[npt.NDArray[np.void], Array]:
+    """Return estimates to be filled (n, n_fingers), and the same memory as numbers."""
+    numbers = np.zeros((n, n_fingers, ESTIMATE.itemsize // 8))
+    return numbers.view(ESTIMATE)[..., 0], numbers

@@ -1,0 +1,11 @@
+/* The kernel and the detector as one source file; see kernel.c. */
+#include "detector.h"
+
+#include "kernel.c"
+
+#include "contact.c"
+#include "heads.c"
+
+#include "decision.c"
+
+#include "detector.c"

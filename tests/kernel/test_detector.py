@@ -1,0 +1,240 @@
+"""The detector in C: the estimates of compiled Python, to the last bit."""
+
+import copy
+import pickle
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+import holdfast
+from detector.build import cause_head, lively, model, sensor
+from exporters.c_detector import random_samples
+from exporters.models import MODELS, made
+from holdfast.contact import Cause
+from holdfast.detector import Detector, detect
+from holdfast.detector import detector as module
+from holdfast.detector.tables import ESTIMATE, estimate_rows, rules_of
+from holdfast.errors import StreamError
+from holdfast.io import import_recordings, load_recording
+from holdfast.kernel import _extension
+from holdfast.model import Model
+
+N = 3000
+EVERY_CAUSE = tuple(Cause)
+
+
+def with_causes(**options):
+    """A model with every kind of head for two fingers, and the forward filter."""
+    made_model = model(slips=("thumb",), speeds=("thumb",), threshold=60.0, **options)
+    fingers = {
+        name: part.with_heads(cause_head(part.features, seed, EVERY_CAUSE[seed:]))
+        for seed, (name, part) in enumerate(made_model.fingers.items())
+    }
+    debounce = replace(made_model.debounce, switching=15.0, hysteresis=0.1, hold=0.05)
+    return replace(made_model, fingers=fingers, debounce=debounce)
+
+
+def both(monkeypatch, make):
+    """Return what a function makes with the compiled Python, and with C."""
+    found = []
+    for use_c in (False, True):
+        monkeypatch.setattr(module, "USE_C", use_c)
+        found.append(make())
+    return found
+
+
+def answer(detector, samples, time):
+    try:
+        return detector.update(samples, time)
+    except StreamError as error:
+        return str(error)
+
+
+def assert_equal(detectors, samples):
+    n = 0
+    for n, (sample, time) in enumerate(samples, 1):
+        python, c = (repr(answer(detector, sample, time)) for detector in detectors)
+        assert python == c, n
+    events = [detector.events() for detector in detectors]
+    assert events[0] == events[1]
+    return n
+
+
+@pytest.mark.parametrize("in_contact", [False, True])
+@pytest.mark.parametrize("name", [*MODELS, "causes", "minimum duration"])
+def test_random_samples_as_compiled_python(monkeypatch, name, in_contact):
+    if name in MODELS:
+        used, sensors, rate = made(name)
+    else:
+        used = with_causes()
+        sensors, rate = dict.fromkeys(used.fingers, sensor()), used.rate
+        if name == "minimum duration":
+            used = replace(used, debounce=replace(used.debounce, min_duration=0.04))
+    detectors = both(monkeypatch, lambda: Detector(used, sensors, rate, in_contact=in_contact))
+    counts = all(finger.unit == "count" for finger in sensors.values())
+    rng = np.random.default_rng(11)
+    assert assert_equal(detectors, random_samples(rng, sensors, rate, N, counts)) == N
+    for detector in detectors:
+        detector.reset()
+        detector.set_thresholds(dict.fromkeys(sensors, 0.7))
+    rows = random_samples(np.random.default_rng(12), sensors, rate, 500, counts)
+    assert_equal(detectors, rows)
+    baselines = [detector.baselines() for detector in detectors]
+    assert repr(baselines[0]) == repr(baselines[1])
+
+
+def test_a_finger_without_the_head_of_causes_has_none(monkeypatch):
+    monkeypatch.setattr(module, "USE_C", True)
+    used = with_causes()
+    index = used.fingers["index"]
+    plain = replace(index, heads=tuple(head for head in index.heads if head.name != "cause"))
+    detector, found = Detector(replace(used, fingers=used.fingers | {"index": plain})), []
+    for k, sample in enumerate(lively(200)):
+        fingers = detector.update({"thumb": sample, "index": sample}, k / 100).fingers
+        found.append((fingers["thumb"].cause, fingers["index"].cause, fingers["index"].state))
+    assert any(state == "UNSTABLE" for *_, state in found)
+    assert any(thumb is not None for thumb, *_ in found)
+    assert {index for _, index, _ in found} == {None}
+
+
+@pytest.mark.parametrize("name", ["paper", "twin", "rich"])
+def test_chunks_of_any_length_give_the_estimates_of_updates(monkeypatch, name):
+    used, sensors, rate = made(name)
+    monkeypatch.setattr(module, "USE_C", True)
+    one, many = Detector(used, sensors, rate), Detector(used, sensors, rate)
+    bounds = np.cumsum([0, *(finger.n_taxels for finger in sensors.values())])
+    rng, last, rows = np.random.default_rng(5), -np.inf, []
+    for samples, time in random_samples(rng, sensors, rate, 500):
+        estimate, before = answer(one, samples, time), last
+        last = max(last, time)
+        if before < time < np.inf and not isinstance(estimate, str):
+            readings = np.full((bounds[-1], 3), np.nan)
+            for finger, first, stop in zip(sensors, bounds, bounds[1:], strict=False):
+                if finger in samples:
+                    readings[first:stop] = samples[finger]
+            rows.append((readings, [finger in samples for finger in sensors], time, estimate))
+    readings, present, times = (np.array(column) for column in list(zip(*rows, strict=True))[:3])
+    estimates, numbers = estimate_rows(*present.shape)
+    for start, stop in ((0, 1), (1, 200), (200, 200), (200, len(times))):
+        part, hand = slice(start, stop), np.zeros(stop - start)
+        many._kernel.run(readings[part], present[part], times[part], numbers[part], hand)
+    for (*_, expected), found in zip(rows, estimates, strict=True):
+        for finger, row in zip(expected.fingers.values(), found, strict=True):
+            assert (finger.state.code, repr(finger.time)) == (
+                row["state"],
+                repr(float(row["time"])),
+            )
+            assert repr(finger.stable_probability) == repr(float(row["probability"]))
+            assert repr(finger.force) == repr(tuple(row["force"].tolist()))
+
+
+def recordings(data_folder):
+    yield load_recording(Path(holdfast.__file__).parent / "recorded/box-slips.mcap")
+    for dataset in ("uskin_pick_move", "gtac"):
+        yield from list(import_recordings(data_folder / dataset))[:2]
+
+
+@pytest.mark.parametrize("name", ["builtin:any", "builtin:noise-floor"])
+def test_recordings_as_compiled_python(monkeypatch, name, data_folder):
+    used = Model.load(name)
+    for recording in recordings(data_folder):
+        python, c = both(monkeypatch, lambda recording=recording: detect(used, recording))
+        assert python.fingers.keys() == c.fingers.keys()
+        for finger, trace in python.fingers.items():
+            for expected, found in zip(trace, c.fingers[finger], strict=True):
+                assert (expected is None) == (found is None)
+                assert expected is None or np.array_equal(expected, found, equal_nan=True)
+        assert np.array_equal(python.hand, c.hand)
+
+
+class TestEstimates:
+    @pytest.fixture
+    def estimate(self, monkeypatch):
+        monkeypatch.setattr(module, "USE_C", True)
+        detector = Detector(with_causes())
+        for k, sample in enumerate(lively(60)):
+            estimate = detector.update({"thumb": sample, "index": sample}, k / 100)
+        return estimate
+
+    def test_they_are_a_mapping(self, estimate):
+        fingers = estimate.fingers
+        assert (list(fingers), len(fingers), "thumb" in fingers) == (["thumb", "index"], 2, True)
+        assert fingers == dict(fingers)
+        assert fingers["thumb"] == fingers["thumb"]
+        assert fingers["index"].slip_probability is None
+        assert fingers["thumb"].slip_speed is not None
+        with pytest.raises(KeyError, match="ring"):
+            fingers["ring"]
+
+    @pytest.mark.parametrize(
+        "call", [copy.copy, copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))]
+    )
+    def test_they_are_copied_as_a_dictionary(self, estimate, call):
+        assert call(estimate) == estimate
+        assert type(call(estimate.fingers)) is dict
+
+    def test_they_outlive_the_detector(self, monkeypatch):
+        monkeypatch.setattr(module, "USE_C", True)
+        kept = [Detector(with_causes()).update({}, float(k)) for k in range(100)]
+        assert {str(estimate.fingers["thumb"].state) for estimate in kept} == {"UNKNOWN"}
+
+    def test_one_that_no_detector_made_has_no_fingers(self):
+        assert len(_extension.Estimates()) == 0
+        with pytest.raises(KeyError):
+            _extension.Estimates()["thumb"]
+
+    def test_they_have_the_size_of_the_struct(self):
+        assert _extension.Estimates.__itemsize__ == ESTIMATE.itemsize
+
+
+class TestDetector:
+    @pytest.mark.parametrize("call", [copy.copy, copy.deepcopy, pickle.dumps])
+    def test_it_cannot_be_copied(self, monkeypatch, call):
+        monkeypatch.setattr(module, "USE_C", True)
+        with pytest.raises(TypeError, match=r"cannot pickle .*Detector. object"):
+            call(Detector(with_causes())._kernel)
+
+    def test_another_thread_is_refused(self, monkeypatch):
+        monkeypatch.setattr(module, "USE_C", True)
+        detector, refused, n = Detector(with_causes())._kernel, [], 20_000
+        arguments = [
+            np.ones((n, 4, 3)), np.ones((n, 2), dtype=bool), np.arange(float(n)),
+            np.zeros((n, 2, ESTIMATE.itemsize // 8)), np.zeros(n),
+        ]  # fmt: skip
+        for _ in range(50):  # until a call was made while the thread was inside one
+            thread = threading.Thread(target=detector.run, args=arguments)
+            thread.start()
+            while thread.is_alive():
+                try:
+                    detector.update({}, -1.0)
+                except RuntimeError as error:
+                    refused.append(str(error))
+            thread.join()
+            arguments[2] = arguments[2] + n
+            if refused:
+                break
+        assert set(refused) == {"another thread is using this detector"}
+
+    @pytest.mark.parametrize(
+        ("change", "wrong"),
+        [
+            (lambda r, h, w: (r[:1], h, w), "lists of a rule and four heads"),
+            (lambda r, h, w: (r, h, w[:-1]), "first of a head"),
+            (lambda r, h, w: (r, h, w * np.nan), "a weight of a head"),
+            (lambda r, h, w: (r, [h[0] | {"n_features": 99}, *h[1:]], w), "n_features or has_sq"),
+            (lambda r, h, w: (r, [h[0] | {"n_outputs": 0}, *h[1:]], w), "n_outputs of a head"),
+            (lambda r, h, w: (r, [h[0] | {"gain": np.nan}, *h[1:]], w), "a number of a head"),
+            (lambda r, h, w: (r, [*h[:3], h[3] | {"causes": [9] * 6}, *h[4:]], w), "causes of"),
+            (lambda r, h, w: ([r[0] | {"contact": 4}, r[1]], h, w), "contact or contact_limit"),
+            (lambda r, h, w: ([r[0] | {"contact": 3}, r[1]], h, w), "contact by the load of a"),
+        ],
+    )
+    def test_rules_that_do_not_fit_are_refused(self, monkeypatch, change, wrong):
+        monkeypatch.setattr(module, "USE_C", True)
+        used = with_causes()
+        detector = Detector(used)
+        with pytest.raises(ValueError, match=wrong):
+            detector._kernel.set_rules(*change(*rules_of(used, detector._stream.plan)))
