@@ -287,7 +287,7 @@ static void store(PyObject *value, field_type type, void *target)
         *(double *)target = PyFloat_AsDouble(value);
     } else if (type == FLAG) {
         *(bool *)target = PyObject_IsTrue(value) == 1;
-    } else {
+    } else if (type == CODE) {
         const long code = PyLong_AsLong(value);
         if (code < INT32_MIN || code > INT32_MAX) {
             PyErr_Format(PyExc_OverflowError, "%ld has more than 32 bits", code);
