@@ -10,22 +10,32 @@ typedef struct {
     holdfast_detector d;
     void *rules; /* tables that `set_rules` replaces */
     void *weights;
-    double *readings;                   /* (n_taxels, 3) of one sample */
+    double *readings;                    /* (n_taxels, 3) of one sample */
     holdfast_finger_estimate *estimates; /* (n_fingers) */
-    char *before; /* (n_fingers + 1) states of fingers and hand */
+    char *before;                        /* (n_fingers + 1) states of fingers and hand */
     char *after;
     PyObject *makers;
     PyObject *array_type; /* numpy.ndarray */
     PyObject *note;       /* is called with (time, states before, states after) at a change */
 } detector;
 
-#define OF_MODEL(type, name) {#name, type, offsetof(holdfast_model, name)}
-#define OF_RULE(type, name) {#name, type, offsetof(holdfast_rule, name)}
-#define OF_HEAD(type, name) {#name, type, offsetof(holdfast_head, name)}
+#define OF_MODEL(type, name)                                                                       \
+    {                                                                                              \
+#name, type, offsetof(holdfast_model, name)                                                \
+    }
+#define OF_RULE(type, name)                                                                        \
+    {                                                                                              \
+#name, type, offsetof(holdfast_rule, name)                                                 \
+    }
+#define OF_HEAD(type, name)                                                                        \
+    {                                                                                              \
+#name, type, offsetof(holdfast_head, name)                                                 \
+    }
 
 static const field model_fields[] = {
-    OF_MODEL(SIZE, n_model_fingers), OF_MODEL(REAL, hysteresis), OF_MODEL(REAL, min_duration),
-    OF_MODEL(REAL, hold),            OF_MODEL(FLAG, has_filter), OF_MODEL(REAL, switching),
+    OF_MODEL(SIZE, n_model_fingers), OF_MODEL(REAL, hysteresis),
+    OF_MODEL(REAL, min_duration),    OF_MODEL(REAL, hold),
+    OF_MODEL(FLAG, has_filter),      OF_MODEL(REAL, switching),
     OF_MODEL(FLAG, zero_unknown),    {NULL, SIZE, 0},
 };
 
@@ -36,9 +46,11 @@ static const field rule_fields[] = {
 };
 
 static const field head_fields[] = {
-    OF_HEAD(SIZE, n_outputs), OF_HEAD(SIZE, n_features), OF_HEAD(SIZE, first),
-    OF_HEAD(FLAG, has_squares), OF_HEAD(REAL, threshold), OF_HEAD(REAL, gain),
-    OF_HEAD(REAL, hold), OF_HEAD(REAL, highest), OF_HEAD(CODES_6, causes), {NULL, SIZE, 0},
+    OF_HEAD(SIZE, n_outputs), OF_HEAD(SIZE, n_features),
+    OF_HEAD(SIZE, first),     OF_HEAD(FLAG, has_squares),
+    OF_HEAD(REAL, threshold), OF_HEAD(REAL, gain),
+    OF_HEAD(REAL, hold),      OF_HEAD(REAL, highest),
+    OF_HEAD(CODES_6, causes), {NULL, SIZE, 0},
 };
 
 /* Fill the rule of each finger from dictionaries, or set an exception and return -1. */
@@ -46,7 +58,8 @@ static int fill_rules(PyObject *list, PyObject *heads, holdfast_rule *rules, siz
 {
     if (!PyList_Check(list) || !PyList_Check(heads) || PyList_Size(list) != (Py_ssize_t)n ||
         PyList_Size(heads) != (Py_ssize_t)(n * HOLDFAST_N_HEADS)) {
-        PyErr_SetString(PyExc_ValueError, "lists of a rule and four heads for each finger expected");
+        PyErr_SetString(
+            PyExc_ValueError, "lists of a rule and four heads for each finger expected");
         return -1;
     }
     for (size_t i = 0; i < n; ++i) {
@@ -70,7 +83,7 @@ static int set_tables(detector *s, PyObject *list, PyObject *heads, PyObject *nu
     array a = {0};
     holdfast_rule *rules = NULL;
     double *weights = NULL;
-    if (get_array(numbers, "weights", 1, PyBUF_SIMPLE, &a) < 0) {
+    if (get_array('d', numbers, "weights", 1, PyBUF_SIMPLE, &a) < 0) {
         goto failed;
     }
     model.n_weights = (size_t)a.view.shape[0];
@@ -109,9 +122,9 @@ static PyObject *detector_new(PyTypeObject *type, PyObject *args, PyObject *name
 {
     PyObject *stream_args, *model, *rules, *heads, *weights, *makers, *array_type, *note;
     if ((names != NULL && PyDict_Size(names) > 0) ||
-        !PyArg_ParseTuple(args, "O!O!OOOO!OO:Detector", &PyTuple_Type, &stream_args, &PyDict_Type,
-                          &model, &rules, &heads, &weights, &PyTuple_Type, &makers, &array_type,
-                          &note)) {
+        !PyArg_ParseTuple(
+            args, "O!O!OOOO!OO:Detector", &PyTuple_Type, &stream_args, &PyDict_Type, &model, &rules,
+            &heads, &weights, &PyTuple_Type, &makers, &array_type, &note)) {
         return NULL;
     }
     if (PyTuple_Size(makers) != N_MAKERS || !PyDict_Check(PyTuple_GetItem(makers, PLACES)) ||
@@ -143,7 +156,8 @@ static PyObject *detector_new(PyTypeObject *type, PyObject *args, PyObject *name
     s->d.decisions = PyMem_Calloc(n, sizeof(holdfast_decision));
     s->before = PyMem_Calloc(2, n + 1);
     s->after = s->before + n + 1;
-    if (s->readings == NULL || s->estimates == NULL || s->before == NULL || s->d.decisions == NULL) {
+    if (s->readings == NULL || s->estimates == NULL || s->before == NULL ||
+        s->d.decisions == NULL) {
         PyErr_NoMemory();
         goto failed;
     }
@@ -260,8 +274,8 @@ static PyObject *make_hand(const detector *s, double time)
     if (e != NULL && when != NULL && state != NULL) {
         e->makers = Py_NewRef(s->makers);
         memcpy(e->fingers, s->estimates, n * sizeof *s->estimates);
-        result = PyObject_CallFunctionObjArgs(PyTuple_GetItem(s->makers, MAKE_HAND), when, state,
-                                              e, NULL);
+        result = PyObject_CallFunctionObjArgs(
+            PyTuple_GetItem(s->makers, MAKE_HAND), when, state, e, NULL);
     }
     Py_XDECREF((PyObject *)e);
     Py_XDECREF(when);
@@ -323,11 +337,10 @@ static PyObject *detector_step(PyObject *self, PyObject *const *args, Py_ssize_t
     const double time = PyFloat_AsDouble(args[2]);
     array arrays[2] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
     PyObject *result = NULL;
-    if (PyErr_Occurred() || get_array(args[0], "readings", 2, PyBUF_SIMPLE, readings) < 0 ||
-        get_array_of('?', args[1], "present", 1, PyBUF_SIMPLE, present) < 0 ||
-        check_axis(readings, 0, (Py_ssize_t)s->base.n_taxels) < 0 ||
-        check_axis(readings, 1, 3) < 0 ||
-        check_axis(present, 0, (Py_ssize_t)s->base.hand.n_fingers) < 0) {
+    if (PyErr_Occurred() || get_array('d', args[0], "readings", 2, PyBUF_SIMPLE, readings) < 0 ||
+        get_array('?', args[1], "present", 1, PyBUF_SIMPLE, present) < 0 ||
+        check_shape(readings, SHAPE((Py_ssize_t)s->base.n_taxels, 3)) < 0 ||
+        check_shape(present, SHAPE((Py_ssize_t)s->base.hand.n_fingers)) < 0) {
         goto done;
     }
     if (!(time > s->base.last_time && time <= DBL_MAX)) {
@@ -345,8 +358,9 @@ done:
 }
 
 /* Process n samples, and fill the estimates of the fingers and the state of the hand. */
-static void run_all(detector *s, const array *readings, const array *present, const array *times,
-                    const array *out, const array *hand)
+static void run_all(
+    detector *s, const array *readings, const array *present, const array *times, const array *out,
+    const array *hand)
 {
     const size_t n = (size_t)times->view.shape[0], n_fingers = s->base.hand.n_fingers;
     const unsigned char *is_present = present->view.buf;
@@ -356,9 +370,9 @@ static void run_all(detector *s, const array *readings, const array *present, co
         for (size_t f = 0; f < n_fingers; ++f) {
             s->base.present[f] = *is_present++ != 0;
         }
-        states[k] = holdfast_update(&s->d, times->data[k],
-                                    readings->data + 3 * s->base.n_taxels * k, s->base.present,
-                                    rows + n_fingers * k);
+        states[k] = holdfast_update(
+            &s->d, times->data[k], readings->data + 3 * s->base.n_taxels * k, s->base.present,
+            rows + n_fingers * k);
     }
 }
 
@@ -372,25 +386,21 @@ static PyObject *detector_run(PyObject *self, PyObject *const *args, Py_ssize_t 
     array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
     array *const times = &arrays[2], *const out = &arrays[3], *const hand = &arrays[4];
     PyObject *result = NULL;
-    if (get_array(args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array_of('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
-        get_array(args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
+    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
+        get_array('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
+        get_array('d', args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
         /* (n, n_fingers, size of a struct in doubles): its bytes, aligned */
-        get_array(args[3], "estimates", 3, PyBUF_WRITABLE, out) < 0 ||
-        get_array(args[4], "hand", 1, PyBUF_WRITABLE, hand) < 0) {
+        get_array('d', args[3], "estimates", 3, PyBUF_WRITABLE, out) < 0 ||
+        get_array('d', args[4], "hand", 1, PyBUF_WRITABLE, hand) < 0) {
         goto done;
     }
     const Py_ssize_t n = times->view.shape[0], n_fingers = (Py_ssize_t)s->base.hand.n_fingers;
-    if (check_axis(readings, 0, n) < 0 ||
-        check_axis(readings, 1, (Py_ssize_t)s->base.n_taxels) < 0 ||
-        check_axis(readings, 2, 3) < 0 || check_axis(present, 0, n) < 0 ||
-        check_axis(present, 1, n_fingers) < 0 || check_axis(out, 0, n) < 0 ||
-        check_axis(out, 1, n_fingers) < 0 ||
-        check_axis(out, 2, (Py_ssize_t)(sizeof(holdfast_finger_estimate) / sizeof(double))) < 0 ||
-        check_axis(hand, 0, n) < 0 || check_apart(readings, out) < 0 ||
-        check_apart(readings, hand) < 0 || check_apart(out, hand) < 0 ||
-        check_apart(times, out) < 0 || check_apart(times, hand) < 0 ||
-        check_times(times, s->base.last_time) < 0) {
+    const Py_ssize_t n_taxels = (Py_ssize_t)s->base.n_taxels;
+    const Py_ssize_t n_doubles = (Py_ssize_t)(sizeof(holdfast_finger_estimate) / sizeof(double));
+    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
+        check_shape(present, SHAPE(n, n_fingers)) < 0 ||
+        check_shape(out, SHAPE(n, n_fingers, n_doubles)) < 0 || check_shape(hand, SHAPE(n)) < 0 ||
+        check_apart(arrays, 5, 2) < 0 || check_times(times, s->base.last_time) < 0) {
         goto done;
     }
     if (n > 0) {
@@ -428,14 +438,13 @@ static PyObject *detector_baselines(PyObject *self, PyObject *const *args, Py_ss
     array out = {0};
     PyObject *result = NULL;
     const holdfast_hand *const hand = &s->base.hand;
-    if (get_array(args[0], "out", 2, PyBUF_WRITABLE, &out) == 0 &&
-        check_axis(&out, 0, (Py_ssize_t)s->base.n_taxels) == 0 && check_axis(&out, 1, 3) == 0) {
+    if (get_array('d', args[0], "out", 2, PyBUF_WRITABLE, &out) == 0 &&
+        check_shape(&out, SHAPE((Py_ssize_t)s->base.n_taxels, 3)) == 0) {
         result = PyList_New((Py_ssize_t)hand->n_fingers);
     }
     for (size_t i = 0; result != NULL && i < hand->n_fingers; ++i) {
         const holdfast_finger *const finger = &hand->fingers[i];
-        const bool is_tared =
-            holdfast_baseline(&s->d, i, out.data + 3 * finger->first_taxel);
+        const bool is_tared = holdfast_baseline(&s->d, i, out.data + 3 * finger->first_taxel);
         if (PyList_SetItem(result, (Py_ssize_t)i, PyBool_FromLong(is_tared)) < 0) {
             Py_CLEAR(result);
         }
@@ -452,11 +461,14 @@ static PyObject *detector_last_time(PyObject *self, PyObject *const *args, Py_ss
                                       : PyFloat_FromDouble(((detector *)self)->base.last_time);
 }
 
-#define METHOD(name) {#name, (PyCFunction)(void (*)(void))detector_##name, METH_FASTCALL, NULL}
+#define METHOD(name)                                                                               \
+    {                                                                                              \
+#name, (PyCFunction)(void (*)(void))detector_##name, METH_FASTCALL, NULL                   \
+    }
 
 static PyMethodDef detector_methods[] = {
-    METHOD(update), METHOD(step), METHOD(run), METHOD(set_rules), METHOD(baselines), METHOD(last_time),
-    {NULL, NULL, 0, NULL},
+    METHOD(update),    METHOD(step),      METHOD(run),           METHOD(set_rules),
+    METHOD(baselines), METHOD(last_time), {NULL, NULL, 0, NULL},
 };
 
 static PyType_Slot detector_slots[] = {
