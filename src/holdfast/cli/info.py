@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 MAX_VALUE_LENGTH = 90
 """Maximum number of characters of a metadata value in the table."""
+SAMPLES_OF_PART = 20_000
+"""Samples that a detector gets at a time: it keeps a multiple of their memory."""
 
 
 def info(
@@ -193,8 +195,12 @@ def _faults(
 
     model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
     alone = replace(recording, modules={name: module}, truth=None)
-    masks = Detector.for_recording(model, alone).run(alone).fingers[name].faults
-    counts = {fault: int((masks >> bit & 1).sum()) for bit, fault in enumerate(Fault)}
+    detector, counts = Detector.for_recording(model, alone), dict.fromkeys(Fault, 0)
+    for start in range(0, module.n_samples, SAMPLES_OF_PART):
+        part = replace(alone, modules={name: module.slice(start, start + SAMPLES_OF_PART)})
+        masks = detector.run(part).fingers[name].faults
+        for bit, fault in enumerate(Fault):
+            counts[fault] += int((masks >> bit & 1).sum())
     return {fault.value: n for fault, n in counts.items() if n}
 
 
