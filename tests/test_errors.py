@@ -1,6 +1,5 @@
 import json
 import pickle
-from importlib import metadata
 from types import SimpleNamespace
 
 import pytest
@@ -53,16 +52,14 @@ WHEEL = {"url": "file:///tmp/holdfast-0.1.0-py3-none-any.whl", "archive_info": {
 def test_a_missing_extra_names_the_command_that_adds_it(monkeypatch, installer, origin, command):
     files = {"INSTALLER": f"{installer}\n", "direct_url.json": origin and json.dumps(origin)}
     found = SimpleNamespace(read_text=files.get)
-    monkeypatch.setattr("importlib.metadata.distribution", lambda name: found)
+    bare = SimpleNamespace(read_text={}.get)  # what setuptools leaves in `src`
+    monkeypatch.setattr("importlib.metadata.distributions", lambda name: [bare, found])
     failure = errors.MissingExtra("h5py", "hdf5")
     assert str(failure) == f"this needs the package h5py, which is not installed: {command}"
 
 
 def test_without_an_installation_the_package_is_named(monkeypatch):
-    def missing(name):
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr("importlib.metadata.distribution", missing)
+    monkeypatch.setattr("importlib.metadata.distributions", lambda name: [])
     assert errors.install_command("hdf5") == 'pip install "holdfast[hdf5]"'
 
 
@@ -79,5 +76,5 @@ def test_several_extras_are_added_by_one_command(monkeypatch):
     ]:
         files = {"INSTALLER": installer, "direct_url.json": json.dumps(origin)}
         found = SimpleNamespace(read_text=files.get)
-        monkeypatch.setattr("importlib.metadata.distribution", lambda name, found=found: found)
+        monkeypatch.setattr("importlib.metadata.distributions", lambda name, found=found: [found])
         assert errors.install_command("twin,plot") == command

@@ -202,8 +202,8 @@ def test_doctor_outlives_a_plug_in(parts, monkeypatch, name, error):
         monkeypatch.setattr(doctor, "PLUGIN_TIMEOUT", 3.0, raising=False)
     points = {"holdfast.laws": {name: f"parts:{name}"}}
     install(parts / "more", "bad", {}, points)
-    monkeypatch.syspath_prepend(str(parts / "more"))
-    found = {plugin.name: plugin.error for plugin in doctor._plugins()}
+    with on_the_path(parts / "more", monkeypatch):
+        found = {plugin.name: plugin.error for plugin in doctor._plugins()}
     assert error in found[name]
 
 

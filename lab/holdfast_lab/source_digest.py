@@ -14,8 +14,8 @@ WITHOUT_RESULTS = (
     *("holdfast_lab.figures", "holdfast_lab.report", "holdfast_lab.verbs"),
 )
 """Packages that only show results."""
-DATA_SUFFIXES = (".csv", ".json", ".toml")
-"""Data files beside a module, on which its results depend too."""
+DATA_SUFFIXES = (".csv", ".json", ".toml", ".c", ".h")
+"""Data files beside a module, and C files, on which its results depend too."""
 
 
 @lru_cache

@@ -127,11 +127,11 @@ def install_command(extra: str) -> str:
     From a clone it installs the clone, and from a wheel the wheel, not a package of that name.
     """
     import json
-    from importlib.metadata import PackageNotFoundError, distribution
+    from importlib.metadata import distributions
 
-    try:
-        installed = distribution("holdfast")
-    except PackageNotFoundError:
+    # setuptools leaves metadata in `src` as well, which no installer has made.
+    found = (one for one in distributions(name="holdfast") if one.read_text("INSTALLER"))
+    if (installed := next(found, None)) is None:
         return f'pip install "holdfast[{extra}]"'
     with_uv = (installed.read_text("INSTALLER") or "").strip() == "uv"
     origin = json.loads(installed.read_text("direct_url.json") or "{}")

@@ -193,7 +193,7 @@ class FeatureStream:
         ]
         times = reduce(_union, (module.times for _, _, module in modules))
         for start in range(0, len(times), CHUNK_SAMPLES):
-            chunk = times[start : start + CHUNK_SAMPLES]
+            chunk = np.ascontiguousarray(times[start : start + CHUNK_SAMPLES])
             present = np.zeros((len(chunk), len(self.slices)), dtype=np.bool_)
             readings = np.zeros((len(chunk), len(self.layout.rotations), 3))
             for place, taxels, module in modules:
