@@ -3,7 +3,6 @@
 import logging
 from asyncio import run, wait_for
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from concurrent.futures import Future as Result
 from concurrent.futures import wait
 from contextlib import contextmanager, suppress
 from functools import lru_cache, partial
@@ -11,10 +10,10 @@ from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from threading import Thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from holdfast.errors import EngineError, MissingExtra
+from holdfast.threads import in_thread
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -179,7 +178,7 @@ def _connect(scheduler: str) -> "Client":
     from distributed import Client
 
     try:
-        _in_thread(lambda: run(_connect_once(scheduler))).result()
+        in_thread(lambda: run(_connect_once(scheduler))).result()
         return Client(scheduler, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as cause:  # a server of any other kind may answer there
         raise EngineError(
@@ -204,27 +203,13 @@ def _watched(client: "Client", call: Callable[[], T]) -> T:
     Raises:
         EngineError: it does not answer a new connection in time.
     """
-    result = _in_thread(call)
+    result = in_thread(call)
     while not wait([result], SCHEDULER_TIMEOUT).done:
         try:
-            _in_thread(lambda: run(_connect_once(client.scheduler.address))).result()
+            in_thread(lambda: run(_connect_once(client.scheduler.address))).result()
         except (OSError, TimeoutError) as cause:
             raise EngineError(_GONE) from cause
     return result.result()
-
-
-def _in_thread(call: Callable[[], T]) -> "Result[T]":
-    """Make a call in a thread that can be left, and that has no event loop."""
-    result: Result[T] = Result()
-
-    def make() -> None:
-        try:
-            result.set_result(call())
-        except BaseException as cause:  # raised where the result is read
-            result.set_exception(cause)
-
-    Thread(target=make, daemon=True).start()
-    return result
 
 
 def _n_threads(client: "Client") -> int:

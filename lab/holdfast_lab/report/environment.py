@@ -7,6 +7,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from holdfast.threads import usable_processors
+
 REPORTED_PACKAGES = (
     "holdfast", "numpy", "scipy", "scikit-learn", "numba", "optuna", "mujoco", "msgspec",
     "matplotlib", "torch",
@@ -27,7 +29,7 @@ def machine() -> dict[str, Any]:
     memory = physical_memory()
     return {
         "processor": _processor(),
-        "cores": _cores(),
+        "cores": usable_processors(),
         "memory": None if memory is None else round(memory / GIB, 1),
         "system": f"{platform.system()} {platform.machine()}",
     }
@@ -75,12 +77,6 @@ def _processor() -> str:
     lines = cpuinfo.read_text(errors="replace").splitlines() if cpuinfo.exists() else []
     names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return next(names, platform.processor() or platform.machine())
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def physical_memory() -> int | None:

@@ -17,6 +17,7 @@ from holdfast.children import python_command
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_table
 from holdfast.errors import install_command, is_installed
+from holdfast.threads import usable_processors
 
 if TYPE_CHECKING:
     from holdfast.cli.config import Config
@@ -90,9 +91,7 @@ def _report(context: typer.Context) -> dict[str, Any]:
         "holdfast": metadata.version("holdfast"),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "cpus": len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count(),
+        "cpus": usable_processors(),
         "packages": packages.pop("", {}),
         "extras": {extra: _extra(extra, versions) for extra, versions in sorted(packages.items())},
         "kernels": _kernels(),

@@ -15,13 +15,13 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from urllib.parse import quote, urljoin
 
 from holdfast.datasets.registry import PublicFile, PublicSet, other_sets
 from holdfast.errors import OutputError, SourceError
 from holdfast.files import is_lfs_pointer, refusal_of_lfs_pointer
+from holdfast.threads import in_thread
 
 if TYPE_CHECKING:
     from pooch import Pooch
@@ -231,7 +231,7 @@ class _Download:
                 raise SourceError(f"{url} sends a body packed by {packed!r}; a plain one expected")
             self._write(answer, n_done)
         finally:  # closing waits for a thread that was given up
-            Thread(target=answer.close, daemon=True).start()
+            in_thread(answer.close)
 
     def _write(self, answer: "Response", n_done: int) -> None:
         """Write the body of an answer; a server without ranges sends the file from its begin."""
@@ -311,15 +311,7 @@ def _in_time(call: Callable[[], _T]) -> _T:
     """
     import requests
 
-    result: Future[_T] = Future()
-
-    def run() -> None:
-        try:
-            result.set_result(call())
-        except BaseException as cause:  # raised in the thread that waits
-            result.set_exception(cause)
-
-    Thread(target=run, daemon=True).start()
+    result = in_thread(call)
     try:
         return result.result(ANSWER_LIMIT)
     except TimeoutError as cause:

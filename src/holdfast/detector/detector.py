@@ -161,10 +161,12 @@ class Detector:
             for place, (finger, taxels) in enumerate(stream.slices.items())
         }
         self._take = itemgetter(*stream.plan.fingers)  # a tuple, unless the finger is single
-        self._rules = tables.rules_of(model, stream.plan)
-        self._settings = tables.model_table(model, stream.plan, stream.layout.zero_unknown)
-        self._use_c = USE_C and all(isinstance(part.stable.rule, Linear) for part in self._parts)
-        if not self._use_c:
+        self._is_linear = all(isinstance(part.stable.rule, Linear) for part in self._parts)
+        self._use_c = USE_C and self._is_linear
+        if self._use_c:
+            self._rules = tables.rules_of(model, stream.plan)
+            self._settings = tables.model_table(model, stream.plan)
+        else:
             self._step = compiled_fast_step()
         self._use(stream)
 
@@ -173,7 +175,7 @@ class Detector:
         self._stream = stream
         self._feeder = None
         self._n_together = len(self._slots)
-        if not all(isinstance(part.stable.rule, Linear) for part in self._parts):
+        if not self._is_linear:
             self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
             self._n_together = -1  # `update` takes the plain way
         n_causes = self._rule.causes.shape[1]
@@ -252,8 +254,11 @@ class Detector:
         for finger, threshold in thresholds.items():
             place = self._slots[finger][0]
             self._rule.limits[place, THRESHOLD] = threshold
-            self._rules[1][tables.STABLE_HEAD + tables.N_HEADS * place]["threshold"] = threshold
-        self._set_rules()
+            if self._kernel is not None:
+                head = self._rules[1][tables.STABLE_HEAD + tables.N_HEADS * place]
+                head["threshold"] = threshold
+        if self._kernel is not None:
+            self._kernel.set_rules(*self._rules)
 
     @property
     def knows_zero(self) -> bool:
@@ -288,11 +293,8 @@ class Detector:
                 "detector; open the source again with it"
             )
         self._parts = parts
-        self._rules = tables.rules_of(model, plan)
-        self._set_rules()
-
-    def _set_rules(self) -> None:
         if self._kernel is not None:
+            self._rules = tables.rules_of(model, plan)
             self._kernel.set_rules(*self._rules)
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:

@@ -13,7 +13,7 @@ from holdfast.contact import CAUSES, SLIP_CODE
 from holdfast.detector import arrays as rule_at
 from holdfast.detector.arrays import DecisionRule
 from holdfast.features.stream import StreamPlan
-from holdfast.model import ANY_FINGER, FingerModel, HeadName, Model
+from holdfast.model import FingerModel, HeadName, Model
 from holdfast.sensors.types import Array
 
 
@@ -55,7 +55,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         min_duration=float(model.debounce.min_duration),
         hold=float(model.debounce.hold),
         switching=model.debounce.switching_rate,
-        n_model_fingers=len(plan.fingers) if ANY_FINGER in model.fingers else len(model.fingers),
+        n_model_fingers=model.n_fingers(plan.fingers),
     )
 
 

@@ -7,7 +7,7 @@ from holdfast.classifiers import Linear
 from holdfast.contact import CAUSES, SLIP_CODE
 from holdfast.features.stream import StreamPlan
 from holdfast.features.tables import Struct
-from holdfast.model import ANY_FINGER, FingerModel, Head, Model
+from holdfast.model import FingerModel, Head, Model
 from holdfast.model.heads import HEAD_NAMES
 from holdfast.sensors.types import Array
 
@@ -28,17 +28,15 @@ ESTIMATE = np.dtype(
 """`holdfast_finger_estimate`."""
 
 
-def model_table(model: Model, plan: StreamPlan, zero_unknown: bool) -> Struct:
-    """Return the settings of a model that hold for all fingers."""
-    n_fingers = len(plan.fingers) if ANY_FINGER in model.fingers else len(model.fingers)
+def model_table(model: Model, plan: StreamPlan) -> Struct:
+    """Return the settings of a model that hold for all fingers, but `zero_unknown` of a stream."""
     return {
-        "n_model_fingers": n_fingers,
+        "n_model_fingers": model.n_fingers(plan.fingers),
         "hysteresis": model.debounce.hysteresis,
         "min_duration": model.debounce.min_duration,
         "hold": model.debounce.hold,
         "has_filter": model.debounce.switching_rate > 0,
         "switching": model.debounce.switching_rate,
-        "zero_unknown": zero_unknown,
     }
 
 

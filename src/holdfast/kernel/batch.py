@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.kernel import _extension
+from holdfast.threads import usable_processors
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,8 +34,7 @@ def max_threads() -> int:
     given = os.environ.get("OMP_NUM_THREADS", "")  # joblib sets it for the processes it starts
     if limit or given.isdigit():
         return limit or max(int(given), 1)
-    usable = getattr(os, "sched_getaffinity", None)
-    return len(usable(0)) if usable else os.cpu_count() or 1
+    return usable_processors()
 
 
 @contextmanager

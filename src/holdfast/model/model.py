@@ -1,7 +1,7 @@
 """The model of a hand: features, classifiers and decision rule."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from hashlib import sha256
 from importlib import resources
@@ -218,6 +218,14 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             f"{self.name or 'the model'} was calibrated on {', '.join(self.handled_sensors)}, not "
             f"on {', '.join(missing)}: default handling is used (holdfast calibrate)"
         )
+
+    def n_fingers(self, fingers: Collection[str]) -> int:
+        """Return the number of fingers on which the state of the hand depends.
+
+        Args:
+            fingers: of the hand, which a model of any finger decides about.
+        """
+        return len(fingers if ANY_FINGER in self.fingers else self.fingers)
 
     def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
         """Return the fingers that the model estimates on a hand, and their sensors.

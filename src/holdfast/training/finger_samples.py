@@ -41,12 +41,12 @@ class FingerSamples:
     n_usable: int = 0
 
     def without(self, left_out: Collection[int]) -> Samples:
-        """Return the samples that are not in held units."""
+        """Return the samples that are in no unit that is left out."""
         return self.samples.take(self.kept(left_out))
 
     def kept(self, left_out: Collection[int]) -> npt.NDArray[np.bool_]:
-        """Return (n,) whether a sample is not in held units."""
-        return ~np.isin(self.units, [-1, *left_out] if left_out else [])
+        """Return (n,) whether a sample is in no unit that is left out."""
+        return outside_units(self.units, left_out)
 
     def can_evaluate(self, n_units: int) -> npt.NDArray[np.bool_]:
         """Return (n_units,) whether a unit has samples, and both classes are left without it."""
@@ -71,6 +71,16 @@ class FingerSamples:
         return contact_threshold(self.at_rest[list(recordings)])
 
 
+def outside_units(units: Integers, left_out: Collection[int]) -> npt.NDArray[np.bool_]:
+    """Return (n,) whether a sample is in no unit that is left out; -1 is left out with each."""
+    return ~np.isin(units, [-1, *left_out] if left_out else [])
+
+
+def finite_rows(features: npt.NDArray[np.floating[Any]], used: npt.NDArray[np.bool_]) -> Integers:
+    """Return the rows that are used (n,) and have finite features (n, n_features)."""
+    return np.flatnonzero(used & np.isfinite(features).all(axis=1))
+
+
 def usable_rows(features: npt.NDArray[np.floating[Any]], states: npt.NDArray[np.int8]) -> Integers:
     """Return the rows that have a label and finite features.
 
@@ -78,7 +88,7 @@ def usable_rows(features: npt.NDArray[np.floating[Any]], states: npt.NDArray[np.
         features: (n, n_features).
         states: (n,) state codes of the labels.
     """
-    return np.flatnonzero((states != UNKNOWN) & np.isfinite(features).all(axis=1))
+    return finite_rows(features, states != UNKNOWN)
 
 
 def labelled_samples(

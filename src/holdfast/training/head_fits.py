@@ -44,7 +44,7 @@ def fit_slip(
     is_any: bool,
     squares: bool = False,
 ) -> Head | None:
-    """Fit the head `slip` to the samples that are not in held units.
+    """Fit the head `slip` to the samples that are in no unit that is left out.
 
     For a model of one hand all samples weigh alike: balanced classes fit the middle, and the
     threshold lies far in the tail. On real recordings that made a model of any hand worse.
@@ -92,7 +92,7 @@ def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> L
 
 
 def fit_speed(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:
-    """Fit the head `slip_speed` to the samples that are not in held units.
+    """Fit the head `slip_speed` to the samples that are in no unit that is left out.
 
     The root of the speed is fitted by least squares with a small penalty. So fast slides count
     more than with the logarithm, and less than with the speed itself.
@@ -137,7 +137,7 @@ def _solve(columns: Array, target: Array, weights: Array) -> Array:
 
 
 def fit_cause(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:
-    """Fit the head `cause` to the samples that are not in held units.
+    """Fit the head `cause` to the samples that are in no unit that is left out.
 
     Args:
         samples: of the target.

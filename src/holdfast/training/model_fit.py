@@ -106,7 +106,7 @@ def fit_model(
     parameters: Mapping[str, Parameters],
     left_out: Collection[int],
 ) -> Model | None:
-    """Fit a model to all samples that are not in held units. It has no provenance yet.
+    """Fit a model to all samples that are in no unit that is left out. It has no provenance yet.
 
     Args:
         data: to fit.

@@ -49,9 +49,8 @@ class ThresholdReplay:
         """
         plain = msgspec.structs.replace(model.with_threshold("stable", 0.0), debounce=Debounce())
         raw = compute_decisions(plain, recording)
-        n_fingers = len(raw.fingers) if "*" in model.fingers else len(model.fingers)
         period = 1 / (model.rate or recording.rate)
-        return cls(raw, model.debounce, period, n_fingers)
+        return cls(raw, model.debounce, period, model.n_fingers(raw.fingers))
 
     def hand(self, threshold: float) -> FingerDecisions:
         """Return the decisions about the hand at a threshold."""

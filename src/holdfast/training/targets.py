@@ -17,6 +17,7 @@ from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import HeadName
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.training.finger_samples import finite_rows, outside_units
 
 EARLY_DURATION = 0.1
 """Time after the onset of a slip whose samples train the head `slip`: later it is found [s]."""
@@ -62,8 +63,8 @@ class TargetSamples:
         )
 
     def kept(self, left_out: Collection[int]) -> Flags:
-        """Return (n,) whether a sample is not in held units."""
-        return ~np.isin(self.units, [-1, *left_out] if left_out else [])
+        """Return (n,) whether a sample is in no unit that is left out."""
+        return outside_units(self.units, left_out)
 
     @property
     def n_positive(self) -> int:
@@ -120,7 +121,7 @@ def slip_target(given: TargetInput, features: Array) -> TargetSamples:
     if not given.is_any:
         slides &= _in_spans([(s.onset, s.onset + EARLY_DURATION) for s in truth.slips], given.times)
     is_still = truth.codes == STILL
-    usable = np.flatnonzero((slides | is_still) & np.isfinite(features).all(axis=1))
+    usable = finite_rows(features, slides | is_still)
     quiet = usable[(is_still & truth.quiet)[usable]][:: step * (1 if given.is_any else QUIET_STEP)]
     disturbed = usable[(is_still & ~truth.quiet)[usable]][::step]
     rows = np.sort(np.concatenate([usable[slides[usable]], quiet, disturbed]))
@@ -143,7 +144,7 @@ def speed_target(given: TargetInput, features: Array) -> TargetSamples | None:
     slides = in_long_slips(given.times, truth)
     used = slides.copy()
     used[np.flatnonzero(truth.codes == STILL)[::STILL_STEP]] = True
-    rows = np.flatnonzero(used & np.isfinite(features).all(axis=1))
+    rows = finite_rows(features, used)
     speed = np.where(slides, true_speed(recording, finger, given.times), 0.0)
     return given.samples(features, speed, rows, len(rows))
 
@@ -170,9 +171,9 @@ def cause_target(given: TargetInput, features: Array) -> TargetSamples | None:
         if label.state is ContactState.UNSTABLE and label.cause not in (None, Cause.SLIP):
             first, last = np.searchsorted(given.times, (label.start, label.end))
             codes[first:last] = CAUSES.index(ALIKE.get(label.cause, label.cause)) + 1
-    used = (codes > 0) & (given.truth.codes != SLIDING) & np.isfinite(features).all(axis=1)
-    rows = np.flatnonzero(used)[:: given.step]
-    return given.samples(features, codes, rows, int(used.sum())) if len(rows) else None
+    usable = finite_rows(features, (codes > 0) & (given.truth.codes != SLIDING))
+    rows = usable[:: given.step]
+    return given.samples(features, codes, rows, len(usable)) if len(rows) else None
 
 
 TARGETS: dict[HeadName, Callable[[TargetInput, Array], TargetSamples | None]] = {

@@ -13,8 +13,9 @@ import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE
 from holdfast.metrics import match_alarms
+from holdfast.metrics.alarms import outside
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
+from holdfast.metrics.events import EARLY_TOLERANCE, alarm_windows
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
@@ -57,23 +58,14 @@ def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
     other = label_hand(recording.times, recording.calm_labels)
     glitch = runs(event.labels != other.labels)
     ends = event.times + sample_durations(event.times)
-    near = _near(event.times, event.times[glitch[:, 0]], ends[glitch[:, 1] - 1])
+    spans = np.column_stack([event.times[glitch[:, 0]], ends[glitch[:, 1] - 1]])
+    near = ~outside(event.times, alarm_windows(spans))
     nowhere = np.zeros_like(near)
     return {
         EVENT: AlarmLabels(event.labels, near, nowhere),
         FALSE_ALARM: AlarmLabels(other.labels, near, nowhere),
         LEFT_OUT: AlarmLabels(other.labels, nowhere, near),
     }
-
-
-def _near(times: Array, starts: Array, ends: Array) -> Mask:
-    """Return the samples at which an alarm belongs to a span of time, by the rule for events."""
-    near = np.zeros(len(times), dtype=np.bool_)
-    first = np.searchsorted(times, starts - EARLY_TOLERANCE - TIME_TOLERANCE)
-    last = np.searchsorted(times, ends + LATE_TOLERANCE + TIME_TOLERANCE, side="right")
-    for rows in map(slice, first, last):
-        near[rows] = True
-    return near
 
 
 class AlarmStatistics(msgspec.Struct, frozen=True):
@@ -166,7 +158,7 @@ class FalseAlarmRanges(NamedTuple):
         times, stable = scores.times, labels.labels == STABLE
         match = match_alarms(times, labels.labels, labels.labels)
         spans = np.array([(event.onset, event.end) for event in match.events]).reshape(-1, 2)
-        counted = stable & ~labels.left_out & ~_near(times, *spans.T)
+        counted = stable & ~labels.left_out & outside(times, alarm_windows(spans))
         seconds = match.stable_seconds
         seconds -= float(sample_durations(times)[stable & labels.left_out].sum())
         after = np.where(scores.known & ~scores.grasped, -np.inf, scores.margin)
