@@ -23,16 +23,13 @@ from real_slips import boxes, tugs
 from sklearn.metrics import roc_auc_score
 from train_any import FEATURES, N_FOLDS, fit, model_of, out_of_fold, untrained
 
-from holdfast.features.motion import (
-    LEAST_CHANGE,
-    MIN_BLOCK_STEPS,
-    NOISE_BLOCK_SECONDS,
-    NOISE_SQUARES,
-    TWO_AXES,
-)
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
 from holdfast.recordings import Recording, Tactile
+
+# As in kernel/motion.c.
+NOISE_BLOCK_SECONDS, MIN_BLOCK_STEPS = 0.2, 5
+LEAST_CHANGE, NOISE_SQUARES, TWO_AXES = 0.005, 4.0, 2.0 / 3.0
 
 SHARES = {
     "force_change": 1.0, "shear_change": TWO_AXES, "residual": 1.0, "shear_residual": TWO_AXES,

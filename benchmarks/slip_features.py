@@ -164,7 +164,7 @@ def candidates(module: Tactile, tare: Tare, rate: float) -> dict[str, Array]:
     force, normal = g.sum(axis=1), np.array(tip.normal, dtype=np.float64)
     least = (1 / np.sqrt(12) if tip.unit == "count" else 1e-6) * np.sqrt(3 * tip.n_taxels)
     taxel_noise, noise = noise_of(g, rate, least), noise_of(force, rate, least)
-    # The reference, as in holdfast.features.motion: the sample of the least F . n so far.
+    # The reference, as in kernel/motion.c: the sample of the least F . n so far.
     pressed = np.minimum(force @ normal, 0)
     lowest = np.minimum.accumulate(pressed)
     reference = np.maximum.accumulate(np.where(force @ normal <= lowest, np.arange(len(g)), -1))

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.classifiers import Linear
-from holdfast.classifiers.linear import add_scores, add_squares, speed_of
+from holdfast.classifiers.linear import MAX_DEVIATION
 from holdfast.errors import ModelError
 
 numbers = st.floats(-1e3, 1e3)
@@ -128,36 +128,6 @@ def test_arrays_of_one_output_and_of_several():
     assert raw[:, 0] + raw[:, 1:] @ [7.0, 8.0] == pytest.approx(expected[0])
 
 
-SPEED = Linear((1.0, 2.0), (2.0, 0.5), ((0.5, -1.0),), (3.0,), ((0.25, 0.0),))
-HIGHEST = 40.0
-
-
-def speed(features):
-    weights = SPEED.raw_weights()[0]
-    value = weights[0] + features @ weights[1:]
-    return speed_of(add_squares(value, features, SPEED.raw_squares()), HIGHEST)
-
-
-@pytest.mark.parametrize(
-    ("features", "expected"),
-    [
-        ([1.0, 2.0], 3.0**2),  # the means
-        ([3.0, 2.0], (3.0 + 0.5 + 0.25) ** 2),
-        ([1.0, 3.5], 0.0),  # z = 3 - 3
-        ([1.0, 9.0], 0.0),  # z < 0
-        ([21.0, 2.0], 40.0),  # the highest
-        ([-99.0, -48.0], 40.0),  # squares of at most 5 deviations: 3 - 25 + 100 + 6.25
-    ],
-)
-def test_values_of_a_speed(features, expected):
-    assert speed(np.array(features)) == pytest.approx(expected)
-
-
-@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2))
-def test_a_speed_is_never_negative_nor_above_the_highest(features):
-    assert 0 <= speed(np.array(features)) <= HIGHEST
-
-
 def test_squares_by_hand():
     rule = Linear((1.0, -2.0), (4.0, 9.0), ((0.0, 0.0),), (0.0,), ((0.3, -0.2),), slope=0.4)
     assert Linear(rule.mean, rule.scale, rule.weights, (0.0,)).raw_squares()[2].tolist() == [0, 0]
@@ -165,15 +135,6 @@ def test_squares_by_hand():
     u = (phi - np.array(rule.mean)) / np.array(rule.scale)
     assert abs(u[1]) > 5
     expected = rule.slope * np.array(rule.squares[0]) @ np.minimum(np.abs(u), 5.0) ** 2
-    assert add_squares(0.5, phi, rule.raw_squares()) == pytest.approx(0.5 + expected)
-
-
-def test_the_largest_sum_of_scores_wins():
-    rule = Linear((1.0, 2.0), (2.0, 4.0), ((1.0, -1.0), (0.5, 3.0)), (0.25, -0.5))
-    rows = np.array([[0.0, 1.0], [5.0, 9.0]])
-    standardised = (rows - rule.mean) / rule.scale
-    wanted = (standardised @ np.array(rule.weights).T + rule.intercepts).cumsum(axis=0)
-    scores = np.zeros(2)
-    for row, sums in zip(rows, wanted, strict=True):
-        assert add_scores(row, rule.raw_weights(), scores) == sums.argmax() + 1
-        assert scores == pytest.approx(sums)
+    mean, inverse, weights = rule.raw_squares()
+    found = weights @ np.minimum(np.abs((phi - mean) * inverse), MAX_DEVIATION) ** 2
+    assert found == pytest.approx(expected)

@@ -11,12 +11,11 @@ import pytest
 from holdfast.classifiers import Linear
 from holdfast.contact import ContactEvent, ContactState, Fault, Reason
 from holdfast.detector import HAND, Detector, detect
-from holdfast.detector import detector as detector_module
 from holdfast.detector.detector import MAX_EVENTS
-from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
-from holdfast.features import FeatureSpec
-from holdfast.features.arrays import NOISE
+from holdfast.features import FeatureSpec, Tare
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.sensors import sensor as built_in
 
@@ -428,11 +427,6 @@ class TestConstruction:
 
 
 class TestNoiseFloor:
-    @pytest.fixture(autouse=True)
-    def _compiled_python(self, monkeypatch):
-        """The tests read the memory of the compiled Python; tests/kernel holds C equal to it."""
-        monkeypatch.setattr(detector_module, "USE_C", False)
-
     def noisy(self, level, n=1000):
         values = np.random.default_rng(5).normal(scale=level, size=(n, 2, 3))
         values[200:, :, 0] += 500 * level  # in contact
@@ -454,17 +448,24 @@ class TestNoiseFloor:
     @pytest.mark.parametrize("tare", ["2", "first", "none"])
     @pytest.mark.parametrize("level", [0.8, 3.0, 40.0, 900.0])
     def test_the_noise_is_that_of_a_force_component(self, level, tare):
-        rng = np.random.default_rng(7)
-        detector = Detector(by_force(tare=tare), {"f": FLAT})
-        feed(detector, rng.normal(scale=level, size=(250, 1, 3)), "f")
-        found = detector._stream.memory.levels[0, NOISE]
+        values = np.random.default_rng(7).normal(scale=level, size=(250, 1, 3))
         # half a second holds 50 samples only: 10 % is one and a half standard errors
-        assert found == pytest.approx(level, rel=0.1 if tare == "2" else 0.2)
+        expected = pytest.approx(level, rel=0.1 if tare == "2" else 0.2)
+        assert self.noise_of(values, FLAT, tare) == expected
 
     def test_the_noise_in_counts_is_at_least_that_of_the_step(self):
-        detector = Detector(model(("thumb",)))
-        feed(detector, np.full((40, 2, 3), 500.0))
-        assert detector._stream.memory.levels[0, NOISE] == pytest.approx(np.sqrt(2 / 12))
+        values = np.full((40, 2, 3), 500.0)
+        values[35:, 0, 0] += [0, 9, 0, 0, 4]
+        assert self.noise_of(values, sensor(), "0.2") == pytest.approx(np.sqrt(2 / 12))
+
+    def noise_of(self, values, which, tare):
+        """Return the noise by which the feature `noise` divides, over a window of 4 samples."""
+        specs = (FeatureSpec("sigma", 4), FeatureSpec("sigma", 4, "noise"))
+        plan = StreamPlan({"f": which}, {"f": specs}, 4, Tare.parse(tare), RATE)
+        module = type(tactile())(which, np.arange(len(values)) / RATE, values)
+        sigma, ratio = extract(plan, recording(f=module))["f"].features[-1]
+        # the details of noise have its variance, and N_w / 2 - 1 of N_w degrees of freedom
+        return sigma / np.exp(ratio) / np.sqrt((4 / 2 - 1) / 4)
 
 
 class TestBaselines:
@@ -519,18 +520,12 @@ class TestThresholds:
         assert str(raised.value) == "threshold of ring given; the detector has thumb, index"
 
 
-def test_the_plain_way_gives_the_same_estimates(monkeypatch):
-    monkeypatch.setattr(detector_module, "USE_C", False)  # C has no table of types
+def test_samples_that_python_converts_give_the_same_estimates():
     values = lively()
-    fast = feed(Detector(model(("thumb",))), values)
-    monkeypatch.setattr(detector_module, "KNOWN_TYPES", np.zeros_like(KNOWN_TYPES))
-    plain = Detector(model(("thumb",)))
-    stored = []
-    monkeypatch.setattr(
-        plain, "_store", lambda samples: (stored.append(1), Detector._store(plain, samples))
-    )
-    assert [repr(estimate) for estimate in feed(plain, values)] == [repr(e) for e in fast]
-    assert len(stored) == len(values)
+    expected = feed(Detector(model(("thumb",))), values)
+    for convert in (np.float32, np.int64, np.ndarray.tolist, lambda v: v[::-1].copy()[::-1]):
+        found = feed(Detector(model(("thumb",))), [convert(value) for value in values])
+        assert [repr(estimate) for estimate in found] == [repr(e) for e in expected]
 
 
 @pytest.mark.parametrize(

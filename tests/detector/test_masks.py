@@ -5,7 +5,6 @@ import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import Detector, detect
-from holdfast.features import masks
 from holdfast.metrics.masks import runs as stretches_of
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
@@ -18,6 +17,8 @@ NO_CONTACT, STABLE, UNKNOWN = (
 )
 FINGER = "thumb"
 LIMIT = 65_535.0
+LOST_SECONDS = 0.5
+"""HF_LOST_SECONDS of `kernel/masks.c`."""
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +203,7 @@ class TestEstimates:
         values = noise()
         values[:, 3] = np.nan
         found = self.estimates(values, tare=tare)
-        wait = round((masks.LOST_SECONDS + 0.5) * RATE) + 10
+        wait = round((LOST_SECONDS + 0.5) * RATE) + 10
         assert {e.state is ContactState.UNKNOWN for e in found[wait:]} == {False}
         assert {(e.faults, e.faulty_taxels) for e in found[wait:]} == {((Fault.NOT_FINITE,), (3,))}
         whole = self.estimates(np.delete(values, 3, axis=1), _without(TIP, 3), tare=tare)

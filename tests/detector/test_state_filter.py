@@ -8,23 +8,36 @@ from msgspec.structs import replace
 
 from holdfast.contact import STABLE
 from holdfast.detector import Detector, detect
-from holdfast.detector.decision_rule import filter_probability, new_decision_memory
 from holdfast.errors import ModelError
-from holdfast.model import Debounce, Model
+from holdfast.features import FeatureSpec
+from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.model.files import decode, encode
 from holdfast.synthetic import synthetic_recording
 from holdfast.training.replay import ThresholdReplay
 
+from .build import finger_model, linear, sensor
+
 STAY_60 = -30 * math.log(0.6)
 """Rate of switching at which a state stays for 1/60 s with a probability of 0.8 [1/s]."""
 MAX_DELAY = 0.015
+UNIT = {"mean": np.zeros(1), "scale": np.ones(1), "weights": np.ones(1), "intercepts": 0.0}
 
 
 def filtered(probabilities, times, threshold=0.5, switching=STAY_60):
-    memory = new_decision_memory(1).values[0]
+    """Return the filtered probabilities, by a detector whose probability is that of F_x alone."""
+    rate = 1 / (times[1] - times[0])
+    which = sensor(1, "one", rate, (-1e4, 1e4), "N")
+    part = finger_model((FeatureSpec("F_x"),), rule=linear(1, **UNIT), threshold=threshold)
+    debounce = Debounce(switching=switching)
+    made = Model(fingers={ANY_FINGER: part}, tare="none", window=2, rate=rate, debounce=debounce)
+    detector = Detector(made, {"f": which}, rate)
+    turn = which.rotations[0].T  # from the fingertip frame to that of the taxel
+    detector.update({"f": [turn @ (0, 1, 0)]}, times[0] - 1 / rate)  # the window has two samples
+    bounded = np.clip(probabilities, 1e-12, 1 - 1e-12)
+    logits = np.log(bounded / (1 - bounded))
     return np.array([
-        filter_probability(memory, p, threshold, switching, t)
-        for p, t in zip(probabilities, times, strict=True)
+        detector.update({"f": [turn @ (z, k % 7, 0)]}, time).fingers["f"].stable_probability
+        for k, (z, time) in enumerate(zip(logits, times, strict=True))
     ])  # fmt: skip
 
 

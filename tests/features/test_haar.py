@@ -1,4 +1,3 @@
-import math
 from itertools import pairwise
 
 import numpy as np
@@ -7,8 +6,11 @@ import pywt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.features import FEATURE_NAMES, haar_features
-from holdfast.features.haar import N_SUMS, append_pair, n_levels, newest_moments
+from holdfast.features import FEATURE_NAMES, FeatureSpec, Tare, haar_features
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Sensor
 
 from . import naive
 
@@ -151,15 +153,15 @@ def test_any_chunking_gives_the_same_bits(n, half, cuts, seed):
 @pytest.mark.parametrize("longest", [2, 14, 34, 64])
 def test_a_stream_gives_the_same_bits_in_every_window(longest):
     """Also where the memory is longer than the window."""
-    force, levels = walk(3 * longest), n_levels(longest)
-    amplitude = [math.sqrt(x * x + y * y + z * z) for x, y, z in force.tolist()]
-    expected = {w: haar_features(force, w)[:, 4:].tolist() for w in range(2, longest + 1, 2)}
-    blocks = np.full((longest, 1 + N_SUMS * levels), np.nan)
-    for k, pair in enumerate(pairwise(amplitude), start=1):
-        append_pair(*pair, blocks, k % longest, 1, levels)
-        for window, rows in expected.items():
-            if k >= window - 1:
-                assert newest_moments(blocks, k % longest, 1, window) == tuple(rows[k])
+    force, windows = walk(3 * longest), range(2, longest + 1, 2)
+    specs = tuple(FeatureSpec(kind, w) for w in windows for kind in ("m", "sigma"))
+    given = Sensor("one", np.zeros((1, 3)), np.eye(3)[None], np.array([0.0, 0.0, 1.0]), 100.0, "N")
+    plan = StreamPlan({"f": given}, {"f": specs}, 2, Tare.parse("none"), 100.0)
+    module = Tactile(given, np.arange(len(force)) / 100, force[:, None])
+    found = extract(plan, Recording("made", {"f": module}))["f"].features[longest - 1 :]
+    for place, window in enumerate(windows):
+        expected = haar_features(force, window)[longest - 1 :, 4:]
+        assert np.array_equal(found[:, 2 * place : 2 * place + 2], expected)
 
 
 forces = st.builds(walk, st.integers(30, 80), st.integers(0, 99), st.sampled_from([0.01, 1, 1e4]))

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.features import Tare
-from holdfast.features.motion import AVERAGE_SECONDS
 from holdfast.features.specs import (
     ANY_FEATURES,
     ANY_LAGS,
@@ -19,17 +18,19 @@ from holdfast.features.specs import (
     SLIP_FEATURES,
     FeatureSpec,
 )
-from holdfast.features.stream import (
+from holdfast.features.stream import extract
+from holdfast.features.tables import (
+    AVERAGE_SECONDS,
     COUNT_NOISE,
     NEWTON_NOISE,
-    FeatureStream,
     StreamPlan,
-    extract,
+    stream_tables,
 )
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, sensor
 
 RATE = 100.0
+NEEDED = ("changes", "seconds", "means", "ratios")
 EVERY = tuple(
     FeatureSpec(kind, transform="relative", seconds=lag)
     for kind in RELATIVE_KINDS
@@ -269,29 +270,18 @@ def test_the_ratio_rises_with_shear_and_falls_with_load():
 def test_a_stream_computes_only_the_kinds_that_it_needs():
     given = sensor("uskin-4x4")
     plan = StreamPlan({"a": given}, {"a": SLIP_FEATURES}, 14, Tare.parse("first"), 150.0)
-    layout = FeatureStream(plan).layout
-    assert layout.lags.tolist() == [1, 2, 4, 16]
-    assert layout.families.tolist() == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
+    lags = stream_tables(plan)[3]
+    assert [lag["samples"] for lag in lags] == [1, 2, 4, 16]
+    needed = [[lag[f"has_{what}"] for what in NEEDED] for lag in lags]
+    assert needed == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     plan = StreamPlan({"a": given}, {"a": ANY_FEATURES}, 14, Tare.parse("first"), 150.0)
-    assert FeatureStream(plan).layout.families.tolist() == [[1, 0, 0, 0]] * 5
-
-
-@pytest.mark.parametrize(("name", "axis"), [("uskin-curved", 0), ("uskin-4x4", 2)])
-def test_a_normal_that_is_an_axis_gives_the_bits_of_any_other_normal(name, axis, monkeypatch):
-    given = sensor(name)
-    readings = walk(given, 150)
-    plan = StreamPlan({"a": given}, {"a": EVERY}, 14, Tare.parse("first"), RATE)
-    assert FeatureStream(plan).layout.normal_axes.tolist() == [axis]
-    short = features_of(readings, given)
-    monkeypatch.setattr("holdfast.features.stream._axis_of", lambda normal: 3)
-    np.testing.assert_array_equal(features_of(readings, given), short)
+    lags = stream_tables(plan)[3]
+    assert [[lag[f"has_{what}"] for what in NEEDED] for lag in lags] == [[1, 0, 0, 0]] * 5
 
 
 @pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
-def test_other_normals_take_the_general_way(normal):
+def test_other_normals(normal):
     given = replace(sensor("uskin-4x4"), normal=np.array(normal))
-    plan = StreamPlan({"a": given}, {"a": EVERY}, 14, Tare.parse("first"), RATE)
-    assert FeatureStream(plan).layout.normal_axes.tolist() in ([3], [1])
     readings = walk(given, 60)
     np.testing.assert_allclose(features_of(readings, given), naive(readings, given), atol=1e-6)
 

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from holdfast.features import DEPLOYED_FEATURES, FeatureSpec, parse_features
-from holdfast.features.specs import spec_codes
 
 
 def test_the_deployed_features_drop_m():
@@ -76,15 +75,3 @@ def test_refuses_specifications(arguments, message):
 
 def test_text():
     assert str(FeatureSpec("sigma", 20, "noise", "hand")) == "hand noise(sigma[20])"
-
-
-def test_codes_are_padded():
-    specs = [FeatureSpec("F_z"), FeatureSpec("sigma", 8, "log", "hand", 1.0)]
-    padding = [-1] * 5
-    assert spec_codes(specs, 3).tolist() == [[3, 0, 0, 0, 0], [5, 8, 1, 1, 1], padding]
-
-
-def test_codes_name_the_first_that_is_the_same_but_for_its_scope():
-    sigma = FeatureSpec("sigma", 8, "log", "finger", 1.0)
-    others = [FeatureSpec("sigma", 8, "log", "hand", floor) for floor in (1.0, 2.0)]
-    assert spec_codes([FeatureSpec("F_a"), sigma, *others], 4)[:, 4].tolist() == [0, 1, 1, 3]

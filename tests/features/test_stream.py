@@ -3,7 +3,8 @@ import pytest
 
 from detector.build import RATE, broken, recording, sensor, tactile
 from holdfast.features import Tare, fingertip_force, haar_features, parse_features
-from holdfast.features.stream import FeatureStream, StreamPlan, extract
+from holdfast.features.stream import FeatureStream, extract
+from holdfast.features.tables import StreamPlan
 
 
 def plan_of(tare="first", window=6, fingers=("thumb",)):
@@ -54,7 +55,7 @@ class TestFeatureStream:
         made = recording(thumb=tactile(seed=3))
         stream = FeatureStream.for_recording(plan_of("0.5:0.9"), made)
         expected = made.modules["thumb"].readings[50:90].mean(axis=0)
-        assert np.allclose(stream.memory.baseline, expected)
+        assert np.allclose(stream.baseline, expected)
 
     def test_no_baseline_before_the_first_sample(self):
-        assert FeatureStream(plan_of()).baselines() == {}
+        assert not FeatureStream(plan_of()).baseline.any()

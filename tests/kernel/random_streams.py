@@ -11,7 +11,7 @@ from holdfast.features.specs import (
     WINDOWED,
     FeatureSpec,
 )
-from holdfast.features.stream import StreamPlan
+from holdfast.features.tables import StreamPlan
 from holdfast.sensors import Sensor
 
 RATES = (20.0, 60.0, 150.0, 500.0, 1000.0)

@@ -1,26 +1,21 @@
-"""The detector in C: the estimates of compiled Python, to the last bit."""
+"""The detector of the extension: chunks, its estimates, and rules that do not fit."""
 
 import copy
 import pickle
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-import holdfast
-from detector.build import cause_head, lively, model, sensor
+from detector.build import cause_head, lively, model
 from exporters.c_detector import random_samples
-from exporters.models import MODELS, made
+from exporters.models import made
 from holdfast.contact import Cause
-from holdfast.detector import Detector, detect
-from holdfast.detector import detector as module
+from holdfast.detector import Detector
 from holdfast.detector.tables import ESTIMATE, estimate_rows, rules_of
 from holdfast.errors import StreamError
-from holdfast.io import import_recordings, load_recording
 from holdfast.kernel import _extension
-from holdfast.model import Model
 
 N = 3000
 EVERY_CAUSE = tuple(Cause)
@@ -37,15 +32,6 @@ def with_causes(**options):
     return replace(made_model, fingers=fingers, debounce=debounce)
 
 
-def both(monkeypatch, make):
-    """Return what a function makes with the compiled Python, and with C."""
-    found = []
-    for use_c in (False, True):
-        monkeypatch.setattr(module, "USE_C", use_c)
-        found.append(make())
-    return found
-
-
 def answer(detector, samples, time):
     try:
         return detector.update(samples, time)
@@ -53,41 +39,7 @@ def answer(detector, samples, time):
         return str(error)
 
 
-def assert_equal(detectors, samples):
-    n = 0
-    for n, (sample, time) in enumerate(samples, 1):
-        python, c = (repr(answer(detector, sample, time)) for detector in detectors)
-        assert python == c, n
-    events = [detector.events() for detector in detectors]
-    assert events[0] == events[1]
-    return n
-
-
-@pytest.mark.parametrize("in_contact", [False, True])
-@pytest.mark.parametrize("name", [*MODELS, "causes", "minimum duration"])
-def test_random_samples_as_compiled_python(monkeypatch, name, in_contact):
-    if name in MODELS:
-        used, sensors, rate = made(name)
-    else:
-        used = with_causes()
-        sensors, rate = dict.fromkeys(used.fingers, sensor()), used.rate
-        if name == "minimum duration":
-            used = replace(used, debounce=replace(used.debounce, min_duration=0.04))
-    detectors = both(monkeypatch, lambda: Detector(used, sensors, rate, in_contact=in_contact))
-    counts = all(finger.unit == "count" for finger in sensors.values())
-    rng = np.random.default_rng(11)
-    assert assert_equal(detectors, random_samples(rng, sensors, rate, N, counts)) == N
-    for detector in detectors:
-        detector.reset()
-        detector.set_thresholds(dict.fromkeys(sensors, 0.7))
-    rows = random_samples(np.random.default_rng(12), sensors, rate, 500, counts)
-    assert_equal(detectors, rows)
-    baselines = [detector.baselines() for detector in detectors]
-    assert repr(baselines[0]) == repr(baselines[1])
-
-
-def test_a_finger_without_the_head_of_causes_has_none(monkeypatch):
-    monkeypatch.setattr(module, "USE_C", True)
+def test_a_finger_without_the_head_of_causes_has_none():
     used = with_causes()
     index = used.fingers["index"]
     plain = replace(index, heads=tuple(head for head in index.heads if head.name != "cause"))
@@ -101,9 +53,8 @@ def test_a_finger_without_the_head_of_causes_has_none(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["paper", "twin", "rich"])
-def test_chunks_of_any_length_give_the_estimates_of_updates(monkeypatch, name):
+def test_chunks_of_any_length_give_the_estimates_of_updates(name):
     used, sensors, rate = made(name)
-    monkeypatch.setattr(module, "USE_C", True)
     one, many = Detector(used, sensors, rate), Detector(used, sensors, rate)
     bounds = np.cumsum([0, *(finger.n_taxels for finger in sensors.values())])
     rng, last, rows = np.random.default_rng(5), -np.inf, []
@@ -131,29 +82,9 @@ def test_chunks_of_any_length_give_the_estimates_of_updates(monkeypatch, name):
             assert repr(finger.force) == repr(tuple(row["force"].tolist()))
 
 
-def recordings(data_folder):
-    yield load_recording(Path(holdfast.__file__).parent / "recorded/box-slips.mcap")
-    for dataset in ("uskin_pick_move", "gtac"):
-        yield from list(import_recordings(data_folder / dataset))[:2]
-
-
-@pytest.mark.parametrize("name", ["builtin:any", "builtin:noise-floor"])
-def test_recordings_as_compiled_python(monkeypatch, name, data_folder):
-    used = Model.load(name)
-    for recording in recordings(data_folder):
-        python, c = both(monkeypatch, lambda recording=recording: detect(used, recording))
-        assert python.fingers.keys() == c.fingers.keys()
-        for finger, trace in python.fingers.items():
-            for expected, found in zip(trace, c.fingers[finger], strict=True):
-                assert (expected is None) == (found is None)
-                assert expected is None or np.array_equal(expected, found, equal_nan=True)
-        assert np.array_equal(python.hand, c.hand)
-
-
 class TestEstimates:
     @pytest.fixture
-    def estimate(self, monkeypatch):
-        monkeypatch.setattr(module, "USE_C", True)
+    def estimate(self):
         detector = Detector(with_causes())
         for k, sample in enumerate(lively(60)):
             estimate = detector.update({"thumb": sample, "index": sample}, k / 100)
@@ -176,8 +107,7 @@ class TestEstimates:
         assert call(estimate) == estimate
         assert type(call(estimate.fingers)) is dict
 
-    def test_they_outlive_the_detector(self, monkeypatch):
-        monkeypatch.setattr(module, "USE_C", True)
+    def test_they_outlive_the_detector(self):
         kept = [Detector(with_causes()).update({}, float(k)) for k in range(100)]
         assert {str(estimate.fingers["thumb"].state) for estimate in kept} == {"UNKNOWN"}
 
@@ -192,13 +122,11 @@ class TestEstimates:
 
 class TestDetector:
     @pytest.mark.parametrize("call", [copy.copy, copy.deepcopy, pickle.dumps])
-    def test_it_cannot_be_copied(self, monkeypatch, call):
-        monkeypatch.setattr(module, "USE_C", True)
+    def test_it_cannot_be_copied(self, call):
         with pytest.raises(TypeError, match=r"cannot pickle .*Detector. object"):
             call(Detector(with_causes())._kernel)
 
-    def test_another_thread_is_refused(self, monkeypatch):
-        monkeypatch.setattr(module, "USE_C", True)
+    def test_another_thread_is_refused(self):
         detector, refused, n = Detector(with_causes())._kernel, [], 20_000
         arguments = [
             np.ones((n, 4, 3)), np.ones((n, 2), dtype=bool), np.arange(float(n)),
@@ -232,8 +160,7 @@ class TestDetector:
             (lambda r, h, w: ([r[0] | {"contact": 3}, r[1]], h, w), "contact by the load of a"),
         ],
     )
-    def test_rules_that_do_not_fit_are_refused(self, monkeypatch, change, wrong):
-        monkeypatch.setattr(module, "USE_C", True)
+    def test_rules_that_do_not_fit_are_refused(self, change, wrong):
         used = with_causes()
         detector = Detector(used)
         with pytest.raises(ValueError, match=wrong):

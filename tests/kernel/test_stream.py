@@ -1,4 +1,4 @@
-"""The stream of the extension: the numbers of compiled Python, and arguments that do not fit."""
+"""The stream of the extension: chunks, threads, and arguments that do not fit."""
 
 import copy
 import pickle
@@ -7,8 +7,6 @@ import threading
 import numpy as np
 import pytest
 
-from holdfast.features import arrays as at
-from holdfast.features import kernel, tables
 from holdfast.features.stream import FeatureStream
 from holdfast.kernel import _extension
 from kernel.random_streams import random_plan, random_rows
@@ -25,26 +23,11 @@ def made(seed=0, n=N):
     return FeatureStream(plan), [np.ascontiguousarray(readings), present, times]
 
 
-def c_stream(stream):
-    return tables.c_stream(stream.layout, stream.memory)
-
-
 def advanced(c, stream, samples):
-    n, (n_fingers, n_features, _) = len(samples[2]), stream.layout.specs.shape
+    n, n_fingers, n_features = (*samples[1].shape, stream.plan.width)
     out = [np.full((n, n_fingers, n_features), 7.0), np.full((n, n_fingers), 7.0)]
     c.advance(*samples, *out)
     return out
-
-
-def by_python(stream, samples):
-    features, amplitude = [], []
-    for readings, present, time in zip(*samples, strict=True):
-        kernel.advance(
-            stream.layout, stream.memory, stream.output, readings.copy(), present, float(time)
-        )
-        features.append(stream.output.features.copy())
-        amplitude.append(stream.output.values[:, at.AMPLITUDE].copy())
-    return [np.array(features), np.array(amplitude)]
 
 
 def assert_same(found, expected):
@@ -52,15 +35,9 @@ def assert_same(found, expected):
         assert np.array_equal(a, b, equal_nan=True)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_numbers_are_those_of_the_compiled_python(seed):
-    stream, samples = made(seed)
-    assert_same(advanced(c_stream(stream), stream, samples), by_python(stream, samples))
-
-
 def test_any_chunking_gives_the_same_bits():
     stream, samples = made(3)
-    whole, c, parts = advanced(c_stream(stream), stream, samples), c_stream(stream), []
+    whole, c, parts = advanced(stream.start(), stream, samples), stream.start(), []
     for start, stop in ((0, 0), (0, 1), (1, 150), (150, 150), (150, N)):
         parts.append(advanced(c, stream, [values[start:stop] for values in samples]))
     assert_same([np.concatenate(part) for part in zip(*parts, strict=True)], whole)
@@ -69,8 +46,8 @@ def test_any_chunking_gives_the_same_bits():
 def test_any_byte_but_zero_means_that_a_finger_is_present():
     stream, (readings, present, times) = made(1)
     other = (present.astype(np.uint8) * 200).view(np.bool_)
-    whole = advanced(c_stream(stream), stream, (readings, present, times))
-    assert_same(advanced(c_stream(stream), stream, (readings, other, times)), whole)
+    whole = advanced(stream.start(), stream, (readings, present, times))
+    assert_same(advanced(stream.start(), stream, (readings, other, times)), whole)
 
 
 def test_a_stream_that_another_thread_uses_raises_and_is_not_harmed():
@@ -81,10 +58,10 @@ def test_a_stream_that_another_thread_uses_raises_and_is_not_harmed():
         np.concatenate([samples[1]] * 30),
         np.concatenate([samples[2] + step for step in steps]),
     ]
-    expected = advanced(c_stream(stream), stream, samples)
+    expected = advanced(stream.start(), stream, samples)
     nothing, refused = [values[:0] for values in samples], []
     for _ in range(50):  # until a call was made while the thread was inside one
-        c, found = c_stream(stream), []
+        c, found = stream.start(), []
         thread = threading.Thread(
             target=lambda c=c, found=found: found.extend(advanced(c, stream, samples))
         )
@@ -104,19 +81,19 @@ def test_a_stream_that_another_thread_uses_raises_and_is_not_harmed():
 @pytest.mark.parametrize("call", [copy.copy, copy.deepcopy, pickle.dumps])
 def test_a_stream_cannot_be_copied(call):
     with pytest.raises(TypeError, match=r"cannot pickle .*Stream. object"):
-        call(c_stream(made()[0]))
+        call(made()[0].start())
 
 
 def refused(change, error):
     """Return the message of a call with one argument changed."""
     stream, samples = made()
-    n, (n_fingers, n_features, _) = len(samples[2]), stream.layout.specs.shape
+    n, n_fingers, n_features = (*samples[1].shape, stream.plan.width)
     arguments = dict(zip(("readings", "present", "times"), samples, strict=True))
     arguments["features"] = np.zeros((n, n_fingers, n_features))
     arguments["amplitude"] = np.zeros((n, n_fingers))
     arguments |= change(arguments)
     with pytest.raises(error) as raised:
-        c_stream(stream).advance(*arguments.values())
+        stream.start().advance(*arguments.values())
     return str(raised.value)
 
 
@@ -165,19 +142,15 @@ def test_times_that_do_not_increase_are_refused(bad):
 
 def test_times_increase_from_call_to_call():
     stream, samples = made()
-    c = c_stream(stream)
+    c = stream.start()
     advanced(c, stream, samples)
     with pytest.raises(ValueError, match="times: number 0 is not finite, or not later"):
         advanced(c, stream, samples)
 
 
-def tables_of(stream, monkeypatch):
+def tables_of(stream):
     """Return the arguments with which the stream is made."""
-    found = []
-    with monkeypatch.context() as patch:
-        patch.setattr(tables._extension, "Stream", lambda *arguments: found.append(arguments))
-        c_stream(stream)
-    return copy.deepcopy(list(found[0]))
+    return copy.deepcopy(list(stream.tables()))
 
 
 CHANGES = {
@@ -211,9 +184,9 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_tables_that_do_not_fit_are_refused(name, monkeypatch):
+def test_tables_that_do_not_fit_are_refused(name):
     change, message = CHANGES[name]
-    arguments = tables_of(made()[0], monkeypatch)
+    arguments = tables_of(made()[0])
     _extension.Stream(*arguments)
     change(arguments)
     with pytest.raises((TypeError, ValueError, KeyError, OverflowError, IndexError)) as raised:
@@ -222,8 +195,8 @@ def test_tables_that_do_not_fit_are_refused(name, monkeypatch):
 
 
 @pytest.mark.parametrize("which", [1, 2])
-def test_a_number_that_cuts_the_list_it_is_in_is_refused(which, monkeypatch):
-    arguments = tables_of(made()[0], monkeypatch)
+def test_a_number_that_cuts_the_list_it_is_in_is_refused(which):
+    arguments = tables_of(made()[0])
     field = {1: "low", 2: "floor"}[which]
 
     class Cutting:

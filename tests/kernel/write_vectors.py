@@ -16,7 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from holdfast.features import Tare, kernel
 from holdfast.features.specs import RELATIVE_KINDS, FeatureSpec
-from holdfast.features.stream import FeatureStream, StreamPlan
+from holdfast.features.stream import FeatureStream
+from holdfast.features.tables import StreamPlan
 from holdfast.sensors import Sensor
 from kernel.c_kernel import Tables
 

@@ -19,7 +19,6 @@ from detector.build import (
     tactile,
 )
 from holdfast.classifiers import Onnx
-from holdfast.classifiers.linear import add_scores, add_squares
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError
 from holdfast.live.arrival_detector import ArrivalDetector
@@ -74,7 +73,8 @@ def test_the_slip_rule_sees_them_in_own_units_and_so_do_its_squares():
     squares = rule.slope * (np.minimum(np.abs(u), 5.0) ** 2 @ rule.squares[0])
     (weights,), table = OWN.slip.rule.raw_weights(), OWN.slip.rule.raw_squares()
     rows = ROWS[:, places(SLIP_OWN)]
-    found = [add_squares(weights[0] + row @ weights[1:], row, table) for row in rows]
+    of_squares = np.minimum(np.abs((rows - table[0]) * table[1]), 5.0) ** 2 @ table[2]
+    found = weights[0] + rows @ weights[1:] + of_squares
     assert found == pytest.approx(linear + squares, abs=1e-12, rel=1e-12)
     assert OWN.slip.threshold == 0.83
 
@@ -83,12 +83,9 @@ def test_causes_move_as_the_default_handling_does():
     columns = places(RICH)
     location, scale = PART.default_handling
     default = location[columns] + scale[columns] * own_units(ROWS, RICH)
-    scores = [np.zeros(2), np.zeros(2)]
-    rules = [part.head("cause").rule.raw_weights() for part in (OWN, PART)]
-    for own_row, default_row in zip(ROWS[:, columns], default, strict=True):
-        add_scores(own_row, rules[0], scores[0])
-        add_scores(default_row, rules[1], scores[1])
-        assert scores[0] == pytest.approx(scores[1], rel=1e-9)
+    own, other = (part.head("cause").rule.raw_weights() for part in (OWN, PART))
+    scores = own[:, :1] + own[:, 1:] @ ROWS[:, columns].T
+    assert scores == pytest.approx(other[:, :1] + other[:, 1:] @ default.T, rel=1e-9)
 
 
 def test_default_handling_is_mean_and_scale_of_the_classifiers():

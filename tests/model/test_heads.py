@@ -18,12 +18,12 @@ from detector.build import (
     stable_head,
 )
 from holdfast.classifiers import Linear, Onnx
-from holdfast.contact import Cause
-from holdfast.detector.head_arrays import rule_of
+from holdfast.contact import CAUSES, Cause
+from holdfast.detector.tables import rules_of
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
 from holdfast.model import ANY_FINGER, FingerModel, Model
-from holdfast.model.heads import Head
+from holdfast.model.heads import HEAD_NAMES, Head
 
 STABLE, SLIP = stable_head(SLIP_OWN), squared_head(SLIP_OWN)
 SPEED, CAUSE = speed_head(SLIP), cause_head(SLIP_OWN)
@@ -150,7 +150,7 @@ def test_features_that_compare_taxels_need_two():
 
 
 @pytest.mark.parametrize("with_slip", [True, False])
-def test_a_cause_that_a_head_does_not_know_never_has_the_largest_score(with_slip):
+def test_the_weights_of_causes_are_those_that_the_head_knows(with_slip):
     """Nor has a slip, where a head of its own decides about slips."""
     rule = Linear((0.0,), (2.0,), ((1.0,), (3.0,)), (0.25, -0.5))
     features = (FeatureSpec("F_x"),)
@@ -159,9 +159,10 @@ def test_a_cause_that_a_head_does_not_know_never_has_the_largest_score(with_slip
     part = finger_model(features, 0, cause)
     part = part.with_heads(slip_head(features)) if with_slip else part
     model = Model(fingers={ANY_FINGER: part})
-    (rows,) = rule_of(model, model.plan({"thumb": sensor()}, 100.0)).causes
-    known = dict(zip(Cause, rows.tolist(), strict=True))
-    assert known.pop(Cause.GLITCH) == [-0.5, 1.5]
-    if not with_slip:
-        assert known.pop(Cause.SLIP) == [0.25, 0.5]
-    assert [row[0] for row in known.values()] == [-math.inf] * len(known)
+    _, heads, numbers = rules_of(model, model.plan({"thumb": sensor()}, 100.0))
+    head = heads[HEAD_NAMES.index("cause")]
+    rows = numbers[head["first"] :].reshape(-1, 2)
+    found = dict(zip(head["causes"], rows.tolist(), strict=False))
+    codes = {cause: CAUSES.index(cause) + 1 for cause in classes}
+    expected = {} if with_slip else {codes[Cause.SLIP]: [0.25, 0.5]}
+    assert found == expected | {codes[Cause.GLITCH]: [-0.5, 1.5]}

@@ -23,7 +23,7 @@ CHANGE_FLOOR_SHARE = 1e-3
 """Changes below this share of the load hardly count."""
 NOISE_WEIGHT, LOAD_DECAY, NOISE_BLOCK = 100.0, 5.0, 0.2
 """Noise in a load, time constant [s] of the largest load, and block of a noise [s]: as in
-`holdfast.features.motion`."""
+`kernel/motion.c`."""
 LOADED_TAXEL = 0.04
 """Least share of the normal load of a taxel that counts for the largest of W9."""
 

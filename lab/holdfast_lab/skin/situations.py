@@ -12,7 +12,8 @@ import numpy as np
 
 from holdfast.contact import HELD_PHASES
 from holdfast.features import Tare, parse_features
-from holdfast.features.stream import StreamPlan, extract
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
 from holdfast.io.importers.gtac import SERVO_POSITIONS

@@ -1,14 +1,13 @@
-"""Linear functions of standardised features and of their squares, and what heads make of them."""
+"""Linear functions of standardised features and of their squares."""
 
-import math
 from typing import Self
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_step, joined_step
 from holdfast.errors import ModelError
+from holdfast.kernel import _extension
 from holdfast.sensors.types import Array
 
 MAX_DEVIATION = 5.0
@@ -137,10 +136,12 @@ class Linear(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linea
         Raises:
             ValueError: the number of features is not `n_features`.
         """
-        rows = feature_rows(features, self.n_features)
-        probabilities = np.empty(len(rows))
-        _probabilities(rows, self.raw_weights()[0], probabilities)
-        return probabilities
+        rows, (offset, *weights) = feature_rows(features, self.n_features), self.raw_weights()[0]
+        z = np.full(len(rows), offset)
+        for weight, column in zip(weights, rows.T, strict=True):
+            z += weight * column  # one feature after the other: the bits of the detector
+        _extension.logistic(z)
+        return z
 
 
 def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
@@ -153,80 +154,3 @@ def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
     if rows.ndim != 2 or rows.shape[1] != n_features:
         raise ValueError(f"features of shape (n, {n_features}) expected, {rows.shape} given")
     return rows
-
-
-@compiled_step
-def log_odds(features: Array, weights: Array) -> float:
-    """Return the weighted sum w_0 + sum_j w_j phi_j, for offline and live detection."""
-    value = weights[0]
-    for j in range(len(weights) - 1):
-        value += weights[j + 1] * features[j]
-    return float(value)
-
-
-@joined_step
-def linear_probability(features: Array, weights: Array) -> float:
-    """Return the logistic function of the weighted sum, for offline and live detection."""
-    return 1.0 / (1.0 + math.exp(-log_odds(features, weights)))
-
-
-@compiled_step
-def _probabilities(features: Array, weights: Array, out: Array) -> None:
-    for k in range(len(features)):
-        out[k] = linear_probability(features[k], weights)
-
-
-@joined_step
-def add_squares(value: float, features: Array, squares: Array) -> float:
-    """Return log odds with the squares of standardised features.
-
-    Args:
-        value: log odds without them.
-        features: (n_features,) or more.
-        squares: (3, n_features) as of `Linear.raw_squares`.
-    """
-    # z + sum_j q_j min(|u_j|, 5)^2, u_j = (phi_j - mean_j) / scale_j.
-    for j in range(squares.shape[1]):
-        deviation = abs((features[j] - squares[0, j]) * squares[1, j])
-        deviation = min(deviation, MAX_DEVIATION)
-        value += squares[2, j] * (deviation * deviation)
-    return value
-
-
-@joined_step
-def add_scores(features: Array, weights: Array, scores: Array) -> int:
-    """Add the scores of a sample to the sums. Return the code of the cause with the largest.
-
-    Args:
-        features: (n_features,) or more.
-        weights: (n_causes, n_features + 1) or wider, as of `Linear.raw_weights`.
-        scores: (n_causes,) sums; is changed.
-    """
-    best = 0
-    for cause in range(len(weights)):
-        value = weights[cause, 0]
-        for j in range(weights.shape[1] - 1):
-            value += weights[cause, j + 1] * features[j]
-        scores[cause] += value
-        if scores[cause] > scores[best]:
-            best = cause
-    return best + 1
-
-
-@compiled_step
-def smooth(smoothed: float, value: float, gain: float) -> float:
-    """Return the smoothed value after a new one; the first value starts it."""
-    return value if math.isnan(smoothed) else smoothed + gain * (value - smoothed)
-
-
-@compiled_step
-def probability_of(log_odds: float) -> float:
-    """Return 1 / (1 + exp(-log odds))."""
-    return 1.0 / (1.0 + math.exp(-log_odds))
-
-
-@compiled_step
-def speed_of(value: float, highest: float) -> float:
-    """Return the speed of a slip min(max(z, 0)^2, highest) [mm/s]."""
-    root = max(value, 0.0)
-    return min(root * root, highest)

@@ -1,8 +1,9 @@
 """Estimates of a whole recording, as arrays."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from itertools import repeat
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,79 +13,18 @@ from holdfast.contact import (
     Cause,
     ContactEstimate,
     ContactState,
-    Fault,
     HandEstimate,
     Reason,
     faults_of,
     taxels_of,
 )
-from holdfast.detector.arrays import (
-    NO_SLIP_RULE,
-    NO_SPEED_RULE,
-    REPORT_CODE,
-    REPORT_DISTANCE,
-    REPORT_FORCE,
-    REPORT_PROBABILITY,
-    REPORT_SIGMA,
-    REPORT_SLIP,
-    REPORT_SPEED,
-    REPORT_TIME,
-)
-from holdfast.detector.decision_rule import TraceRows, estimate_code, split_code
 from holdfast.kernel import _extension
 from holdfast.model import FingerModel
-from holdfast.sensors.types import Array, Integers
+from holdfast.sensors.types import Array, Flags, Integers
 
 STATE_BY_CODE = tuple(ContactState)
 REASON_BY_CODE = tuple(Reason)
 CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
-
-
-Decision = tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]
-
-
-class DecisionCache(dict[float, Decision]):
-    """State, reason, faults and cause by the code that the kernel reports, of the codes so far."""
-
-    def __missing__(self, code: float) -> Decision:
-        state, reason, faults, cause = split_code(int(code))
-        self[code] = (
-            STATE_BY_CODE[state], REASON_BY_CODE[reason], faults_of(faults), CAUSE_BY_CODE[cause]
-        )  # fmt: skip
-        return self[code]
-
-
-_DECISIONS = DecisionCache()
-Name = TypeVar("Name", str, int)
-
-
-def estimates_of(
-    names: Iterable[Name], report: Iterable[Sequence[float]], taxel_masks: Integers
-) -> dict[Name, ContactEstimate]:
-    """Return the estimates of rows of a report, see `decision_rule.fill_report`.
-
-    Args:
-        names: of the rows: fingers, or numbers of samples.
-        report: rows of `REPORT_WIDTH` numbers.
-        taxel_masks: bits of the faulty taxels of each row.
-    """
-    estimates: dict[Name, ContactEstimate] = {}
-    known = _DECISIONS
-    for name, row in zip(names, report, strict=False):
-        time, code, probability, sigma, x, y, z, slip, speed, distance = row
-        state, reason, faults, cause = known[code]
-        taxels = taxels_of(int(taxel_masks[len(estimates)])) if faults else ()
-        if speed == NO_SPEED_RULE:
-            estimates[name] = ContactEstimate(
-                time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
-                None if slip == NO_SLIP_RULE else slip,
-            )  # fmt: skip
-        else:
-            estimates[name] = ContactEstimate(
-                time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
-                slip, speed, distance,
-            )  # fmt: skip
-    return estimates
 
 
 class FingerEstimates(_extension.Estimates, Mapping[str, ContactEstimate]):
@@ -113,29 +53,6 @@ def _slip_heads(parts: Sequence[FingerModel]) -> tuple[int, ...]:
     return tuple(
         0 if part.slip is None else 1 if part.head("slip_speed") is None else 2 for part in parts
     )
-
-
-def rows_of(
-    estimates: npt.NDArray[np.void], hand: Array, parts: Sequence[FingerModel]
-) -> TraceRows:
-    """Return the rows of estimates (n, n_fingers) and states of the hand that C filled."""
-    rows = TraceRows.empty(*estimates.shape)
-    fields = (estimates[name].astype(np.int64) for name in ("state", "reason", "faults", "cause"))
-    rows.report[..., REPORT_CODE] = estimate_code(*fields)
-    for column, name in (
-        (REPORT_TIME, "time"), (REPORT_PROBABILITY, "probability"), (REPORT_SIGMA, "sigma"),
-        (REPORT_SLIP, "slip"), (REPORT_SPEED, "speed"), (REPORT_DISTANCE, "distance"),
-    ):  # fmt: skip
-        rows.report[..., column] = estimates[name]
-    rows.report[..., REPORT_FORCE : REPORT_FORCE + 3] = estimates["force"]
-    heads = np.array(_slip_heads(parts))
-    has_no_slip, has_no_speed = heads < 1, heads < 2
-    rows.report[:, has_no_slip, REPORT_SLIP] = NO_SLIP_RULE
-    rows.report[:, has_no_speed, REPORT_SPEED] = NO_SPEED_RULE
-    rows.report[:, has_no_speed, REPORT_DISTANCE] = NO_SPEED_RULE
-    rows.taxels[...] = estimates["taxels"]
-    rows.hand[...] = hand
-    return rows
 
 
 class FingerTrace(NamedTuple):
@@ -181,21 +98,19 @@ class FingerTrace(NamedTuple):
 
     def estimates(self, rows: slice = slice(None)) -> list[ContactEstimate]:
         """Return the estimates of these samples."""
-        fields = (self.state, self.reason, self.faults, self.cause)
-        codes = estimate_code(*(field[rows].astype(np.int64) for field in fields))
-        slips = [
-            np.full(len(self), missing) if column is None else column
-            for column, missing in (
-                (self.slip_probability, NO_SLIP_RULE),
-                (self.slip_speed, NO_SPEED_RULE),
-                (self.slip_distance, NO_SPEED_RULE),
+        given = (self.slip_probability, self.slip_speed, self.slip_distance)
+        slips = (repeat(None) if column is None else column[rows].tolist() for column in given)
+        columns = (column[rows].tolist() for column in self[:-3])
+        return [
+            ContactEstimate(
+                time, STATE_BY_CODE[state], REASON_BY_CODE[reason], probability, sigma,
+                tuple(force), faults_of(faults), taxels_of(taxels) if faults else (),
+                CAUSE_BY_CODE[cause], *slip,
             )
-        ]
-        columns = (self.times, self.stable_probability, self.instability, *self.force.T, *slips)
-        times, *numbers = (column[rows] for column in columns)
-        report = np.column_stack([times, codes, *numbers]).tolist()
-        numbered = estimates_of(range(len(report)), report, self.faulty_taxels[rows])
-        return list(numbered.values())
+            for time, state, reason, probability, sigma, force, faults, taxels, cause, *slip in zip(
+                *columns, *slips, strict=False
+            )
+        ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -215,50 +130,58 @@ class Detection:
     hand: npt.NDArray[np.int8]
 
 
+class Chunk(NamedTuple):
+    """Estimates of successive instants that the kernel filled.
+
+    Attributes:
+        times: (n,) [s].
+        present: (n, n_fingers) True for each finger with a sample at that instant.
+        estimates: (n, n_fingers) of `ESTIMATE` of `detector.tables`.
+        hand: (n,) codes of the hand's state.
+    """
+
+    times: Array
+    present: Flags
+    estimates: npt.NDArray[np.void]
+    hand: Array
+
+
 def detection_of(
-    name: str,
-    fingers: Sequence[str],
-    chunks: Sequence[tuple[Array, npt.NDArray[np.bool_], TraceRows]],
+    name: str, fingers: Sequence[str], parts: Sequence[FingerModel], chunks: Sequence[Chunk]
 ) -> Detection:
-    """Join the chunks that the compiled rule filled.
+    """Join the chunks of a recording.
 
     Args:
         name: of the recording.
         fingers: in the order of the columns.
-        chunks: times, present fingers and rows of each chunk.
+        parts: models of the fingers.
+        chunks: at least one, in order of time.
     """
-    if not chunks:
-        return Detection(name, {}, np.empty(0), np.empty(0, dtype=np.int8))
-    rows = TraceRows(*(np.concatenate(x) for x in zip(*(c[2] for c in chunks), strict=True)))
-    times = np.concatenate([chunk[0] for chunk in chunks])
-    present = np.concatenate([chunk[1] for chunk in chunks])
+    times, present, estimates, hand = (
+        np.concatenate(arrays) for arrays in zip(*chunks, strict=True)
+    )
     found = {}
-    for place, finger in enumerate(fingers):
+    for place, (finger, n_slips) in enumerate(zip(fingers, _slip_heads(parts), strict=True)):
         own = present[:, place]
         if own.any():
-            found[finger] = _trace_of(times[own], rows.report[own, place], rows.taxels[own, place])
-    return Detection(name, found, times, rows.hand)
+            found[finger] = _trace_of(times[own], estimates[own, place], n_slips)
+    return Detection(name, found, times, hand.astype(np.int8))
 
 
-def _trace_of(times: Array, report: Array, taxels: Integers) -> FingerTrace:
-    state, reason, faults, cause = split_code(report[:, REPORT_CODE].astype(np.int64))
+def _trace_of(times: Array, rows: npt.NDArray[np.void], n_slips: int) -> FingerTrace:
+    """Return the trace of a finger with 0, 1 or 2 heads of slips; see `_slip_heads`."""
+    columns = {name: rows[name].copy() for name in rows.dtype.names or ()}
     return FingerTrace(
         times,
-        state.astype(np.int8),
-        reason.astype(np.int8),
-        report[:, REPORT_PROBABILITY].copy(),
-        report[:, REPORT_SIGMA].copy(),
-        report[:, REPORT_FORCE : REPORT_FORCE + 3].copy(),
-        faults.astype(np.int16),
-        taxels,
-        cause.astype(np.int8),
-        _column(report, REPORT_SLIP, NO_SLIP_RULE),
-        _column(report, REPORT_SPEED, NO_SPEED_RULE),
-        _column(report, REPORT_DISTANCE, NO_SPEED_RULE),
+        columns["state"].astype(np.int8),
+        columns["reason"].astype(np.int8),
+        columns["probability"],
+        columns["sigma"],
+        columns["force"],
+        columns["faults"].astype(np.int16),
+        columns["taxels"],
+        columns["cause"].astype(np.int8),
+        columns["slip"] if n_slips > 0 else None,
+        columns["speed"] if n_slips > 1 else None,
+        columns["distance"] if n_slips > 1 else None,
     )
-
-
-def _column(report: Array, place: int, missing: float) -> Array | None:
-    """Return a copy of a column of the report; None if the model has no rule for it."""
-    column = report[:, place].copy()
-    return None if (column == missing).any() else column

@@ -1,15 +1,13 @@
 """The detector: from samples of a hand to estimates. No I/O, no clock, no growth of memory.
 
-Offline detection is the same detector, fed with a recording: one kernel computes the features
-and the probability, and one rule turns them into a state.
+Offline detection is the same detector, fed with a recording. The C kernel does all that happens at
+a sample, see `kernel/detector.h`.
 """
 
-import os
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
-from operator import itemgetter
 from typing import Self
 
 import numpy as np
@@ -19,48 +17,30 @@ from numpy import ndarray
 from holdfast.classifiers import Linear
 from holdfast.contact import (
     ContactEvent,
-    ContactState,
     HandEstimate,
     StateChanges,
 )
 from holdfast.detector import tables
-from holdfast.detector.address_table import table_of
-from holdfast.detector.arrays import REPORT_CODE, REPORT_WIDTH, THRESHOLD
-from holdfast.detector.decision_rule import (
-    ProbabilityFeeder,
-    TraceRows,
-    new_decision_memory,
-    replace_values,
-    run,
-    split_code,
-)
 from holdfast.detector.detection import (
     STATE_BY_CODE,
+    Chunk,
     Detection,
     detection_of,
-    estimates_of,
     makers,
-    rows_of,
 )
-from holdfast.detector.fast_step import CHANGED, UNREADABLE, StepArrays, compiled_fast_step
-from holdfast.detector.head_arrays import rule_of
-from holdfast.detector.sample_arrays import KNOWN_TYPES
+from holdfast.detector.onnx_feeder import OnnxFeeder
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.arrays import TAXELS
 from holdfast.features.loaded_start import declared_baselines
-from holdfast.features.stream import FeatureStream, StreamPlan
-from holdfast.features.tables import stream_tables
+from holdfast.features.stream import FeatureStream
+from holdfast.features.tables import StreamPlan
 from holdfast.kernel import _extension
-from holdfast.model import Model
+from holdfast.model import FingerModel, Model
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import resample, true_updates
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array, Flags
+from holdfast.sensors.types import Array
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
-States = tuple[ContactState, ...]
-USE_C = os.environ.get("HOLDFAST_KERNEL") == "c"
-"""Whether a detector is that of the C kernel; an ONNX file beside a model needs the other one."""
 HAND = "hand"
 """Name of the hand as a whole, beside the fingers of events and metrics."""
 MAX_EVENTS = 1000
@@ -147,74 +127,42 @@ class Detector:
         return detector
 
     def _start(self, model: Model, stream: FeatureStream) -> None:
-        self._rule = rule_of(model, stream.plan)
-        self._parts = [model.finger(*finger) for finger in stream.plan.sensors.items()]
-        n_fingers = len(stream.plan.fingers)
-        self._names = (*stream.plan.fingers, HAND)
-        self._readings = np.zeros((len(stream.layout.rotations), 3))
-        self._flags = bytearray(n_fingers)  # present fingers: an array is slower to write to
-        self._present = np.frombuffer(self._flags, dtype=np.bool_)
-        self._report = np.zeros((n_fingers, REPORT_WIDTH))
-        self._read_report = self._report.tolist
+        plan = stream.plan
+        self._names = (*plan.fingers, HAND)
+        self._settings = tables.model_table(model, plan)
+        self._parts = [model.finger(*finger) for finger in plan.sensors.items()]
+        self._rules = tables.rules_of(model, plan)
+        self._readings = np.zeros_like(stream.baseline)
+        self._present = np.zeros(len(plan.fingers), dtype=np.bool_)
         self._slots = {
             finger: (place, self._readings[taxels], (taxels.stop - taxels.start, 3))
             for place, (finger, taxels) in enumerate(stream.slices.items())
         }
-        self._take = itemgetter(*stream.plan.fingers)  # a tuple, unless the finger is single
-        self._is_linear = all(isinstance(part.stable.rule, Linear) for part in self._parts)
-        self._use_c = USE_C and self._is_linear
-        if self._use_c:
-            self._rules = tables.rules_of(model, stream.plan)
-            self._settings = tables.model_table(model, stream.plan)
-        else:
-            self._step = compiled_fast_step()
         self._use(stream)
 
     def _use(self, stream: FeatureStream) -> None:
         """Set a new feature stream, and an empty decision memory."""
         self._stream = stream
-        self._feeder = None
-        self._n_together = len(self._slots)
-        if not self._is_linear:
-            self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
-            self._n_together = -1  # `update` takes the plain way
-        n_causes = self._rule.causes.shape[1]
-        self._decision = new_decision_memory(len(self._slots), n_causes, self._rule.slip_limits)
-        if not self._use_c:
-            arrays = StepArrays(
-                stream.layout, stream.memory, stream.output, self._rule, self._decision,
-                self._readings, self._present, self._report, KNOWN_TYPES,
-            )  # fmt: skip
-            self._table, self._arrays = table_of(arrays)
-        self._taxel_masks = stream.output.status[:, TAXELS]
         self._changes = StateChanges(self._names)
-        self._states: States = tuple(self._changes.states)
-        self._transitions: deque[tuple[float, States, States]] = deque(maxlen=MAX_EVENTS)
-        self._last_time = -inf
         self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
-        self._kernel = None
-        if self._use_c:
-            self._makers = makers(stream.plan.fingers, self._parts)
-            self._c_changes: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
-            self._kernel = _extension.Detector(
-                stream_tables(stream.layout, stream.memory),
-                self._settings | {"zero_unknown": stream.layout.zero_unknown},
-                *self._rules, self._makers, ndarray, self._c_changes.append,
-            )  # fmt: skip
+        self._transitions: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
+        self._kernel = _extension.Detector(
+            stream.tables(), self._settings, *self._rules,
+            makers(stream.plan.fingers, self._parts), ndarray, self._transitions.append,
+        )  # fmt: skip
+        self._feeder = None if _are_linear(self._parts) else OnnxFeeder(self._parts, stream)
 
     def __getstate__(self) -> object:
-        # A copy would share memory with this one, by address.
+        # A copy would share the memory of the kernel with this one.
         raise TypeError("a detector is not copied or pickled; make another of the same model")
 
     @property
     def n_fingers(self) -> int:
         """Number of fingers of the model, on which the state of the hand depends."""
-        return self._rule.n_model_fingers
+        return int(self._settings["n_model_fingers"])
 
     def baselines(self) -> dict[str, Array]:
         """Return (n_taxels, 3) the tare of each finger whose tare is complete [its unit]."""
-        if self._kernel is None:
-            return self._stream.baselines()
         baseline = np.empty_like(self._readings)
         complete = self._kernel.baselines(baseline)
         slices = self._stream.slices.items()
@@ -252,18 +200,13 @@ class Detector:
                 f"the detector has {', '.join(self._slots)}"
             )
         for finger, threshold in thresholds.items():
-            place = self._slots[finger][0]
-            self._rule.limits[place, THRESHOLD] = threshold
-            if self._kernel is not None:
-                head = self._rules[1][tables.STABLE_HEAD + tables.N_HEADS * place]
-                head["threshold"] = threshold
-        if self._kernel is not None:
-            self._kernel.set_rules(*self._rules)
+            tables.stable_head(self._rules, self._slots[finger][0])["threshold"] = threshold
+        self._kernel.set_rules(*self._rules)
 
     @property
     def knows_zero(self) -> bool:
         """Whether the readings without contact are known, if the first samples were load."""
-        return not self._stream.layout.zero_unknown
+        return not self._stream.plan.zero_unknown
 
     def set_model(self, model: Model) -> None:
         """Change weights and thresholds to those of another model, from the next sample on.
@@ -281,21 +224,19 @@ class Detector:
         plan = self._stream.plan
         features = {name: model.finger(name).features for name in plan.sensors}
         parts = [model.finger(*finger) for finger in plan.sensors.items()]
-        is_linear = all(isinstance(part.stable.rule, Linear) for part in parts)
-        if self._feeder is not None or not is_linear or features != dict(plan.features):
+        if self._feeder is not None or not _are_linear(parts) or features != dict(plan.features):
             raise ModelError(
                 f"{model.name or 'the model'} has other features than the model of the detector, "
                 "or a classifier that is not linear; open the source again with it"
             )
-        if not replace_values(self._rule, rule_of(model, plan)):
+        settings, rules = tables.model_table(model, plan), tables.rules_of(model, plan)
+        if settings != self._settings or tables.shapes(rules) != tables.shapes(self._rules):
             raise ModelError(
                 f"{model.name or 'the model'} decides by another rule than the model of the "
                 "detector; open the source again with it"
             )
-        self._parts = parts
-        if self._kernel is not None:
-            self._rules = tables.rules_of(model, plan)
-            self._kernel.set_rules(*self._rules)
+        self._parts, self._rules = parts, rules
+        self._kernel.set_rules(*rules)
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.
@@ -312,30 +253,17 @@ class Detector:
             StreamError: an unknown finger, another number of taxels or axes, what is no number,
                 or a time that does not increase. The detector has not changed then.
         """
-        if self._kernel is not None:
-            estimate: HandEstimate | None = self._kernel.update(samples, time)
+        if self._feeder is None:
+            # None for what is converted or refused here: other types, shapes, names or times.
+            estimate = self._kernel.update(samples, time)
             if estimate is not None:
                 return estimate
-            self._last_time = self._kernel.last_time()
         time = float(time)
-        if not self._last_time < time < inf:
-            self._refuse_time(time)
-        code = UNREADABLE
-        if self._kernel is None and len(samples) == self._n_together:
-            try:
-                arrays = self._take(samples)
-                code = self._step(self._table, time, id(arrays))
-            except KeyError:
-                pass  # another finger, which is refused below
-        if code == UNREADABLE:
-            self._store(samples)
-            if self._kernel is not None:
-                return self._kernel.step(self._readings, self._present, time)
-            if self._feeder is not None:
-                self._feeder.update(self._readings, self._present, time)
-            code = self._step(self._table, time, 0)
-        self._last_time = time
-        return self._estimate(time, code)
+        self._check_time(time)
+        self._store(samples)
+        if self._feeder is not None:
+            self._kernel.give(self._feeder.log_odds(self._readings, self._present, time))
+        return self._kernel.step(self._readings, self._present, time)
 
     def events(self) -> list[ContactEvent]:
         """Return the changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
@@ -358,45 +286,31 @@ class Detector:
             StreamError: the recording has no sample of the fingers, another number of taxels,
                 or begins before the last sample.
         """
-        if self._kernel is not None:
-            self._last_time = self._kernel.last_time()
         self._check_recording(recording)
         self._settle_transitions()
         stream, chunks = self._stream, []
         for times, present, readings in stream.samples_of(recording):
-            rows = self._run_chunk(readings, present, times)
-            states, *_ = split_code(rows.report[:, :, REPORT_CODE].astype(np.int64))
-            codes = np.column_stack([states, rows.hand])
-            self._events += self._changes.update_chunk(times, codes)
-            self._last_time = float(times[-1])
-            chunks.append((times, present, rows))
-        self._states = tuple(self._changes.states)
-        return detection_of(recording.name, stream.plan.fingers, chunks)
-
-    def _run_chunk(self, readings: Array, present: Flags, times: Array) -> TraceRows:
-        """Return the rows of a chunk; sample by sample, if a classifier is not compiled."""
-        stream = self._stream
-        if self._kernel is not None:
             estimates, numbers = tables.estimate_rows(*present.shape)
             hand = np.empty(len(times))
-            self._kernel.run(readings, present, times, numbers, hand)
-            return rows_of(estimates, hand, self._parts)
-        rows = TraceRows.empty(*present.shape)
-        step = len(times) if self._feeder is None else 1
-        for k in range(0, len(times), step):
-            part = slice(k, k + step)
-            if self._feeder is not None:
-                self._feeder.update(readings[k], present[k], float(times[k]))
-            run(
-                stream.layout, stream.memory, stream.output, self._rule, self._decision,
-                readings[part], present[part], times[part],
-                TraceRows._make(array[part] for array in rows),
-            )  # fmt: skip
-        return rows
+            if self._feeder is None:
+                self._kernel.run(readings, present, times, numbers, hand)
+            else:
+                for k, time in enumerate(times.tolist()):
+                    self._kernel.give(self._feeder.log_odds(readings[k], present[k], time))
+                    row = slice(k, k + 1)
+                    self._kernel.run(
+                        readings[row], present[row], times[row], numbers[row], hand[row]
+                    )
+            codes = np.column_stack([estimates["state"], hand.astype(np.int64)])
+            self._events += self._changes.update_chunk(times, codes)
+            chunks.append(Chunk(times, present, estimates, hand))
+        return detection_of(recording.name, stream.plan.fingers, self._parts, chunks)
 
-    def _refuse_time(self, time: float) -> None:
-        after = "" if self._last_time == -inf else f" after {self._last_time:.15g} s"
-        raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
+    def _check_time(self, time: float) -> None:
+        last = self._kernel.last_time()
+        if not last < time < inf:
+            after = "" if last == -inf else f" after {last:.15g} s"
+            raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
 
     def _check_recording(self, recording: Recording) -> None:
         modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
@@ -407,9 +321,7 @@ class Detector:
             )
         for finger, module in modules.items():
             self._check_shape(finger, module.readings.shape[1:])
-        start = min(float(m.times[0]) for m in modules.values() if m.n_samples)
-        if not self._last_time < start < inf:
-            self._refuse_time(start)
+        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
 
     def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
         expected = self._slots[finger][2]
@@ -420,9 +332,9 @@ class Detector:
             )
 
     def _store(self, samples: Mapping[str, npt.ArrayLike]) -> None:
-        """Copy the samples of some fingers, or of any type, into the kernel's array."""
-        slots, flags = self._slots, self._flags
-        flags[:] = bytes(len(flags))
+        """Copy samples of any type for the kernel."""
+        slots = self._slots
+        self._present[:] = False
         for finger, sample in samples.items():
             if finger not in slots:
                 raise StreamError(f"finger {finger!r} given; the model is for {', '.join(slots)}")
@@ -438,27 +350,13 @@ class Detector:
                 OverflowError,
             ) as cause:  # of objects, or rows of lengths
                 raise StreamError(f"{finger}: {shape} numbers expected; {cause}") from cause
-            flags[place] = 1
-
-    def _estimate(self, time: float, code: int) -> HandEstimate:
-        """Return the estimate that the kernel reported, and note its changes of state."""
-        fingers = estimates_of(self._slots, self._read_report(), self._taxel_masks)
-        hand = STATE_BY_CODE[code % CHANGED]
-        if code >= CHANGED:
-            states = (*[finger.state for finger in fingers.values()], hand)
-            self._transitions.append((time, self._states, states))
-            self._states = states
-        return HandEstimate(time, hand, fingers)
+            self._present[place] = True
 
     def _settle_transitions(self) -> None:
         """Turn the changes of state of the last updates into events."""
-        if self._kernel is not None:
-            for time, *states in self._c_changes:
-                old, new = (tuple(STATE_BY_CODE[code] for code in codes) for codes in states)
-                self._transitions.append((time, old, new))
-            self._c_changes.clear()
-        for time, before, after in self._transitions:
-            self._changes.states = list(before)
+        for time, *codes in self._transitions:
+            before, after = ([STATE_BY_CODE[code] for code in states] for states in codes)
+            self._changes.states = before  # the change before this one may be forgotten
             self._events += self._changes.update(after, time)
         self._transitions.clear()
 
@@ -497,6 +395,11 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
     for threshold in thresholds.values():
         if not 0 <= threshold <= 1:
             raise ValueError(f"a threshold from 0 to 1 expected, {threshold} given")
+
+
+def _are_linear(parts: Sequence[FingerModel]) -> bool:
+    """Return whether no finger has an ONNX file as its classifier."""
+    return all(isinstance(part.stable.rule, Linear) for part in parts)
 
 
 def _sensors_of(model: Model) -> dict[str, Sensor]:

@@ -5,13 +5,11 @@ import numpy.typing as npt
 
 from holdfast.classifiers import Linear
 from holdfast.contact import CAUSES, SLIP_CODE
-from holdfast.features.stream import StreamPlan
-from holdfast.features.tables import Struct
+from holdfast.features.tables import StreamPlan, Struct
 from holdfast.model import FingerModel, Head, Model
 from holdfast.model.heads import HEAD_NAMES
 from holdfast.sensors.types import Array
 
-N_HEADS, STABLE_HEAD = len(HEAD_NAMES), HEAD_NAMES.index("stable")
 ALWAYS_CONTACT, BY_FORCE, BY_NOISE, BY_LOAD = range(4)
 
 Rules = tuple[list[Struct], list[Struct], Array]
@@ -29,7 +27,7 @@ ESTIMATE = np.dtype(
 
 
 def model_table(model: Model, plan: StreamPlan) -> Struct:
-    """Return the settings of a model that hold for all fingers, but `zero_unknown` of a stream."""
+    """Return the settings of a model that hold for all fingers."""
     return {
         "n_model_fingers": model.n_fingers(plan.fingers),
         "hysteresis": model.debounce.hysteresis,
@@ -37,6 +35,7 @@ def model_table(model: Model, plan: StreamPlan) -> Struct:
         "hold": model.debounce.hold,
         "has_filter": model.debounce.switching_rate > 0,
         "switching": model.debounce.switching_rate,
+        "zero_unknown": plan.zero_unknown,
     }
 
 
@@ -60,6 +59,16 @@ def rules_of(model: Model, plan: StreamPlan) -> Rules:
             )
             numbers += [rows.ravel(), squares.ravel()]
     return [_contact(part) for part in parts], heads, np.concatenate(numbers)
+
+
+def stable_head(rules: Rules, finger: int) -> Struct:
+    """Return the head of stability of a finger."""
+    return rules[1][finger * len(HEAD_NAMES) + HEAD_NAMES.index("stable")]
+
+
+def shapes(rules: Rules) -> list[tuple[object, ...]]:
+    """Return what another model must have, so that a detector continues with its weights."""
+    return [(head["n_outputs"], head["has_squares"], head["causes"]) for head in rules[1]]
 
 
 def _contact(part: FingerModel) -> Struct:
@@ -95,7 +104,7 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     if not isinstance(head.rule, Linear):
         return np.zeros((1, 1)), np.zeros((0, 0)), []  # its z is given from outside
     columns = part.indices(head)
-    # Features after the last one are read for slips and speeds too, as the compiled Python does.
+    # A head reads the features up to the last that it uses; those of slips read all.
     is_slip = head.name in ("slip", "slip_speed")
     n = len(part.features) if is_slip else int(columns.max(initial=-1)) + 1
     rows = np.zeros((head.rule.n_outputs, n + 1))

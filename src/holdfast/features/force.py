@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import joined_step, sums_in_any_order
 from holdfast.errors import RecordingError
 from holdfast.features.tare import Tare, TareArgument, baseline_of, offline_tare
 from holdfast.kernel.batch import fill_fingertip_force
@@ -135,35 +134,6 @@ def rest_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
     force = _forces(module.readings[:first], baseline, module.sensor)
     amplitude: Array = np.linalg.norm(force, axis=1)
     return amplitude[np.isfinite(amplitude)]
-
-
-@joined_step
-@sums_in_any_order
-def sum_taxels(
-    readings: Array, baseline: Array, rotations: Array, first: int, n: int
-) -> tuple[float, float, float, float]:
-    """Return F_tip = sum_i R_i (f_i - baseline_i), and the sum of the normal readings.
-
-    Args:
-        readings: of all fingers.
-        baseline: of all fingers.
-        rotations: of all fingers.
-        first: first taxel of the finger.
-        n: number of its taxels.
-    """
-    # F_tip = sum_i R_i (f_i - b_i), with the tare b_i (DESIGN, section 1); normal = sum_i z_i.
-    fx = fy = fz = normal = 0.0
-    start = np.uint64(first)
-    for j in range(np.uint64(n)):
-        i = start + j
-        x = readings[i, 0] - baseline[i, 0]
-        y = readings[i, 1] - baseline[i, 1]
-        z = readings[i, 2] - baseline[i, 2]
-        fx += rotations[i, 0, 0] * x + rotations[i, 0, 1] * y + rotations[i, 0, 2] * z
-        fy += rotations[i, 1, 0] * x + rotations[i, 1, 1] * y + rotations[i, 1, 2] * z
-        fz += rotations[i, 2, 0] * x + rotations[i, 2, 1] * y + rotations[i, 2, 2] * z
-        normal += z
-    return fx, fy, fz, normal
 
 
 def _forces(

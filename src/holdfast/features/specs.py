@@ -5,13 +5,11 @@ from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from holdfast.features.arrays import SPECS_WIDTH
 from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, check_window
 
 VALUE_KINDS = (*FEATURE_NAMES, "sigma_xyz", "change")
-"""Kinds that are computed by `features.kernel` from the force."""
+"""Kinds that the kernel computes from the force."""
 WINDOWED = ("m", "sigma", "sigma_xyz", "change")
 """Those of them that are computed over a window; the others need one sample."""
 OF_COMPONENTS = ("sigma_xyz",)
@@ -36,7 +34,7 @@ MEAN_SECOND_KINDS = tuple(f"mean_{kind}" for kind in SECOND_KINDS)
 RATIO_KINDS = ("shear_gain", "normal_gain", "ratio_gain")
 """Kinds of the change of the ratio of tangential to normal force, and of either force."""
 RELATIVE_KINDS = (*LAG_KINDS, *SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
-"""Kinds that look back by a lag in seconds, relative to load or noise; see `features.motion`."""
+"""Kinds that look back by a lag in seconds, relative to load or noise; see `kernel/motion.c`."""
 
 OF_TWO_TAXELS = (
     "residual",
@@ -240,30 +238,3 @@ def parse_features(
         raise ValueError(f"a feature is given twice in {','.join(wanted)}")
     check_window(window)
     return tuple(FeatureSpec(n, window if n in WINDOWED else 0) for n in wanted)
-
-
-def spec_codes(
-    specs: Sequence[FeatureSpec], width: int, lags: Sequence[float] = ()
-) -> npt.NDArray[np.int64]:
-    """Return the features as numbers, for the kernel.
-
-    Args:
-        specs: features of a finger.
-        width: number of rows, at least the number of features.
-        lags: of all relative features of the stream, in seconds.
-
-    Returns:
-        (width, SPECS_WIDTH) kind, window (or place of the lag), transform, scope, and the first
-        feature that is the same except for its scope; -1 is padding.
-    """
-    codes = np.full((width, SPECS_WIDTH), -1, dtype=np.int64)
-    own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
-    for row, spec, alike in zip(codes, specs, own, strict=False):
-        row[:] = (
-            FEATURE_KINDS.index(spec.kind),
-            lags.index(spec.seconds) if spec.seconds else spec.window,
-            TRANSFORMS.index(spec.transform),
-            SCOPES.index(spec.scope),
-            own.index(alike),
-        )
-    return codes

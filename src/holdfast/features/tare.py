@@ -1,6 +1,6 @@
 """The tare: a per-taxel baseline taken without contact, then frozen; offline and live.
 
-`baseline_of` computes it from a recording, `update_baseline` sample by sample in a stream. Both
+`baseline_of` computes it from a recording, `kernel/tare.c` sample by sample in a stream. Both
 add the same samples in the same order, so that both give the same bits.
 """
 
@@ -11,10 +11,8 @@ from typing import Any, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_step
-from holdfast.features.arrays import N_TARED, TARE_FIRST, TARE_SECONDS
 from holdfast.recordings import Tactile
-from holdfast.sensors.types import Array, Integers
+from holdfast.sensors.types import Array
 
 TareArgument = float | str | tuple[float, float]
 """Seconds from the start, "first", "none", "START:END", or (start, end) in seconds."""
@@ -154,47 +152,6 @@ def _mean(readings: npt.NDArray[Any], tare: Tare) -> Array:
     if not len(values):
         raise ValueError(f"tare {tare}: no finite sample in that time")
     return np.asarray(np.add.accumulate(values, axis=0)[-1] / len(values))
-
-
-@compiled_step
-def update_baseline(
-    readings: Array,
-    baseline: Array,
-    counts: Integers,
-    f: int,
-    first: int,
-    last: int,
-    kind: int,
-    running: bool,
-) -> bool:
-    """Add a sample to the baseline of a finger, or freeze it. Return whether it is frozen.
-
-    Args:
-        readings: (n_taxels, 3) of all fingers.
-        baseline: (n_taxels, 3) of all fingers; a sum until it is frozen. Is changed.
-        counts: of all fingers, see `holdfast.features.arrays`. Is changed.
-        f: the finger.
-        first: its first taxel.
-        last: one past its last taxel.
-        kind: code of the tare.
-        running: whether the sample lies in the time of the tare.
-    """
-    # b_i = (1 / n) sum_k f_i(k) over the time of the tare; of the first sample alone: n = 1.
-    taking = running and kind == TARE_SECONDS
-    n_taken = max(counts[f, N_TARED], 1)
-    for i in range(first, last):
-        for axis in range(3):
-            if kind == TARE_FIRST:
-                baseline[i, axis] = readings[i, axis]
-            elif taking:
-                baseline[i, axis] += readings[i, axis]
-            elif kind == TARE_SECONDS:
-                baseline[i, axis] /= n_taken
-    if taking:
-        counts[f, N_TARED] += 1
-        return False
-    counts[f, N_TARED] = -1
-    return True
 
 
 def _exact(number: float) -> str:

@@ -34,6 +34,19 @@ def fingertip_force(
 LANES: int
 """Partial sums of a sum over taxels; arrays of taxels are padded to a multiple of it."""
 
+def logistic(values: npt.NDArray[np.float64], /) -> None:
+    """Replace log odds (n,) by probabilities, with the bits of the detector."""
+
+def replay(
+    times: npt.NDArray[np.float64],
+    probability: npt.NDArray[np.float64],
+    raw: npt.NDArray[np.int8],
+    limits: npt.NDArray[np.float64],
+    out: npt.NDArray[np.int8],
+    /,
+) -> None:
+    """Fill (n,) states of a finger from its probability of stability; see `training.replay`."""
+
 class Stream:
     """The feature stream of a hand; see `kernel.h`. It cannot be copied or pickled.
 
@@ -115,6 +128,9 @@ class Detector:
         /,
     ) -> None:
         """Change rules and heads from the next sample on."""
+
+    def give(self, log_odds: npt.NDArray[np.float64], /) -> None:
+        """Set the log odds of stability (n_fingers,) of fingers without a linear classifier."""
 
     def baselines(self, out: npt.NDArray[np.float64], /) -> list[bool]:
         """Fill (n_taxels, 3) with the tare, and return whether that of each finger is complete."""

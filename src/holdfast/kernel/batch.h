@@ -1,4 +1,5 @@
-/* Features of whole arrays: the fingertip force of many samples, and the paper's features of it.
+/* Whole arrays: the fingertip force of many samples, the paper's features of it, and states of
+ * a finger with other limits.
  *
  * Rows are computed by themselves: a caller may cut an array into parts, in any order and in
  * several threads, and gets the same bits. The caller owns all memory; nothing is allocated.
@@ -7,6 +8,7 @@
 #define HOLDFAST_BATCH_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 enum { HOLDFAST_N_HAAR = 6 }; /* F_a, F_x, F_y, F_z, m, sigma */
 
@@ -34,5 +36,31 @@ void holdfast_haar_features(
 void holdfast_fingertip_force(
     const double *readings, const double *baseline, const double *rotations, size_t n,
     size_t n_taxels, double *force);
+
+/* Replace n log odds z by probabilities 1 / (1 + exp(-z)). */
+void holdfast_logistic(double *values, size_t n);
+
+/* Limits of `holdfast_replay`. */
+enum {
+    HOLDFAST_LIMIT_THRESHOLD = 0,
+    HOLDFAST_LIMIT_HYSTERESIS = 1,
+    HOLDFAST_LIMIT_HOLD = 2,         /* [s] */
+    HOLDFAST_LIMIT_MIN_DURATION = 3, /* [s] */
+    HOLDFAST_LIMIT_PERIOD = 4,       /* of the samples [s] */
+    HOLDFAST_LIMIT_SWITCHING = 5,    /* of the forward filter [1/s]; 0 for none */
+    HOLDFAST_N_LIMITS = 6
+};
+
+/* Decide the states of a finger by the steps of the detector.
+ *
+ * times, probability: (n) [s], of stability by each sample alone.
+ * raw: (n) states without debouncing at the threshold 0: UNKNOWN, NO_CONTACT, STABLE, or UNSTABLE
+ *     of a force that decides alone.
+ * limits: (HOLDFAST_N_LIMITS).
+ * out: (n) states.
+ */
+void holdfast_replay(
+    const double *times, const double *probability, const int8_t *raw, size_t n,
+    const double *limits, int8_t *out);
 
 #endif

@@ -71,18 +71,22 @@ HOLDFAST_API int32_t holdfast_update(
     return d->state;
 }
 
+static void hf_start_decision(holdfast_decision *d)
+{
+    memset(d, 0, sizeof *d); /* UNKNOWN, no excess, no cause */
+    d->probability = d->smoothed = d->filtered = HF_NAN;
+    d->slip_log_odds = d->slip_probability = d->speed = d->distance = HF_NAN;
+    d->candidate_since = d->last_unstable = d->restless_at = d->filtered_at = NAN;
+    d->last_slip = d->slid_at = NAN;
+    d->shaken_at = d->loaded_at = -INFINITY;
+}
+
 HOLDFAST_API void holdfast_start_decisions(const holdfast_model *model, holdfast_detector *d)
 {
     d->model = model;
     d->state = HOLDFAST_UNKNOWN;
     for (size_t i = 0; i < HF_N_FINGERS(model->hand); ++i) {
-        holdfast_decision *const s = &d->decisions[i];
-        memset(s, 0, sizeof *s); /* UNKNOWN, no excess, no cause */
-        s->probability = s->smoothed = s->filtered = HF_NAN;
-        s->slip_log_odds = s->slip_probability = s->speed = s->distance = HF_NAN;
-        s->candidate_since = s->last_unstable = s->restless_at = s->filtered_at = NAN;
-        s->last_slip = s->slid_at = NAN;
-        s->shaken_at = s->loaded_at = -INFINITY;
+        hf_start_decision(&d->decisions[i]);
     }
 }
 

@@ -9,3 +9,5 @@
 #include "decision.c"
 
 #include "detector.c"
+
+#include "offline.c"

@@ -50,7 +50,7 @@ static int check_size(const array *a)
 /* Fill `a` with the buffer of an object, or set an exception and return -1.
  *
  * The buffer must be contiguous, with `n_axes` axes, of the type 'd' (float64 of this machine's
- * byte order) or '?' (bool).
+ * byte order), 'b' (int8) or '?' (bool).
  */
 static int get_array(char type, PyObject *object, const char *name, int n_axes, int flags, array *a)
 {
@@ -66,7 +66,10 @@ static int get_array(char type, PyObject *object, const char *name, int n_axes, 
     if (format[0] != type || format[1] != '\0' || a->view.itemsize != (Py_ssize_t)size) {
         PyErr_Format(
             PyExc_TypeError, "%s: %s expected, the format %s given", name,
-            type == 'd' ? "float64" : "bool", format);
+            type == 'd'   ? "float64"
+            : type == 'b' ? "int8"
+                          : "bool",
+            format);
         return -1;
     }
     if (a->view.ndim != n_axes || a->view.shape == NULL) {
@@ -127,97 +130,7 @@ static int check_count(Py_ssize_t n_args, Py_ssize_t expected)
     return -1;
 }
 
-static PyObject *haar_features(
-    PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
-{
-    if (check_count(n_args, 5) < 0) {
-        return NULL;
-    }
-    const Py_ssize_t window = PyLong_AsSsize_t(args[1]);
-    const Py_ssize_t first = PyLong_AsSsize_t(args[2]);
-    const Py_ssize_t stop = PyLong_AsSsize_t(args[3]);
-    if (PyErr_Occurred()) {
-        return NULL;
-    }
-    array arrays[2] = {0}, *const force = &arrays[0], *const out = &arrays[1];
-    double *scratch = NULL;
-    PyObject *result = NULL;
-    if (get_array('d', args[0], "force", 2, PyBUF_SIMPLE, force) < 0 ||
-        get_array('d', args[4], "out", 2, PyBUF_WRITABLE, out) < 0) {
-        goto done;
-    }
-    const Py_ssize_t n = force->view.shape[0];
-    if (check_shape(force, SHAPE(n, 3)) < 0 || check_shape(out, SHAPE(n, HOLDFAST_N_HAAR)) < 0 ||
-        check_apart(arrays, 2, 1) < 0) {
-        goto done;
-    }
-    if (window < 2 || window % 2 || first < 0 || first > stop || stop > n) {
-        PyErr_Format(
-            PyExc_ValueError, "window %zd, samples %zd to %zd of %zd given", window, first, stop,
-            n);
-        goto done;
-    }
-    if (window <= n) { /* a longer one has no sample with features, and no scratch memory */
-        if (window < MAX_WINDOW) {
-            scratch = PyMem_Malloc(holdfast_haar_scratch((size_t)window) * sizeof(double));
-        }
-        if (scratch == NULL) {
-            PyErr_NoMemory();
-            goto done;
-        }
-    }
-    Py_BEGIN_ALLOW_THREADS
-    holdfast_haar_features(
-        force->data, (size_t)window, (size_t)first, (size_t)stop, out->data, scratch);
-    Py_END_ALLOW_THREADS
-    result = Py_NewRef(Py_None);
-done:
-    PyMem_Free(scratch);
-    release(arrays, 2);
-    return result;
-}
-
-static PyObject *fingertip_force(
-    PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
-{
-    if (check_count(n_args, 6) < 0) {
-        return NULL;
-    }
-    const Py_ssize_t first = PyLong_AsSsize_t(args[3]);
-    const Py_ssize_t stop = PyLong_AsSsize_t(args[4]);
-    if (PyErr_Occurred()) {
-        return NULL;
-    }
-    array arrays[4] = {0}, *const readings = &arrays[0], *const baseline = &arrays[1];
-    array *const rotations = &arrays[2], *const out = &arrays[3];
-    PyObject *result = NULL;
-    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array('d', args[1], "baseline", 2, PyBUF_SIMPLE, baseline) < 0 ||
-        get_array('d', args[2], "rotations", 3, PyBUF_SIMPLE, rotations) < 0 ||
-        get_array('d', args[5], "out", 2, PyBUF_WRITABLE, out) < 0) {
-        goto done;
-    }
-    const Py_ssize_t n = readings->view.shape[0], n_taxels = readings->view.shape[1];
-    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
-        check_shape(baseline, SHAPE(n_taxels, 3)) < 0 ||
-        check_shape(rotations, SHAPE(n_taxels, 3, 3)) < 0 || check_shape(out, SHAPE(n, 3)) < 0 ||
-        check_apart(arrays, 4, 1) < 0) {
-        goto done;
-    }
-    if (first < 0 || first > stop || stop > n) {
-        PyErr_Format(PyExc_ValueError, "samples %zd to %zd of %zd given", first, stop, n);
-        goto done;
-    }
-    Py_BEGIN_ALLOW_THREADS
-    holdfast_fingertip_force(
-        readings->data + 3 * n_taxels * first, baseline->data, rotations->data,
-        (size_t)(stop - first), (size_t)n_taxels, out->data + 3 * first);
-    Py_END_ALLOW_THREADS
-    result = Py_NewRef(Py_None);
-done:
-    release(arrays, 4);
-    return result;
-}
+#include "module_batch.c"
 
 /* A feature stream of a hand: its tables, its memory, and who uses it. */
 typedef struct {
@@ -550,6 +463,8 @@ done:
 static PyMethodDef functions[] = {
     {"haar_features", (PyCFunction)(void (*)(void))haar_features, METH_FASTCALL, NULL},
     {"fingertip_force", (PyCFunction)(void (*)(void))fingertip_force, METH_FASTCALL, NULL},
+    {"logistic", (PyCFunction)(void (*)(void))logistic, METH_FASTCALL, NULL},
+    {"replay", (PyCFunction)(void (*)(void))replay, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
 
@@ -585,7 +500,8 @@ static int add_contents(PyObject *module)
     PyObject *const type = PyType_FromModuleAndSpec(module, &stream_spec, NULL);
     const int result = type == NULL ? -1 : PyModule_AddObjectRef(module, "Stream", type);
     Py_XDECREF(type);
-    return result < 0 || add_detector(module) < 0 || PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
+    return result < 0 || add_detector(module) < 0 ||
+                   PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
                ? -1
                : PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
 }

@@ -15,7 +15,8 @@ import numpy.typing as npt
 from holdfast.classifiers import Linear
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
-from holdfast.features.stream import StreamPlan, extract
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
 from holdfast.model.files import decode, encode, read_model, write_model
 from holdfast.model.heads import Choice, Head, HeadName
 from holdfast.model.parts import (

@@ -5,21 +5,11 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from holdfast.compiled import compiled
-from holdfast.contact import NO_CONTACT, UNKNOWN, UNSTABLE
-from holdfast.detector.arrays import CANDIDATE, FILTERED, LAST_UNSTABLE, STATE
-from holdfast.detector.decision_rule import (
-    classify_contact,
-    debounce,
-    filter_probability,
-    hold_unstable,
-    new_decision_memory,
-)
+from holdfast.kernel import _extension
 from holdfast.metrics import Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording
-from holdfast.sensors.types import Array, Integers
 from holdfast.training.evaluation import compute_decisions
 
 
@@ -64,57 +54,10 @@ class ThresholdReplay:
         """Return the states of a finger at a threshold."""
         out = np.zeros(len(finger.times), dtype=np.int8)
         rule = self.debounce
-        memory = new_decision_memory(1)
         limits = np.array([
             threshold, rule.hysteresis, rule.hold, rule.min_duration, self.period,
             rule.switching_rate,
         ])  # fmt: skip
-        _replay(
-            np.array(finger.times), np.array(finger.stable_probability), np.array(finger.states),
-            limits, memory.codes[0], memory.values[0], out,
-        )  # fmt: skip
+        times, probability = np.array(finger.times), np.array(finger.stable_probability)
+        _extension.replay(times, probability, np.array(finger.states, dtype=np.int8), limits, out)
         return out
-
-
-@compiled
-def _replay(
-    times: Array,
-    probability: Array,
-    raw: Codes,
-    limits: Array,
-    codes: Integers,
-    decided: Array,
-    out: Codes,
-) -> None:
-    """Fill the states of a finger, by the steps of the detector.
-
-    Args:
-        times: (n,) [s].
-        probability: (n,) of stability.
-        raw: (n,) states without debouncing at the threshold 0: UNKNOWN, NO_CONTACT, STABLE, or
-            UNSTABLE of a force that leaves.
-        limits: threshold, hysteresis, hold [s], minimum duration [s], period [s] and switching
-            [1/s].
-        codes: as in `DecisionMemory`; is changed.
-        decided: as in `DecisionMemory`; is changed.
-        out: (n,) is filled.
-    """
-    threshold, hysteresis, hold, min_duration, period, switching = limits
-    for k in range(len(times)):
-        if raw[k] == UNKNOWN:
-            codes[STATE] = codes[CANDIDATE] = UNKNOWN
-            decided[LAST_UNSTABLE] = decided[FILTERED] = np.nan
-        else:
-            state = NO_CONTACT
-            if raw[k] == NO_CONTACT:
-                decided[FILTERED] = np.nan
-            else:
-                stable = probability[k]
-                if switching > 0.0:
-                    stable = filter_probability(decided, stable, threshold, switching, times[k])
-                state = classify_contact(stable, threshold, hysteresis, codes[STATE])
-                if raw[k] == UNSTABLE:
-                    state = UNSTABLE
-                state = hold_unstable(state, codes[CANDIDATE], decided, hold, times[k], period)
-            debounce(codes, decided, state, min_duration, times[k], period)
-        out[k] = codes[STATE]

@@ -12,7 +12,8 @@ from holdfast.contact import NO_CONTACT, UNKNOWN
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.force import rest_amplitude
 from holdfast.features.loaded_start import begins_in_contact
-from holdfast.features.stream import StreamPlan, extract
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
 from holdfast.metrics.slip_truth import slip_truth
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE, HeadName
 from holdfast.parallel import Engine

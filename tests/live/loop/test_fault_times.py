@@ -9,13 +9,14 @@ from grip.build import RATE, hand, holding
 from holdfast.contact import ContactState
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.sources.timeline import MIN_LATE_DELAY
-from holdfast.features.faults import STUCK_SECONDS
 from holdfast.grip import Limits, LoopState, repeats
 from holdfast.grip.controller import OVERLOAD
 from holdfast.live.loop import grip_loop as loop
 from holdfast.live.loop import runner, watchdog
 
 LIMITS = Limits()
+STUCK_SECONDS = 0.5
+"""HF_STUCK_SECONDS of `kernel/faults.c`."""
 
 
 def ms(seconds):

@@ -15,7 +15,8 @@ from collections.abc import Mapping
 from holdfast.classifiers import recipe
 from holdfast.features import DEFAULT_WINDOW
 from holdfast.features.specs import HOLDFAST_FEATURES
-from holdfast.features.stream import StreamPlan, extract
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
 from holdfast.sensors.types import Array
 from holdfast_lab.study.methods.method import HandSignal, Method
 

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from holdfast.classifiers import Parameters, Recipe
 from holdfast.features import Tare
 from holdfast.features.force import tared_force
-from holdfast.features.motion import GAP_LIMIT_PERIODS
+from holdfast.features.tables import GAP_LIMIT_PERIODS
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array

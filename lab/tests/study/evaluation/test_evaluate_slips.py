@@ -4,7 +4,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.classifiers.linear import smooth
 from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.metrics import slip_thresholds
 from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS, ThresholdChoice
@@ -100,7 +99,7 @@ def test_scores_are_smoothed_as_by_the_rule_of_a_model():
     gain, state = Head.gain(_Smoothing, RATE), np.nan
     expected = []
     for value in values:
-        state = np.nan if np.isnan(value) else smooth(state, value, gain)
+        state = value if np.isnan(state + value) else state + gain * (value - state)
         expected.append(state)
     np.testing.assert_allclose(smoothed(times, values), expected, atol=1e-12)
 

@@ -14,7 +14,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
-from holdfast.features.faults import LOADED_SECONDS
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument, baseline_of, offline_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
@@ -28,6 +27,8 @@ FORCE_SMOOTHING_TIME = 0.05
 VISIBLE_SHARE = 0.02
 """Share of the grip force that is visible on a plot. Less is neither contact, because baselines
 drift, nor a change."""
+LOADED_SECONDS = 0.25
+"""A pull for this long means that the tare was taken under load, as in `kernel/faults.c` [s]."""
 CREEP_LEVEL = 0.2
 """Share of the grip force below which a released elastomer may still keep a load (creep)."""
 CREEP_RATE = 0.1
