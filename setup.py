@@ -23,8 +23,6 @@ SOURCES = ("module.c", "haar.c", "force.c", "holdfast.c")
 DEFINITIONS = {
     "Py_LIMITED_API": "0x030B0000",
     "HOLDFAST_API": "extern",
-    # sums over taxels in the order of the compiled Python, until the live step is in C as well
-    "HF_LANES": "1",
 }
 COMPILER_PACKAGE = "ziglang==0.15.2"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]

@@ -24,7 +24,7 @@ import numpy as np
 from real_slips import TUG_QUIET, auc, boxes, tugs
 
 from holdfast.classifiers.fitting import Samples
-from holdfast.classifiers.linear import Linear, smooth
+from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.compiled import compiled_step
 from holdfast.contact import STABLE, Cause, ContactState
@@ -111,7 +111,8 @@ def averaged(values: Array, gain: float, out: Array) -> None:
     """Fill the exponential averages of values."""
     last = np.nan
     for k in range(len(values)):
-        last = smooth(last, values[k], gain) if np.isfinite(values[k]) else np.nan
+        step = gain * (values[k] - last) if np.isfinite(last) else 0.0
+        last = (last if np.isfinite(last) else values[k]) + step if np.isfinite(values[k]) else np.nan
         out[k] = last
 
 

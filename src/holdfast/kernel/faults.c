@@ -50,34 +50,35 @@ typedef struct {
 static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
 {
     const size_t n = f->n;
-    const hf_real *const used = f->used;
-    hf_sum sum_x = {{0}}, sum_y = {{0}}, sum_z = {{0}}, least, most;
-    for (size_t l = 0; l < 4; ++l) {
-        least.lane[l] = HF_INFINITY;
-        most.lane[l] = -HF_INFINITY;
-    }
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real x = readings[i], y = readings[n + i], z = readings[2 * n + i];
-            sum_x.lane[l] += x;
-            sum_y.lane[l] += y;
-            sum_z.lane[l] += z;
-            /* Each comparison by itself: a branch of two is mispredicted by half of the samples. */
-            hf_real low = x < y ? x : y;
-            hf_real high = x > y ? x : y;
-            low = z < low ? z : low;
-            high = z > high ? z : high;
-            low = used[i] > 0 ? low : HF_INFINITY;
-            high = used[i] > 0 ? high : -HF_INFINITY;
-            least.lane[l] = low < least.lane[l] ? low : least.lane[l];
-            most.lane[l] = high > most.lane[l] ? high : most.lane[l];
+    hf_sum sum_x, sum_y, sum_z, minus_least, most;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide x = {0}, y = {0}, z = {0};
+        const hf_wide none = x - HF_INFINITY;
+        hf_wide lowest = none, highest = none;
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors v = hf_load_vectors(readings, n, i);
+            hf_wide high = hf_where(v.x > v.y, v.x, v.y);
+            hf_wide low = hf_where(v.x < v.y, v.x, v.y);
+            high = hf_where(v.z > high, v.z, high);
+            low = -hf_where(v.z < low, v.z, low);
+            const hf_wide used = hf_load(f->used + i);
+            high = hf_where(used > 0, high, none);
+            low = hf_where(used > 0, low, none);
+            x += v.x;
+            y += v.y;
+            z += v.z;
+            highest = hf_where(high > highest, high, highest);
+            lowest = hf_where(low > lowest, low, lowest);
         }
+        hf_put(&sum_x, lane, x);
+        hf_put(&sum_y, lane, y);
+        hf_put(&sum_z, lane, z);
+        hf_put(&most, lane, highest);
+        hf_put(&minus_least, lane, lowest);
     }
     const hf_scan scan = {
         hf_total(sum_x) + HF_WEIGHT_Y * hf_total(sum_y) + HF_WEIGHT_Z * hf_total(sum_z),
-        hf_min(hf_min(least.lane[0], least.lane[1]), hf_min(least.lane[2], least.lane[3])),
-        hf_max(hf_max(most.lane[0], most.lane[1]), hf_max(most.lane[2], most.lane[3]))};
+        -hf_largest_lane(minus_least), hf_largest_lane(most)};
     return scan;
 }
 

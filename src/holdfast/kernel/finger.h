@@ -80,26 +80,11 @@ static inline hf_real hf_square(const hf_real v[3])
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-/* The order of every sum over taxels: lane l adds up taxels l, l + 4, l + 8, ..., and the total is
- * (lane 0 + lane 1) + (lane 2 + lane 3). So compilers may compute several taxels at a time, and all
- * get the same bits. Lanes without a taxel, and ignored taxels, add 0. */
-typedef struct {
-    hf_real lane[4];
-} hf_sum;
-
-static inline void hf_add(hf_sum *sum, size_t taxel, hf_real value)
-{
-    sum->lane[taxel % HF_LANES] += value;
-}
-
-static inline hf_real hf_total(hf_sum sum)
-{
-    return (sum.lane[0] + sum.lane[1]) + (sum.lane[2] + sum.lane[3]);
-}
-
 static inline hf_real hf_dot(const hf_real a[3], const hf_real b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
+
+#include "lanes.h"
 
 #endif

@@ -103,11 +103,9 @@ typedef double hf_real;
 #define HF_ARRAY(type, name, length) type *name
 #endif
 
-/* Partial sums of which a sum over taxels consists (finger.h); the taxels of a finger are padded to
- * a multiple of it. Tests also compile with 1: all taxels one after the other, as in Python. */
-#ifndef HF_LANES
-#define HF_LANES 4
-#endif
+/* Parts of which a sum over taxels consists (lanes.h); the taxels of a finger are padded to a
+ * multiple of it. */
+enum { HF_LANES = 4 };
 
 /* Why a finger has no features at a sample. */
 enum {

@@ -1,28 +1,72 @@
 /* Loops over the taxels of a finger that add up their forces and their motion.
  *
  * All numbers here are finite. Lanes without a taxel, and those of ignored taxels, hold zeros in
- * the readings and the rotations. Each loop takes HF_LANES taxels at a time, in the order of
- * `hf_sum`; the inner loop has no branch. */
+ * the readings and the rotations. lanes.h has the order of the sums. */
 #include "finger.h"
+#include "lanes.h"
+
+/* Vectors of some taxels: their x, y and z. */
+typedef struct {
+    hf_wide x, y, z;
+} hf_vectors;
+
+/* Return the vectors (3, n) from a lane on. */
+static inline hf_vectors hf_load_vectors(const hf_real *values, size_t n, size_t i)
+{
+    const hf_vectors v = {
+        hf_load(values + i), hf_load(values + n + i), hf_load(values + 2 * n + i)};
+    return v;
+}
+
+static inline hf_vectors hf_minus(hf_vectors a, hf_vectors b)
+{
+    const hf_vectors v = {a.x - b.x, a.y - b.y, a.z - b.z};
+    return v;
+}
+
+static inline hf_wide hf_squares(hf_vectors v)
+{
+    return v.x * v.x + v.y * v.y + v.z * v.z;
+}
+
+/* Return v . u for a vector u that is the same for all taxels. */
+static inline hf_wide hf_along(hf_vectors v, const hf_real u[3])
+{
+    return v.x * u[0] + v.y * u[1] + v.z * u[2];
+}
+
+/* Return R_i v_i, with the rotations (9, n) from a lane on. */
+static inline hf_vectors hf_turned(const hf_real *rotations, size_t n, size_t i, hf_vectors v)
+{
+    const hf_real *const r = rotations + i;
+    const hf_vectors turned = {
+        hf_load(r) * v.x + hf_load(r + n) * v.y + hf_load(r + 2 * n) * v.z,
+        hf_load(r + 3 * n) * v.x + hf_load(r + 4 * n) * v.y + hf_load(r + 5 * n) * v.z,
+        hf_load(r + 6 * n) * v.x + hf_load(r + 7 * n) * v.y + hf_load(r + 8 * n) * v.z};
+    return turned;
+}
 
 /* Compute F_tip = sum_i R_i (f_i - b_i) (DESIGN, section 1), and return the sum of the normal
  * readings. */
 static hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_real force[3])
 {
     const size_t n = f->n;
-    const hf_real *const r = f->readings, *const b = baseline, *const turn = f->rotations;
-    hf_sum fx = {{0}}, fy = {{0}}, fz = {{0}}, normal = {{0}};
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real x = r[i] - b[i];
-            const hf_real y = r[n + i] - b[n + i];
-            const hf_real z = r[2 * n + i] - b[2 * n + i];
-            fx.lane[l] += turn[i] * x + turn[n + i] * y + turn[2 * n + i] * z;
-            fy.lane[l] += turn[3 * n + i] * x + turn[4 * n + i] * y + turn[5 * n + i] * z;
-            fz.lane[l] += turn[6 * n + i] * x + turn[7 * n + i] * y + turn[8 * n + i] * z;
-            normal.lane[l] += z;
+    hf_sum fx, fy, fz, normal;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide x = {0}, y = {0}, z = {0}, readings_z = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors reading =
+                hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(baseline, n, i));
+            const hf_vectors g = hf_turned(f->rotations, n, i, reading);
+            x += g.x;
+            y += g.y;
+            z += g.z;
+            readings_z += reading.z;
         }
+        hf_put(&fx, lane, x);
+        hf_put(&fy, lane, y);
+        hf_put(&fz, lane, z);
+        hf_put(&normal, lane, readings_z);
     }
     force[0] = hf_total(fx);
     force[1] = hf_total(fy);
@@ -49,44 +93,39 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
     /* g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|,
      * moved = sum |g_i(k) - g_i(k-1)|^2. */
     const size_t n = f->n;
-    const hf_real *const r = f->readings, *const b = f->baseline, *const turn = f->rotations;
-    const hf_real *const rest = f->reference, *const then = hf_forces_at(f, before);
-    hf_real *const g = hf_forces_at(f, now), *const p = f->pressed;
-    const hf_real nx = f->finger->normal[0], ny = f->finger->normal[1], nz = f->finger->normal[2];
-    hf_sum fx = {{0}}, fy = {{0}}, fz = {{0}}, normal = {{0}};
-    hf_sum weight = {{0}}, pressure_squares = {{0}}, squares = {{0}}, moved = {{0}};
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        hf_real own[4][HF_LANES]; /* stored at the end: a store between would end the vectors */
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real x = r[i] - b[i];
-            const hf_real y = r[n + i] - b[n + i];
-            const hf_real z = r[2 * n + i] - b[2 * n + i];
-            const hf_real gx = turn[i] * x + turn[n + i] * y + turn[2 * n + i] * z;
-            const hf_real gy = turn[3 * n + i] * x + turn[4 * n + i] * y + turn[5 * n + i] * z;
-            const hf_real gz = turn[6 * n + i] * x + turn[7 * n + i] * y + turn[8 * n + i] * z;
-            const hf_real dx = gx - then[i], dy = gy - then[n + i], dz = gz - then[2 * n + i];
-            const hf_real hx = gx - rest[i], hy = gy - rest[n + i], hz = gz - rest[2 * n + i];
-            const hf_real pressed = hf_abs(hx * nx + hy * ny + hz * nz);
-            own[0][l] = gx;
-            own[1][l] = gy;
-            own[2][l] = gz;
-            own[3][l] = pressed;
-            fx.lane[l] += gx;
-            fy.lane[l] += gy;
-            fz.lane[l] += gz;
-            normal.lane[l] += z;
-            moved.lane[l] += dx * dx + dy * dy + dz * dz;
-            weight.lane[l] += pressed;
-            pressure_squares.lane[l] += pressed * pressed;
-            squares.lane[l] += hx * hx + hy * hy + hz * hz;
+    hf_real *const ring = hf_forces_at(f, now);
+    const hf_real *const then = hf_forces_at(f, before);
+    hf_sum fx, fy, fz, normal, weight, pressure_squares, squares, moved;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide x = {0}, y = {0}, z = {0}, readings_z = {0};
+        hf_wide p = {0}, pp = {0}, hh = {0}, steps = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors reading =
+                hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
+            const hf_vectors g = hf_turned(f->rotations, n, i, reading);
+            const hf_vectors h = hf_minus(g, hf_load_vectors(f->reference, n, i));
+            const hf_wide pressed = hf_wide_abs(hf_along(h, f->finger->normal));
+            steps += hf_squares(hf_minus(g, hf_load_vectors(then, n, i)));
+            hf_store(ring + i, g.x);
+            hf_store(ring + n + i, g.y);
+            hf_store(ring + 2 * n + i, g.z);
+            hf_store(f->pressed + i, pressed);
+            x += g.x;
+            y += g.y;
+            z += g.z;
+            readings_z += reading.z;
+            p += pressed;
+            pp += pressed * pressed;
+            hh += hf_squares(h);
         }
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            g[start + l] = own[0][l];
-            g[n + start + l] = own[1][l];
-            g[2 * n + start + l] = own[2][l];
-            p[start + l] = own[3][l];
-        }
+        hf_put(&fx, lane, x);
+        hf_put(&fy, lane, y);
+        hf_put(&fz, lane, z);
+        hf_put(&normal, lane, readings_z);
+        hf_put(&weight, lane, p);
+        hf_put(&pressure_squares, lane, pp);
+        hf_put(&squares, lane, hh);
+        hf_put(&moved, lane, steps);
     }
     const hf_taxel_sums sums = {
         {hf_total(fx), hf_total(fy), hf_total(fz)},
@@ -103,20 +142,24 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
 static hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
 {
     const size_t n = f->n;
-    const hf_real *const g = hf_forces_at(f, now), *const r = f->places, *const p = f->pressed;
-    const hf_real nx = f->finger->normal[0], ny = f->finger->normal[1], nz = f->finger->normal[2];
-    hf_sum cx = {{0}}, cy = {{0}}, cz = {{0}}, moment = {{0}};
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real gx = g[i], gy = g[n + i], gz = g[2 * n + i];
-            const hf_real rx = r[i], ry = r[n + i], rz = r[2 * n + i];
-            cx.lane[l] += p[i] * rx;
-            cy.lane[l] += p[i] * ry;
-            cz.lane[l] += p[i] * rz;
-            moment.lane[l] +=
-                (ry * gz - rz * gy) * nx + (rz * gx - rx * gz) * ny + (rx * gy - ry * gx) * nz;
+    const hf_real *const ring = hf_forces_at(f, now);
+    hf_sum cx, cy, cz, moment;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide x = {0}, y = {0}, z = {0}, m = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors g = hf_load_vectors(ring, n, i), r = hf_load_vectors(f->places, n, i);
+            const hf_vectors product = {
+                r.y * g.z - r.z * g.y, r.z * g.x - r.x * g.z, r.x * g.y - r.y * g.x};
+            const hf_wide p = hf_load(f->pressed + i);
+            x += p * r.x;
+            y += p * r.y;
+            z += p * r.z;
+            m += hf_along(product, f->finger->normal);
         }
+        hf_put(&cx, lane, x);
+        hf_put(&cy, lane, y);
+        hf_put(&cz, lane, z);
+        hf_put(&moment, lane, m);
     }
     centre[0] = hf_total(cx);
     centre[1] = hf_total(cy);
@@ -137,20 +180,20 @@ static hf_residual hf_residual_of(
     /* sum |u_i|^2 and sum (u_i . n)^2, with u_i = dg_i - mean dg. */
     const size_t n = f->n;
     const hf_real *const g = hf_forces_at(f, now), *const old = hf_forces_at(f, then);
-    const hf_real *const used = f->used;
-    const hf_real nx = f->finger->normal[0], ny = f->finger->normal[1], nz = f->finger->normal[2];
-    const hf_real mx = mean[0], my = mean[1], mz = mean[2];
-    hf_sum moved = {{0}}, pressed = {{0}};
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real x = used[i] * (g[i] - old[i] - mx);
-            const hf_real y = used[i] * (g[n + i] - old[n + i] - my);
-            const hf_real z = used[i] * (g[2 * n + i] - old[2 * n + i] - mz);
-            const hf_real along = x * nx + y * ny + z * nz;
-            moved.lane[l] += x * x + y * y + z * z;
-            pressed.lane[l] += along * along;
+    hf_sum moved, pressed;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide squares = {0}, along = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_wide used = hf_load(f->used + i);
+            const hf_vectors d = hf_minus(hf_load_vectors(g, n, i), hf_load_vectors(old, n, i));
+            const hf_vectors u = {
+                used * (d.x - mean[0]), used * (d.y - mean[1]), used * (d.z - mean[2])};
+            const hf_wide normal = hf_along(u, f->finger->normal);
+            squares += hf_squares(u);
+            along += normal * normal;
         }
+        hf_put(&moved, lane, squares);
+        hf_put(&pressed, lane, along);
     }
     const hf_residual sums = {hf_total(moved), hf_total(pressed)};
     return sums;
@@ -177,36 +220,45 @@ typedef struct {
 static hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
 {
     const size_t n = f->n;
-    const hf_real *const g = hf_forces_at(f, at.now), *const mid = hf_forces_at(f, at.before);
-    const hf_real *const old = hf_forces_at(f, at.first), *const p = f->pressed;
+    const hf_real *const ring = hf_forces_at(f, at.now), *const mid = hf_forces_at(f, at.before);
+    const hf_real *const old = hf_forces_at(f, at.first);
     const hf_real a = at.newest, c = at.oldest;
     const hf_real mean = f->state->motion.pressure / f->finger->n_used;
-    const hf_real nx = f->finger->normal[0], ny = f->finger->normal[1], nz = f->finger->normal[2];
-    hf_sum squares = {{0}}, shared = {{0}}, along = {{0}}, px = {{0}}, py = {{0}}, pz = {{0}};
-    hf_sum top = {{0}};
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real x = a * g[i] - 2 * mid[i] + c * old[i];
-            const hf_real y = a * g[n + i] - 2 * mid[n + i] + c * old[n + i];
-            const hf_real z = a * g[2 * n + i] - 2 * mid[2 * n + i] + c * old[2 * n + i];
-            const hf_real square = x * x + y * y + z * z, pushed = x * nx + y * ny + z * nz;
-            const hf_real rival = p[i] > mean ? square : 0;
-            squares.lane[l] += square;
-            shared.lane[l] += p[i] * square;
-            along.lane[l] += p[i] * (pushed * pushed);
-            px.lane[l] += p[i] * x;
-            py.lane[l] += p[i] * y;
-            pz.lane[l] += p[i] * z;
-            top.lane[l] = rival > top.lane[l] ? rival : top.lane[l];
+    hf_sum squares, shared, along, px, py, pz, top;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide dd = {0}, pdd = {0}, pushes = {0}, x = {0}, y = {0}, z = {0}, most = {0};
+        const hf_wide none = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors g = hf_load_vectors(ring, n, i), m = hf_load_vectors(mid, n, i);
+            const hf_vectors o = hf_load_vectors(old, n, i);
+            const hf_vectors d = {
+                a * g.x - 2 * m.x + c * o.x, a * g.y - 2 * m.y + c * o.y,
+                a * g.z - 2 * m.z + c * o.z};
+            const hf_wide p = hf_load(f->pressed + i), square = hf_squares(d);
+            const hf_wide pushed = hf_along(d, f->finger->normal);
+            const hf_wide rival = hf_where(p > mean, square, none);
+            dd += square;
+            pdd += p * square;
+            pushes += p * (pushed * pushed);
+            x += p * d.x;
+            y += p * d.y;
+            z += p * d.z;
+            most = hf_where(rival > most, rival, most);
         }
+        hf_put(&squares, lane, dd);
+        hf_put(&shared, lane, pdd);
+        hf_put(&along, lane, pushes);
+        hf_put(&px, lane, x);
+        hf_put(&py, lane, y);
+        hf_put(&pz, lane, z);
+        hf_put(&top, lane, most);
     }
     const hf_second_sums sums = {
         hf_total(squares),
         hf_total(shared),
         hf_total(along),
         {hf_total(px), hf_total(py), hf_total(pz)},
-        hf_max(hf_max(top.lane[0], top.lane[1]), hf_max(top.lane[2], top.lane[3]))};
+        hf_largest_lane(top)};
     return sums;
 }
 
@@ -214,15 +266,16 @@ static hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
 static hf_real hf_risen(const hf_finger *f, size_t now)
 {
     const size_t n = f->n;
-    const hf_real *const g = hf_forces_at(f, now), *const normal = f->finger->normal;
-    hf_sum risen = {{0}};
-    for (size_t start = 0; start < n; start += HF_LANES) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            const size_t i = start + l;
-            const hf_real pressed =
-                g[i] * normal[0] + g[n + i] * normal[1] + g[2 * n + i] * normal[2];
-            risen.lane[l] += pressed > 0 ? pressed : 0;
+    const hf_real *const ring = hf_forces_at(f, now);
+    hf_sum risen;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide part = {0};
+        const hf_wide none = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_wide pressed = hf_along(hf_load_vectors(ring, n, i), f->finger->normal);
+            part += hf_where(pressed > none, pressed, none);
         }
+        hf_put(&risen, lane, part);
     }
     return hf_total(risen);
 }
