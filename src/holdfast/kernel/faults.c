@@ -155,12 +155,19 @@ static bool hf_has_reading(const hf_real *readings, size_t n, size_t i)
     return readings[i] != 0 || readings[n + i] != 0 || readings[2 * n + i] != 0;
 }
 
-/* Note that a taxel which changes now did not for `still` samples before, or never did. */
-static void hf_note_still(const hf_finger *f, holdfast_taxel *taxel, int64_t still)
+/* Forget the last change of a taxel, so that its next second difference is a first one. */
+static void hf_forget_change(const hf_finger *f, size_t i)
 {
+    f->changes[i] = f->changes[f->n + i] = f->changes[2 * f->n + i] = 0;
+}
+
+/* Note that a taxel which changes now did not for `still` samples before, or never did. */
+static void hf_note_still(const hf_finger *f, size_t i, int64_t still)
+{
+    holdfast_taxel *const taxel = &f->taxels[i];
     const hf_real period = f->hand->period, length = (hf_real)still;
     if ((length + 1) * hf_min(1, period / HF_NOISE_SMOOTHING) > 1) { /* jumps follow faster */
-        hf_fill(taxel->last_change, 3, 0);
+        hf_forget_change(f, i);
     }
     if (taxel->n_changed == 0) {
         taxel->longest_still = f->state->n_seen - 1;
@@ -174,66 +181,122 @@ static void hf_note_still(const hf_finger *f, holdfast_taxel *taxel, int64_t sti
     }
 }
 
-/* Note the change of a taxel. Return the square of its second difference. */
-static hf_real hf_second_square(const hf_finger *f, holdfast_taxel *taxel, const hf_real change[3])
+/* How the taxels of a finger change. */
+typedef struct {
+    bool any_still;  /* some taxel did not change for 0.5 s of changes of the finger */
+    bool alone;      /* one taxel has most of the second differences */
+    hf_real largest; /* its P2 */
+} hf_changes;
+
+/* Return |D2|^2 of a taxel that changes by D1, with D2 = D1 - D1 of its last change. */
+static hf_real hf_second_square(const hf_finger *f, size_t i, const hf_real change[3])
 {
+    holdfast_taxel *const taxel = &f->taxels[i];
     const int64_t still = f->state->n_changes - taxel->changed_at - 1;
     if (still != 0 || taxel->n_changed == 0) {
-        hf_note_still(f, taxel, still);
+        hf_note_still(f, i, still);
     }
-    /* |D2|^2, with D2 = D1 - D1 of the last change. */
     hf_real second[3];
     for (size_t axis = 0; axis < 3; ++axis) {
-        second[axis] = change[axis] - taxel->last_change[axis];
-        taxel->last_change[axis] = change[axis];
+        hf_real *const last = &f->changes[axis * f->n + i];
+        second[axis] = change[axis] - *last;
+        *last = change[axis];
     }
     taxel->n_changed += 1;
     taxel->changed_at = f->state->n_changes;
     return hf_square(second);
 }
 
-/* How the taxels of a finger change. */
-typedef struct {
-    bool any_still;  /* some taxel did not change for 0.5 s of changes of the finger */
-    bool alone;      /* one taxel has most of the second differences */
-    hf_real largest; /* its second_power */
-} hf_changes;
+/* Update the past of one taxel. Return whether it did not change for long. */
+static bool hf_update_taxel(const hf_finger *f, size_t i, hf_real share)
+{
+    const size_t n = f->n;
+    const hf_real *const now = f->readings, *const then = f->previous;
+    const hf_real change[3] = {
+        now[i] - then[i], now[n + i] - then[n + i], now[2 * n + i] - then[2 * n + i]};
+    const hf_real square = hf_square(change);
+    hf_real first_power = (1 - share) * f->powers[i];
+    hf_real second_power = (1 - share) * f->powers[n + i];
+    bool is_still = false;
+    if (square > 0) {
+        const hf_real second = hf_second_square(f, i, change);
+        if (hf_has_reading(now, n, i) && hf_has_reading(then, n, i)) {
+            first_power += share * square;
+            second_power += share * second;
+        } else {
+            hf_forget_change(f, i);
+        }
+    } else {
+        const hf_real still = (hf_real)(f->state->n_changes - f->taxels[i].changed_at);
+        is_still = still >= HF_STUCK_SECONDS / f->hand->period;
+    }
+    f->powers[i] = first_power;
+    f->powers[n + i] = second_power;
+    return is_still;
+}
+
+/* Return whether all taxels from a lane on change now and did so at the change before, with
+ * readings: the usual case, in which nothing about a single taxel is to be noted. */
+static bool hf_are_lively(const hf_finger *f, size_t i, hf_vectors now, hf_vectors then)
+{
+    bool are_lively = true;
+    for (size_t l = 0; l < HF_WIDTH; ++l) {
+        const holdfast_taxel *const taxel = &f->taxels[i + l];
+        are_lively &= taxel->n_changed > 0 && taxel->changed_at == f->state->n_changes - 1;
+    }
+    return are_lively && hf_are_positive(hf_squares(hf_minus(now, then))) &&
+           hf_are_positive(hf_wide_abs(now.x) + hf_wide_abs(now.y) + hf_wide_abs(now.z)) &&
+           hf_are_positive(hf_wide_abs(then.x) + hf_wide_abs(then.y) + hf_wide_abs(then.z));
+}
+
+/* As `hf_update_taxel`, for taxels in the usual case. */
+static void hf_update_lively(
+    const hf_finger *f, size_t i, hf_vectors now, hf_vectors then, hf_real share)
+{
+    const size_t n = f->n;
+    const hf_vectors change = hf_minus(now, then);
+    const hf_vectors second = hf_minus(change, hf_load_vectors(f->changes, n, i));
+    hf_store(f->changes + i, change.x);
+    hf_store(f->changes + n + i, change.y);
+    hf_store(f->changes + 2 * n + i, change.z);
+    const hf_wide first = hf_load(f->powers + i), power = hf_load(f->powers + n + i);
+    hf_store(f->powers + i, (1 - share) * first + share * hf_squares(change));
+    hf_store(f->powers + n + i, (1 - share) * power + share * hf_squares(second));
+    for (size_t l = 0; l < HF_WIDTH; ++l) {
+        f->taxels[i + l].n_changed += 1;
+        f->taxels[i + l].changed_at = f->state->n_changes;
+    }
+}
 
 /* Update the past of each taxel of a finger with a sample that changed a reading. */
 static hf_changes hf_update_taxels(const hf_finger *f)
 {
+    /* D1 = f_i(k) - f_i(k-1), D2 = D1 - D1 of the last change, s = T / tau:
+     * P1 = (1 - s) P1 + s |D1|^2, P2 = (1 - s) P2 + s |D2|^2. Without a change D1 = D2 = 0. */
     const size_t n = f->n;
-    const hf_real *const now = f->readings, *const then = f->previous;
-    const hf_real least = HF_STUCK_SECONDS / f->hand->period;
-    /* s = T / tau: the weight of a sample in a first order mean. */
     const hf_real share = hf_min(1, f->hand->period / HF_NOISE_SMOOTHING);
     hf_changes changes = {false, false, 0};
-    hf_sum total = {{0}};
-    for (size_t i = 0; i < f->n_taxels; ++i) {
-        /* D1 = f_i(k) - f_i(k-1), D2 = D1 - D1 of the last change:
-         * P1 = (1 - s) P1 + s |D1|^2, P2 = (1 - s) P2 + s |D2|^2. Without a change D1 = D2 = 0. */
-        holdfast_taxel *const taxel = &f->taxels[i];
-        const hf_real change[3] = {
-            now[i] - then[i], now[n + i] - then[n + i], now[2 * n + i] - then[2 * n + i]};
-        const hf_real square = hf_square(change);
-        hf_real first_power = (1 - share) * taxel->first_power;
-        hf_real second_power = (1 - share) * taxel->second_power;
-        if (square > 0) {
-            const hf_real second = hf_second_square(f, taxel, change);
-            if (hf_has_reading(now, n, i) && hf_has_reading(then, n, i)) {
-                first_power += share * square;
-                second_power += share * second;
+    hf_sum total, largest;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide sum = {0}, most = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors now = hf_load_vectors(f->readings, n, i);
+            const hf_vectors then = hf_load_vectors(f->previous, n, i);
+            if (hf_are_lively(f, i, now, then)) {
+                hf_update_lively(f, i, now, then, share);
             } else {
-                hf_fill(taxel->last_change, 3, 0);
+                for (size_t l = 0; l < HF_WIDTH && i + l < f->n_taxels; ++l) {
+                    changes.any_still |= hf_update_taxel(f, i + l, share);
+                }
             }
-        } else if ((hf_real)(f->state->n_changes - taxel->changed_at) >= least) {
-            changes.any_still = true;
+            const hf_wide power = hf_load(f->powers + n + i);
+            sum += power;
+            most = hf_where(power > most, power, most);
         }
-        taxel->first_power = first_power;
-        taxel->second_power = second_power;
-        hf_add(&total, i, second_power);
-        changes.largest = second_power > changes.largest ? second_power : changes.largest;
+        hf_put(&total, lane, sum);
+        hf_put(&largest, lane, most);
     }
+    changes.largest = hf_largest_lane(largest);
     changes.alone = changes.largest >= HF_LONE_SHARE * hf_total(total);
     return changes;
 }
@@ -322,15 +385,14 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
         quiet = s->noise / hf_sqrt(f->finger->n_used);
     }
     size_t loudest = 0;
-    while (loudest + 1 < f->n_taxels && f->taxels[loudest].second_power != largest) {
+    while (loudest + 1 < f->n_taxels && f->powers[f->n + loudest] != largest) {
         ++loudest;
     }
     /* Noisy: P2 > 2.5 P1 (white noise has 3 P1), and P2 > 6 (100 noise)^2: D2 of white noise of a
      * reading has the variance 6 noise^2. */
-    const holdfast_taxel *const taxel = &f->taxels[loudest];
+    const hf_real first_power = f->powers[loudest], second_power = f->powers[f->n + loudest];
     const hf_real loud = HF_LOUD_RATIO * quiet;
-    if (taxel->second_power > HF_WHITE_RATIO * taxel->first_power &&
-        taxel->second_power > 6 * (loud * loud)) {
+    if (second_power > HF_WHITE_RATIO * first_power && second_power > 6 * (loud * loud)) {
         s->taxel_faults |= HOLDFAST_NOISY;
         s->noisy_taxels = hf_bit(loudest);
         s->faulty_taxels |= s->noisy_taxels;
@@ -343,8 +405,8 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
     holdfast_finger_memory *const s = f->state;
     const hf_changes changes = hf_update_taxels(f);
     for (size_t i = 0; after_gap && i < f->n_taxels; ++i) { /* a change over a gap is no noise */
-        hf_fill(f->taxels[i].last_change, 3, 0);
-        f->taxels[i].first_power = f->taxels[i].second_power = 0;
+        hf_forget_change(f, i);
+        f->powers[i] = f->powers[f->n + i] = 0;
     }
     s->taxel_faults = 0;
     s->faulty_taxels = s->noisy_taxels = 0;

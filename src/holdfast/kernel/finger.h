@@ -26,7 +26,9 @@ typedef struct {
     hf_real *previous;
     hf_real *baseline;
     hf_real *reference;
+    hf_real *changes;
     hf_real *pressed; /* (n) */
+    hf_real *powers;  /* (2, n) */
     holdfast_taxel *taxels;
     holdfast_mask *masks;
     holdfast_ring *rings;

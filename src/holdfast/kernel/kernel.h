@@ -256,15 +256,12 @@ typedef struct {
     const hf_real *places;            /* (3 n_lanes) from the centroid, in radii of the patch */
 } holdfast_hand;
 
-/* Past of a taxel, to find whether it is faulty (faults.c). */
+/* Changes of a taxel, to find whether it is faulty (faults.c). */
 typedef struct {
-    hf_real last_change[3]; /* [unit of the readings] */
-    hf_real first_power;    /* smoothed mean square of its first differences */
-    hf_real second_power;   /* smoothed mean square of its second differences */
-    int64_t n_changed;      /* samples that changed the taxel */
-    int64_t changed_at;     /* n_changes of its finger when the taxel last changed */
-    int64_t longest_still;  /* most successive samples without a change, of those that changed the
-                               finger */
+    int64_t n_changed;     /* samples that changed the taxel */
+    int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
+    int64_t longest_still; /* most successive samples without a change, of those that changed the
+                              finger */
 } holdfast_taxel;
 
 /* What replaces a taxel that is left out (masks.c). */
@@ -388,6 +385,9 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
+    HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
+    HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
+                                                           of its second differences */
     HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS * HF_N_RING_SUMS); /* of samples, a ring */
     /* (n_fingers, n_history, 4) and (n_fingers, n_history, n_channels, n_levels, 3): rings. */
     HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HF_N_COMPONENTS);

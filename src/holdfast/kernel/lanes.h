@@ -23,6 +23,8 @@
 #if defined(__GNUC__)
 enum { HF_WIDTH = 16 / sizeof(hf_real) };
 typedef hf_real hf_wide __attribute__((vector_size(16)));
+/* The same in an array of numbers: compilers know that it aliases numbers alone. */
+typedef hf_real hf_wide_in_memory __attribute__((vector_size(16), aligned(sizeof(hf_real))));
 #ifdef HOLDFAST_SINGLE
 typedef int32_t hf_wide_bits __attribute__((vector_size(16)));
 #else
@@ -43,6 +45,7 @@ static inline hf_wide hf_wide_abs(hf_wide a)
 #else
 enum { HF_WIDTH = 1 };
 typedef hf_real hf_wide;
+typedef hf_real hf_wide_in_memory;
 
 static inline hf_wide hf_where(bool holds, hf_wide b, hf_wide a)
 {
@@ -61,20 +64,30 @@ typedef struct {
 
 static inline hf_wide hf_load(const hf_real *values)
 {
-    hf_wide a;
-    memcpy(&a, values, sizeof a);
-    return a;
+    return *(const hf_wide_in_memory *)values;
 }
 
 static inline void hf_store(hf_real *values, hf_wide a)
 {
-    memcpy(values, &a, sizeof a);
+    *(hf_wide_in_memory *)values = a;
+}
+
+/* Return whether all of these numbers are above 0. */
+static inline bool hf_are_positive(hf_wide a)
+{
+    hf_real values[HF_WIDTH];
+    bool are_positive = true;
+    hf_store(values, a);
+    for (size_t l = 0; l < HF_WIDTH; ++l) {
+        are_positive &= values[l] > 0;
+    }
+    return are_positive;
 }
 
 /* Set as many parts of a sum as HF_WIDTH, from a lane on. */
 static inline void hf_put(hf_sum *sum, size_t lane, hf_wide parts)
 {
-    memcpy(&sum->lane[lane], &parts, sizeof parts);
+    hf_store(&sum->lane[lane], parts);
 }
 
 static inline void hf_add(hf_sum *sum, size_t taxel, hf_real value)

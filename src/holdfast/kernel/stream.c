@@ -21,7 +21,9 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
     f.previous = memory->previous + 3 * first;
     f.baseline = memory->baseline + 3 * first;
     f.reference = memory->reference + 3 * first;
+    f.changes = memory->changes + 3 * first;
     f.pressed = memory->pressed + first;
+    f.powers = memory->powers + 2 * first;
     f.taxels = memory->taxels + first;
     f.masks = memory->masks + first;
     f.rings = memory->rings + first;

@@ -170,6 +170,8 @@ static uint64_t hf_place(const holdfast_hand *hand, holdfast_memory *m, void *bl
     m->baseline = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->reference = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->pressed = (hf_real *)hf_take(block, &used, lanes, width);
+    m->changes = (hf_real *)hf_take(block, &used, 3 * lanes, width);
+    m->powers = (hf_real *)hf_take(block, &used, 2 * lanes, width);
     m->sums = (hf_real *)hf_take(block, &used, fingers * HF_N_RING_SUMS, width);
     m->history = (hf_real *)hf_take(block, &used, rows * HF_N_COMPONENTS, width);
     m->blocks = (hf_real *)hf_take(
