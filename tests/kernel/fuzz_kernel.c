@@ -4,10 +4,10 @@
  *         tests/kernel/fuzz_kernel.c -o fuzz && ./fuzz -max_len=4096
  *
  * The first bytes make tables that fit; the next change any number in them, sizes too, before the
- * arrays are allocated with exactly the lengths that these say. Tables that `holdfast_check`
- * accepts then process samples made from the remaining bytes: whatever they hold, no access may lie
- * outside. */
-#include "kernel.c"
+ * arrays are allocated with exactly the lengths that these say. A hand and a model that
+ * `holdfast_check_model` accepts then process samples made from the remaining bytes: whatever they
+ * hold, no access may lie outside. */
+#include "holdfast.c"
 
 #include <stdlib.h>
 
@@ -121,46 +121,112 @@ static void make_sizes(input *in, holdfast_hand *hand)
     hand->has_ratios = take(in, 1) % 2;
 }
 
-/* Process samples until the input ends. */
-static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
+/* Make heads and limits of a finger; the input then spoils some. */
+static void make_rule(input *in, holdfast_rule *rule, const holdfast_hand *hand)
 {
-    holdfast_memory memory;
-    const size_t size = holdfast_memory_size(hand);
-    void *const block = size <= MAX_MEMORY ? malloc(size) : NULL;
-    hf_real *const readings = (hf_real *)malloc(3 * n_taxels * sizeof(hf_real));
-    bool *const present = (bool *)malloc(hand->n_fingers * sizeof(bool));
-    if (block && readings && present) {
-        holdfast_place(hand, &memory, block);
-        for (size_t i = 0; i < 3 * n_taxels; ++i) {
-            readings[i] = (hf_real)(30000 + i % 7);
-        }
-        holdfast_begin(hand, &memory, take(in, 1) % 2 ? readings : NULL);
-        double time = take_number(in);
-        while (in->size > 0) {
-            const size_t n_changed = (size_t)take(in, 1) % 16,
-                         n_times = 1 + (size_t)take(in, 1) % 32;
-            for (size_t i = 0; i < n_changed; ++i) {
-                readings[(size_t)take(in, 2) % (3 * n_taxels)] = (hf_real)take_number(in);
-            }
-            for (size_t i = 0; i < hand->n_fingers; ++i) {
-                present[i] = take(in, 1) % 8 > 0;
-            }
-            if (take(in, 1) % 16 == 0) {
-                time = take_number(in);
-            }
-            const bool noisy = take(in, 1) % 2;
-            for (size_t k = 0; k < n_times; ++k) {
-                for (size_t i = 0; noisy && i < 3 * n_taxels; ++i) {
-                    readings[i] += (hf_real)((i * 7 + k * 13) % 5) - 2;
-                }
-                time += (double)hand->period;
-                holdfast_advance(hand, &memory, readings, present, time);
-            }
+    rule->contact = (int32_t)(take(in, 1) % 4);
+    rule->contact_limit = (hf_real)take(in, 1);
+    for (size_t name = 0; name < HOLDFAST_N_HEADS; ++name) {
+        holdfast_head *const head = &rule->heads[name];
+        const size_t most = name == HOLDFAST_HEAD_CAUSE ? (size_t)HOLDFAST_N_CAUSES : 1;
+        head->n_outputs = name == HOLDFAST_HEAD_STABLE ? 1 : (size_t)take(in, 1) % (most + 1);
+        head->n_features = (size_t)take(in, 1) % (hand->n_features + 1);
+        head->has_squares = head->n_outputs == 1 && take(in, 1) % 2;
+        head->first = (size_t)take(in, 1) % 8;
+        head->threshold = (hf_real)0.5;
+        head->gain = (hf_real)0.3;
+        head->hold = (hf_real)0.05;
+        head->highest = 40;
+        for (size_t k = 0; k < most; ++k) {
+            head->causes[k] = (int32_t)k + 1;
         }
     }
+    if (take(in, 1) % 8 == 0) {
+        holdfast_head *const head = &rule->heads[(size_t)take(in, 1) % HOLDFAST_N_HEADS];
+        size_t *const sizes[] = {&head->n_outputs, &head->n_features, &head->first};
+        spoil(in, sizes, sizeof sizes / sizeof *sizes);
+        head->causes[(size_t)take(in, 1) % 6] = (int32_t)take(in, 4);
+        rule->contact = (int32_t)take(in, 1) - 100;
+        head->gain = (hf_real)take_number(in);
+    }
+}
+
+/* Process samples until the input ends. */
+static void process(input *in, holdfast_detector *d, hf_real *readings, size_t n_taxels)
+{
+    const holdfast_hand *const hand = d->model->hand;
+    bool *const present = (bool *)malloc(hand->n_fingers * sizeof(bool));
+    holdfast_finger_estimate *const estimates =
+        (holdfast_finger_estimate *)malloc(hand->n_fingers * sizeof *estimates);
+    double time = take_number(in);
+    while (present && estimates && in->size > 0) {
+        const size_t n_changed = (size_t)take(in, 1) % 16, n_times = 1 + (size_t)take(in, 1) % 32;
+        for (size_t i = 0; i < n_changed; ++i) {
+            readings[(size_t)take(in, 2) % (3 * n_taxels)] = (hf_real)take_number(in);
+        }
+        for (size_t i = 0; i < hand->n_fingers; ++i) {
+            present[i] = take(in, 1) % 8 > 0;
+        }
+        if (take(in, 1) % 16 == 0) {
+            time = take_number(in);
+        }
+        const bool noisy = take(in, 1) % 2;
+        for (size_t k = 0; k < n_times; ++k) {
+            for (size_t i = 0; noisy && i < 3 * n_taxels; ++i) {
+                readings[i] += (hf_real)((i * 7 + k * 13) % 5) - 2;
+            }
+            time += (double)hand->period;
+            holdfast_update(d, time, readings, present, estimates);
+        }
+    }
+    for (size_t i = 0; i < hand->n_fingers; ++i) {
+        holdfast_baseline(d, i, readings + 3 * hand->fingers[i].first_taxel);
+    }
+    free(estimates);
     free(present);
-    free(readings);
+}
+
+/* Make a model for a hand, and run its detector if the model is accepted. */
+static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
+{
+    holdfast_model model;
+    memset(&model, 0, sizeof model);
+    model.hand = hand;
+    model.n_model_fingers = 1 + (size_t)take(in, 1) % 3;
+    model.hysteresis = (hf_real)0.1;
+    model.min_duration = (hf_real)(take(in, 1) % 2) / 10;
+    model.hold = (hf_real)(take(in, 1) % 2) / 10;
+    model.has_filter = take(in, 1) % 2;
+    model.switching = 15;
+    model.zero_unknown = take(in, 1) % 2;
+    model.n_weights = 8 + (6 + 3) * (hand->n_features + 1);
+    holdfast_rule *const rules = (holdfast_rule *)calloc(hand->n_fingers, sizeof *rules);
+    hf_real *const weights = (hf_real *)calloc(model.n_weights, sizeof(hf_real));
+    hf_real *const readings = (hf_real *)malloc(3 * n_taxels * sizeof(hf_real));
+    for (size_t i = 0; i < model.n_weights; ++i) {
+        weights[i] = (hf_real)(i % 5) - 2;
+    }
+    for (size_t i = 0; i < hand->n_fingers; ++i) {
+        make_rule(in, &rules[i], hand);
+    }
+    for (size_t i = 0; i < 3 * n_taxels; ++i) {
+        readings[i] = (hf_real)(30000 + i % 7);
+    }
+    model.rules = rules;
+    model.weights = weights;
+    const bool fits = !holdfast_check_model(&model);
+    const size_t size = fits ? holdfast_detector_size(&model) : 0;
+    void *const block = fits && size <= MAX_MEMORY ? malloc(size) : NULL;
+    if (block) {
+        holdfast_detector d;
+        holdfast_detector_place(&model, &d, block);
+        holdfast_start(&model, &d, take(in, 1) % 2 ? readings : NULL);
+        process(in, &d, readings, n_taxels);
+    }
     free(block);
+    free(readings);
+    free(weights);
+    free(rules);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
