@@ -138,9 +138,9 @@ class Linear(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linea
             ValueError: the number of features is not `n_features`.
         """
         rows = feature_rows(features, self.n_features)
-        probabilities = np.empty(len(rows))
-        _probabilities(rows, self.raw_weights()[0], probabilities)
-        return probabilities
+        weights = self.raw_weights()[0]
+        with np.errstate(over="ignore"):  # 1 / (1 + infinity) is 0
+            return np.asarray(1.0 / (1.0 + np.exp(-(weights[0] + rows @ weights[1:]))))
 
 
 def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
@@ -168,12 +168,6 @@ def log_odds(features: Array, weights: Array) -> float:
 def linear_probability(features: Array, weights: Array) -> float:
     """Return the logistic function of the weighted sum, for offline and live detection."""
     return 1.0 / (1.0 + math.exp(-log_odds(features, weights)))
-
-
-@compiled_step
-def _probabilities(features: Array, weights: Array, out: Array) -> None:
-    for k in range(len(features)):
-        out[k] = linear_probability(features[k], weights)
 
 
 @joined_step
