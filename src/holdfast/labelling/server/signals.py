@@ -94,12 +94,13 @@ class _Level(NamedTuple):
 
     def part(self, blocks: slice) -> "_Level":
         """Return some of the blocks."""
-        return _Level(*(array[:, blocks] for array in self))
+        low, high, falls = self.low[:, blocks], self.high[:, blocks], self.falls[:, blocks]
+        return _Level(self.times[:, blocks], low, high, falls)
 
     @property
     def n_blocks(self) -> int:
         """Number of blocks."""
-        return self.times.shape[1]
+        return len(self.times[0])
 
 
 class FingerSignals:
