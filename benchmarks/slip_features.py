@@ -112,7 +112,9 @@ def averaged(values: Array, gain: float, out: Array) -> None:
     last = np.nan
     for k in range(len(values)):
         step = gain * (values[k] - last) if np.isfinite(last) else 0.0
-        last = (last if np.isfinite(last) else values[k]) + step if np.isfinite(values[k]) else np.nan
+        last = (
+            (last if np.isfinite(last) else values[k]) + step if np.isfinite(values[k]) else np.nan
+        )
         out[k] = last
 
 

@@ -18,7 +18,9 @@ FLAGS = (
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
-@pytest.mark.parametrize("name", ["module.c", "haar.c", "force.c", "kernel.c", "holdfast.c"])
+@pytest.mark.parametrize(
+    "name", ["module.c", "haar.c", "force.c", "counts.c", "kernel.c", "holdfast.c"]
+)
 def test_no_warning(compiler, level, name, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} here")

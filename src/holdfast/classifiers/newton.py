@@ -1,4 +1,4 @@
-"""Newton's method for logistic regression, compiled: a few passes over the samples.
+"""Newton's method for logistic regression: a few passes over the samples.
 
 The objective of two classes is that of scikit-learn: sum_i s_i log(1 + exp(-t_i z_i)) +
 |w|^2 / (2 C), with z = w x + b, t = 1 for stable and -1 for other samples, and s the weight of a
@@ -8,14 +8,12 @@ All are strictly convex in w, so the method ends at the same weights; it goes on
 is left, where scikit-learn stops at 1e-4.
 """
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 
 Evaluate = Callable[[Array, Array, Array], float]
@@ -24,8 +22,11 @@ Evaluate = Callable[[Array, Array, Array], float]
 MAX_ITERATIONS = 100
 LAST_STEP = 1e-6
 """A step whose parts are smaller is the last: the error after it is about its square."""
-MIN_PRODUCT = 1e-100
-"""Product of probabilities from which on its logarithm is taken, far above the least number."""
+PART_PRODUCTS = 1 << 18
+"""Multiplications of a matrix product of a part of the samples: OpenBLAS takes one thread for so
+few, and the weights do not depend on the number of threads."""
+MIN_PART, MAX_PART = 64, 4096
+"""Samples of a part at least, and at most: its arrays stay in the cache."""
 ROUNDING_RISE = 1e-14
 """Relative rise of the objective that is rounding; a step with a larger rise is halved."""
 MIN_STEP = 1e-12
@@ -137,7 +138,6 @@ def _step(hessian: Array, gradient: Array) -> Array:
         return np.asarray(np.linalg.lstsq(hessian, gradient)[0])
 
 
-@compiled
 def _evaluate(
     features: Array,
     positive: npt.NDArray[np.bool_],
@@ -149,41 +149,31 @@ def _evaluate(
     hessian: Array,
 ) -> float:
     """Return the objective, and write its gradient and its Hessian (n_weights, n_weights)."""
-    n, d = features.shape
+    d = features.shape[1]
     gradient[:] = 0.0
     hessian[:] = 0.0
-    losses = np.zeros(2)
-    products = np.ones(2)  # of probabilities; one logarithm for many of them
-    for i in range(n):
-        z = weights[d]
-        for a in range(d):
-            z += weights[a] * features[i, a]
-        kind = 1 if positive[i] else 0
-        size = math.exp(-abs(z))
-        likely = 1.0 / (1.0 + size)  # probability of the sign of z
-        products[kind] *= likely
-        if products[kind] < MIN_PRODUCT:
-            losses[kind] -= math.log(products[kind])
-            products[kind] = 1.0
-        if (z >= 0.0) != positive[i]:
-            losses[kind] += abs(z)
-        slope = class_weights[kind] * ((likely if z >= 0.0 else size * likely) - kind)
-        bend = class_weights[kind] * likely * (size * likely)
-        for a in range(d):
-            gradient[a] += slope * features[i, a]
-            scaled = bend * features[i, a]
-            for b in range(a + 1):
-                hessian[a, b] += scaled * features[i, b]
-            hessian[d, a] += scaled
-        gradient[d] += slope
-        hessian[d, d] += bend
     objective = 0.0
-    for kind in range(2):
-        objective += class_weights[kind] * (losses[kind] - math.log(products[kind]))
-    return _add_penalty(objective, penalty, prior, weights, gradient, hessian)
+    for part in _parts(features):
+        x, is_positive = np.ascontiguousarray(features[part].T), positive[part]
+        share = np.where(is_positive, class_weights[1], class_weights[0])
+        z = weights[:d] @ x + weights[d]
+        margin = np.where(is_positive, z, -z)
+        size = np.exp(-np.abs(z))
+        likely = 1.0 / (1.0 + size)  # probability of the sign of z
+        unlikely = size * likely
+        objective += float(share @ (np.maximum(-margin, 0.0) - np.log(likely)))
+        wrong = np.where(margin >= 0.0, unlikely, likely)  # probability of the other class
+        slope = np.where(is_positive, -share, share) * wrong
+        bend = share * likely * unlikely
+        gradient[:d] += x @ slope
+        gradient[d] += slope.sum()
+        hessian[:d, :d] += (x * bend) @ x.T
+        hessian[d, :d] += x @ bend
+        hessian[d, d] += bend.sum()
+    hessian[:d, d] = hessian[d, :d]
+    return objective + _add_penalty(penalty, prior, weights, gradient, hessian)
 
 
-@compiled
 def _evaluate_multinomial(
     features: Array,
     classes: npt.NDArray[np.int64],
@@ -200,45 +190,49 @@ def _evaluate_multinomial(
     intercepts change no probability: the square of the sum of the intercepts is added, which is
     0 at the minimum.
     """
-    n, d = features.shape
-    n_classes, width = len(class_weights), d + 1
+    n_classes, width = len(class_weights), features.shape[1] + 1
     gradient[:] = 0.0
     hessian[:] = 0.0
-    objective, row, p = 0.0, np.ones(width), np.empty(n_classes)
-    for i in range(n):
-        row[:d] = features[i]
-        for k in range(n_classes):  # z_k, then p_k = exp(z_k) / sum_l exp(z_l)
-            p[k] = (row * weights[k * width : (k + 1) * width]).sum()
-        top, own, share = p.max(), p[classes[i]], class_weights[classes[i]]
-        p[:] = np.exp(p - top)
-        total = p.sum()
+    blocks = hessian.reshape(n_classes, width, n_classes, width)
+    objective = 0.0
+    for part in _parts(features):
+        x = np.vstack([features[part].T, np.ones(len(classes[part]))])
+        is_class = np.arange(n_classes)[:, None] == classes[part]
+        share = class_weights[classes[part]]
+        z = weights.reshape(n_classes, width) @ x
+        top = z.max(axis=0)
+        p = np.exp(z - top)  # p_k = exp(z_k) / sum_l exp(z_l)
+        total = p.sum(axis=0)
         p /= total
-        objective += share * (math.log(total) + top - own)
+        objective += float(share @ (np.log(total) + top - (z * is_class).sum(axis=0)))
+        gradient += ((share * (p - is_class)) @ x.T).ravel()
         for k in range(n_classes):
-            slope = share * (p[k] - (1.0 if k == classes[i] else 0.0))
-            for a in range(width):
-                gradient[k * width + a] += slope * row[a]
             for m in range(k + 1):
-                bend = share * p[k] * ((1.0 if k == m else 0.0) - p[m])
-                for a in range(width):
-                    for b in range(a + 1 if k == m else width):
-                        hessian[k * width + a, m * width + b] += bend * row[a] * row[b]
-    shift = weights[d::width].sum()
-    objective += 0.5 * shift**2
-    gradient[d::width] += shift
-    hessian[d::width, d::width] += 1.0
-    return _add_penalty(objective, penalty, prior, weights, gradient, hessian)
+                bend = share * p[k] * ((k == m) - p[m])
+                blocks[k, :, m] += (x * bend) @ x.T
+    for k in range(n_classes):
+        for m in range(k):
+            blocks[m, :, k] = blocks[k, :, m].T
+    shift = float(weights[width - 1 :: width].sum())
+    gradient[width - 1 :: width] += shift
+    hessian[width - 1 :: width, width - 1 :: width] += 1.0
+    penalties = _add_penalty(penalty, prior, weights, gradient, hessian)
+    return objective + 0.5 * shift**2 + penalties
 
 
-@compiled
+def _parts(features: Array) -> Iterator[slice]:
+    """Return parts of the samples, one after the other."""
+    n_samples = PART_PRODUCTS // (features.shape[1] + 1) ** 2
+    n_samples = min(max(n_samples, MIN_PART), MAX_PART)
+    for start in range(0, len(features), n_samples):
+        yield slice(start, start + n_samples)
+
+
 def _add_penalty(
-    objective: float, penalty: Array, prior: Array, weights: Array, gradient: Array, hessian: Array
+    penalty: Array, prior: Array, weights: Array, gradient: Array, hessian: Array
 ) -> float:
-    """Add sum_a penalty_a (w_a - prior_a)^2 / 2, and mirror the Hessian's lower triangle."""
-    for a in range(len(weights)):
-        objective += 0.5 * penalty[a] * (weights[a] - prior[a]) ** 2
-        gradient[a] += penalty[a] * (weights[a] - prior[a])
-        hessian[a, a] += penalty[a]
-        for b in range(a):
-            hessian[b, a] = hessian[a, b]
-    return objective
+    """Return sum_a penalty_a (w_a - prior_a)^2 / 2, and add its derivatives."""
+    apart = weights - prior
+    gradient += penalty * apart
+    hessian[np.diag_indices(len(weights))] += penalty
+    return float(0.5 * (penalty * apart) @ apart)

@@ -1,7 +1,8 @@
-"""Functions in C. They release the GIL, and refuse anything but contiguous arrays of float64."""
+"""Functions in C. Those of arrays release the GIL, and refuse all but contiguous float64."""
 
 from collections.abc import Callable, Iterator
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -30,6 +31,9 @@ def fingertip_force(
     /,
 ) -> None:
     """Fill rows first to stop of `out` (n, 3) with the force of readings (n, n_taxels, 3)."""
+
+def parse_counts(text: bytes | msgspec.Raw, integers: bytes | msgspec.Raw, /) -> bytearray | None:
+    """Return the counts (uint16) of the two forms of a sensor; None for unusual or other ones."""
 
 LANES: int
 """Partial sums of a sum over taxels; arrays of taxels are padded to a multiple of it."""

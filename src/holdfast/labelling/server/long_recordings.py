@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording
 from holdfast.io.header import Header, header_sensors
@@ -27,7 +26,7 @@ from holdfast.sensors.types import Array
 
 MAX_READINGS = 50_000_000
 """Largest number of readings that are kept; 100 MB of counts, 15 minutes of four fingertips."""
-CACHED_SAMPLES = 512
+CACHED_SAMPLES = 2048
 """Samples whose forces are summed at a time, so that they stay in the cache."""
 
 
@@ -135,7 +134,6 @@ def _with_shared_times(arrays: Mapping[str, TimedArray]) -> dict[str, TimedArray
     }
 
 
-@compiled
 def _sum_taxels(columns: npt.NDArray[Any], rotations: Array, force: Array) -> None:
     """Fill (n, 3) F_tip = sum_i R_i f_i; NaN where a reading is not finite.
 
@@ -144,27 +142,12 @@ def _sum_taxels(columns: npt.NDArray[Any], rotations: Array, force: Array) -> No
         rotations: (n_taxels, 3, 3) R_i.
         force: (n, 3) is filled.
     """
-    sums = np.empty((3, CACHED_SAMPLES))
+    rows = rotations.transpose(1, 0, 2).reshape(3, -1)  # (3, 3 n_taxels) of all R_i
     for start in range(0, len(force), CACHED_SAMPLES):
-        stop = min(len(force), start + CACHED_SAMPLES)
-        sums[:] = 0.0
-        for i in range(len(rotations)):
-            x, y, z = columns[3 * i], columns[3 * i + 1], columns[3 * i + 2]
-            for axis in range(3):
-                _add_axis(
-                    x[start:stop], y[start:stop], z[start:stop], rotations[i, axis], sums[axis]
-                )
-        for k in range(stop - start):
-            known = np.isfinite(sums[0, k] + sums[1, k] + sums[2, k])
-            for axis in range(3):
-                force[start + k, axis] = sums[axis, k] if known else np.nan
-
-
-@compiled
-def _add_axis(
-    x: npt.NDArray[Any], y: npt.NDArray[Any], z: npt.NDArray[Any], row: Array, total: Array
-) -> None:
-    """Add the product of a row of R_i and the readings of a taxel to one axis of the force."""
-    a, b, c = row[0], row[1], row[2]
-    for k in range(len(x)):
-        total[k] = total[k] + a * np.float64(x[k]) + b * np.float64(y[k]) + c * np.float64(z[k])
+        part = slice(start, start + CACHED_SAMPLES)
+        with np.errstate(invalid="ignore"):  # infinite readings
+            sums = rows @ columns[:, part].astype(np.float64)
+        known = np.isfinite(sums).all(axis=0)
+        if not known.all():
+            sums[:, ~known] = np.nan
+        force[part] = sums.T

@@ -7,14 +7,13 @@ before, or the other way round.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument
@@ -79,11 +78,13 @@ class SignalPart(msgspec.Struct, frozen=True):
 class _Level(NamedTuple):
     """Minima and maxima of blocks of neighbouring samples.
 
+    Blocks are on the last axis, so that NumPy computes many of them at a time.
+
     Attributes:
-        times: (n, 2) of the first and of the last sample of each block [s].
-        low: (n, n_series) minima; NaN where all samples are unknown.
-        high: (n, n_series) maxima.
-        falls: (n, n_series) whether the maximum comes before the minimum.
+        times: (2, n) of the first and of the last sample of each block [s].
+        low: (n_series, n) minima; NaN where all samples are unknown.
+        high: (n_series, n) maxima.
+        falls: (n_series, n) whether the maximum comes before the minimum.
     """
 
     times: Array
@@ -93,7 +94,13 @@ class _Level(NamedTuple):
 
     def part(self, blocks: slice) -> "_Level":
         """Return some of the blocks."""
-        return _Level(self.times[blocks], self.low[blocks], self.high[blocks], self.falls[blocks])
+        low, high, falls = self.low[:, blocks], self.high[:, blocks], self.falls[:, blocks]
+        return _Level(self.times[:, blocks], low, high, falls)
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks."""
+        return len(self.times[0])
 
 
 class FingerSignals:
@@ -113,7 +120,7 @@ class FingerSignals:
         self._levels: dict[int, _Level] = {}  # by depth, of blocks of 2^depth samples
         depth, level = FIRST_DEPTH, self._first_level()
         self._levels[depth] = level
-        while len(level.times) > 2:
+        while level.n_blocks > 2:
             depth, level = depth + 1, _halved(level)
             self._levels[depth] = level
 
@@ -134,7 +141,7 @@ class FingerSignals:
             return True, _series(self.times[first:last], self.values[first:last])
         depth = max(int(np.ceil(np.log2(n / max(points - 2, 1)))), 1)
         level = self._blocks(first, last, min(depth, max(self._levels)))
-        return False, _series(level.times.ravel(), _in_order(level))
+        return False, _series(level.times.T.ravel(), _in_order(level))
 
     def _blocks(self, first: int, last: int, depth: int) -> _Level:
         """Return the blocks of 2^depth samples that contain samples `first` up to `last`."""
@@ -147,13 +154,12 @@ class FingerSignals:
         """Return the blocks of the first depth that is kept, from parts of the samples."""
         starts = range(0, max(len(self.times), 1), PART_SAMPLES)
         parts = [self._reduced(start, start + PART_SAMPLES, FIRST_DEPTH) for start in starts]
-        return _Level(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        return _joined(parts)
 
     def _reduced(self, start: int, stop: int, depth: int) -> _Level:
         """Return the blocks of samples `start` up to `stop`, which is a whole number of blocks."""
-        times, values = self.times[start:stop], self.values[start:stop]
-        falls = np.zeros(values.shape, dtype=bool)
-        level = _Level(np.column_stack([times, times]), values, values, falls)
+        times, values = self.times[start:stop], np.ascontiguousarray(self.values[start:stop].T)
+        level = _Level(np.stack([times, times]), values, values, np.zeros(values.shape, dtype=bool))
         for _ in range(depth):
             level = _halved(level)
         return level
@@ -253,37 +259,32 @@ def _with_gaps(
 
 def _halved(level: _Level) -> _Level:
     """Return the next level: two neighbouring blocks become one; the last may stay alone."""
-    n = -(-len(level.times) // 2)
-    half = _Level(*(np.empty((n, *array.shape[1:]), array.dtype) for array in level))
-    _halve(level, half)
-    return half
+    n = level.n_blocks // 2 * 2
+    first, second = level.part(slice(0, n, 2)), level.part(slice(1, n, 2))
+    unknown = np.isnan(first.low)
+    low_is_later = (second.low < first.low) | unknown
+    high_is_later = (second.high > first.high) | unknown
+    pairs = _Level(
+        np.stack([first.times[0], second.times[1]]),
+        np.where(low_is_later, second.low, first.low),
+        np.where(high_is_later, second.high, first.high),
+        (low_is_later & ~high_is_later)
+        | (low_is_later & high_is_later & second.falls)  # both are of one block
+        | (~low_is_later & ~high_is_later & first.falls),
+    )
+    return _joined([pairs, level.part(slice(n, None))]) if n < level.n_blocks else pairs
 
 
-@compiled
-def _halve(level: _Level, half: _Level) -> None:
-    """Fill a level with the blocks of the level before, joined in pairs."""
-    n = len(level.times)
-    for k in range(len(half.times)):
-        first, second = 2 * k, min(2 * k + 1, n - 1)
-        half.times[k, 0], half.times[k, 1] = level.times[first, 0], level.times[second, 1]
-        for series in range(level.low.shape[1]):
-            low, high = level.low[first, series], level.high[first, series]
-            low_is_later = level.low[second, series] < low or math.isnan(low)
-            high_is_later = level.high[second, series] > high or math.isnan(high)
-            half.low[k, series] = level.low[second if low_is_later else first, series]
-            half.high[k, series] = level.high[second if high_is_later else first, series]
-            if low_is_later == high_is_later:  # both are of one block
-                falls = level.falls[second if low_is_later else first, series]
-            else:
-                falls = low_is_later
-            half.falls[k, series] = falls
+def _joined(levels: Sequence[_Level]) -> _Level:
+    """Return the blocks of several levels, one after the other."""
+    return _Level(*(np.concatenate(arrays, axis=1) for arrays in zip(*levels, strict=True)))
 
 
 def _in_order(level: _Level) -> npt.NDArray[np.floating]:
     """Return (2 n, n_series) minimum and maximum of each block, the earlier one first."""
     first = np.where(level.falls, level.high, level.low)
     second = np.where(level.falls, level.low, level.high)
-    return np.stack([first, second], axis=1).reshape(-1, len(SERIES))
+    return np.stack([first, second], axis=2).reshape(len(SERIES), -1).T
 
 
 def _series(times: Array, values: npt.NDArray[np.floating]) -> Series:

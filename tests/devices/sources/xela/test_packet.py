@@ -147,6 +147,8 @@ def test_invalid_packets(given, why):
         ({"data": "FA00,FB00,FCG0"}, "no hexadecimal digit"),
         ({"data": "FA00,FB00,  00"}, "no hexadecimal digit"),
         ({"data": "FA00,F,00,FC00"}, "no hexadecimal digit"),
+        *(({"data": f"{x}A00,FB00,FC00"}, "no hexadecimal digit") for x in "+-/:@G`g\x7f ,"),
+        ({"data": "FA00,F\t00,FC00"}, "no hexadecimal digit"),
         ({"data": "FA00,FB00,FC0é"}, "no hexadecimal digit"),
         ({"data": 7}, "Expected `str | null`, got `int` - at `$.data`"),
         ({"integer": [1, 2, 65536]}, "integer contains a number that is no uint16"),

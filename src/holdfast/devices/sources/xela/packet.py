@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from holdfast.devices.sources.assembler import SEQUENCE_PERIOD
 from holdfast.devices.sources.timeline import is_plausible
-from holdfast.devices.sources.xela.counts import counts_of
+from holdfast.kernel import _extension
 
 ROUTINE_TYPE = "routine"
 """Type of packets with samples; packets have a type since version 1.8."""
@@ -173,8 +173,10 @@ def _plain_counts(raw: msgspec.Raw) -> PlainCounts | None:
         part = _RAW_COUNTS.decode(raw)
     except (ValueError, RecursionError):
         return None
-    counts = counts_of(part.data, part.integer)
-    return None if counts is None else PlainCounts(part.taxels, part.time, part.model, counts)
+    parsed = _extension.parse_counts(part.data, part.integer)
+    if parsed is None:
+        return None
+    return PlainCounts(part.taxels, part.time, part.model, np.frombuffer(parsed, np.uint16))
 
 
 def _fields(text: str | bytes) -> dict[str, msgspec.Raw]:

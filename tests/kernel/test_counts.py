@@ -1,17 +1,20 @@
+"""Counts of XELA packets, parsed in C, against the parser in Python."""
+
 import json
 
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.devices.sources.xela.counts import counts_of
 from holdfast.devices.sources.xela.packet import Counts, InvalidPacket, PlainCounts, read_sensor
+from holdfast.kernel import _extension
 
 
 def parsed(data, integer="null"):
-    found = counts_of(msgspec.Raw(data.encode()), msgspec.Raw(integer.encode()))
-    return None if found is None else found.tolist()
+    found = _extension.parse_counts(data.encode(), integer.encode())
+    return None if found is None else np.frombuffer(found, np.uint16).tolist()
 
 
 @pytest.mark.parametrize(
@@ -40,6 +43,7 @@ def test_other_strings_are_left_to_python(data):
     "integer",
     [
         *("[]", "[1]", "[1,3]", "[1,2,3]", "[1,2.0]", "[1,2e0]", "[1,-2]", "[1,65538]"),
+        *("", "[", "]", "[ ", "[1,2", "[1,2 ", "[1,000002]", "[1,2]]", "[1,2,]"),
         *("[1,true]", "[1,[2]]", '"12"', "2", "{}", "[1\t,2]", "[1,18446744073709551618]"),
     ],
 )
@@ -54,7 +58,7 @@ def test_other_lists_are_left_to_python(integer):
     character=st.sampled_from('0123456789abcdefABCDEFg", []-+.\\x'),
 )
 def test_what_it_reads_is_what_python_reads(counts, place, character):
-    """One character is replaced: the compiled parser reads the same values, or none."""
+    """One character is replaced: the parser in C reads the same values, or none."""
     counts = counts[: len(counts) // 3 * 3]
     text = json.dumps({"data": ",".join(f"{count:04X}" for count in counts), "integer": counts})
     text = text[:place] + character + text[place + 1 :]
@@ -70,8 +74,14 @@ def test_what_it_reads_is_what_python_reads(counts, place, character):
     assert found is None or found.tolist() == expected.tolist()
 
 
-def test_a_usual_sensor_is_parsed_by_the_compiled_step():
+def test_a_usual_sensor_is_parsed_in_c():
     raw = msgspec.Raw(b'{"data": "0001,0002,0003", "integer": [1, 2, 3], "taxels": 1}')
     part = read_sensor(raw, calibrated=False)
     assert isinstance(part, PlainCounts)
     assert (part.taxels, part.readings().tolist()) == (1, [[1, 2, 3]])
+
+
+@pytest.mark.parametrize("given", [(), (b"",), ("text", b"null"), (b'"0001"', None)])
+def test_refuses_other_arguments(given):
+    with pytest.raises(TypeError):
+        _extension.parse_counts(*given)
