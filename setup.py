@@ -19,7 +19,7 @@ from setuptools.build_meta import *  # noqa: F403 (the hooks of a backend)
 from setuptools.command.build_ext import build_ext
 
 KERNEL = Path("src/holdfast/kernel")  # backends run in the folder of pyproject.toml
-SOURCES = ("module.c", "haar.c", "force.c", "counts.c", "holdfast.c")
+SOURCES = ("module.c", "haar.c", "force.c", "counts.c", "offline.c")
 DEFINITIONS = {
     "Py_LIMITED_API": "0x030B0000",
     "HOLDFAST_API": "extern",

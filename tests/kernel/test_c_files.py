@@ -19,7 +19,7 @@ FLAGS = (
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
 @pytest.mark.parametrize(
-    "name", ["module.c", "haar.c", "force.c", "counts.c", "kernel.c", "holdfast.c"]
+    "name", ["module.c", "haar.c", "force.c", "counts.c", "kernel.c", "holdfast.c", "offline.c"]
 )
 def test_no_warning(compiler, level, name, tmp_path):
     if shutil.which(compiler) is None:

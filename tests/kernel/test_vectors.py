@@ -3,9 +3,11 @@ from pathlib import Path
 
 import pytest
 
-from kernel.c_kernel import SOURCES, WARNINGS
+import holdfast
 
 PROGRAM = Path(__file__).with_name("check_vectors.c")
+SOURCES = Path(holdfast.__file__).with_name("kernel")
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 
 
 @pytest.mark.parametrize("sizes", [(), ("-DHOLDFAST_VECTORS_FIXED",)], ids=["fields", "macros"])

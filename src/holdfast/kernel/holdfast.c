@@ -9,5 +9,3 @@
 #include "decision.c"
 
 #include "detector.c"
-
-#include "offline.c"

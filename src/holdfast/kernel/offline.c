@@ -1,7 +1,9 @@
-/* Rules of the detector for whole arrays: probabilities, and states with other limits. */
+/* The detector, and its rules for whole arrays: probabilities, and states with other limits.
+ *
+ * The extension alone has the latter: exported headers join the files of holdfast.c. */
+#include "holdfast.c"
+
 #include "batch.h"
-#include "detector.h"
-#include "finger.h"
 
 void holdfast_logistic(double *values, size_t n)
 {
