@@ -26,7 +26,6 @@ from real_slips import TUG_QUIET, auc, boxes, tugs
 from holdfast.classifiers.fitting import Samples
 from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.compiled import compiled_step
 from holdfast.contact import STABLE, Cause, ContactState
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.io import load_dataset
@@ -73,70 +72,45 @@ class FingerRows:
     truth: SlipTruth | None
 
 
-@compiled_step
 def taxel_sums(g: Array, shares: Array, tangent: Array, back: int, order: int, out: Array) -> None:
-    """Fill (n, 5) sums over taxels of squares of differences of g, in one pass for each sample.
+    """Fill (n, 5) sums over taxels of squares of differences of g.
 
     With d_i the first (or second) difference of g_i over `back` samples, and D their sum:
     sum |d_i|^2, n sum w_i |d_i|^2, sum |d_i - w_i D|^2, n max |d_i|^2 of taxels with more than
     their share of the load, sum max(d_i . t, 0).
     """
-    for k in range(order * back, len(g)):
-        plain = shared = squares = gained = top = 0.0
-        vx = vy = vz = dx = dy = dz = 0.0
-        for i in range(g.shape[1]):
-            x = g[k, i, 0] - g[k - back, i, 0]
-            y = g[k, i, 1] - g[k - back, i, 1]
-            z = g[k, i, 2] - g[k - back, i, 2]
-            if order == 2:
-                x -= g[k - back, i, 0] - g[k - 2 * back, i, 0]
-                y -= g[k - back, i, 1] - g[k - 2 * back, i, 1]
-                z -= g[k - back, i, 2] - g[k - 2 * back, i, 2]
-            square, w = x * x + y * y + z * z, shares[k, i]
-            if w * g.shape[1] > 1.0:
-                top = max(top, square)
-            plain, shared, squares = plain + square, shared + w * square, squares + w * w
-            vx, vy, vz = vx + w * x, vy + w * y, vz + w * z
-            dx, dy, dz = dx + x, dy + y, dz + z
-            gained += max(x * tangent[k, 0] + y * tangent[k, 1] + z * tangent[k, 2], 0.0)
-        # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.
-        cross, whole = vx * dx + vy * dy + vz * dz, dx * dx + dy * dy + dz * dz
-        out[k, 0], out[k, 1] = plain, g.shape[1] * shared
-        out[k, 2] = max(plain - 2.0 * cross + whole * squares, 0.0)
-        out[k, 3], out[k, 4] = g.shape[1] * top, gained
-
-
-@compiled_step
-def averaged(values: Array, gain: float, out: Array) -> None:
-    """Fill the exponential averages of values."""
-    last = np.nan
-    for k in range(len(values)):
-        step = gain * (values[k] - last) if np.isfinite(last) else 0.0
-        last = (
-            (last if np.isfinite(last) else values[k]) + step if np.isfinite(values[k]) else np.nan
-        )
-        out[k] = last
-
-
-@compiled_step
-def peaks(values: Array, keep: float, out: Array) -> None:
-    """Fill the largest value so far, which is slowly forgotten."""
-    peak = 0.0
-    for k in range(len(values)):
-        peak = max(values[k], keep * peak)
-        out[k] = peak
+    d, (n, n_taxels, _) = g, g.shape
+    for _ in range(order):
+        d = d[back:] - d[:-back]
+    w, t, sums = (values[n - len(d) :] for values in (shares, tangent, out))
+    squares, whole = (d**2).sum(axis=2), d.sum(axis=1)
+    # sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2.
+    cross = (np.einsum("ni,nia->na", w, d) * whole).sum(axis=1)
+    sums[:, 0] = squares.sum(axis=1)
+    sums[:, 1] = n_taxels * (w * squares).sum(axis=1)
+    own = sums[:, 0] - 2 * cross + (whole**2).sum(axis=1) * (w**2).sum(axis=1)
+    sums[:, 2] = np.maximum(own, 0)
+    sums[:, 3] = n_taxels * np.where(w * n_taxels > 1, squares, 0).max(axis=1)
+    sums[:, 4] = np.maximum(np.einsum("nia,na->ni", d, t), 0).sum(axis=1)
 
 
 def mean_over(values: Array, seconds: float, rate: float) -> Array:
-    out = np.empty(len(values))
-    averaged(np.ascontiguousarray(values), -np.expm1(-1 / (rate * seconds)), out)
-    return out
+    """Return the exponential averages of values; each gap of unknown values starts it anew."""
+    gain, last, out = -np.expm1(-1 / (rate * seconds)), math.nan, []
+    for value in values.tolist():
+        is_first = not (math.isfinite(value) and math.isfinite(last))
+        last = value if is_first else last + gain * (value - last)
+        out.append(last if math.isfinite(value) else math.nan)
+    return np.array(out)
 
 
 def peak_of(values: Array, rate: float) -> Array:
-    out = np.empty(len(values))
-    peaks(np.ascontiguousarray(values), np.exp(-1 / (rate * PEAK_SECONDS)), out)
-    return out
+    """Return the largest value so far, which is slowly forgotten."""
+    keep, peak, out = np.exp(-1 / (rate * PEAK_SECONDS)), 0.0, []
+    for value in values.tolist():
+        peak = max(value, keep * peak)
+        out.append(peak)
+    return np.array(out)
 
 
 def lagged(values: Array, back: int) -> Array:
@@ -167,7 +141,7 @@ def candidates(module: Tactile, tare: Tare, rate: float) -> dict[str, Array]:
     force, normal = g.sum(axis=1), np.array(tip.normal, dtype=np.float64)
     least = (1 / np.sqrt(12) if tip.unit == "count" else 1e-6) * np.sqrt(3 * tip.n_taxels)
     taxel_noise, noise = noise_of(g, rate, least), noise_of(force, rate, least)
-    # The reference, as in kernel/motion.c: the sample of the least F . n so far.
+    # The reference, as in holdfast.features.motion: the sample of the least F . n so far.
     pressed = np.minimum(force @ normal, 0)
     lowest = np.minimum.accumulate(pressed)
     reference = np.maximum.accumulate(np.where(force @ normal <= lowest, np.arange(len(g)), -1))
@@ -275,10 +249,7 @@ class Fitted:
         raw = _expand(np.stack([rows.columns[n] for n in self.names], 1), self.mean, self.scale)
         (weights,) = self.classifier.raw_weights()
         rate = 1 / np.median(np.diff(rows.times))
-        out = np.empty(len(raw))
-        gain = -math.expm1(-1.0 / (float(rate) * SLIP_SMOOTHING))
-        averaged(raw @ weights[1:] + weights[0], gain, out)
-        return out
+        return mean_over(raw @ weights[1:] + weights[0], SLIP_SMOOTHING, float(rate))
 
     def curve(self, rows: FingerRows) -> SlipCurve:
         """Return the counts of slips at all thresholds."""

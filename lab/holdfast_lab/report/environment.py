@@ -10,7 +10,7 @@ from typing import Any
 from holdfast.threads import usable_processors
 
 REPORTED_PACKAGES = (
-    "holdfast", "numpy", "scipy", "scikit-learn", "numba", "optuna", "mujoco", "msgspec",
+    "holdfast", "numpy", "scipy", "scikit-learn", "optuna", "mujoco", "msgspec",
     "matplotlib", "torch",
 )  # fmt: skip
 GIB = 2**30
