@@ -22,7 +22,7 @@ KERNEL = Path("src/holdfast/kernel")  # backends run in the folder of pyproject.
 SOURCES = ("module.c", "haar.c", "force.c", "holdfast.c")
 DEFINITIONS = {
     "Py_LIMITED_API": "0x030B0000",
-    "HOLDFAST_API": "extern",
+    "HF_API": "extern",
     # sums over taxels in the order of the compiled Python, until the live step is in C as well
     "HF_LANES": "1",
 }

@@ -53,7 +53,7 @@ def compiled(folder, *options, lanes=4, compiler="cc"):
     """
     path = Path(folder) / "kernel.so"
     words = ["-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *options, "-shared", "-fPIC"]
-    command = [shutil.which(compiler), *words, "-DHOLDFAST_API=extern", f"-DHF_LANES={lanes}"]
+    command = [shutil.which(compiler), *words, "-DHF_API=extern", f"-DHF_LANES={lanes}"]
     subprocess.run([*command, SOURCES / "kernel.c", "-o", path, "-lm"], check=True)
     library = ctypes.CDLL(str(path))
     library.lanes = lanes
