@@ -22,7 +22,7 @@ KERNEL = Path("src/holdfast/kernel")  # backends run in the folder of pyproject.
 SOURCES = ("module.c", "haar.c", "force.c", "counts.c", "offline.c")
 DEFINITIONS = {
     "Py_LIMITED_API": "0x030B0000",
-    "HOLDFAST_API": "extern",
+    "HF_API": "extern",
 }
 COMPILER_PACKAGE = "ziglang==0.15.2"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]

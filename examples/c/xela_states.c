@@ -4,7 +4,7 @@
  *     cc -std=c99 -O2 -I. xela_states.c -o xela_states -lm
  *     websocat ws://127.0.0.1:5000 | ./xela_states
  *
- * Sensor n of the server is finger n of the header.
+ * Sensor n of the server is finger n of the header; all are alike.
  */
 #include "model.h"
 
@@ -13,6 +13,8 @@
 #include <string.h>
 
 #define LINE_SIZE 65536
+
+enum { N_TAXELS = HOLDFAST_N_TAXELS / HOLDFAST_N_FINGERS }; /* of a finger */
 
 static const char *const NAMES[] = {"UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"};
 
@@ -24,9 +26,9 @@ static const char *value_of(const char *text, const char *key)
 }
 
 /* Copy the readings "804D,8276,8F6A,..." of a finger. Return whether there were enough. */
-static bool copy_readings(const char *data, holdfast_real (*readings)[3], int64_t n_taxels)
+static bool copy_readings(const char *data, holdfast_real (*readings)[3])
 {
-    for (int64_t i = 0; i < 3 * n_taxels; ++i) {
+    for (int i = 0; i < 3 * N_TAXELS; ++i) {
         char *end;
         readings[i / 3][i % 3] = (holdfast_real)strtol(data, &end, 16);
         if (end == data) {
@@ -41,15 +43,14 @@ static bool copy_readings(const char *data, holdfast_real (*readings)[3], int64_
 static double read_packet(const char *line, holdfast_real (*readings)[3])
 {
     const char *time = value_of(line, "\"time\"");
-    for (int64_t i = 0; i < HOLDFAST_N_TAXELS; ++i) {
+    for (int i = 0; i < HOLDFAST_N_TAXELS; ++i) {
         readings[i][0] = readings[i][1] = readings[i][2] = HF_NAN;
     }
     while ((line = value_of(line, "\"sensor\"")) != NULL) {
         const long finger = strtol(line, NULL, 10) - 1;
         const char *data = value_of(line, "\"data\"");
         if (finger >= 0 && finger < HOLDFAST_N_FINGERS && data != NULL) {
-            const int64_t first = hf_layout_offsets[finger];
-            copy_readings(data, readings + first, hf_layout_offsets[finger + 1] - first);
+            copy_readings(data, readings + N_TAXELS * finger);
         }
     }
     return time == NULL ? (double)NAN : strtod(time, NULL);

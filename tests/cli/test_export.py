@@ -31,7 +31,7 @@ def test_json_has_the_sizes(capsys, tmp_path):
     code, out, _ = run(capsys, *words, "--json")
     document = json.loads(out)
     assert code == 0 and document["fingers"] == ["thumb"]
-    assert document["state_size"] > 10_000 and "memory_track" in document["double_fields"]
+    assert document["state_size"] > 10_000 and "track.time" in document["double_fields"]
     assert (document["code_size"] is None) == (shutil.which("cc") is None)
 
 

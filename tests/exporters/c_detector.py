@@ -13,12 +13,10 @@ from holdfast.detector import Detector
 from holdfast.errors import StreamError
 from holdfast.exporters.c_header import header_of
 
-WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 STATES, REASONS, CAUSES = tuple(ContactState), tuple(Reason), (None, *KNOWN_CAUSES)
 RING = np.random.default_rng(1).integers(0, 9, size=(30, 30, 3))
 """Readings of samples that come again and again."""
-EXACT, SINGLE = 1e-9, 2e-3
-"""Tolerance of probabilities of a header of double precision; and of single precision."""
 
 
 def estimate_type(n_fingers, real=ctypes.c_double):
@@ -75,14 +73,14 @@ class CDetector:
         return code, self.estimate
 
 
-def both(model, sensors, rate, folder, *, single=False, options=(), in_contact=False):
+def both(model, sensors, rate, folder, *, single=False, options=(), **stream):
     """Return the detector of Python and that of C of a model."""
-    header = header_of(model, sensors, rate, single=single, in_contact=in_contact)
+    header = header_of(model, sensors, rate, single=single, **stream)
     c = CDetector(header, folder, sensors, single=single, options=options)
-    return Detector(model, sensors, rate, in_contact=in_contact), c
+    return Detector(model, sensors, rate, **stream), c
 
 
-def compare(python, c, samples, time, tolerance=EXACT):
+def compare(python, c, samples, time):
     """Process a sample by both, and hold the estimates equal. Return those of Python."""
     try:
         hand = python.update(samples, time)
@@ -93,31 +91,29 @@ def compare(python, c, samples, time, tolerance=EXACT):
     assert code == 0
     assert (STATES[got.state], got.time) == (hand.state, hand.time), time
     for name, finger in zip(c.names, got.finger, strict=True):
-        _compare_finger(hand.fingers[name], finger, tolerance, (name, time))
+        _compare_finger(hand.fingers[name], finger, (name, time))
     return hand
 
 
-def _compare_finger(expected, got, tolerance, where):
+def _compare_finger(expected, got, where):
     assert STATES[got.state] is expected.state, where
     assert REASONS[got.reason] is expected.reason, where
     assert faults_of(got.faults) == expected.faults, where
     assert not expected.faults or taxels_of(got.faulty_taxels) == expected.faulty_taxels, where
     assert CAUSES[got.cause] is expected.cause, where
-    assert same(got.time, expected.time, 0.0), where
-    assert same(got.stable_probability, expected.stable_probability, tolerance), where
-    assert same(got.slip_probability, expected.slip_probability, tolerance), where
-    for value, other in (
-        (got.instability, expected.instability), (got.slip_speed, expected.slip_speed),
-        (got.slip_distance, expected.slip_distance), *zip(got.force, expected.force, strict=True),
-    ):  # fmt: skip
-        assert same(value, other, tolerance * max(1.0, abs(other or 0.0))), where
+    numbers = ("time", "stable_probability", "slip_probability", "slip_speed", "slip_distance",
+               "instability")  # fmt: skip
+    for name in numbers:
+        assert same(getattr(got, name), getattr(expected, name)), (*where, name)
+    for value, other in zip(got.force, expected.force, strict=True):
+        assert same(value, other), (*where, "force")
 
 
-def same(got, expected, tolerance):
+def same(got, expected):
     """Return whether numbers are equal; NaN is equal to NaN and to None."""
     if expected is None or math.isnan(expected):
         return math.isnan(got)
-    return abs(got - expected) <= tolerance
+    return got == expected
 
 
 def random_samples(rng, sensors, rate, n, counts=True):

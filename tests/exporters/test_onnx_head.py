@@ -6,7 +6,6 @@ from msgspec.structs import replace
 
 from exporters.models import HAND, built_in, paper, rich
 from holdfast.classifiers import Onnx
-from holdfast.classifiers.linear import add_squares, log_odds
 from holdfast.errors import ModelError
 from holdfast.exporters import export
 from holdfast.exporters.onnx_head import onnx_of
@@ -36,11 +35,10 @@ def test_probabilities_are_those_of_the_classifiers(make):
         n_checked += 1
         if part.slip is not None:
             rule = part.slip.linear
-            values = [
-                add_squares(log_odds(row, rule.raw_weights()[0]), row, rule.raw_squares())
-                for row in rows[f"{own}_slip_features"]
-            ]
-            expected = 1.0 / (1.0 + np.exp(-np.array(values)))
+            phi, (offset, *weights) = rows[f"{own}_slip_features"], rule.raw_weights()[0]
+            mean, inverse, squares = rule.raw_squares()
+            deviations = np.minimum(np.abs((phi - mean) * inverse), 5.0)
+            expected = 1.0 / (1.0 + np.exp(-(offset + phi @ weights + deviations**2 @ squares)))
             np.testing.assert_allclose(got[f"{own}_slip"][:, 0], expected, atol=1e-9)
             n_checked += 1
     assert n_checked == len(outputs)

@@ -152,9 +152,11 @@ static void make_rule(input *in, holdfast_rule *rule, const holdfast_hand *hand)
 }
 
 /* Process samples until the input ends. */
-static void process(input *in, holdfast_detector *d, hf_real *readings, size_t n_taxels)
+static void process(
+    input *in, const holdfast_model *model, holdfast_detector_memory *d, hf_real *readings,
+    size_t n_taxels)
 {
-    const holdfast_hand *const hand = d->model->hand;
+    const holdfast_hand *const hand = model->hand;
     bool *const present = (bool *)malloc(hand->n_fingers * sizeof(bool));
     holdfast_finger_estimate *const estimates =
         (holdfast_finger_estimate *)malloc(hand->n_fingers * sizeof *estimates);
@@ -176,11 +178,11 @@ static void process(input *in, holdfast_detector *d, hf_real *readings, size_t n
                 readings[i] += (hf_real)((i * 7 + k * 13) % 5) - 2;
             }
             time += (double)hand->period;
-            holdfast_update(d, time, readings, present, estimates);
+            holdfast_detect(model, d, time, readings, present, estimates);
         }
     }
     for (size_t i = 0; i < hand->n_fingers; ++i) {
-        holdfast_baseline(d, i, readings + 3 * hand->fingers[i].first_taxel);
+        holdfast_baseline(model, d, i, readings + 3 * hand->fingers[i].first_taxel);
     }
     free(estimates);
     free(present);
@@ -218,10 +220,10 @@ static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
     const size_t size = fits ? holdfast_detector_size(&model) : 0;
     void *const block = fits && size <= MAX_MEMORY ? malloc(size) : NULL;
     if (block) {
-        holdfast_detector d;
+        holdfast_detector_memory d;
         holdfast_detector_place(&model, &d, block);
         holdfast_start(&model, &d, take(in, 1) % 2 ? readings : NULL);
-        process(in, &d, readings, n_taxels);
+        process(in, &model, &d, readings, n_taxels);
     }
     free(block);
     free(readings);

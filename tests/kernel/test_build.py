@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -63,6 +64,17 @@ def test_after_an_edit_of_c_one_line_names_the_command_that_builds(clone):
     after = python(clone, version)
     assert after.stderr == ""
     assert after.stdout != before
+
+
+def test_a_wheel_has_the_c_files_that_an_exported_header_joins(clone):
+    built = python(clone, "import setup; setup.build_wheel('dist')")
+    assert built.returncode == 0, built.stderr
+    folder = clone / "installed"
+    with zipfile.ZipFile(next((clone / "dist").glob("*.whl"))) as wheel:
+        wheel.extractall(folder / "src")
+    shown = python(folder, "from holdfast.exporters import c_header as c; print(c.kernel_text())")
+    assert "holdfast_detect(" in shown.stdout, shown.stderr
+    assert not (folder / "src" / "holdfast" / "kernel" / "module.c").exists()
 
 
 def test_a_kernel_that_is_not_built_names_the_command_that_builds_it(clone):

@@ -10,7 +10,7 @@ import pytest
 KERNEL = Path(__file__).parents[2] / "src" / "holdfast" / "kernel"
 FLAGS = (
     *("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"),
-    *("-ffp-contract=off", "-DPy_LIMITED_API=0x030B0000", "-DHOLDFAST_API=extern"),
+    *("-ffp-contract=off", "-DPy_LIMITED_API=0x030B0000", "-DHF_API=extern"),
     '-DHOLDFAST_SOURCES=""',
     *("-isystem", sysconfig.get_path("include")),
 )

@@ -13,8 +13,10 @@
  * in the unit of the training; NaN in all taxels of a finger that has no sample. Nothing allocates
  * memory, reads a clock or a file, or depends on the locale. Constants take @CONSTANTS_SIZE@ bytes.
  *
- * Compile without -ffast-math, and with -ffp-contract=off, for the same results as in Python but
- * for the rounding of sums over taxels, of which GCC and Clang compute several taxels at a time.
+ * The parts: names and sizes of this hand; the kernel, which is the same for all models; the tables
+ * of this model; estimates and functions for your program, at the end.
+ *
+ * Compile without -ffast-math, and with -ffp-contract=off, for the same bits as in Python.
  */
 #ifdef HOLDFAST_HEADER_ID
 #if HOLDFAST_HEADER_ID != @HEADER_ID@
@@ -26,22 +28,10 @@
 #define HOLDFAST_MODEL "@MODEL@"
 #define HOLDFAST_MODEL_DIGEST "@MODEL_DIGEST@"
 
-/* Such arithmetic has no NaN, which marks a finger without a sample: other states, no warning.
- * No macro shows -fassociative-math alone: do not use it either. */
-#if defined(__FAST_MATH__) || __FINITE_MATH_ONLY__ + 0 || defined(_M_FP_FAST)
-#error "the holdfast header needs arithmetic with NaN: compile without -ffast-math or /fp:fast"
-#endif
-
 /* Define HOLDFAST_EXPECTED_ID before the include, to compile with this header only. */
 #if defined(HOLDFAST_EXPECTED_ID) && HOLDFAST_EXPECTED_ID != HOLDFAST_HEADER_ID
 #error "the holdfast header is not the one that this program was written for"
 #endif
-
-#include <float.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 
 /* Functions are part of each source file; -DHOLDFAST_API=extern makes a library of the header. */
 #ifndef HOLDFAST_API
@@ -52,34 +42,21 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* Functions whose numbers are finite and whose sums may be taken in any order, so that compilers
- * compute several taxels at a time at -O2. Nothing else is computed by other rules. */
-#if defined(__clang__) && __clang_major__ >= 11
-#define HF_ANY_ORDER
-#define HF_ANY_ORDER_INSIDE _Pragma("clang fp reassociate(on)")
-#elif defined(__GNUC__) && !defined(__clang__)
-#define HF_ANY_ORDER __attribute__((optimize( \
-    "tree-vectorize", "vect-cost-model=dynamic", "unswitch-loops", "associative-math", \
-    "no-signed-zeros", "no-trapping-math", "finite-math-only")))
-#define HF_ANY_ORDER_INSIDE
-#else
-#define HF_ANY_ORDER
-#define HF_ANY_ORDER_INSIDE
-#endif
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-typedef @REAL@ holdfast_real;
-#define HF_MATH(name) @MATH@
-#define HF_NAN ((holdfast_real)NAN)
-#define HF_INFINITY ((holdfast_real)INFINITY)
-
-#define HOLDFAST_N_FINGERS @N_FINGERS@
-#define HOLDFAST_N_TAXELS @N_TAXELS@
+@SIZES@
 
 @ENUMS@
+
+/* ---- The kernel ---- */
+
+@KERNEL@
+
+/* ---- The tables of the model ---- */
+
+@TABLES@
+
+/* ---- Estimates and functions for your program ---- */
+
+typedef hf_real holdfast_real;
 
 /* Results of holdfast_update. */
 enum {
@@ -88,82 +65,24 @@ enum {
     HOLDFAST_WRONG_HEADER = -2 /* not initialised, or by another header */
 };
 
-/* Estimate of one finger; a probability is NaN where there is none. */
+/* Estimate of the hand. `reason` of a finger is HOLDFAST_REASON_..., its `faults` are bits
+ * HOLDFAST_FAULT_...; see holdfast_finger_estimate for the others. */
 typedef struct {
-    double time;                       /* of the last sample of the finger [s] */
-    int state;                         /* HOLDFAST_UNKNOWN, ... */
-    int reason;                        /* HOLDFAST_REASON_..., while UNKNOWN */
-    int cause;                         /* HOLDFAST_CAUSE_..., while unstable or sliding */
-    uint32_t faults;                   /* bits HOLDFAST_FAULT_... */
-    uint64_t faulty_taxels;            /* bit i: taxel i of the finger */
-    holdfast_real stable_probability;
-    holdfast_real slip_probability;
-    holdfast_real slip_speed;          /* [mm/s] */
-    holdfast_real slip_distance;       /* since the slip began [mm] */
-    holdfast_real instability;         /* sigma [unit of the readings] */
-    holdfast_real force[3];            /* in the fingertip frame [unit of the readings] */
-} holdfast_finger_estimate;
-
-typedef struct {
-    double time;  /* of the newest sample [s] */
-    int state;    /* of the hand */
+    double time; /* of the newest sample [s] */
+    int state;   /* of the hand */
     holdfast_finger_estimate finger[HOLDFAST_N_FINGERS];
 } holdfast_estimate;
 
 /* All memory of a detector. */
 typedef struct {
     uint32_t header_id;
-    int64_t hand; /* its state */
     double last_time;
-@STATE@
+    holdfast_detector_memory memory;
 } holdfast_detector;
 
-@CONSTANTS@
-
-static inline int64_t hf_max_i(int64_t a, int64_t b) { return b > a ? b : a; }
-static inline int64_t hf_min_i(int64_t a, int64_t b) { return b < a ? b : a; }
-static inline holdfast_real hf_max_r(holdfast_real a, holdfast_real b) { return b > a ? b : a; }
-static inline holdfast_real hf_min_r(holdfast_real a, holdfast_real b) { return b < a ? b : a; }
-static inline double hf_max_d(double a, double b) { return b > a ? b : a; }
-static inline double hf_min_d(double a, double b) { return b < a ? b : a; }
-static inline int64_t hf_magnitude(int64_t a) { return a < 0 ? -a : a; }
-static inline int64_t hf_square_i(int64_t a) { return a * a; }
-static inline holdfast_real hf_square_r(holdfast_real a) { return a * a; }
-static inline double hf_square_d(double a) { return a * a; }
-
-/* Division that rounds down, as Python's, and its remainder. */
-static inline int64_t hf_quotient(int64_t a, int64_t b)
-{
-    return a / b - ((a % b != 0) && ((a < 0) != (b < 0)));
-}
-
-static inline int64_t hf_remainder(int64_t a, int64_t b)
-{
-    return a - b * hf_quotient(a, b);
-}
-
-static inline void hf_fill_r(holdfast_real *values, int64_t n, holdfast_real value)
-{
-    for (int64_t i = 0; i < n; ++i) {
-        values[i] = value;
-    }
-}
-
-static inline void hf_fill_d(double *values, int64_t n, double value)
-{
-    for (int64_t i = 0; i < n; ++i) {
-        values[i] = value;
-    }
-}
-
-static inline void hf_fill_i(int64_t *values, int64_t n, int64_t value)
-{
-    for (int64_t i = 0; i < n; ++i) {
-        values[i] = value;
-    }
-}
-
-@FUNCTIONS@
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* Return the size of a detector [bytes], for callers that cannot read this header. */
 HOLDFAST_API size_t holdfast_size(void)
@@ -174,50 +93,21 @@ HOLDFAST_API size_t holdfast_size(void)
 /* Initialise a detector, or reset it. */
 HOLDFAST_API void holdfast_init(holdfast_detector *d)
 {
-    d->hand = HOLDFAST_UNKNOWN;
+    holdfast_start(&hf_model, &d->memory, @BASELINE@);
     d->last_time = -INFINITY;
-@INIT@
     d->header_id = HOLDFAST_HEADER_ID;
 }
 
-/* Copy the readings of the fingers that have a sample, axis by axis. */
-static inline void hf_receive(holdfast_detector *d, const holdfast_real *readings)
+/* Return whether a finger has a sample: a reading that is not NaN. */
+static inline bool hf_is_present(const holdfast_finger *finger, const holdfast_real *readings)
 {
-    for (int f = 0; f < HOLDFAST_N_FINGERS; ++f) {
-        const int64_t first = hf_layout_offsets[f], last = hf_layout_offsets[f + 1];
-        d->present[f] = false;
-        for (int64_t i = 3 * first; i < 3 * last && !d->present[f]; ++i) {
-            d->present[f] = !isnan(readings[i]);
-        }
-        for (int64_t i = first; i < last && d->present[f]; ++i) {
-            d->readings[i] = readings[3 * i];
-            d->readings[HOLDFAST_N_TAXELS + i] = readings[3 * i + 1];
-            d->readings[2 * HOLDFAST_N_TAXELS + i] = readings[3 * i + 2];
+    const holdfast_real *const own = readings + 3 * finger->first_taxel;
+    for (size_t i = 0; i < 3 * finger->n_taxels; ++i) {
+        if (!isnan(own[i])) {
+            return true;
         }
     }
-}
-
-/* Write the estimate of a finger. */
-static inline void hf_write(holdfast_detector *d, int f, holdfast_finger_estimate *finger)
-{
-    @REPORT_REAL@ *const row = &d->report[HF_REPORT_WIDTH * f];
-    @FILL_REPORT@
-    const hf_tuple_iiii code = @SPLIT_CODE@;
-    finger->time = row[HF_REPORT_TIME];
-    finger->state = (int)code.v0;
-    finger->reason = (int)code.v1;
-    finger->faults = (uint32_t)code.v2;
-    finger->cause = (int)code.v3;
-    finger->faulty_taxels = (uint64_t)d->output_status[HF_STATUS_WIDTH * f + HF_TAXELS];
-    finger->stable_probability = (holdfast_real)row[HF_REPORT_PROBABILITY];
-    finger->instability = (holdfast_real)row[HF_REPORT_SIGMA];
-    finger->slip_probability = (holdfast_real)(row[HF_REPORT_SLIP] < 0 ? NAN : row[HF_REPORT_SLIP]);
-    finger->slip_speed = (holdfast_real)(row[HF_REPORT_SPEED] < 0 ? NAN : row[HF_REPORT_SPEED]);
-    finger->slip_distance =
-        (holdfast_real)(row[HF_REPORT_DISTANCE] < 0 ? NAN : row[HF_REPORT_DISTANCE]);
-    for (int axis = 0; axis < 3; ++axis) {
-        finger->force[axis] = (holdfast_real)row[HF_REPORT_FORCE + axis];
-    }
+    return false;
 }
 
 /* Write an estimate without any knowledge. */
@@ -228,7 +118,7 @@ static inline void hf_write_unknown(holdfast_estimate *estimate)
         {HF_NAN, HF_NAN, HF_NAN}};
     estimate->time = NAN;
     estimate->state = HOLDFAST_UNKNOWN;
-    for (int f = 0; f < HOLDFAST_N_FINGERS; ++f) {
+    for (size_t f = 0; f < HOLDFAST_N_FINGERS; ++f) {
         estimate->finger[f] = finger;
     }
 }
@@ -244,15 +134,17 @@ HOLDFAST_API int holdfast_update(
     }
     const bool is_later = time > d->last_time && time < INFINITY;
     if (is_later) {
+        bool present[HOLDFAST_N_FINGERS];
+        for (size_t f = 0; f < HOLDFAST_N_FINGERS; ++f) {
+            present[f] = hf_is_present(&hf_fingers[f], readings);
+        }
         d->last_time = time;
-        hf_receive(d, readings);
-        d->hand = @STEP@;
+        holdfast_detect(&hf_model, &d->memory, time, readings, present, estimate->finger);
+    } else {
+        holdfast_estimates(&hf_model, &d->memory, estimate->finger);
     }
     estimate->time = d->last_time;
-    estimate->state = (int)d->hand;
-    for (int f = 0; f < HOLDFAST_N_FINGERS; ++f) {
-        hf_write(d, f, &estimate->finger[f]);
-    }
+    estimate->state = d->memory.state;
     return is_later ? HOLDFAST_OK : HOLDFAST_WRONG_TIME;
 }
 

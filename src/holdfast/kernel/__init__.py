@@ -16,6 +16,6 @@ try:
     from holdfast.kernel import _extension
 except ImportError as error:
     raise HoldfastError(f"the C kernel cannot be loaded ({error}); build it: {_BUILD}") from error
-# A wheel has no C files, so nothing is compared there.
+# A wheel has no module.c, so nothing is compared there.
 if (_FOLDER / "module.c").exists() and digest(_FOLDER) != _extension.SOURCES:
     raise HoldfastError(f"the C kernel was built from other sources; build it again: {_BUILD}")

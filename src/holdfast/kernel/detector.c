@@ -3,12 +3,12 @@
 
 #include "finger.h"
 
-static int32_t hf_hand_state(const holdfast_detector *d)
+static int32_t hf_hand_state(const holdfast_model *model, const holdfast_detector_memory *d)
 {
     /* UNSTABLE if any finger is, else UNKNOWN if any is, else STABLE if two are in stable contact
      * (one, for a model of one finger), else NO_CONTACT. */
     size_t n_stable = 0, n_unknown = 0;
-    for (size_t i = 0; i < HF_N_FINGERS(d->model->hand); ++i) {
+    for (size_t i = 0; i < HF_N_FINGERS(model->hand); ++i) {
         const int32_t state = d->decisions[i].state;
         if (state == HOLDFAST_UNSTABLE) {
             return HOLDFAST_UNSTABLE;
@@ -19,8 +19,7 @@ static int32_t hf_hand_state(const holdfast_detector *d)
     if (n_unknown > 0) {
         return HOLDFAST_UNKNOWN;
     }
-    return n_stable >= (d->model->n_model_fingers > 1 ? 2 : 1) ? HOLDFAST_STABLE
-                                                               : HOLDFAST_NO_CONTACT;
+    return n_stable >= (model->n_model_fingers > 1 ? 2 : 1) ? HOLDFAST_STABLE : HOLDFAST_NO_CONTACT;
 }
 
 static void hf_fill_estimate(
@@ -43,11 +42,10 @@ static void hf_fill_estimate(
     memcpy(out->force, f->values->force, sizeof out->force);
 }
 
-HOLDFAST_API int32_t holdfast_update(
-    holdfast_detector *d, double time, const hf_real *readings, const bool *present,
-    holdfast_finger_estimate *estimates)
+HF_API int32_t holdfast_detect(
+    const holdfast_model *model, holdfast_detector_memory *d, double time, const hf_real *readings,
+    const bool *present, holdfast_finger_estimate *estimates)
 {
-    const holdfast_model *const model = d->model;
     const holdfast_hand *const hand = model->hand;
     holdfast_advance(hand, &d->memory, readings, present, time);
     for (size_t i = 0; i < HF_N_FINGERS(hand); ++i) {
@@ -67,7 +65,7 @@ HOLDFAST_API int32_t holdfast_update(
         }
         hf_fill_estimate(&f, decision, &estimates[i]);
     }
-    d->state = hf_hand_state(d);
+    d->state = hf_hand_state(model, d);
     return d->state;
 }
 
@@ -81,25 +79,34 @@ static void hf_start_decision(holdfast_decision *d)
     d->shaken_at = d->loaded_at = -INFINITY;
 }
 
-HOLDFAST_API void holdfast_start_decisions(const holdfast_model *model, holdfast_detector *d)
+HF_API void holdfast_estimates(
+    const holdfast_model *model, holdfast_detector_memory *d, holdfast_finger_estimate *estimates)
 {
-    d->model = model;
+    for (size_t i = 0; i < HF_N_FINGERS(model->hand); ++i) {
+        const hf_finger f = hf_finger_of(model->hand, &d->memory, i);
+        hf_fill_estimate(&f, &d->decisions[i], &estimates[i]);
+    }
+}
+
+HF_API void holdfast_start_decisions(const holdfast_model *model, holdfast_detector_memory *d)
+{
     d->state = HOLDFAST_UNKNOWN;
     for (size_t i = 0; i < HF_N_FINGERS(model->hand); ++i) {
         hf_start_decision(&d->decisions[i]);
     }
 }
 
-HOLDFAST_API void holdfast_start(
-    const holdfast_model *model, holdfast_detector *d, const hf_real *baseline)
+HF_API void holdfast_start(
+    const holdfast_model *model, holdfast_detector_memory *d, const hf_real *baseline)
 {
     holdfast_begin(model->hand, &d->memory, baseline);
     holdfast_start_decisions(model, d);
 }
 
-HOLDFAST_API bool holdfast_baseline(const holdfast_detector *d, size_t finger, hf_real *out)
+HF_API bool holdfast_baseline(
+    const holdfast_model *model, const holdfast_detector_memory *d, size_t finger, hf_real *out)
 {
-    const holdfast_finger *const own = &d->model->hand->fingers[finger];
+    const holdfast_finger *const own = &model->hand->fingers[finger];
     const size_t n = hf_n_lanes(own->n_taxels);
     const hf_real *const lanes = d->memory.baseline + 3 * own->first;
     for (size_t i = 0; i < own->n_taxels; ++i) {
@@ -141,7 +148,7 @@ static const char *hf_check_head(
     return NULL;
 }
 
-HOLDFAST_API const char *holdfast_check_model(const holdfast_model *model)
+HF_API const char *holdfast_check_model(const holdfast_model *model)
 {
     const char *wrong = holdfast_check(model->hand);
     if (!wrong && (!isfinite(model->hysteresis) || !isfinite(model->min_duration) ||
@@ -164,13 +171,13 @@ HOLDFAST_API const char *holdfast_check_model(const holdfast_model *model)
 }
 
 #ifndef HOLDFAST_N_FINGERS
-HOLDFAST_API size_t holdfast_detector_size(const holdfast_model *model)
+HF_API size_t holdfast_detector_size(const holdfast_model *model)
 {
     return holdfast_memory_size(model->hand) + model->hand->n_fingers * sizeof(holdfast_decision);
 }
 
-HOLDFAST_API void holdfast_detector_place(
-    const holdfast_model *model, holdfast_detector *d, void *block)
+HF_API void holdfast_detector_place(
+    const holdfast_model *model, holdfast_detector_memory *d, void *block)
 {
     holdfast_place(model->hand, &d->memory, block);
     d->decisions =

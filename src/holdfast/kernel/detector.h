@@ -18,13 +18,14 @@
  * The life of a detector
  *   1. Tables (`holdfast_model`) are constants: those of the kernel, and heads and limits of each
  *      finger. `holdfast_check_model` refuses those that do not fit, once.
- *   2. Memory (`holdfast_detector`): the caller's, `holdfast_detector_size` bytes given to
+ *   2. Memory (`holdfast_detector_memory`): the caller's, `holdfast_detector_size` bytes given to
  *      `holdfast_detector_place`; with sizes as macros the struct holds all of it.
  *   3. `holdfast_start` sets the memory to that before the first sample. Call it again to reset.
- *   4. `holdfast_update` processes a sample and fills an estimate of the caller.
+ *   4. `holdfast_detect` processes a sample and fills an estimate of the caller.
+ *   In an exported header, `holdfast_init` and `holdfast_update` do 3 and 4 with its tables.
  */
-#ifndef HOLDFAST_DETECTOR_H
-#define HOLDFAST_DETECTOR_H
+#ifndef HF_DETECTOR_H
+#define HF_DETECTOR_H
 
 #include "kernel.h"
 
@@ -142,11 +143,10 @@ typedef struct {
 
 /* Memory of a detector. */
 typedef struct {
-    const holdfast_model *model;
     holdfast_memory memory;
     HF_ARRAY(holdfast_decision, decisions, HOLDFAST_N_FINGERS);
     int32_t state; /* of the hand */
-} holdfast_detector;
+} holdfast_detector_memory;
 
 /* Estimate of a finger. Numbers that the model does not give are NaN. */
 typedef struct {
@@ -169,35 +169,40 @@ extern "C" {
 #endif
 
 /* Return NULL if the tables fit each other and `holdfast_check` passes, else what is wrong. */
-HOLDFAST_API const char *holdfast_check_model(const holdfast_model *model);
+HF_API const char *holdfast_check_model(const holdfast_model *model);
 
 #ifndef HOLDFAST_N_FINGERS
 /* Return the size of the memory of a detector, beside its struct [bytes]. */
-HOLDFAST_API size_t holdfast_detector_size(const holdfast_model *model);
+HF_API size_t holdfast_detector_size(const holdfast_model *model);
 
 /* Place the arrays of a detector into a block of that size, aligned as for double. */
-HOLDFAST_API void holdfast_detector_place(
-    const holdfast_model *model, holdfast_detector *d, void *block);
+HF_API void holdfast_detector_place(
+    const holdfast_model *model, holdfast_detector_memory *d, void *block);
 #endif
 
-/* Set a detector to that before the first sample, with the tables that it uses from now on.
+/* Set a detector to that before the first sample.
  *
  * baseline: (n_taxels, 3) readings without contact, of all fingers; NULL for none. */
-HOLDFAST_API void holdfast_start(
-    const holdfast_model *model, holdfast_detector *d, const hf_real *baseline);
+HF_API void holdfast_start(
+    const holdfast_model *model, holdfast_detector_memory *d, const hf_real *baseline);
 
 /* Set the decisions alone to those before the first sample. */
-HOLDFAST_API void holdfast_start_decisions(const holdfast_model *model, holdfast_detector *d);
+HF_API void holdfast_start_decisions(const holdfast_model *model, holdfast_detector_memory *d);
 
 /* Fill (n_taxels, 3) with the tare of a finger. Return whether it is complete. */
-HOLDFAST_API bool holdfast_baseline(const holdfast_detector *d, size_t finger, hf_real *out);
+HF_API bool holdfast_baseline(
+    const holdfast_model *model, const holdfast_detector_memory *d, size_t finger, hf_real *out);
 
 /* Process one sample of a hand, and fill (n_fingers) estimates. Return the state of the hand.
  *
  * time, readings, present: as of `holdfast_advance`. */
-HOLDFAST_API int32_t holdfast_update(
-    holdfast_detector *d, double time, const hf_real *readings, const bool *present,
-    holdfast_finger_estimate *estimates);
+HF_API int32_t holdfast_detect(
+    const holdfast_model *model, holdfast_detector_memory *d, double time, const hf_real *readings,
+    const bool *present, holdfast_finger_estimate *estimates);
+
+/* Fill (n_fingers) estimates of the last sample again. */
+HF_API void holdfast_estimates(
+    const holdfast_model *model, holdfast_detector_memory *d, holdfast_finger_estimate *estimates);
 
 #ifdef __cplusplus
 }

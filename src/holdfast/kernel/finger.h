@@ -1,6 +1,6 @@
 /* What the parts of the kernel share: a finger at a sample, and small functions on numbers. */
-#ifndef HOLDFAST_FINGER_H
-#define HOLDFAST_FINGER_H
+#ifndef HF_FINGER_H
+#define HF_FINGER_H
 
 #include "kernel.h"
 

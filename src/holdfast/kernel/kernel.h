@@ -40,8 +40,8 @@
  *   Readings and forces are in the unit of the sensor (counts, or N), times in seconds on the clock
  *   of the caller. Taxel frames have z along the outward normal, positive when pressed.
  */
-#ifndef HOLDFAST_KERNEL_H
-#define HOLDFAST_KERNEL_H
+#ifndef HF_KERNEL_H
+#define HF_KERNEL_H
 
 #include <float.h>
 #include <math.h>
@@ -405,8 +405,8 @@ typedef struct {
 /* clang-format on */
 
 /* Functions of the interface: part of each source file that includes an exported header. */
-#ifndef HOLDFAST_API
-#define HOLDFAST_API static
+#ifndef HF_API
+#define HF_API static inline
 #endif
 
 #ifdef __cplusplus
@@ -414,20 +414,20 @@ extern "C" {
 #endif
 
 /* Return NULL if all sizes, indices and numbers of the tables fit, else what is wrong. */
-HOLDFAST_API const char *holdfast_check(const holdfast_hand *hand);
+HF_API const char *holdfast_check(const holdfast_hand *hand);
 
 #ifndef HOLDFAST_N_FINGERS
 /* Return the size of the memory of a stream [bytes]. */
-HOLDFAST_API size_t holdfast_memory_size(const holdfast_hand *hand);
+HF_API size_t holdfast_memory_size(const holdfast_hand *hand);
 
 /* Place the arrays of a stream into a block of that size, aligned as for double. */
-HOLDFAST_API void holdfast_place(const holdfast_hand *hand, holdfast_memory *memory, void *block);
+HF_API void holdfast_place(const holdfast_hand *hand, holdfast_memory *memory, void *block);
 #endif
 
 /* Set the memory to that before the first sample.
  *
  * baseline: (n_taxels, 3) readings without contact, of all fingers; NULL for none. */
-HOLDFAST_API void holdfast_begin(
+HF_API void holdfast_begin(
     const holdfast_hand *hand, holdfast_memory *memory, const hf_real *baseline);
 
 /* Process one sample of a hand.
@@ -435,7 +435,7 @@ HOLDFAST_API void holdfast_begin(
  * readings: (n_taxels, 3) of all fingers; those of absent fingers are not read.
  * present: (n_fingers) whether the finger has a sample.
  * time: [s]; later than that of the sample before. */
-HOLDFAST_API void holdfast_advance(
+HF_API void holdfast_advance(
     const holdfast_hand *hand, holdfast_memory *memory, const hf_real *readings,
     const bool *present, double time);
 

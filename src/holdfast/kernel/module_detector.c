@@ -7,7 +7,7 @@
 typedef struct {
     stream base;
     holdfast_model model;
-    holdfast_detector d;
+    holdfast_detector_memory d;
     void *rules; /* tables that `set_rules` replaces */
     void *weights;
     double *readings;                    /* (n_taxels, 3) of one sample */
@@ -288,7 +288,7 @@ static PyObject *process(detector *s, const double *readings, double time)
     const size_t n = s->base.hand.n_fingers + 1;
     copy_states(s, s->before);
     s->base.last_time = time;
-    holdfast_update(&s->d, time, readings, s->base.present, s->estimates);
+    holdfast_detect(&s->model, &s->d, time, readings, s->base.present, s->estimates);
     copy_states(s, s->after);
     PyObject *result = make_hand(s, time);
     if (result != NULL && memcmp(s->before, s->after, n) != 0) {
@@ -370,9 +370,9 @@ static void run_all(
         for (size_t f = 0; f < n_fingers; ++f) {
             s->base.present[f] = *is_present++ != 0;
         }
-        states[k] = holdfast_update(
-            &s->d, times->data[k], readings->data + 3 * s->base.n_taxels * k, s->base.present,
-            rows + n_fingers * k);
+        states[k] = holdfast_detect(
+            &s->model, &s->d, times->data[k], readings->data + 3 * s->base.n_taxels * k,
+            s->base.present, rows + n_fingers * k);
     }
 }
 
@@ -465,7 +465,8 @@ static PyObject *detector_baselines(PyObject *self, PyObject *const *args, Py_ss
     }
     for (size_t i = 0; result != NULL && i < hand->n_fingers; ++i) {
         const holdfast_finger *const finger = &hand->fingers[i];
-        const bool is_tared = holdfast_baseline(&s->d, i, out.data + 3 * finger->first_taxel);
+        const bool is_tared =
+            holdfast_baseline(&s->model, &s->d, i, out.data + 3 * finger->first_taxel);
         if (PyList_SetItem(result, (Py_ssize_t)i, PyBool_FromLong(is_tared)) < 0) {
             Py_CLEAR(result);
         }

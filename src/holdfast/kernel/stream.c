@@ -311,7 +311,7 @@ static void hf_fill_features(const holdfast_hand *hand, holdfast_memory *memory,
     }
 }
 
-HOLDFAST_API void holdfast_advance(
+HF_API void holdfast_advance(
     const holdfast_hand *hand, holdfast_memory *memory, const hf_real *readings,
     const bool *present, double time)
 {

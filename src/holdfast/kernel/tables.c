@@ -185,19 +185,19 @@ static uint64_t hf_place(const holdfast_hand *hand, holdfast_memory *m, void *bl
     return used;
 }
 
-HOLDFAST_API size_t holdfast_memory_size(const holdfast_hand *hand)
+HF_API size_t holdfast_memory_size(const holdfast_hand *hand)
 {
     holdfast_memory memory;
     return (size_t)hf_place(hand, &memory, NULL);
 }
 
-HOLDFAST_API void holdfast_place(const holdfast_hand *hand, holdfast_memory *memory, void *block)
+HF_API void holdfast_place(const holdfast_hand *hand, holdfast_memory *memory, void *block)
 {
     hf_place(hand, memory, block);
 }
 #endif
 
-HOLDFAST_API const char *holdfast_check(const holdfast_hand *hand)
+HF_API const char *holdfast_check(const holdfast_hand *hand)
 {
     const char *wrong = hf_check_sizes(hand);
     if (!wrong) {
@@ -242,7 +242,7 @@ static void hf_begin_finger(const hf_finger *f)
     }
 }
 
-HOLDFAST_API void holdfast_begin(
+HF_API void holdfast_begin(
     const holdfast_hand *hand, holdfast_memory *memory, const hf_real *baseline)
 {
     const size_t width = HF_N_FEATURES(hand), n_lags = HF_N_FINGERS(hand) * HF_N_LAGS(hand);
