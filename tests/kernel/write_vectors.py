@@ -1,33 +1,40 @@
-"""Write vectors.h: tables of a small hand, samples, and what the Python kernel computes from them.
+"""Write vectors.h: the tables of a small hand and its model, samples, and estimates of them.
 
     python tests/kernel/write_vectors.py > tests/kernel/vectors.h
 
-`check_vectors.c` holds the C kernel equal to them, without Python. Write them again only if the
+`check_vectors.c` holds the kernel equal to them, without Python. Write them again only if the
 mathematics change.
 """
 
-import ctypes
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from holdfast.features import Tare, kernel
+from detector.build import cause_head, finger_model, speed_head, squared_head
+from holdfast.contact import Cause
+from holdfast.detector import tables
+from holdfast.detector.detection import makers
+from holdfast.exporters.c_tables import Tables, kernel_text
 from holdfast.features.specs import RELATIVE_KINDS, FeatureSpec
 from holdfast.features.stream import FeatureStream
-from holdfast.features.tables import StreamPlan
+from holdfast.kernel import _extension
+from holdfast.model import Debounce, Model
 from holdfast.sensors import Sensor
-from kernel.c_kernel import Tables
 
-RATE, N_SAMPLES, EVERY = 20.0, 260, 10
+RATE, N_SAMPLES, EVERY = 30.0, 260, 10
 """Samples per second [Hz], their number, and the distance of those whose features are written."""
 LINE = 100
+CODES = ("state", "reason", "cause", "faults", "taxels")
+NUMBERS = ("probability", "slip", "speed", "distance", "sigma")
 
 
-def plan():
-    """Return a plan for two sensors with every kind of feature."""
+def model():
+    """Return a model of two sensors with every kind of feature and of head."""
     rng = np.random.default_rng(0)
     sensors = {}
     for name, n in {"thumb": 5, "index": 4}.items():
@@ -46,8 +53,18 @@ def plan():
     relative = tuple(
         FeatureSpec(kind, transform="relative", seconds=0.1) for kind in RELATIVE_KINDS
     )
-    features = {"thumb": (*force, *relative), "index": (*relative[:9], *force)}
-    return StreamPlan(sensors, features, 6, Tare.parse("0.5"), RATE, ignore={"thumb": [3]})
+    fingers = {
+        "thumb": finger_model((*force, *relative), 1, sensor="thumb", contact_load=3.0),
+        "index": finger_model((*relative[:9], *force), 2, sensor="index", contact_noise=8.0),
+    }
+    for name, part in fingers.items():
+        slip = squared_head(part.features, 3)
+        causes = cause_head(part.features, 4, (Cause.CLOSING, Cause.DISTURBANCE, Cause.GLITCH))
+        fingers[name] = part.with_heads(slip, speed_head(slip), causes)
+    debounce = Debounce(min_duration=0.08, hold=0.1, hysteresis=0.05, switching=15.0)
+    return Model(
+        fingers=fingers, sensors=sensors, rate=RATE, window=6, tare="0.5", debounce=debounce
+    )
 
 
 def samples():
@@ -70,18 +87,6 @@ def samples():
         yield readings, np.array([k != 140, True]), time
 
 
-def initializer(value):
-    """Return a C initializer of a value of ctypes."""
-    if isinstance(value, ctypes.Structure):
-        parts = [initializer(getattr(value, name)) for name, _ in value._fields_]
-        return f"{{{', '.join(parts)}}}"
-    if isinstance(value, ctypes.Array):
-        return f"{{{', '.join(map(initializer, value))}}}"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return real(value)
-
-
 def number(value):
     """Return a C constant of a number, to the last bit."""
     if np.isnan(value):
@@ -89,12 +94,6 @@ def number(value):
     if np.isinf(value):
         return "INFINITY" if value > 0 else "-INFINITY"
     return repr(float(value)).removesuffix(".0")
-
-
-def real(value):
-    """Return a C constant of a number that may be of single precision."""
-    text = number(value)
-    return text if text.lstrip("-").isdigit() else f"(hf_real){text}"
 
 
 def array(kind, name, rows):
@@ -108,46 +107,56 @@ def array(kind, name, rows):
     return f"static const {kind} {name}[] = {{\n" + "\n".join([*lines, line.rstrip(", ")]) + "};\n"
 
 
-def tables_text(tables):
-    """Return the tables of a hand in C: sizes as macros, and `hand`."""
-    arrays, hand = tables.arrays, tables.hand
-    sizes = ("fingers", "lanes", "features", "lags", "history", "channels", "levels", "track")
-    parts = ["#ifdef HOLDFAST_VECTORS_FIXED\n"]
-    parts += [f"#define HOLDFAST_N_{s.upper()} {getattr(hand, f'n_{s}')}\n" for s in sizes]
-    parts.append('#endif\n#include "kernel.c"\n\n')
-    for kind in ("finger", "feature", "lag"):
-        parts.append(array(f"holdfast_{kind}", f"{kind}s", map(initializer, arrays[f"{kind}s"])))
-    for name in ("used", "rotations", "places"):
-        parts.append(array("hf_real", name, map(real, arrays[name])))
-    fields = [name for name, _ in hand._fields_]
-    values = [name if name in arrays else initializer(getattr(hand, name)) for name in fields]
-    parts.append(f"static const holdfast_hand hand = {{{', '.join(values)}}};\n")
-    return "".join(parts)
+def estimates_of(used, plan, rows):
+    """Return what the kernel computes: features, and estimates of the fingers."""
+    readings, present, times = (np.array(column) for column in zip(*rows, strict=True))
+    stream = FeatureStream(plan)
+    features = np.empty((*present.shape, plan.width))
+    stream.start().advance(readings, present, times, features, np.empty(present.shape))
+    parts = [used.finger(name) for name in plan.fingers]
+    kernel = _extension.Detector(
+        stream.tables(), tables.model_table(used, plan), *tables.rules_of(used, plan),
+        makers(plan.fingers, parts), np.ndarray, print,
+    )  # fmt: skip
+    estimates, numbers = tables.estimate_rows(*present.shape)
+    hand = np.empty(len(times))
+    kernel.run(readings, present, times, numbers, hand)
+    return features, estimates, hand
 
 
 def main():
     """Write the vectors."""
-    stream = FeatureStream(plan())
-    output, rows, status, features = stream.output, [], [], []
-    for k, (readings, present, time) in enumerate(samples()):
-        rows += [number(time), *map(str, present.astype(int))]
-        rows += map(number, readings.ravel())
-        kernel.advance(stream.layout, stream.memory, output, readings, present, time)
-        status += map(str, output.status.ravel().tolist())
+    used = model()
+    plan = replace(used.plan(used.sensors, RATE), ignore={"thumb": [3]})
+    rows = list(samples())
+    features, estimates, hand = estimates_of(used, plan, rows)
+    made = Tables(kernel_text(), used, plan, single=False)
+    given, codes, numbers = [], [], []
+    for k, (readings, present, time) in enumerate(rows):
+        given += [number(time), *map(str, present.astype(int)), *map(number, readings.ravel())]
+        codes += [str(int(hand[k]))]
+        for row in estimates[k]:
+            codes += [str(int(row[name])) for name in CODES]
+            if k % EVERY == 0:
+                numbers += [number(float(row[name])) for name in NUMBERS]
+                numbers += map(number, row["force"].tolist())
         if k % EVERY == 0:
-            features += [
-                number(float(v)) for v in [*output.features.ravel(), *output.values.ravel()]
-            ]
+            numbers += map(number, features[k].ravel().tolist())
     parts = [
         "/* Written by write_vectors.py; do not edit. */\n",
-        tables_text(Tables(stream.layout, stream.memory, 4)),
-        f"\nenum {{ N_SAMPLES = {N_SAMPLES}, EVERY = {EVERY} }};\n",
+        "#ifdef HOLDFAST_VECTORS_FIXED\n",
+        *(f"#define HOLDFAST_{name.upper()} {n}\n" for name, n in made.sizes.items()),
+        '#endif\n#include "holdfast.c"\n\n',
+        re.sub(r"-?\d+\.\d+(e[+-]?\d+)?", r"(hf_real)\g<0>", "\n".join(made.texts)),
+        f"\n\nenum {{ N_SAMPLES = {N_SAMPLES}, EVERY = {EVERY} }};\n",
         "\n/* Of each sample: time, present fingers, readings (n_taxels, 3). */\n",
-        array("double", "samples", rows),
-        "\n/* Of each sample and finger: reason, faults, their taxels. */\n",
-        array("long", "statuses", status),
-        "\n/* Of each EVERY-th sample: features; force, F_a, m and sigma of each finger. */\n",
-        array("double", "numbers", features),
+        array("double", "samples", given),
+        "\n/* Of each sample: state of the hand; of each finger state, reason, cause, faults and\n",
+        " * their taxels. */\n",
+        array("long", "codes", codes),
+        "\n/* Of each EVERY-th sample: of each finger probability, slip, speed, distance, sigma,\n",
+        " * force; then all features. */\n",
+        array("double", "numbers", numbers),
     ]
     sys.stdout.write("".join(parts))
 
