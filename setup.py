@@ -1,7 +1,7 @@
-"""Build of the package: the C kernel, and the build backend, which is this file too (decision 29).
+"""Build of the package: its C extensions, and the backend, which is this file too (decision 29).
 
 pip and uv import this file as the backend: setuptools' own, which takes a compiler from the package
-index where the machine has none. setuptools then runs the file, which compiles the kernel.
+index where the machine has none. setuptools then runs the file, which compiles them.
 """
 
 import importlib.util
@@ -18,8 +18,12 @@ from setuptools import Extension, build_meta, setup
 from setuptools.build_meta import *  # noqa: F403 (the hooks of a backend)
 from setuptools.command.build_ext import build_ext
 
-KERNEL = Path("src/holdfast/kernel")  # backends run in the folder of pyproject.toml
-SOURCES = ("module.c", "haar.c", "force.c", "counts.c", "offline.c")
+PACKAGE = Path("src/holdfast")  # backends run in the folder of pyproject.toml
+EXTENSIONS = {
+    "kernel._extension": ("module.c", "haar.c", "force.c", "counts.c", "offline.c"),
+    "twin.steps": ("module.c",),
+}
+"""Names of the extension modules, and the C files that are compiled for each."""
 DEFINITIONS = {
     "Py_LIMITED_API": "0x030B0000",
     "HF_API": "extern",
@@ -69,7 +73,7 @@ def choose_compiler() -> None:
 
 
 class BuildKernel(build_ext):
-    """Compile the kernel by the flags above."""
+    """Compile the extensions by the flags above."""
 
     def run(self) -> None:
         """Choose the compiler here: lists of requirements and sdists are made without one."""
@@ -90,17 +94,20 @@ class BuildKernel(build_ext):
 
 
 if __name__ == "__main__":
-    digest = runpy.run_path(str(KERNEL / "sources.py"))["digest"](KERNEL)
-    kernel = Extension(
-        "holdfast.kernel._extension",
-        [str(KERNEL / name) for name in SOURCES],
-        define_macros=[*DEFINITIONS.items(), ("HOLDFAST_SOURCES", f'"{digest}"')],
-        py_limited_api=True,
-    )
+    digest = runpy.run_path(str(PACKAGE / "kernel" / "sources.py"))["digest"](PACKAGE)
+    extensions = [
+        Extension(
+            f"holdfast.{name}",
+            [str(PACKAGE / name.split(".")[0] / source) for source in sources],
+            define_macros=[*DEFINITIONS.items(), ("HOLDFAST_SOURCES", f'"{digest}"')],
+            py_limited_api=True,
+        )
+        for name, sources in EXTENSIONS.items()
+    ]
     # setuptools packs whatever an earlier build left in its folder: each build has its own
     with tempfile.TemporaryDirectory() as folder:
         setup(
-            ext_modules=[kernel],
+            ext_modules=extensions,
             cmdclass={"build_ext": BuildKernel},
             options={"build": {"build_base": folder}, "bdist_wheel": {"py_limited_api": "cp311"}},
         )

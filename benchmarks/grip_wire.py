@@ -28,10 +28,10 @@ from holdfast.devices.ros import dds
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.topic_messages import FLOAT_ARRAY, JOINT_STATE, joint_message, topic_definition
-from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
+from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast_lab.trial.run import RISE
 from holdfast_lab.trial.trials import LOAD_KINDS, Trial, draw_trials
 

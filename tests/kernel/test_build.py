@@ -77,12 +77,17 @@ def test_a_wheel_has_the_c_files_that_an_exported_header_joins(clone):
     assert not (folder / "src" / "holdfast" / "kernel" / "module.c").exists()
 
 
-def test_a_kernel_that_is_not_built_names_the_command_that_builds_it(clone):
-    for path in (clone / "src" / "holdfast" / "kernel").glob("_extension.*[!i]"):
+@pytest.mark.parametrize(
+    ("module", "title"),
+    [("kernel._extension", "the C kernel"), ("twin.steps", "the steps of the twin in C")],
+)
+def test_an_extension_that_is_not_built_names_the_command_that_builds_it(clone, module, title):
+    package, name = module.split(".")
+    for path in (clone / "src" / "holdfast" / package).glob(f"{name}.*.so"):
         path.unlink()
-    failed = python(clone, "from holdfast.cli import main; import holdfast.kernel")
+    failed = python(clone, f"from holdfast.cli import main; import holdfast.{package}")
     last = failed.stderr.splitlines()[-1]
-    assert "the C kernel cannot be loaded (" in last
+    assert f"{title} cannot be loaded (" in last
     assert last.endswith(f"build it: {BUILD}")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-KERNEL = Path(__file__).parents[2] / "src" / "holdfast" / "kernel"
+PACKAGE = Path(__file__).parents[2] / "src" / "holdfast"
 FLAGS = (
     *("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"),
     *("-ffp-contract=off", "-DPy_LIMITED_API=0x030B0000", "-DHF_API=extern"),
@@ -19,11 +19,18 @@ FLAGS = (
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
 @pytest.mark.parametrize(
-    "name", ["module.c", "haar.c", "force.c", "counts.c", "kernel.c", "holdfast.c", "offline.c"]
+    "name",
+    [
+        *(
+            f"kernel/{name}.c"
+            for name in ("module", "haar", "force", "counts", "kernel", "offline")
+        ),
+        "twin/module.c",
+    ],
 )
 def test_no_warning(compiler, level, name, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} here")
-    command = (compiler, *FLAGS, level, "-c", str(KERNEL / name), "-o", str(tmp_path / "object"))
+    command = (compiler, *FLAGS, level, "-c", str(PACKAGE / name), "-o", str(tmp_path / "object"))
     done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -7,9 +7,9 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import Constants, Contact, constants_of, new_contact, touch
+from holdfast.twin.contact import Constants, Contact, constants_of, new_contact
 from holdfast.twin.objects import GraspObject, solid
-from holdfast.twin.shapes import probe
+from holdfast.twin.steps import probe, touch
 from holdfast.twin.surface import Surface, curved_fingertip
 
 GRAVITY = 9.81

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import Contact, constants_of, new_contact, touch
+from holdfast.twin.contact import Contact, constants_of, new_contact
 from holdfast.twin.objects import GraspObject, load_objects, object_named, solid
-from holdfast.twin.shapes import probe, relief
 from holdfast.twin.skin import Skin
+from holdfast.twin.steps import probe, relief, touch
 from holdfast.twin.surface import Surface, curved_fingertip
 
 from .grip import GRAVITY, Grip

@@ -4,18 +4,14 @@ import pytest
 from holdfast.twin import control as module
 from holdfast.twin.control import (
     COMPENSATION,
-    DERIVATIVE,
-    ENCODER_STEP,
     GLITCH_ERROR,
     GLITCH_TICKS,
     PROPORTIONAL,
-    TORQUE_LIMIT,
     TORQUE_NOISE,
-    TORQUE_STEP,
-    control,
     draw_controller,
 )
 from holdfast.twin.hand import JOINTS, RATE, SUBSTEPS
+from holdfast.twin.steps import DERIVATIVE, ENCODER_STEP, TORQUE_LIMIT, TORQUE_STEP, control
 
 PERIOD = 1 / 350
 GLITCH_RATE = 0.12

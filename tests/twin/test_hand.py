@@ -11,12 +11,11 @@ from holdfast.twin.hand import (
     TIMESTEP,
     TIP_MASS,
     HandModel,
-    apply_forces,
-    fill_bodies,
     hand_xml,
 )
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import load_objects, object_named
+from holdfast.twin.steps import N_TIP, apply_forces, fill_bodies
 
 VENDOR_TIPS = {
     "index": (0.0, 0.05531, 0.13344),
@@ -138,13 +137,13 @@ def test_fingertip_frames_are_the_mounts_on_the_last_links(hand):
 def test_applied_forces_do_what_mujoco_computes(hand):
     bodies = moving(hand)
     draw = np.random.default_rng(2)
-    tips, item = draw.normal(size=(4, 6)), draw.normal(size=6)
+    tips, item = draw.normal(size=(4, N_TIP)), draw.normal(size=6)
     apply_forces(hand.arrays, tips, item, bodies)
     expected = np.zeros(hand.model.nv)
     for body, wrench, row in zip(
         [*hand.tips, hand.object_body], [*tips, item], bodies, strict=True
     ):
-        force, torque, point = wrench[:3], wrench[3:], row[:3].copy()
+        force, torque, point = wrench[:3], wrench[3:6], row[:3].copy()
         mujoco.mj_applyFT(hand.model, hand.data, force, torque, point, body, expected)
     without = hand.data.qfrc_smooth.copy()
     mujoco.mj_fwdAcceleration(hand.model, hand.data)

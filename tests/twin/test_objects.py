@@ -18,7 +18,7 @@ from holdfast.twin.objects import (
     object_named,
     solid,
 )
-from holdfast.twin.shapes import MAX_RELIEF, probe, relief
+from holdfast.twin.steps import MAX_RELIEF, probe, relief
 
 OBJECTS = load_objects()
 SMOOTH = {name: replace(one, texture_amplitude=0.0) for name, one in OBJECTS.items()}

@@ -4,8 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from holdfast.twin.operator import (
-    DIRECTIONS,
+from holdfast.twin.operator import DIRECTIONS, TREMOR_BAND, draw_disturbances, draw_tremor
+from holdfast.twin.profile import profile, profiles
+from holdfast.twin.steps import (
     HOLD_STIFFNESS,
     HOLD_TURN_STIFFNESS,
     JERK,
@@ -15,16 +16,11 @@ from holdfast.twin.operator import (
     PUSH_GAP,
     PUSH_LIMIT,
     SHAKE,
-    TREMOR_BAND,
-    draw_disturbances,
-    draw_tremor,
+    aim,
+    disturb_wrench,
     hold_wrench,
-    move_wrench,
-    push_wrench,
     tremor_at,
 )
-from holdfast.twin.operator import _aim as aim
-from holdfast.twin.profile import profile, profiles
 
 STILL = draw_tremor(np.random.default_rng(0))
 STYLES = (PUSH, JERK, SHAKE)
@@ -42,7 +38,7 @@ def parameters(direction=(0.0, 0.0, -1.0), arm=(0.0, 0.0, 0.0), depth=0.006, sti
 
 def push(given, drawn=None, style=PUSH, rms=0.0, elapsed=0.4, duration=0.8):
     drawn = parameters() if drawn is None else drawn
-    out = push_wrench(given, np.zeros(3), drawn, style, duration, STILL, rms, elapsed)
+    out = disturb_wrench(given, np.zeros(12), drawn, style, duration, STILL, rms, elapsed)
     return np.array(out)
 
 
@@ -177,7 +173,8 @@ class TestPush:
 
 def move(given, elapsed=1.0, rms=0.0, depth=0.008, stiffness=500.0, duration=2.0):
     wanted = parameters(depth=depth, stiffness=stiffness)
-    return np.array(move_wrench(given, body()[:12], wanted, duration, STILL, rms, elapsed))
+    out = disturb_wrench(given, body()[:12], wanted, MOVE, duration, STILL, rms, elapsed)
+    return np.array(out)
 
 
 class TestMove:

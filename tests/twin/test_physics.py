@@ -1,34 +1,35 @@
-"""Seven steps in compiled code against the same steps called from Python, bit by bit."""
+"""Seven steps in C against the same steps called from Python, bit by bit."""
 
 import numpy as np
 import pytest
 
 from holdfast.twin import physics
-from holdfast.twin.contact import touch
-from holdfast.twin.control import STEPS_PER_CONTROL, control, draw_controller
+from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import closing_path
-from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel, apply_forces, fill_bodies
+from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import object_named
-from holdfast.twin.operator import (
-    GUIDE_STIFFNESS,
-    JERK,
-    MOVE,
-    NO_GUIDE,
-    PUSH,
-    draw_tremor,
-    guide_wrench,
-    hold_wrench,
-    move_wrench,
-    push_wrench,
-)
+from holdfast.twin.operator import NO_GUIDE, draw_tremor
 from holdfast.twin.physics import (
     Action,
     addresses_work,
     advance_of,
-    advance_sample,
     advance_sample_by_calls,
     engine_of,
+)
+from holdfast.twin.steps import (
+    GUIDE_STIFFNESS,
+    JERK,
+    MOVE,
+    PUSH,
+    advance_sample,
+    apply_forces,
+    control,
+    disturb_wrench,
+    fill_bodies,
+    guide_wrench,
+    hold_wrench,
+    touch,
 )
 from holdfast.twin.world import World
 
@@ -70,11 +71,11 @@ def step_from_python(made, tick, target, given):
     if given.hold > 0:
         weight, tremor = given.weight, given.tremors[0]
         outside += hold_wrench(body, given.anchor, given.hold, weight, tremor, rms, data.time)
-    disturbing = (given.duration, given.tremors[1], rms, elapsed)
-    if given.style == MOVE:
-        outside += move_wrench(body, given.origin, given.parameters, *disturbing)
-    elif given.style >= 0:
-        outside += push_wrench(body, given.origin, given.parameters, given.style, *disturbing)
+    if given.style >= 0:
+        outside += disturb_wrench(
+            body, given.origin, given.parameters, given.style, given.duration, given.tremors[1],
+            rms, elapsed,
+        )  # fmt: skip
     if given.guide[GUIDE_STIFFNESS] > 0:
         ahead = data.time - given.time
         outside += guide_wrench(body, given.guide, ahead, given.tremors[1], data.time)

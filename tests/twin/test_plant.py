@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.control import GLITCH_ERROR, control, draw_controller
+from holdfast.twin.control import GLITCH_ERROR, draw_controller
 from holdfast.twin.hand import FRICTION, N_JOINTS, RATE, HandModel
 from holdfast.twin.objects import object_named
 from holdfast.twin.plant import PLANTS, plant_named
 from holdfast.twin.simulation import Grasp, Simulation
+from holdfast.twin.steps import control
 
 PERIOD = 1 / 350
 HARD = PLANTS["hard"]

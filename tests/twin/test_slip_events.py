@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.contact import Cause, ContactState
 from holdfast.twin.objects import object_named
-from holdfast.twin.operator import GUIDE_STIFFNESS, draw_tremor, guide_wrench
+from holdfast.twin.operator import draw_tremor
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import THUMB_SHARE, Plan
 from holdfast.twin.simulation import Grasp, Simulation
@@ -25,6 +25,7 @@ from holdfast.twin.slip_events import (
     draw_course,
     draw_slip_event,
 )
+from holdfast.twin.steps import GUIDE_STIFFNESS, guide_wrench
 
 PERIOD = 1 / 150
 GRAVITY = 9.81

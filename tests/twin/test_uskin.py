@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from holdfast.features import fingertip_force
 from holdfast.io import import_recordings
 from holdfast.sensors import sensor
+from holdfast.twin.steps import saturated
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import (
     Uskin,
@@ -17,7 +18,6 @@ from holdfast.twin.uskin import (
     taxel_shares,
     with_server_effects,
 )
-from holdfast.twin.uskin_readout import saturated
 
 TIP = sensor("uskin-curved")
 SKIN = curved_fingertip()

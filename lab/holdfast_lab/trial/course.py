@@ -8,8 +8,8 @@ import numpy as np
 
 from holdfast.contact import CONTACT_FORCE
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import RATE
+from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast.twin.world import World
 from holdfast_lab.trial.run import RunningTrial, least_force_at
 from holdfast_lab.trial.trials import Trial

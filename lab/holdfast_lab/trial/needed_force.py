@@ -17,8 +17,8 @@ from holdfast.contact import CONTACT_FORCE
 from holdfast.sensors.types import Array
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
-from holdfast.twin.shapes import probe, unpacked
 from holdfast.twin.simulation import Simulation
+from holdfast.twin.steps import probe
 from holdfast.twin.world import World
 from holdfast_lab.trial.trials import Trial
 
@@ -120,7 +120,7 @@ def _patch(world: World, tip: int) -> Patch:
     forces = world.contact.node_forces[tip]
     touching = np.any(forces != 0.0, axis=1)
     arms = finger[:3] + world.constants.nodes[touching, :3] @ turn.T - item[:3]
-    solid = unpacked(world.constants.solid)
+    solid = world.constants.solid
     outward = np.array([probe(solid, *place)[1:] for place in arms @ back]) @ back.T
     pressed = np.maximum(np.sum(forces[touching] @ turn.T * outward, axis=1), 0.0)
     middle = pressed @ arms / pressed.sum()

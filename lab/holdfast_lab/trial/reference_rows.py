@@ -24,9 +24,9 @@ from holdfast.grip.command import GripReason
 from holdfast.grip.laws import LAWS, Law, Touch, law_named
 from holdfast.grip.laws.base import Wish, stay
 from holdfast.grip.limits import Limits
-from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Simulation
+from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.trials import Trial
 

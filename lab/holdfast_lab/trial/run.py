@@ -17,11 +17,11 @@ from holdfast.grip.limits import Limits
 from holdfast.model import Model
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT, NEWTONS_PER_SHEAR_COUNT
-from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
+from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast.twin.uskin_readout import Counts
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.reference_rows import (

@@ -4,18 +4,36 @@ Nothing is compiled at import. In a clone, an extension that was built from othe
 those beside it is refused: its numbers would not be those of the code that one reads.
 """
 
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from holdfast.errors import HoldfastError
 from holdfast.kernel.sources import digest
 
 _BUILD = "uv sync --inexact --reinstall-package holdfast, or pip install -e ."
-_FOLDER = Path(__file__).parent
-
-try:
-    from holdfast.kernel import _extension
-except ImportError as error:
-    raise HoldfastError(f"the C kernel cannot be loaded ({error}); build it: {_BUILD}") from error
+_PACKAGE = Path(__file__).parents[1]
 # A wheel has no module.c, so nothing is compared there.
-if (_FOLDER / "module.c").exists() and digest(_FOLDER) != _extension.SOURCES:
-    raise HoldfastError(f"the C kernel was built from other sources; build it again: {_BUILD}")
+_SOURCES = digest(_PACKAGE) if (_PACKAGE / "kernel" / "module.c").exists() else None
+
+
+def checked(name: str, title: str) -> ModuleType:
+    """Import an extension module of the package, which was built from the sources beside it.
+
+    Args:
+        name: name of the module.
+        title: what it is, for messages.
+
+    Raises:
+        HoldfastError: it was not built, or was built from other sources.
+    """
+    try:
+        module = import_module(name)
+    except ImportError as error:
+        raise HoldfastError(f"{title} cannot be loaded ({error}); build it: {_BUILD}") from error
+    if _SOURCES not in (None, module.SOURCES):
+        raise HoldfastError(f"{title} was built from other sources; build it again: {_BUILD}")
+    return module
+
+
+checked("holdfast.kernel._extension", "the C kernel")

@@ -12,6 +12,7 @@
 #include <float.h>
 #include <string.h>
 
+#include "arrays.h"
 #include "batch.h"
 #include "counts.h"
 #include "detector.h"
@@ -19,91 +20,6 @@
 
 /* The size of the scratch memory of a longer window could overflow. */
 #define MAX_WINDOW (PY_SSIZE_T_MAX / 1024)
-
-/* An array in C order, and its buffer. */
-typedef struct {
-    Py_buffer view;
-    double *data;     /* the same as view.buf */
-    const char *name; /* in messages */
-} array;
-
-static void release(array *arrays, size_t n)
-{
-    for (size_t i = 0; i < n; ++i) {
-        PyBuffer_Release(&arrays[i].view); /* does nothing if there is no buffer */
-    }
-}
-
-/* Return 0 if the buffer of an array has exactly the bytes that its shape says. */
-static int check_size(const array *a)
-{
-    Py_ssize_t n_bytes = a->view.itemsize;
-    for (int axis = 0; axis < a->view.ndim; ++axis) {
-        const Py_ssize_t length = a->view.shape[axis];
-        if (length < 0 || (length > 0 && n_bytes > PY_SSIZE_T_MAX / length)) {
-            return -1;
-        }
-        n_bytes *= length;
-    }
-    return a->view.len == n_bytes ? 0 : -1;
-}
-
-/* Fill `a` with the buffer of an object, or set an exception and return -1.
- *
- * The buffer must be contiguous, with `n_axes` axes, of the type 'd' (float64 of this machine's
- * byte order), 'b' (int8) or '?' (bool).
- */
-static int get_array(char type, PyObject *object, const char *name, int n_axes, int flags, array *a)
-{
-    const size_t size = type == 'd' ? sizeof(double) : 1;
-    a->name = name;
-    if (PyObject_GetBuffer(object, &a->view, flags | PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0) {
-        return -1;
-    }
-    const char *format = a->view.format ? a->view.format : "B";
-    if (format[0] == '@' || format[0] == '=' || format[0] == (PY_LITTLE_ENDIAN ? '<' : '>')) {
-        ++format;
-    }
-    if (format[0] != type || format[1] != '\0' || a->view.itemsize != (Py_ssize_t)size) {
-        PyErr_Format(
-            PyExc_TypeError, "%s: %s expected, the format %s given", name,
-            type == 'd'   ? "float64"
-            : type == 'b' ? "int8"
-                          : "bool",
-            format);
-        return -1;
-    }
-    if (a->view.ndim != n_axes || a->view.shape == NULL) {
-        PyErr_Format(
-            PyExc_ValueError, "%s: %d axes expected, %d given", name, n_axes, a->view.ndim);
-        return -1;
-    }
-    if (check_size(a) < 0) {
-        PyErr_Format(PyExc_ValueError, "%s: a buffer of another size than its shape", name);
-        return -1;
-    }
-    if ((uintptr_t)a->view.buf % size != 0) {
-        PyErr_Format(PyExc_ValueError, "%s: its numbers are not aligned in memory", name);
-        return -1;
-    }
-    a->data = a->view.buf;
-    return 0;
-}
-
-/* Return 0 if an array has this shape, else set an exception and return -1. */
-static int check_shape(const array *a, const Py_ssize_t *expected)
-{
-    for (int axis = 0; axis < a->view.ndim; ++axis) {
-        if (a->view.shape[axis] != expected[axis]) {
-            PyErr_Format(
-                PyExc_ValueError, "%s: axis %d has the length %zd, %zd expected", a->name, axis,
-                a->view.shape[axis], expected[axis]);
-            return -1;
-        }
-    }
-    return 0;
-}
-#define SHAPE(...) ((const Py_ssize_t[]){__VA_ARGS__})
 
 /* Return 0 if the last n_out of n arrays share no memory with others, else set an exception. */
 static int check_apart(const array *arrays, size_t n, size_t n_out)

@@ -6,10 +6,14 @@ The build runs this file by itself, so it imports nothing of the package.
 import hashlib
 from pathlib import Path
 
+FOLDERS = ("kernel", "twin")
+"""Folders of the package with C files."""
 
-def digest(folder: Path) -> str:
-    """Return a digest of the names and the content of all C files of a folder."""
+
+def digest(package: Path) -> str:
+    """Return a digest of the names and the content of all C files of the package."""
     found = hashlib.sha256()
-    for path in sorted(folder.glob("*.[ch]")):
-        found.update(f"{path.name}\0{path.read_text(encoding='utf-8')}\0".encode())
+    for path in sorted(path for name in FOLDERS for path in (package / name).glob("*.[ch]")):
+        name = path.relative_to(package).as_posix()
+        found.update(f"{name}\0{path.read_text(encoding='utf-8')}\0".encode())
     return found.hexdigest()[:16]

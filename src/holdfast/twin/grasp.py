@@ -17,12 +17,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, JOINTS, MOUNTS, N_JOINTS, HandModel
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, reach_of
+from holdfast.twin.steps import fill_targets
 
 MIDDLE_PLACE = (0.108, 0.020, 0.021)
 """Position of the object's middle in the right palm [m]; its axis is parallel to the palm's y.
@@ -64,7 +64,7 @@ class ClosingPath(NamedTuple):
     def targets(self, depths: Array) -> Array:
         """Return joint angles (16,) [rad] for the gaps of the fingertips (4,) [m]."""
         wanted = np.empty(N_JOINTS)
-        _interpolate(self.depths, self.joints, _FIRST, depths, wanted)
+        fill_targets(self.depths, self.joints, _FIRST, depths, wanted)
         return wanted
 
 
@@ -103,18 +103,7 @@ def object_pose(item: GraspObject) -> tuple[Array, float]:
     return np.array([x, -z, y - _middle(item)]), item.yaw
 
 
-_FIRST = np.array([JOINTS[finger] for finger in FINGERS])
-
-
-@compiled
-def _interpolate(grid: Array, joints: Array, first: Array, depths: Array, out: Array) -> None:
-    last = len(grid) - 1
-    for i in range(len(first)):
-        at = min(max((grid[0] - depths[i]) / (grid[0] - grid[last]), 0.0), 1.0) * last
-        k = min(int(at), last - 1)
-        share = at - k
-        for j in range(4):
-            out[first[i] + j] = (1 - share) * joints[i, k, j] + share * joints[i, k + 1, j]
+_FIRST = np.array([JOINTS[finger] for finger in FINGERS], np.intc)
 
 
 def _middle(item: GraspObject) -> float:

@@ -1,7 +1,7 @@
 """Model of the Allegro hand v4 and the object for MuJoCo: boxes and capsules without contacts.
 
-MuJoCo integrates the motion of the bodies. `holdfast.twin.contact` computes the forces between
-skin and object, which are applied as external forces.
+MuJoCo integrates the motion of the bodies. contact.c computes the forces between skin and object,
+which hand.c applies as external forces.
 """
 
 import csv
@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
@@ -55,7 +54,7 @@ Rows = list[dict[str, str]]
 
 
 class HandArrays(NamedTuple):
-    """Arrays of MuJoCo's state, which change in place, and what compiled code needs with them.
+    """Arrays of MuJoCo's state, which change in place, and what hand.c needs with them.
 
     Attributes:
         xpos, xmat, xipos, ximat, cvel, subtree_com: poses and motion of all bodies.
@@ -149,7 +148,7 @@ class HandModel:
         model = mujoco.MjModel.from_xml_string(hand_xml(item))
         model.dof_frictionloss[:N_JOINTS] = joint_friction
         last = [model.body(f"link_{JOINTS[f] + 3}.0").id for f in FINGERS]
-        return cls(model, mujoco.MjData(model), np.array(last), model.body("object").id)
+        return cls(model, mujoco.MjData(model), np.array(last, np.intc), model.body("object").id)
 
     def limits(self) -> Array:
         """Return the limits of the joints, (16, 2) [rad]."""
@@ -164,68 +163,6 @@ class HandModel:
             data.qpos, data.qfrc_bias, data.qfrc_applied, data.xfrc_applied,
             self.model.body_rootid, self.tips, self.mounts, self.object_body,
         )  # fmt: skip
-
-
-@compiled
-def fill_bodies(hand: HandArrays, out: Array) -> None:
-    """Write pose and motion of the fingertip frames and the object in the world, (5, 18).
-
-    A row has position [m], rotation matrix (9, by rows), velocity of its origin [m/s] and angular
-    velocity [rad/s].
-    """
-    for i in range(len(hand.tips)):
-        b = hand.tips[i]
-        for r in range(3):
-            place = hand.xpos[b, r]
-            for c in range(3):
-                place += hand.xmat[b, 3 * r + c] * hand.mounts[i, c]
-                out[i, 3 + 3 * r + c] = hand.xmat[b, 3 * r + c]
-            out[i, r] = place
-        _fill_motion(hand.cvel[b], hand.subtree_com[hand.roots[b]], out[i])
-    last, b = len(hand.tips), hand.object_body
-    for r in range(3):
-        out[last, r] = hand.xipos[b, r]
-        for c in range(3):
-            out[last, 3 + 3 * r + c] = hand.ximat[b, 3 * r + c]
-    _fill_motion(hand.cvel[b], hand.subtree_com[hand.roots[b]], out[last])
-
-
-@compiled
-def _fill_motion(cvel: Array, com: Array, row: Array) -> None:
-    """Write the velocity of a point from MuJoCo's, which refers to the tree's centre of mass."""
-    wx, wy, wz = cvel[0], cvel[1], cvel[2]
-    x, y, z = row[0] - com[0], row[1] - com[1], row[2] - com[2]
-    row[12] = cvel[3] + wy * z - wz * y
-    row[13] = cvel[4] + wz * x - wx * z
-    row[14] = cvel[5] + wx * y - wy * x
-    row[15], row[16], row[17] = wx, wy, wz
-
-
-@compiled
-def apply_forces(hand: HandArrays, tips: Array, object_wrench: Array, bodies: Array) -> None:
-    """Apply force and torque on fingertips and object in MuJoCo.
-
-    Args:
-        hand: arrays of MuJoCo's state.
-        tips: (4, 6 or more) force [N] and torque about the frame's origin [N m] on the
-            fingertips in the world frame.
-        object_wrench: (6,) force [N] and torque about the centre of mass [N m] on the object in
-            the world frame.
-        bodies: poses as `fill_bodies` writes them.
-    """
-    out = hand.xfrc_applied
-    for i in range(len(hand.tips)):
-        b = hand.tips[i]
-        x = bodies[i, 0] - hand.xipos[b, 0]
-        y = bodies[i, 1] - hand.xipos[b, 1]
-        z = bodies[i, 2] - hand.xipos[b, 2]
-        fx, fy, fz = tips[i, 0], tips[i, 1], tips[i, 2]
-        out[b, 0], out[b, 1], out[b, 2] = fx, fy, fz
-        out[b, 3] = tips[i, 3] + y * fz - z * fy
-        out[b, 4] = tips[i, 4] + z * fx - x * fz
-        out[b, 5] = tips[i, 5] + x * fy - y * fx
-    for k in range(6):
-        out[hand.object_body, k] = object_wrench[k]
 
 
 def _table() -> Rows:

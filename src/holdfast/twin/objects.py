@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from holdfast.files import read_toml
 from holdfast.sensors.types import Array, rebuilt
-from holdfast.twin.shapes import (
+from holdfast.twin.steps import (
     AROUND_2,
     BOX,
     CAPSULE,
@@ -290,7 +290,7 @@ def _revolve(core: Array, foot: float, top: float, half_height: float, rounding:
 
 
 def solid(item: GraspObject) -> Array:
-    """Pack shape and surface of an object as numbers for compiled code.
+    """Pack shape and surface of an object as numbers for shapes.c.
 
     Returns:
         (N_OBJECT_NUMBERS,) array: code, core, texture, static and kinetic friction.
@@ -326,8 +326,14 @@ def distance_to(item: GraspObject, points: npt.ArrayLike) -> Array:
     """
     places = np.asarray(points, dtype=np.float64)
     flat = np.ascontiguousarray(places.reshape(-1, 3))
-    signed: Array = distances(solid(item), flat)
+    signed = _distances(solid(item), flat)
     return signed.reshape(places.shape[:-1])
+
+
+def _distances(packed: Array, points: Array) -> Array:
+    signed = np.empty(len(points))
+    distances(packed, points, signed)
+    return signed
 
 
 def reach_of(item: GraspObject, direction: Array, height: float) -> float:
@@ -341,10 +347,10 @@ def reach_of(item: GraspObject, direction: Array, height: float) -> float:
     Returns:
         The distance of the last point inside, of points 0.1 mm apart; NaN without any.
     """
-    distances = np.linspace(0.0, 0.09, 901)
-    points = distances[:, None] * direction + [0.0, 0.0, height]
+    reach = np.linspace(0.0, 0.09, 901)
+    points = reach[:, None] * direction + [0.0, 0.0, height]
     inside = np.flatnonzero(distance_to(item, points) < 0)
-    return float(distances[inside[-1]]) if len(inside) else math.nan
+    return float(reach[inside[-1]]) if len(inside) else math.nan
 
 
 def _mass_of(core: Array) -> tuple[float, float, Array]:
@@ -358,7 +364,7 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
     across = (np.arange(math.ceil(wide / step)) + 0.5) * step
     up = (np.arange(2 * math.ceil(tall / step)) + 0.5) * step - math.ceil(tall / step) * step
     x, y, z = (part.ravel() for part in np.meshgrid(across, across, up, indexing="ij"))
-    depth = -distances(core, np.stack([x, y, z], axis=1))
+    depth = -_distances(core, np.stack([x, y, z], axis=1))
     cell = 4 * step**3 * np.clip(0.5 + depth / step, 0.0, 1.0)
     volume = float(cell.sum())
     centre = float((cell * z).sum()) / volume

@@ -1,29 +1,23 @@
-"""One sample of physics, compiled: seven steps of MuJoCo, contact, operator and controller.
+"""One sample of physics: seven steps of MuJoCo, contact, operator and controller, in physics.c.
 
-MuJoCo's half steps are called from compiled code by their addresses, because a call from Python
-with its arrays costs as much as the half step. The addresses are private parts of its package:
+MuJoCo's half steps are called from C by their addresses, because a call from Python with its
+arrays costs as much as the half step. The addresses are private parts of its package:
 where they do not work, the same steps are called from Python, with the same result.
 """
 
 import ctypes
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
-
-from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import Constants, Contact, touch
-from holdfast.twin.control import Controller, control
-from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
+from holdfast.twin.contact import Constants, Contact
+from holdfast.twin.control import Controller
+from holdfast.twin.hand import HandArrays, HandModel
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.operator import GUIDE_STIFFNESS, disturb_wrench, guide_wrench, hold_wrench
+from holdfast.twin.steps import advance_sample, apply_all
 
 FALLING_BODY = """<mujoco><worldbody>
   <body><freejoint/><geom size=".01"/></body>
@@ -141,7 +135,7 @@ def advance_of(hand: HandModel) -> Callable[..., float]:
 
 
 def engine_of(model: mujoco.MjModel, data: mujoco.MjData) -> HalfSteps:
-    """Return the addresses with which compiled code steps a model."""
+    """Return the addresses with which physics.c steps a model."""
     library = _library()
     return HalfSteps(
         _address(library.mj_step1), _address(library.mj_step2), model._address, data._address
@@ -185,52 +179,6 @@ def _address(function: object) -> int:
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)  # type: ignore[arg-type]
 
 
-def _declare_call(
-    _: object, function: object, model: object, data: object
-) -> tuple[object, object]:
-    """Return the signature of `_call`, and a function that generates its code."""
-
-    def generate(
-        _: object, builder: ir.IRBuilder, signature: object, addresses: Sequence[ir.Value]
-    ) -> ir.Constant:
-        pointer = cgutils.voidptr_t
-        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer]).as_pointer()
-        entry = builder.inttoptr(addresses[0], kind)
-        builder.call(entry, [builder.inttoptr(address, pointer) for address in addresses[1:]])
-        return pointer(None)
-
-    return types.void(types.intp, types.intp, types.intp), generate
-
-
-_call = cast("Callable[[int, int, int], None]", intrinsic(_declare_call))
-"""Call a C function of two pointers; all three are addresses."""
-
-
-@compiled
-def advance_sample(
-    engine: HalfSteps, physics: Physics, tick: int, target: Array, action: Action
-) -> float:
-    """Advance the physics by one sample.
-
-    Args:
-        engine: model and state of MuJoCo.
-        physics: everything else; it is written.
-        tick: number of the first step.
-        target: (16,) set-points of the joints [rad].
-        action: what the operator does.
-
-    Returns:
-        The largest error of a set-point, in a glitch of the controller [rad].
-    """
-    worst, time = 0.0, action.time
-    for k in range(physics.steps.n):
-        _call(engine.first_half, engine.model, engine.data)
-        worst = max(worst, _apply_all(physics, tick, k, target, action, time))
-        _call(engine.second_half, engine.model, engine.data)
-        time += physics.steps.period  # as MuJoCo adds it
-    return worst
-
-
 def advance_sample_by_calls(
     hand: HandModel, physics: Physics, tick: int, target: Array, action: Action
 ) -> float:
@@ -238,76 +186,7 @@ def advance_sample_by_calls(
     worst, time = 0.0, action.time
     for k in range(physics.steps.n):
         mujoco.mj_step1(hand.model, hand.data)
-        worst = max(worst, _apply_all(physics, tick, k, target, action, time))
+        worst = max(worst, apply_all(physics, tick, k, target, action, time))
         mujoco.mj_step2(hand.model, hand.data)
         time += physics.steps.period  # as MuJoCo adds it
     return worst
-
-
-@compiled
-def _apply_all(
-    physics: Physics, tick: int, k: int, target: Array, action: Action, time: float
-) -> float:
-    """Apply all forces of step `k` of a sample, between MuJoCo's half steps.
-
-    Returns:
-        The largest error of a set-point, in a glitch of the controller [rad]; 0 between the
-        steps of the controller.
-    """
-    steps, arrays = physics.steps, physics.arrays
-    contact, bodies = physics.contact, physics.bodies
-    fill_bodies(arrays, bodies)
-    touch(contact, physics.constants, bodies, steps.period)
-    elapsed = action.elapsed + k * steps.period
-    _operate(action, bodies[-1], contact.wrench, time, elapsed, physics.wrenches)
-    apply_forces(arrays, contact.tips, physics.wrenches.total, bodies)
-    if (tick + k) % steps.per_control != 0:
-        return 0.0
-    number = (tick + k) // steps.per_control
-    control(
-        physics.controller, number, arrays.qpos, arrays.qfrc_bias, target,
-        steps.per_control * steps.period, arrays.qfrc_applied,
-    )  # fmt: skip
-    return _glitch(physics.controller, number)
-
-
-@compiled
-def _glitch(controller: Controller, tick: int) -> float:
-    """Return the largest error of a set-point in a step of the controller [rad]."""
-    row = min(tick, len(controller.errors) - 1)
-    worst = 0.0
-    for error in controller.errors[row]:
-        worst = max(worst, abs(error))
-    return worst
-
-
-@compiled
-def _operate(
-    action: Action, body: Array, fingers: Array, time: float, elapsed: float, out: Wrenches
-) -> None:
-    """Write force and torque on the object: of operator and loads, and with the fingers'."""
-    outside = out.outside
-    outside[:] = 0.0
-    if action.hold > 0.0:
-        held = hold_wrench(
-            body, action.anchor, action.hold, action.weight, action.tremors[0], action.rms, time
-        )
-        for k in range(6):
-            outside[k] += held[k]
-    if action.style >= 0:
-        disturbed = disturb_wrench(
-            body, action.origin, action.parameters, action.style, action.duration,
-            action.tremors[1], action.rms, elapsed,
-        )  # fmt: skip
-        for k in range(6):
-            outside[k] += disturbed[k]
-    if action.guide[GUIDE_STIFFNESS] > 0.0:
-        ahead = time - action.time
-        guided = guide_wrench(body, action.guide, ahead, action.tremors[1], time)
-        for k in range(6):
-            outside[k] += guided[k]
-    for k in range(6):
-        out.total[k] = outside[k] + fingers[k]
-    for k in range(6):
-        outside[k] += action.pull[k]
-        out.total[k] += action.pull[k]

@@ -19,7 +19,7 @@ from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.loads import Load, LoadState, load_state
 from holdfast.twin.objects import GraspObject, object_named
-from holdfast.twin.operator import draw_disturbances, draw_tremor, tremor_at
+from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.plant import MILD, plant_named
 from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import (
@@ -31,6 +31,7 @@ from holdfast.twin.protocol import (
     touched_phase,
 )
 from holdfast.twin.slip_events import NO_SLIP, SlipEvents, SlipState, draw_course
+from holdfast.twin.steps import tremor_at
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_readout import Counts, Readout, UskinParameters

@@ -19,13 +19,13 @@ from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.loads import LoadState
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import (
-    GUIDE_STIFFNESS,
     NO_GUIDE,
     PUSH_DIRECTIONS,
     Disturbance,
     draw_disturbance,
 )
 from holdfast.twin.profile import Profile, SlipRanges, Span
+from holdfast.twin.steps import GUIDE_STIFFNESS
 
 GRASP_LINE = np.array([math.cos(GRASP_DIRECTION), -math.sin(GRASP_DIRECTION), 0.0])
 """Unit vector in the world from thumb to fingers of the right hand."""

@@ -1,4 +1,4 @@
-"""Readout of a uSkin fingertip: silicone, magnets, temperature, noise and whole counts.
+"""Parameters and state of the readout of a uSkin fingertip, which uskin_readout.c computes.
 
 Every parameter has its source.
 """
@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled, compiled_inside
 from holdfast.sensors.types import Array, Integers
 from holdfast.twin.skin import Three
+from holdfast.twin.steps import read_out
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,6 @@ Counts = npt.NDArray[np.uint16]
 
 ROUNDING_VARIANCE = 1 / 12
 """Variance of rounding to whole counts [count^2]."""
-UINT16_MAX = 65535.0
 
 
 class Taxels(NamedTuple):
@@ -164,7 +163,7 @@ class Taxels(NamedTuple):
 
 
 class _Constants(NamedTuple):
-    """What a fingertip does not change, for compiled code.
+    """What a fingertip does not change, for uskin_readout.c.
 
     Attributes:
         taxels: properties of the taxels.
@@ -174,7 +173,6 @@ class _Constants(NamedTuple):
         taus: (n_lags,) time constant of each [s].
         prompt: share of a force without delay.
         noise: (3,) standard deviation of the noise of a reading before rounding [count].
-        n_averaged: number of readings that are averaged.
         scan: time in which the taxels of a line are read [s]; 0: all with the packet.
         line: number of taxels on a line.
         step: of the readings [count].
@@ -189,7 +187,6 @@ class _Constants(NamedTuple):
     taus: Array
     prompt: float
     noise: Array
-    n_averaged: int
     scan: float
     line: int
     step: float
@@ -206,6 +203,7 @@ class _State(NamedTuple):
         numbers: (3,) time of the last sample [s], NaN before; rate of warming [K/s];
             temperature above that at the start [K].
         passed: (n_taxels, 3) forces after the silicone at the last sample [N].
+        passed_now: (n_taxels, 3) the same at this sample.
         readings: (n_averaged, n_taxels, 3) last readings of each taxel [count].
         n_read: (n_taxels,) number of readings so far.
         shown: (n_taxels, 3) counts of the last sample.
@@ -216,6 +214,7 @@ class _State(NamedTuple):
     delayed: Array
     numbers: Array
     passed: Array
+    passed_now: Array
     readings: Array
     n_read: Integers
     shown: Counts
@@ -241,8 +240,9 @@ class Readout:
             delayed=np.zeros((len(parameters.lag_times), *shape)),
             numbers=np.array([np.nan, 0, 0]),
             passed=np.zeros(shape),
+            passed_now=np.zeros(shape),
             readings=np.zeros((int(parameters.n_averaged), *shape)),
-            n_read=np.zeros(len(taxels.baseline), dtype=np.int64),
+            n_read=np.zeros(len(taxels.baseline), dtype=np.intc),
             shown=np.zeros(shape, dtype=np.uint16),
             colour=np.zeros((2, len(taxels.baseline) * 3)),
         )
@@ -260,18 +260,34 @@ class Readout:
             drawn = self._generator.standard_normal((len(clock), 1 + self._state.force.size))
             if self._parameters.slow_share or self._parameters.walk:
                 self._colour(clock, drawn)
-            _read_out(forces, clock, drawn, self._constants, self._state, counts)
+            if math.isnan(self._state.numbers[_TIME]):
+                self._rest(forces[0], clock[0], drawn[0, 0])
+            read_out(forces, clock, drawn, self._constants, self._state, counts)
         return counts
 
+    def _rest(self, forces: Array, time: float, drawn: float) -> None:
+        """Set the state of a silicone at rest under forces."""
+        state = self._state
+        state.force[:] = state.delayed[:] = forces
+        state.numbers[_TIME], state.numbers[_RATE] = time, self._constants.spread * drawn
+
     def _colour(self, clock: Array, drawn: Array) -> None:
-        """Colour the noise, with random numbers of its own."""
-        parameters = self._parameters
-        shape = (len(clock), *self._state.colour.shape)
-        fresh = self._colour_generator.standard_normal(shape)
-        _write_coloured(
-            clock, self._state.numbers[_TIME], parameters.slow_share, parameters.slow_time,
-            parameters.walk, 1 / math.sqrt(parameters.n_averaged), fresh, self._state.colour, drawn,
-        )  # fmt: skip
+        """Colour the noise, with random numbers of its own: white, slow and a random walk.
+
+        The slow part is an Ornstein-Uhlenbeck process, which begins with its stationary variance:
+        y <- e y + sqrt(1 - e^2) n, with e = exp(-h / tau) over a step h. The walk begins at 0.
+        Averaging lowers only the white noise.
+        """
+        parameters, (slow, walk) = self._parameters, self._state.colour
+        fresh = self._colour_generator.standard_normal((len(clock), 2, len(slow)))
+        share, scale = parameters.slow_share, 1 / math.sqrt(parameters.n_averaged)
+        steps = np.diff(clock, prepend=self._state.numbers[_TIME]).tolist()
+        for step, normal, white in zip(steps, fresh, drawn[:, 1:], strict=True):
+            keep = 0.0 if math.isnan(step) else math.exp(-step / parameters.slow_time)
+            wander = 0.0 if math.isnan(step) else parameters.walk * math.sqrt(step)
+            slow[:] = keep * slow + math.sqrt(1 - keep * keep) * normal[0]
+            walk += wander * normal[1]
+            white[:] = math.sqrt(1 - share) * white + scale * (math.sqrt(share) * slow + walk)
 
     def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
         forces = np.ascontiguousarray(taxel_forces, dtype=np.float64)
@@ -299,7 +315,6 @@ def _constants(parameters: UskinParameters, taxels: Taxels) -> _Constants:
         np.array(parameters.lag_times),
         1.0 - float(shares.sum()),
         _noise_of_reading(parameters),
-        int(parameters.n_averaged),
         parameters.scan_time,
         int(parameters.scan_line),
         float(parameters.step),
@@ -313,221 +328,3 @@ def _noise_of_reading(parameters: UskinParameters) -> Array:
     noises = [parameters.noise_counts * factor for factor in parameters.noise_by_axis]
     before_rounding = [math.sqrt(max(noise**2 - ROUNDING_VARIANCE, 0.0)) for noise in noises]
     return np.array(before_rounding) * math.sqrt(parameters.n_averaged)
-
-
-@compiled
-def saturated(newtons: float, limit: float) -> float:
-    """Return a reading that saturates at a limit: x / (1 + (x / limit)^4)^(1/4).
-
-    With a limit of 7.35 N the slope falls to 85 % at 4.5 N and to 48 % at 7 N, where the data
-    sheet shows a change of slope.
-
-    Args:
-        newtons: reading without a limit [N].
-        limit: limit of the reading [N].
-
-    Returns:
-        The saturated reading [N].
-    """
-    square = (newtons / limit) ** 2
-    return newtons / math.sqrt(math.sqrt(1.0 + square * square))
-
-
-@compiled
-def _read_out(
-    forces: Array, times: Array, drawn: Array, constants: _Constants, state: _State, out: Counts
-) -> None:
-    """Write the counts of samples, and advance the state.
-
-    Args:
-        forces: (n, n_taxels, 3) forces [N].
-        times: (n,) times [s].
-        drawn: (n, 1 + 3 n_taxels) normal random numbers: of the warming, of the readings.
-        constants: properties of the fingertip.
-        state: its state; it is written.
-        out: (n, n_taxels, 3) is written.
-    """
-    numbers = state.numbers
-    if np.isnan(numbers[_TIME]):
-        numbers[_TIME], numbers[_RATE] = times[0], constants.spread * drawn[0, 0]
-        _rest(forces[0], state)
-    passed = np.empty_like(state.force)
-    at_once = constants.scan == 0.0 and constants.n_averaged == 1
-    for k in range(len(times)):
-        step = times[k] - numbers[_TIME]
-        _advance_warming(constants, step, drawn[k, 0], numbers)
-        _low_pass(constants, forces[k], step, state, passed)
-        if at_once:
-            _write_counts(constants, passed, numbers[_WARMTH], drawn[k, 1:], out[k])
-        else:
-            _write_last_counts(constants, passed, times[k], drawn[k, 1:], state, out[k])
-        numbers[_TIME] = times[k]
-
-
-@compiled
-def _write_coloured(
-    times: Array,
-    last: float,
-    share: float,
-    tau: float,
-    walk: float,
-    scale: float,
-    fresh: Array,
-    colour: Array,
-    drawn: Array,
-) -> None:
-    """Write coloured noise over white noise: white, a slow part, and a random walk.
-
-    The slow part is an Ornstein-Uhlenbeck process, which begins with its stationary variance:
-    y <- e y + sqrt(1 - e^2) n, with e = exp(-h / tau) over a step h. The walk begins at 0.
-
-    Args:
-        times: (n,) times [s].
-        last: time before them [s]; NaN at the start.
-        share: of the variance that is slow.
-        tau: correlation time of the slow part [s].
-        walk: rms of the random walk in a second.
-        scale: factor on the slow part and the walk: averaging lowers only white noise.
-        fresh: (n, 2, m) normal random numbers.
-        colour: (2, m) state; it is written.
-        drawn: (n, 1 + m) is written from its second column on.
-    """
-    for k in range(len(times)):
-        step = np.inf if np.isnan(last) else times[k] - last
-        keep = np.exp(-step / tau)
-        kick = np.sqrt(1 - keep * keep)
-        wander = 0.0 if np.isnan(last) else walk * np.sqrt(step)
-        for i in range(colour.shape[1]):
-            colour[0, i] = keep * colour[0, i] + kick * fresh[k, 0, i]
-            colour[1, i] += wander * fresh[k, 1, i]
-            slow = np.sqrt(share) * colour[0, i] + colour[1, i]
-            drawn[k, 1 + i] = np.sqrt(1 - share) * drawn[k, 1 + i] + scale * slow
-        last = times[k]
-
-
-@compiled
-def _rest(forces: Array, state: _State) -> None:
-    """Set the state of a silicone at rest under forces."""
-    for i in range(forces.shape[0]):
-        for axis in range(forces.shape[1]):
-            state.force[i, axis] = forces[i, axis]
-            for lag in range(len(state.delayed)):
-                state.delayed[lag, i, axis] = forces[i, axis]
-
-
-@compiled
-def _advance_warming(constants: _Constants, step: float, drawn: float, numbers: Array) -> None:
-    """Advance rate and temperature, an integrated random rate; the first step is 0."""
-    keep = np.exp(-step / constants.thermal_time)
-    rate = keep * numbers[_RATE] + np.sqrt(1 - keep * keep) * constants.spread * drawn
-    numbers[_WARMTH] += 0.5 * (numbers[_RATE] + rate) * step
-    numbers[_RATE] = rate
-
-
-@compiled
-def _low_pass(
-    constants: _Constants, forces: Array, step: float, state: _State, passed: Array
-) -> None:
-    """Write the force after the silicone: the sum of a prompt part and low-pass parts.
-
-    It is exact for forces that are linear between samples. Over a step h of a force from u to v:
-    y <- e y + (g - e) u + (1 - g) v, with e = exp(-h / tau) and g = (1 - e) tau / h.
-    """
-    n_taxels, n_axes = forces.shape
-    for i in range(n_taxels):
-        for axis in range(n_axes):
-            passed[i, axis] = constants.prompt * forces[i, axis]
-    for lag in range(len(constants.taus)):
-        ratio = step / constants.taus[lag]
-        keep = np.exp(-ratio)
-        mean = 1.0 if ratio == 0.0 else -np.expm1(-ratio) / ratio
-        for i in range(n_taxels):
-            for axis in range(n_axes):
-                late = keep * state.delayed[lag, i, axis]
-                late += (mean - keep) * state.force[i, axis] + (1 - mean) * forces[i, axis]
-                state.delayed[lag, i, axis] = late
-                passed[i, axis] += constants.shares[lag] * late
-    for i in range(n_taxels):
-        for axis in range(n_axes):
-            state.force[i, axis] = forces[i, axis]
-
-
-@compiled
-def _write_counts(
-    constants: _Constants, forces: Array, warmth: float, drawn: Array, out: Counts
-) -> None:
-    """Write the counts of a packet whose taxels are all read when it is sent."""
-    n_taxels, n_axes = forces.shape
-    for i in range(n_taxels):
-        for axis in range(n_axes):
-            value = _reading(constants, forces, i, axis, warmth, drawn[i * n_axes + axis])
-            out[i, axis] = _whole(value, constants.step)
-
-
-@compiled
-def _write_last_counts(
-    constants: _Constants, forces: Array, time: float, drawn: Array, state: _State, out: Counts
-) -> None:
-    """Write the counts of a packet: the mean of the last readings of each taxel, rounded.
-
-    A taxel that was not read since the last packet shows the same counts again. Between two
-    packets forces are linear.
-    """
-    n_taxels, n_axes = forces.shape
-    warmth = state.numbers[_WARMTH]
-    for i in range(n_taxels):
-        share = _share_of_step(constants, i, time, state)
-        if share > 0.0:
-            for axis in range(n_axes):
-                before = state.passed[i, axis]
-                state.passed[i, axis] = before + share * (forces[i, axis] - before)
-            place = state.n_read[i] % constants.n_averaged
-            state.n_read[i] += 1
-            n_known = min(state.n_read[i], constants.n_averaged)
-            for axis in range(n_axes):
-                random = drawn[i * n_axes + axis]
-                reading = _reading(constants, state.passed, i, axis, warmth, random)
-                state.readings[place, i, axis] = reading
-                mean = state.readings[:n_known, i, axis].sum() / n_known
-                state.shown[i, axis] = _whole(mean, constants.step)
-        for axis in range(n_axes):
-            out[i, axis] = state.shown[i, axis]
-            state.passed[i, axis] = forces[i, axis]
-
-
-@compiled
-def _share_of_step(constants: _Constants, i: int, time: float, state: _State) -> float:
-    """Return when a taxel was read last, as a share of the step from the last packet to this.
-
-    Readings of taxel i are at (j + (i mod n + 1/2) / n) scan times, for j = 0, 1, ..., with n
-    taxels on a line. The result is at most 0 if there was none in this step.
-    """
-    before = state.numbers[_TIME]
-    if constants.scan == 0.0 or state.n_read[i] == 0 or time <= before:
-        return 1.0
-    phase = (i % constants.line + 0.5) / constants.line
-    last = (math.floor(time / constants.scan - phase) + phase) * constants.scan
-    share: float = (last - before) / (time - before)
-    return share
-
-
-@compiled_inside
-def _whole(value: float, step: float) -> float:
-    """Return a reading as a multiple of a step, between 0 and the largest number [count]."""
-    whole: float = min(max(np.rint(value / step) * step, 0.0), UINT16_MAX)
-    return whole
-
-
-@compiled_inside
-def _reading(
-    constants: _Constants, forces: Array, i: int, axis: int, warmth: float, random: float
-) -> float:
-    """Compute a reading: cross-talk and gain, range, baseline, temperature, noise [count]."""
-    taxels = constants.taxels
-    newtons = 0.0
-    for other in range(forces.shape[1]):
-        newtons += taxels.mixing[i, axis, other] * forces[i, other]
-    value: float = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
-    value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
-    value += constants.noise[axis] * taxels.noise[i] * random
-    return value

@@ -7,7 +7,7 @@ import numpy as np
 from holdfast.contact import Phase
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import TIP_SLIP, TIP_SLIPPING_SHARE, Contact, constants_of, new_contact
+from holdfast.twin.contact import Contact, constants_of, new_contact
 from holdfast.twin.control import STEPS_PER_CONTROL, Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import (
@@ -17,7 +17,6 @@ from holdfast.twin.hand import (
     SUBSTEPS,
     TIMESTEP,
     HandModel,
-    fill_bodies,
 )
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
@@ -25,8 +24,14 @@ from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import NO_GUIDE
 from holdfast.twin.physics import Action, Physics, Steps, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
-from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
+from holdfast.twin.steps import (
+    MU_KINETIC,
+    MU_STATIC,
+    TIP_SLIP,
+    TIP_SLIPPING_SHARE,
+    fill_bodies,
+)
 from holdfast.twin.surface import Surface, curved_fingertip
 
 MIN_HEIGHT = -0.3

@@ -2,22 +2,21 @@
 
 Two opposite pads are a parallel gripper; with more, one pad (the thumb) faces the others. Every
 pad closes along a straight line on a drive of finite stiffness, and yields sideways. MuJoCo
-moves the bodies; skin and object meet in `holdfast.twin.contact`.
+moves the bodies; skin and object meet in contact.c.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import touch
-from holdfast.twin.hand import HandModel, apply_forces, fill_bodies, object_xml
+from holdfast.twin.hand import HandModel, object_xml
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, reach_of
 from holdfast.twin.protocol import OPEN_GAP
 from holdfast.twin.randomized.palm import PalmMotion
 from holdfast.twin.skin import Skin
+from holdfast.twin.steps import apply_forces, fill_bodies, on_object, touch
 from holdfast.twin.surface import Surface
 from holdfast.twin.world import ContactWorld
 
@@ -161,7 +160,7 @@ def gripper_model(
   <default><geom contype="0" conaffinity="0"/></default>
   <worldbody>{bodies}{object_xml(item)}</worldbody>
 </mujoco>""")
-    tips = np.array([model.body(f"pad{i}").id for i in range(layout.n_pads)])
+    tips = np.array([model.body(f"pad{i}").id for i in range(layout.n_pads)], np.intc)
     mounts = np.zeros((layout.n_pads, 3))
     return HandModel(model, mujoco.MjData(model), tips, model.body("object").id, mounts)
 
@@ -253,6 +252,7 @@ class GripperWorld(ContactWorld):
         self._draw_glitch()
         noise = self.drives.noise * self._generator.standard_normal(self.layout.n_pads)
         self.set_point_error = float(np.abs(self._jump).max())
+        drives, damping = slice(0, N_PAD_JOINTS * len(noise), N_PAD_JOINTS), self.drives.damping
         for k in range(self.n_substeps):
             at = palm.at(row + k * self.timestep)
             model.opt.gravity[:] = palm.gravity[at]
@@ -261,15 +261,16 @@ class GripperWorld(ContactWorld):
             touch(self.contact, self.constants, self.bodies, self.timestep)
             operator.fill(self.bodies[-1], self.outside, k * self.timestep)
             self._limit_torque()
-            _on_object(
+            self._wrench[:] = on_object(
                 self.contact.wrench, self.outside, self.bodies[-1], self.item.inertia,
-                self.item.mass, palm.spin[at], palm.turn[at], self._wrench,
+                self.item.mass, palm.spin[at], palm.turn[at],
             )  # fmt: skip
             apply_forces(self.hand.arrays, self.contact.tips, self._wrench, self.bodies)
-            _drive(
-                data.qpos, data.qvel, travels, self._jump, noise, self.drives.stiffness,
-                self.drives.damping, data.qfrc_applied,
-            )  # fmt: skip
+            data.qfrc_applied[drives] = (
+                self.drives.stiffness * (travels + self._jump - data.qpos[drives])
+                - damping * data.qvel[drives]
+                + noise
+            )
             mujoco.mj_step2(model, data)
         self.time += self.n_substeps * self.timestep
 
@@ -317,45 +318,3 @@ class OperatorForce:
             ahead: time since the sample began [s].
         """
         out[:] = 0.0
-
-
-@compiled
-def _on_object(
-    fingers: Array,
-    outside: Array,
-    body: Array,
-    inertia: Array,
-    mass: float,
-    spin: Array,
-    turn: Array,
-    out: Array,
-) -> None:
-    """Sum fingers, operator and the inertia of a turning frame: -m(2 w x v), -I dw/dt."""
-    for k in range(6):
-        out[k] = fingers[k] + outside[k]
-    vx, vy, vz = body[12], body[13], body[14]
-    out[0] -= 2 * mass * (spin[1] * vz - spin[2] * vy)
-    out[1] -= 2 * mass * (spin[2] * vx - spin[0] * vz)
-    out[2] -= 2 * mass * (spin[0] * vy - spin[1] * vx)
-    for r in range(3):  # I = R diag R^T
-        for c in range(3):
-            about = 0.0
-            for k in range(3):
-                about += body[3 + 3 * r + k] * inertia[k] * body[3 + 3 * c + k]
-            out[3 + r] -= about * turn[c]
-
-
-@compiled
-def _drive(
-    place: Array,
-    speed: Array,
-    travels: Array,
-    jump: Array,
-    noise: Array,
-    stiffness: float,
-    damping: float,
-    out: Array,
-) -> None:
-    for i in range(len(travels)):
-        j = N_PAD_JOINTS * i
-        out[j] = stiffness * (travels[i] + jump[i] - place[j]) - damping * speed[j] + noise[i]

@@ -13,7 +13,7 @@ from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array, Integers
 from holdfast.twin.hand import FINGERS
-from holdfast.twin.operator import draw_tremor, hold_wrench
+from holdfast.twin.operator import draw_tremor
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.randomized.arms import carrying_legs, draw_carrier, person_acceleration
@@ -36,6 +36,7 @@ from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
 from holdfast.twin.randomized.palm import Segment, log_uniform, palm_motion, uniform
 from holdfast.twin.randomized.scenario import Scenario, draw_events
 from holdfast.twin.simulation import generator_of
+from holdfast.twin.steps import hold_wrench
 from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
 from holdfast.twin.world import TruthLog
 

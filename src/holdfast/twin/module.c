@@ -1,0 +1,414 @@
+/* The extension module of the twin: Python objects in, C pointers out, no arithmetic.
+ *
+ * A function takes numbers, arrays and named tuples of them, which module_fields.c describes: the
+ * fields of a struct are read from the attributes of the same names. All arrays are checked at each
+ * call, before anything is computed: type, order in memory, and shape, where an axis of one name
+ * has one length in all arguments. The GIL is kept: a step takes microseconds. */
+#include "../kernel/arrays.h"
+
+#include "steps.c"
+
+#include "module_fields.c"
+
+/* What a call has read so far. */
+typedef struct {
+    array arrays[MAX_ARRAYS];
+    size_t n_arrays;
+    Py_ssize_t lengths[N_AXES + 1]; /* by name of the axis; -1 until it was seen */
+} call;
+
+/* Each of these calls a step, and fills the numbers that it returns. */
+
+static void run_distances(arguments *a, double *Py_UNUSED(out))
+{
+    distances(a->solid, a->points, a->n, a->out);
+}
+
+static void run_probe(arguments *a, double *out)
+{
+    *(nearest *)out = probe(a->solid, a->point);
+}
+
+static void run_relief(arguments *a, double *out)
+{
+    *out = relief(a->solid, a->point);
+}
+
+static void run_touch(arguments *a, double *Py_UNUSED(out))
+{
+    touch(&a->physics.contact, &a->physics.constants, a->bodies, a->period);
+}
+
+static void run_fill_bodies(arguments *a, double *Py_UNUSED(out))
+{
+    fill_bodies(&a->physics.arrays, (body *)a->bodies);
+}
+
+static void run_apply_forces(arguments *a, double *Py_UNUSED(out))
+{
+    apply_forces(&a->physics.arrays, (const tip *)a->tips, a->total, a->bodies);
+}
+
+static void run_on_object(arguments *a, double *out)
+{
+    *(wrench *)out =
+        on_object(a->fingers, a->outside, a->body, *a->inertia, a->mass, *a->spin, *a->turn);
+}
+
+static void run_control(arguments *a, double *Py_UNUSED(out))
+{
+    control(&a->physics.controller, a->tick, a->joints, a->bias, a->target, a->period, a->torques);
+}
+
+static void run_fill_targets(arguments *a, double *Py_UNUSED(out))
+{
+    fill_targets(a->grid, a->n, a->path, a->first, a->depths, a->m, a->out);
+}
+
+static void run_tremor_at(arguments *a, double *out)
+{
+    *(motion *)out = tremor_at(a->tremor, a->time, (size_t)a->step);
+}
+
+static void run_aim(arguments *a, double *out)
+{
+    *(motion *)out = aim(a->style, a->depth, a->rate, a->elapsed, a->duration);
+}
+
+static void run_hold_wrench(arguments *a, double *out)
+{
+    *(wrench *)out =
+        hold_wrench(a->body, a->anchor, a->gain, a->weight, a->tremor, a->rms, a->time);
+}
+
+static void run_guide_wrench(arguments *a, double *out)
+{
+    *(wrench *)out = guide_wrench(a->body, a->guide, a->ahead, a->tremor, a->time);
+}
+
+static void run_disturb_wrench(arguments *a, double *out)
+{
+    *(wrench *)out = disturb_wrench(
+        a->body, a->anchor, a->parameters, a->style, a->duration, a->tremor, a->rms, a->elapsed);
+}
+
+static void run_advance_sample(arguments *a, double *out)
+{
+    *out = advance_sample(&a->engine, &a->physics, a->tick, a->target, &a->action);
+}
+
+static void run_apply_all(arguments *a, double *out)
+{
+    *out = apply_all(&a->physics, a->tick, a->step, a->target, &a->action, a->time);
+}
+
+static void run_saturated(arguments *a, double *out)
+{
+    *out = saturated(a->newtons, a->limit);
+}
+
+static void run_read_out(arguments *a, double *Py_UNUSED(out))
+{
+    read_out(a->forces, a->times, a->drawn, a->n, &a->constants, &a->state, a->counts);
+}
+
+/* A function of the module. */
+typedef struct {
+    const char *name;
+    field *fields;
+    void (*run)(arguments *, double *);
+    Py_ssize_t n_results;
+} function;
+
+static function functions[] = {
+    {"distances", distances_arguments, run_distances, 0},
+    {"probe", probe_arguments, run_probe, 4},
+    {"relief", probe_arguments, run_relief, 1},
+    {"touch", touch_arguments, run_touch, 0},
+    {"fill_bodies", fill_bodies_arguments, run_fill_bodies, 0},
+    {"apply_forces", apply_forces_arguments, run_apply_forces, 0},
+    {"on_object", on_object_arguments, run_on_object, 6},
+    {"control", control_arguments, run_control, 0},
+    {"fill_targets", fill_targets_arguments, run_fill_targets, 0},
+    {"tremor_at", tremor_at_arguments, run_tremor_at, 2},
+    {"aim", aim_arguments, run_aim, 2},
+    {"hold_wrench", hold_wrench_arguments, run_hold_wrench, 6},
+    {"guide_wrench", guide_wrench_arguments, run_guide_wrench, 6},
+    {"disturb_wrench", disturb_wrench_arguments, run_disturb_wrench, 6},
+    {"advance_sample", advance_sample_arguments, run_advance_sample, 1},
+    {"apply_all", apply_all_arguments, run_apply_all, 1},
+    {"saturated", saturated_arguments, run_saturated, 1},
+    {"read_out", read_out_arguments, run_read_out, 0},
+};
+
+/* Read an array and check its shape, or set an exception and return -1. */
+static int read_array(call *c, const field *f, PyObject *value, void *target)
+{
+    Py_ssize_t expected[4];
+    int n_axes = 0;
+    array *const a = &c->arrays[c->n_arrays];
+    while (n_axes < 4 && f->axes[n_axes] != 0) {
+        ++n_axes;
+    }
+    c->n_arrays += 1; /* it is released with the others, whatever happens */
+    const int flags = f->is_out ? PyBUF_WRITABLE : PyBUF_SIMPLE;
+    if (get_array(f->format, value, f->name, n_axes, flags, a) < 0) {
+        return -1;
+    }
+    for (int axis = 0; axis < n_axes; ++axis) {
+        const int length = f->axes[axis];
+        Py_ssize_t *const seen = length < 0 ? &c->lengths[-length] : &(Py_ssize_t){length};
+        if (*seen < 0) {
+            *seen = a->view.shape[axis];
+            if (*seen == 0 && length != N_SAMPLES && length != N_POINTS) {
+                PyErr_Format(PyExc_ValueError, "%s: axis %d has the length 0", f->name, axis);
+                return -1;
+            }
+        }
+        expected[axis] = *seen;
+    }
+    *(void **)target = a->view.buf;
+    return check_shape(a, expected);
+}
+
+/* Read the fields of an object, or set an exception and return -1. */
+static int read_struct(call *c, field *fields, PyObject *object, char *target);
+
+static int read_field(call *c, const field *f, PyObject *value, char *target)
+{
+    if (f->kind == AN_ARRAY) {
+        return read_array(c, f, value, target);
+    }
+    if (f->kind == A_STRUCT) {
+        return read_struct(c, f->fields, value, target);
+    }
+    if (f->kind == A_REAL) {
+        *(double *)target = PyFloat_AsDouble(value);
+    } else {
+        *(int64_t *)target = PyLong_AsLongLong(value);
+    }
+    return PyErr_Occurred() ? -1 : 0;
+}
+
+static int read_struct(call *c, field *fields, PyObject *object, char *target)
+{
+    for (field *f = fields; f->name != NULL; ++f) {
+        if (f->kind == A_LENGTH) {
+            *(size_t *)(target + f->offset) = (size_t)c->lengths[-f->axes[0]];
+            continue;
+        }
+        if (f->key == NULL && (f->key = PyUnicode_InternFromString(f->name)) == NULL) {
+            return -1;
+        }
+        PyObject *const value = PyObject_GetAttr(object, f->key);
+        const int result = value == NULL ? -1 : read_field(c, f, value, target + f->offset);
+        Py_XDECREF(value); /* its buffer, if any, keeps it */
+        if (result < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int refuse(const char *reason)
+{
+    PyErr_SetString(PyExc_ValueError, reason);
+    return -1;
+}
+
+/* Check the numbers by which steps index or divide, or set an exception and return -1. */
+static int check_numbers(const call *c, const function *f, const arguments *a)
+{
+    const hand *const h = &a->physics.arrays;
+    const steps *const s = &a->physics.steps;
+    const Py_ssize_t n_tips = c->lengths[-N_TIPS], n_bodies = c->lengths[-N_BODIES];
+    if (n_tips >= 0 && n_bodies >= 0 && n_bodies != n_tips + 1) {
+        return refuse("bodies: a row for each fingertip and one for the object expected");
+    }
+    if (h->tips != NULL) {
+        for (size_t i = 0; i <= h->n_tips; ++i) {
+            const int64_t body = i < h->n_tips ? h->tips[i] : h->object_body;
+            if (body < 0 || (size_t)body >= h->n_model || h->roots[body] < 0 ||
+                (size_t)h->roots[body] >= h->n_model) {
+                return refuse("tips, object_body, roots: a body that the model does not have");
+            }
+        }
+    }
+    for (int axis = N_QPOS; a->target != NULL && axis <= N_TORQUES; ++axis) {
+        if (c->lengths[-axis] >= 0 && c->lengths[-axis] < N_JOINTS) {
+            return refuse("joints, bias or torques: at least 16 numbers expected");
+        }
+    }
+    for (size_t i = 0; a->first != NULL && i < a->m; ++i) {
+        if (a->first[i] < 0 || a->first[i] > N_JOINTS - JOINTS_OF_FINGER || a->n < 2) {
+            return refuse("first, grid: joints of the hand and two points of a path expected");
+        }
+    }
+    if (a->tick < 0 || a->step < 0 || (f->run == run_tremor_at && a->step > 2)) {
+        return refuse("a number of a step or an axis is out of range");
+    }
+    if (a->physics.bodies != NULL && (s->n < 0 || s->per_control < 1 || a->tick > INT64_MAX / 2 ||
+                                      s->n > INT64_MAX / 2 || a->step > INT64_MAX / 2)) {
+        return refuse("steps: a number is out of range");
+    }
+    if (f->run == run_advance_sample &&
+        !(a->engine.first_half && a->engine.second_half && a->engine.model && a->engine.data)) {
+        return refuse("engine: an address is 0");
+    }
+    if (f->run == run_read_out &&
+        (a->constants.line < 1 || c->lengths[-N_DRAWN] != 1 + 3 * c->lengths[-N_TAXELS])) {
+        return refuse("line: at least 1 expected; drawn: 1 + 3 numbers for each taxel");
+    }
+    return 0;
+}
+
+/* Return None, a number, or a tuple of numbers. */
+static PyObject *results(const double *numbers, Py_ssize_t n)
+{
+    if (n < 2) {
+        return n == 0 ? Py_NewRef(Py_None) : PyFloat_FromDouble(*numbers);
+    }
+    PyObject *const tuple = PyTuple_New(n);
+    for (Py_ssize_t i = 0; tuple != NULL && i < n; ++i) {
+        PyObject *const number = PyFloat_FromDouble(numbers[i]);
+        if (number == NULL) {
+            Py_DECREF(tuple);
+            return NULL;
+        }
+        PyTuple_SetItem(tuple, i, number);
+    }
+    return tuple;
+}
+
+/* Call a function of the table, which is in the capsule. */
+static PyObject *run(PyObject *capsule, PyObject *const *args, Py_ssize_t n_args)
+{
+    const function *const f = PyCapsule_GetPointer(capsule, NULL);
+    arguments a = {0};
+    call c = {0};
+    memset(c.lengths, -1, sizeof c.lengths);
+    PyObject *result = NULL;
+    double numbers[6];
+    Py_ssize_t n = 0;
+    for (const field *argument = f->fields; argument->name != NULL; ++argument) {
+        char *const target = (char *)&a + argument->offset;
+        if (argument->kind == A_LENGTH) {
+            *(size_t *)target = (size_t)c.lengths[-argument->axes[0]];
+        } else if (n++ >= n_args) {
+            continue; /* to count them */
+        } else if (read_field(&c, argument, args[n - 1], target) < 0) {
+            goto done;
+        }
+    }
+    if (n != n_args) {
+        PyErr_Format(PyExc_TypeError, "%s: %zd arguments expected, %zd given", f->name, n, n_args);
+        goto done;
+    }
+    if (check_numbers(&c, f, &a) == 0) {
+        f->run(&a, numbers);
+        result = results(numbers, f->n_results);
+    }
+done:
+    release(c.arrays, c.n_arrays);
+    return result;
+}
+
+/* Columns of arrays, and other whole numbers of the C files that Python uses too. */
+#define COLUMN(type, member) ((long)(offsetof(type, member) / sizeof(double)))
+static const struct {
+    const char *name;
+    long value;
+} whole_numbers[] = {
+    {"REVOLVED", REVOLVED},
+    {"BOX", BOX},
+    {"HEXAGON", HEXAGON},
+    {"CAPSULE", CAPSULE},
+    {"CODE", COLUMN(solid, code)},
+    {"SIDE_OUT", COLUMN(solid, side_out)},
+    {"SIDE_UP", COLUMN(solid, side_up)},
+    {"SIDE_LENGTH", COLUMN(solid, side_length)},
+    {"EXTENSION", COLUMN(solid, extension)},
+    {"CENTRE", COLUMN(solid, centre)},
+    {"TEXTURE_AMPLITUDE", COLUMN(solid, texture_amplitude)},
+    {"AROUND_2", COLUMN(solid, around_2)},
+    {"MU_STATIC", COLUMN(solid, mu_static)},
+    {"MU_KINETIC", COLUMN(solid, mu_kinetic)},
+    {"N_OBJECT_NUMBERS", N_NUMBERS(solid)},
+    {"N_BRISTLE", N_NUMBERS(bristle)},
+    {"TIP_SLIP", COLUMN(tip, slip)},
+    {"TIP_SLIPPING_SHARE", COLUMN(tip, slipping_share)},
+    {"TIP_LOAD", COLUMN(tip, load)},
+    {"N_TIP", N_NUMBERS(tip)},
+    {"GUIDE_STIFFNESS", COLUMN(guide, stiffness)},
+    {"N_GUIDE", N_NUMBERS(guide)},
+    {"PUSH", PUSH},
+    {"JERK", JERK},
+    {"SHAKE", SHAKE},
+    {"MOVE", MOVE},
+};
+
+static const struct {
+    const char *name;
+    double value;
+} real_numbers[] = {
+    {"MAX_RELIEF", MAX_RELIEF},
+    {"DERIVATIVE", DERIVATIVE},
+    {"ENCODER_STEP", ENCODER_STEP},
+    {"TORQUE_STEP", TORQUE_STEP},
+    {"TORQUE_LIMIT", TORQUE_LIMIT},
+    {"HOLD_STIFFNESS", HOLD_STIFFNESS},
+    {"HOLD_TURN_STIFFNESS", HOLD_TURN_STIFFNESS},
+    {"PUSH_LIMIT", PUSH_LIMIT},
+    {"PUSH_GAP", PUSH_GAP},
+    {"MOVE_GRASP_TIME", MOVE_GRASP_TIME},
+};
+
+/* Add an object, whose reference is taken, or return -1. */
+static int add_object(PyObject *module, const char *name, PyObject *object)
+{
+    const int result = PyModule_AddObjectRef(module, name, object); /* fails for NULL */
+    Py_XDECREF(object);
+    return result;
+}
+
+#define N_OF(table) (sizeof(table) / sizeof((table)[0]))
+static PyMethodDef methods[N_OF(functions)];
+
+static int add_contents(PyObject *module)
+{
+    int result = PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
+    for (size_t i = 0; result == 0 && i < N_OF(functions); ++i) {
+        methods[i] =
+            (PyMethodDef){functions[i].name, (PyCFunction)(void (*)(void))run, METH_FASTCALL, NULL};
+        PyObject *const capsule = PyCapsule_New(&functions[i], NULL, NULL);
+        PyObject *const made = capsule == NULL ? NULL : PyCFunction_New(&methods[i], capsule);
+        Py_XDECREF(capsule);
+        result = add_object(module, functions[i].name, made);
+    }
+    for (size_t i = 0; result == 0 && i < N_OF(whole_numbers); ++i) {
+        result = PyModule_AddIntConstant(module, whole_numbers[i].name, whole_numbers[i].value);
+    }
+    for (size_t i = 0; result == 0 && i < N_OF(real_numbers); ++i) {
+        PyObject *const number = PyFloat_FromDouble(real_numbers[i].value);
+        result = add_object(module, real_numbers[i].name, number);
+    }
+    return result;
+}
+
+static PyModuleDef_Slot module_slots[] = {
+#if defined(__GNUC__) && defined(__STRICT_ANSI__)
+    {Py_mod_exec, __extension__(void *) add_contents},
+#else
+    {Py_mod_exec, (void *)add_contents},
+#endif
+    {0, NULL},
+};
+
+static struct PyModuleDef module_definition = {
+    PyModuleDef_HEAD_INIT, "steps", NULL, 0, NULL, module_slots, NULL, NULL, NULL,
+};
+
+PyMODINIT_FUNC PyInit_steps(void)
+{
+    return PyModuleDef_Init(&module_definition);
+}

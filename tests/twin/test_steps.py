@@ -1,0 +1,112 @@
+"""The binding of the steps in C: what it refuses."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from holdfast.twin import steps
+from holdfast.twin.control import draw_controller
+from holdfast.twin.hand import HandModel
+from holdfast.twin.objects import object_named, solid
+from holdfast.twin.operator import draw_tremor
+
+from .grip import Grip
+
+CAN = object_named("can")
+TREMOR = draw_tremor(np.random.default_rng(0))
+BODY = np.zeros(18)
+HALF = np.zeros(16)
+
+
+def touched(**changes):
+    grip = Grip(CAN)
+    given = {"state": grip.state, "constants": grip.constants, "bodies": grip.bodies, "dt": 1e-3}
+    for name, change in changes.items():
+        given[name] = change(given[name])
+    steps.touch(*given.values())
+
+
+def fields(**changes):
+    return lambda old: old._replace(
+        **{name: make(getattr(old, name)) for name, make in changes.items()}
+    )
+
+
+def controlled(tick=0, joints=HALF, torques=HALF, **changes):
+    controller = draw_controller(np.random.default_rng(0), 1.0, 0.003, 0.0)._replace(**changes)
+    steps.control(controller, tick, joints, HALF, HALF, 0.003, torques.copy())
+
+
+def bodies_of(**changes):
+    steps.fill_bodies(HandModel.build(CAN).arrays._replace(**changes), np.zeros((5, 18)))
+
+
+def sample(tick=0, **changes):
+    engine = SimpleNamespace(first_half=0, second_half=0, model=0, data=0, **changes)
+    steps.advance_sample(engine, None, tick, HALF, None)
+
+
+REFUSED = {
+    "type": (lambda: steps.probe(solid(CAN).astype("f4"), 0, 0, 0),
+             TypeError, "solid: float64 expected, the format f given"),
+    "byte order": (lambda: steps.probe(solid(CAN).astype(">f8"), 0, 0, 0),
+                   TypeError, "solid: float64 expected, the format >d given"),
+    "axes": (lambda: steps.probe(solid(CAN)[None], 0, 0, 0),
+             ValueError, "solid: 1 axes expected, 2 given"),
+    "length": (lambda: steps.probe(solid(CAN)[:-1].copy(), 0, 0, 0),
+               ValueError, "solid: axis 0 has the length 15, 16 expected"),
+    "number": (lambda: steps.probe(solid(CAN), 0, "x", 0),
+               TypeError, "must be real number, not str"),
+    "count": (lambda: steps.probe(solid(CAN)), TypeError, "probe: 4 arguments expected, 1 given"),
+    "not contiguous": (lambda: steps.probe(np.zeros(32)[::2], 0, 0, 0),
+                       ValueError, "ndarray is not C-contiguous"),
+    "no array": (lambda: steps.probe(None, 0, 0, 0),
+                 TypeError, "a bytes-like object is required, not 'NoneType'"),
+    "points": (lambda: steps.distances(solid(CAN), np.zeros((3, 3)), np.zeros(2)),
+               ValueError, "out: axis 0 has the length 2, 3 expected"),
+    "read-only": (lambda: touched(state=fields(wrench=lambda old: np.frombuffer(bytes(48)))),
+                  ValueError, "buffer source array is read-only"),
+    "no field": (lambda: touched(constants=lambda old: old.nodes),
+                 AttributeError, "'numpy.ndarray' object has no attribute 'nodes'"),
+    "nodes": (lambda: touched(constants=fields(nodes=lambda old: old[1:].copy())),
+              ValueError, "nodes: axis 0 has the length 157, 158 expected"),
+    "no tips": (lambda: touched(state=fields(bristles=lambda old: old[:0])),
+                ValueError, "bristles: axis 0 has the length 0"),
+    "bodies": (lambda: touched(bodies=lambda old: old[:-1].copy()),
+               ValueError, "bodies: a row for each fingertip and one for the object expected"),
+    "link": (lambda: bodies_of(tips=np.full(4, 99, np.intc)),
+             ValueError, "tips, object_body, roots: a body that the model does not have"),
+    "links": (lambda: bodies_of(tips=np.arange(4.0)),
+              TypeError, "tips: int32 expected, the format d given"),
+    "object": (lambda: bodies_of(object_body=-1),
+               ValueError, "tips, object_body, roots: a body that the model does not have"),
+    "joints": (lambda: controlled(joints=np.zeros(15)),
+               ValueError, "joints, bias or torques: at least 16 numbers expected"),
+    "torques": (lambda: controlled(torques=np.zeros(15)),
+                ValueError, "joints, bias or torques: at least 16 numbers expected"),
+    "errors": (lambda: controlled(errors=np.zeros((0, 16))),
+               ValueError, "errors: axis 0 has the length 0"),
+    "tick": (lambda: controlled(tick=-1),
+             ValueError, "a number of a step or an axis is out of range"),
+    "large tick": (lambda: controlled(tick=2**63), OverflowError, "int too big to convert"),
+    "axis": (lambda: steps.tremor_at(TREMOR, 0.0, 3),
+             ValueError, "a number of a step or an axis is out of range"),
+    "physics": (sample, AttributeError, "'NoneType' object has no attribute 'steps'"),
+    "pose": (lambda: steps.hold_wrench(BODY, np.zeros(3), 1.0, 0.0, TREMOR, 0.0, 0.0),
+             ValueError, "anchor: axis 0 has the length 3, 12 expected"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "error", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_does_not_fit_is_refused(call, error, message):
+    with pytest.raises(error, match=f"^{re.escape(message)}$"):
+        call()
+
+
+def test_an_index_is_a_number_that_the_model_has():
+    touched()
+    controlled()
+    bodies_of()
+    assert steps.tremor_at(TREMOR, 0.0, 2)
