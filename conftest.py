@@ -1,12 +1,8 @@
-import ast
 import functools
-import logging
-import math
 import os
 import re
 import shutil
 import signal
-from contextlib import suppress
 from pathlib import Path
 
 import hypothesis
@@ -60,12 +56,6 @@ def data_folder():
 def collected(pytestconfig):
     """What this run collected, before any selection: file of each test, whether it is quick."""
     return pytestconfig.stash[COLLECTED]
-
-
-@pytest.fixture(autouse=True)
-def no_line_about_compiling(monkeypatch):
-    """Leave out the line that says that kernels compile: it depends on what ran before."""
-    monkeypatch.setattr(logging.getLogger("holdfast.compiled"), "disabled", True)
 
 
 @pytest.fixture
@@ -163,48 +153,3 @@ def is_slow(path):
     root = Path(__file__).parent
     is_in_slow_folder = any(path.is_relative_to(root / folder) for folder in SLOW_FOLDERS)
     return is_in_slow_folder or SLOW_FILE.search(path.read_text("utf-8")) is not None
-
-
-def pytest_sessionstart(session):
-    """Delete compiled kernels that are older than a source that they may be made of.
-
-    Numba looks at the file of a kernel only, not at those that it imports, whose functions and
-    constants are compiled into it.
-    """
-    if hasattr(session.config, "workerinput"):
-        return
-    package = Path(__file__).parent / "src" / "holdfast"
-    newest_source = max(path.stat().st_mtime for path in package.rglob("*.py"))
-    for cache in package.rglob("__pycache__/*.nb[ci]"):
-        source = cache.parents[1] / f"{cache.name.split('.')[0]}.py"
-        with suppress(FileNotFoundError):  # another run of the tests deletes them too
-            made = cache.stat().st_mtime
-            if made < newest_source and made < newest(source):  # the second one takes seconds
-                cache.unlink()
-
-
-@functools.cache
-def newest(source):
-    """When a file, or one that it imports of the package, or so on, last changed."""
-    waiting, seen = [source], set()
-    while waiting:
-        path = waiting.pop()
-        if path not in seen and path.is_file():
-            seen.add(path)
-            waiting += imported(path)
-    return max((path.stat().st_mtime for path in seen), default=math.inf)
-
-
-@functools.cache
-def imported(path):
-    """Where the modules are that a file may import of the package, some of which are not."""
-    names = []
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            module = node.module or ""
-            names += [module, *(f"{module}.{alias.name}" for alias in node.names)]
-    source = Path(__file__).parent / "src"
-    places = [source.joinpath(*name.split(".")) for name in names if name.startswith("holdfast")]
-    return [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]

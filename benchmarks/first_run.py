@@ -2,8 +2,8 @@
 
     python benchmarks/first_run.py
 
-A new environment gets this project and the extras of the demo by uv, without byte code and without
-compiled kernels. The time begins with the command; the installation does not count.
+A new environment gets this project and the extras of the demo by uv, without byte code.
+The time begins with the command; the installation does not count.
 """
 
 import json
@@ -29,7 +29,7 @@ def first_run(folder: Path) -> dict[str, float]:
     subprocess.run([*install, f"{PROJECT}[{EXTRAS}]"], check=True)
     command = str(environment / "bin" / "holdfast")
     words = [command, "demo", str(folder / "demo"), "--no-browser"]
-    variables = os.environ | {"NUMBA_CACHE_DIR": str(folder / "kernels"), "PYTHONUNBUFFERED": "1"}
+    variables = os.environ | {"PYTHONUNBUFFERED": "1"}
     variables.pop("PYTHONDONTWRITEBYTECODE", None)
     begin = time.perf_counter()
     demo = subprocess.Popen(

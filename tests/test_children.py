@@ -17,7 +17,7 @@ from holdfast.synthetic import synthetic_recording
 
 OTHER_MODULES = (
     "cloudpickle", "cyclonedds", "glfw", "holdfast", "joblib", "matplotlib", "mcap", "msgspec",
-    "mujoco", "numba", "numpy", "pyarrow", "rich", "scipy", "sklearn", "threadpoolctl", "typer",
+    "mujoco", "numpy", "pyarrow", "rich", "scipy", "sklearn", "threadpoolctl", "typer",
 )  # fmt: skip
 MARK = "import os\nopen({marker!r}, 'a').write({name!r} + ' ')\n"
 COMMAND = "import sys\nfrom holdfast.cli import main\nsys.exit(main())\n"

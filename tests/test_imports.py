@@ -25,7 +25,6 @@ def run(module):
 
 @pytest.mark.parametrize("module", [*DETECTING, "holdfast.metrics", "holdfast.classifiers"])
 def test_to_detect_no_package_of_an_extra_is_needed(module):
-    # Numba imports SciPy itself where it is installed; so it is hidden, not looked for.
     assert run(module).stderr == ""
 
 

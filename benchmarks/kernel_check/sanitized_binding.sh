@@ -14,8 +14,8 @@ sanitizers="-fsanitize=address,undefined -fno-sanitize-recover=undefined"
 CFLAGS="-g -fno-omit-frame-pointer $sanitizers" LDFLAGS="$sanitizers" CC=gcc \
     "$python" -c "import setup; setup.build_editable('.')" > build.txt || { cat build.txt; exit 1; }
 # Python itself leaks at exit, and its own allocator would hide the ends of objects. With -s the
-# report of a sanitizer is not captured. The comparison with compiled Python would compile it first.
+# report of a sanitizer is not captured.
 LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so)" \
     ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc PYTHONPATH="$copy/src" \
     "$python" -m pytest -s -o addopts= -q -p no:cacheprovider -p no:randomly \
-    tests/kernel/test_batch.py tests/kernel/test_stream.py tests/kernel/test_detector.py -k "not compiled_python" "$@"
+    tests/kernel/test_batch.py tests/kernel/test_stream.py tests/kernel/test_detector.py "$@"

@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import Any, Self
 
 BEGIN_TIMEOUT = 60.0
-"""Longest wait until the grip begins; the first start compiles [s]."""
+"""Longest wait until the grip begins [s]."""
 END_TIMEOUT = 10.0
 """Longest wait until the loop has ended [s]."""
 POLL_TIME = 0.02

@@ -8,7 +8,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from threading import Lock, Thread
@@ -16,7 +16,6 @@ from typing import Any, NamedTuple, Self, TypeVar, cast
 
 from holdfast.children import SAFE_PATH_VARIABLE, safe_path
 from holdfast.cluster import Arguments, Call, call_on_cluster
-from holdfast.compile_notice import compiling_shown, is_waiting
 from holdfast.errors import EngineError, MissingExtra, is_installed
 
 T = TypeVar("T")
@@ -161,10 +160,7 @@ def _in_processes(
         for name in list(started):
             yield name, _call_alone(function, name, started.pop(name))
         call_named = delayed(_call_in_worker)
-        tasks = (
-            call_named(os.getpid(), function, *call, shows_compiling=is_waiting())
-            for call in _record(rest, started)
-        )
+        tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
         with suppress(TerminatedWorkerError), _WITHOUT_WARNING:
             for name, result in _start(n_jobs, tasks):
                 del started[name]
@@ -236,16 +232,10 @@ def _record(calls: Iterator[Call[K]], started: dict[K, Arguments]) -> Iterator[C
 
 
 def _call_in_worker(
-    parent: int,
-    function: Callable[..., T],
-    name: K,
-    arguments: Arguments,
-    *,
-    shows_compiling: bool = False,
+    parent: int, function: Callable[..., T], name: K, arguments: Arguments
 ) -> tuple[K, T]:
     _end_with(parent)
-    with compiling_shown() if shows_compiling else nullcontext():
-        return name, function(*arguments)
+    return name, function(*arguments)
 
 
 @cache

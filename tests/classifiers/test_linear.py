@@ -21,7 +21,7 @@ def classifiers(n):
 
 
 @given(rule=classifiers(3), seed=st.integers(0, 99))
-@settings(deadline=None)  # the first one may compile
+@settings(deadline=None)
 def test_weights_decision_and_probability_agree(rule, seed):
     features = np.random.default_rng(seed).normal(scale=100, size=(20, 3))
     with np.errstate(over="ignore"):

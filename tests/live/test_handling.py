@@ -18,7 +18,7 @@ from holdfast.training import calibrate
 from live import build
 from training.build import handling_recording, normalised_model
 
-PATIENCE = 240.0  # the first fit compiles its kernels
+PATIENCE = 60.0
 OPEN = 2.0  # time before and after the handling [s]
 
 

@@ -6,7 +6,7 @@ miss, and precision is the share of alarms that are not false. Both are made her
 that the labels were made of, not by our code. aeon has no counterpart for closed gaps, for the
 stable time before an event, for latency and for rates by time.
 
-aeon pins versions of NumPy and numba, so it is not among the development tools: see
+aeon needs an older NumPy, so it is not among the development tools: see
 CONTRIBUTING.md.
 """
 

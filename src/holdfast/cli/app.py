@@ -19,7 +19,6 @@ import typer
 from typer.main import get_command
 
 from holdfast.cli.terminal.console import print_error, print_line
-from holdfast.compile_notice import compiling_shown
 from holdfast.errors import HoldfastError, missing_extra
 
 VERBS = {
@@ -87,8 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        with compiling_shown():
-            code = _run(words)
+        code = _run(words)
         sys.stdout.flush()
     except BrokenPipeError:
         return _close_stdout()

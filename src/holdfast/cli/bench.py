@@ -97,7 +97,7 @@ def benchmark(n_samples: int = 10_000_000, n_updates: int = 20_000) -> dict[str,
 
 def machine() -> dict[str, Any]:
     """Return the machine and the versions that the times depend on."""
-    packages = ("holdfast", "numpy", "numba", "scikit-learn", "PyWavelets", "tsflex")
+    packages = ("holdfast", "numpy", "scikit-learn", "PyWavelets", "tsflex")
     return {
         "processor": platform.processor() or platform.machine(),
         "n_processors": os.cpu_count(),

@@ -113,7 +113,6 @@ def demo(
     real = show_clip(speed, print_message)
     recordings = _simulate(grasps, folder, force)
     print_message(f"3/5  evaluating {DEMO_MODEL}, which was not trained on these objects")
-    print_message("     (the first run on a machine compiles the detector here)")
     ours = Model.load(DEMO_MODEL)
     metrics = evaluate(ours, recordings)
     trained = _train(recordings, model, seed, force)

@@ -67,7 +67,7 @@ _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra
 def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
     """Check the installation and the reachable sources.
 
-    Report Python, the packages, the extras and how to install them, the compiled kernels, the
+    Report Python, the packages, the extras and how to install them, the kernel, the
     live sources that can be reached, which limits hold for imports (time, time of the processor,
     memory), the plug-ins of other packages, the configuration file of
     the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
@@ -158,7 +158,7 @@ def _extra(extra: str, packages: dict[str, str | None]) -> dict[str, Any]:
 
 
 def _kernels() -> dict[str, Any]:
-    """Compile the feature kernel or load it from its cache, and run it once."""
+    """Load the kernel and run it once."""
     begin = time.perf_counter()
     error = None
     try:
@@ -172,7 +172,6 @@ def _kernels() -> dict[str, Any]:
     return {
         "ok": error is None,
         "seconds": round(time.perf_counter() - begin, 3),
-        "cache": os.environ.get("NUMBA_CACHE_DIR", "beside the package"),
         "error": error,
     }
 
@@ -216,7 +215,6 @@ def _print(report: dict[str, Any]) -> None:
     rows = [(key, report[key]) for key in ("python", "platform", "cpus")]
     rows += [
         ("kernels", loaded if kernels["ok"] else kernels["error"]),
-        ("kernel cache", kernels["cache"]),
         ("limits of imports", _limits_text(report["limits"])),
         ("HOLDFAST_DATA", _data_text(data)),
         ("your hand", _config_text(report["config"])),

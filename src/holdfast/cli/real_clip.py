@@ -1,22 +1,13 @@
-"""The first part of `holdfast demo`: a real recording, with one plain sentence per event.
+"""The first part of `holdfast demo`: a real recording, with one plain sentence per event."""
 
-The kernels run uncompiled, in a process of their own, so that the first estimates of a new
-installation do not wait for the compiler: 285 samples of two fingers take about a second.
-"""
-
-import json
-import os
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from holdfast.children import python_command
 from holdfast.contact import Cause, StateChanges
 from holdfast.detector import HAND, detect
 from holdfast.detector.detection import STATE_BY_CODE, Detection
 from holdfast.detector.slips import SlipWatch
-from holdfast.errors import HoldfastError
 from holdfast.io import load_recording
 from holdfast.model import Model
 from holdfast.recorded import BOX_SLIPS
@@ -34,7 +25,6 @@ LABEL_SENTENCES = {
     Cause.SLIP: "The authors label a slip from here on.",
     Cause.LOST: "By their label, the box is lost.",
 }
-PROGRAM = "from holdfast.cli.real_clip import print_events; print_events()"
 
 
 class ClipEvent(NamedTuple):
@@ -54,35 +44,15 @@ def show_clip(speed: float, write: Callable[[str], None]) -> list[ClipEvent]:
 
     Returns:
         The events.
-
-    Raises:
-        HoldfastError: the process that detects failed.
     """
     write("1/5  a real recording: a robot carries a box between two uSkin sensors")
-    events = _events_of_child()
+    events = sorted(_events())
     start = time.monotonic()
     for event in events:
         if speed:
             time.sleep(max(start + event.time / speed - time.monotonic(), 0))
         write(f"     {event.time:6.2f} s   {event.state:10}  {event.sentence}")
     return events
-
-
-def _events_of_child() -> list[ClipEvent]:
-    """Return the events, detected in a process in which nothing is compiled."""
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    child = subprocess.run(
-        python_command(PROGRAM), env=environment, capture_output=True, text=True, check=False
-    )
-    if child.returncode:
-        reason = (child.stderr.strip().splitlines() or ["no message"])[-1]
-        raise HoldfastError(f"the detection on {BOX_SLIPS.name} failed: {reason}")
-    return [ClipEvent(*event) for event in json.loads(child.stdout)]
-
-
-def print_events() -> None:
-    """Print the events of the clip as JSON: the program of the child."""
-    print(json.dumps(sorted(_events())))  # noqa: T201
 
 
 def _events() -> Iterator[ClipEvent]:

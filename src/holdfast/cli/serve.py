@@ -91,10 +91,7 @@ def serve(
     guard = Guard(access.host, token)
     check_speed(source, speed)
     with message_if_slow(f"loading the detector for {source}" if awaited(source) else ""):
-        from holdfast.live.stream_detector import compile_kernels
-
         loaded = options.load_model(model)
-        compile_kernels()
 
     def announce(url: str) -> None:
         report_missing_slip_rules(loaded)

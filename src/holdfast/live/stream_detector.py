@@ -15,17 +15,11 @@ from holdfast.contact import (
     HandEstimate,
     StateChanges,
 )
-from holdfast.detector import HAND, Detector
+from holdfast.detector import HAND
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.base import DeviceSource, ModuleSamples
 from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
 from holdfast.model import Model
-from holdfast.sensors import sensor
-
-
-def compile_kernels() -> None:
-    """Load the compiled kernels before a live source is opened."""
-    Detector(Model.load("builtin:noise-floor"), {"index": sensor("uskin-4x4")})
 
 
 class StreamUpdate(NamedTuple):

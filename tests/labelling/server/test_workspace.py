@@ -116,13 +116,6 @@ def test_poses_of_the_workspace(tmp_path):
     assert {label.author for label in found["thumb"]} == {"rule:tracking"}
 
 
-def test_the_warm_up_reads_nothing(tmp_path):
-    kept = workspace_of(tmp_path / "gone.parquet")
-    kept.warm_up()
-    with pytest.raises(RecordingError):
-        kept.signals(0)
-
-
 def test_recordings_that_were_deleted(tmp_path):
     kept = workspace_of(made(tmp_path, "one"))
     assert kept.open(0).recording.name == "one"

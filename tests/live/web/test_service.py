@@ -14,7 +14,7 @@ from holdfast.io import load_recording
 from holdfast.live.documents import finger_document
 from holdfast.live.session import Session
 from holdfast.live.status import operating_points
-from holdfast.live.stream_detector import StreamDetector, compile_kernels
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
 from holdfast.metrics.masks import runs
@@ -23,12 +23,6 @@ from holdfast.web.guard import Guard
 from live import build, estimates
 
 PATIENCE = 30.0
-
-
-@pytest.fixture(autouse=True, scope="module")
-def kernels():
-    """Compile the kernels before a test waits for an estimate."""
-    compile_kernels()
 
 
 @asynccontextmanager

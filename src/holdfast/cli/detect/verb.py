@@ -229,9 +229,7 @@ def _detect_live(
     """Yield the estimates of each arrival, until a signal or for `seconds`."""
     from holdfast.cli.detect.output import chunk_from_stream
     from holdfast.devices.sources import open_source
-    from holdfast.live.stream_detector import compile_kernels
 
-    compile_kernels()
     with handle_stop_signals() as stop, open_source(uri) as source:
         stream = options.create_stream(model, source)
         report_missing_slip_rules(model)

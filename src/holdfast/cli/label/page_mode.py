@@ -71,15 +71,10 @@ def show_label_page(
     def announce(url: str) -> None:
         _announce(page_url(url, token), files, browser=browser, as_json=as_json)
 
-    threads = [
-        Thread(target=work, args=(workspace,), daemon=True)
-        for work in (_prepare, Workspace.warm_up)
-    ]
-    for thread in threads:
-        thread.start()
+    preparing = Thread(target=_prepare, args=(workspace,), daemon=True)
+    preparing.start()
     run_server(LabellingService(workspace, guard).app, access.host, access.port, announce)
-    for thread in threads:  # a library that is at work when Python ends stops with a fatal error
-        thread.join(END_TIMEOUT)
+    preparing.join(END_TIMEOUT)  # a library that is at work when Python ends stops with an error
 
 
 def _announce(page: str, files: Sequence[Path], *, browser: bool, as_json: bool) -> None:

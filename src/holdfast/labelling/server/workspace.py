@@ -8,8 +8,6 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
@@ -32,8 +30,7 @@ from holdfast.labelling.server.store import (
     read_stored,
     save_stored,
 )
-from holdfast.recordings import Label, Recording, Tactile
-from holdfast.sensors import sensor
+from holdfast.recordings import Label, Recording
 
 if TYPE_CHECKING:
     from holdfast.labelling.review.audit import Suspect
@@ -145,7 +142,7 @@ class Workspace:
         self._open: OrderedDict[tuple[Path, int, int], OpenRecording] = OrderedDict()
         self._read_lock = RLock()
         self._save_lock = RLock()
-        self._compute_lock = RLock()  # parallel compiled kernels must not run at the same time
+        self._compute_lock = RLock()  # two requests do not compute the signals of one recording
         self._changes_lock = RLock()  # separate: zooming does not wait for change points
 
     def summary(self, index: int) -> RecordingSummary:
@@ -188,13 +185,6 @@ class Workspace:
         opened = self.open(index)
         with self._compute_lock:
             return opened.signals
-
-    def warm_up(self) -> None:
-        """Load the compiled kernels, which takes as long as reading a recording."""
-        tip = sensor("uskin-4x4")
-        still = Tactile(tip, np.arange(32) / tip.rate, np.zeros((32, tip.n_taxels, 3)))
-        with self._compute_lock:
-            FingerSignals(still)
 
     def changes(self, index: int) -> dict[str, list[float]]:
         """Return the change points of a recording by finger [s].
