@@ -48,6 +48,14 @@ def linear(n_features, seed=0, **options):
     return Linear.of(**(fields | options))
 
 
+def outputs(rule, features):
+    """Return z of each row of features by the first output of a rule, with its squares."""
+    offset, *weights = rule.raw_weights()[0]
+    mean, inverse, squares = rule.raw_squares()
+    deviations = np.minimum(np.abs((features - mean) * inverse), 5.0)
+    return offset + features @ weights + deviations**2 @ squares
+
+
 def stable_head(features=None, seed=0, rule=None, threshold=0.5):
     features = parse_features("F_a,F_x,F_y,F_z,sigma", 6) if features is None else features
     rule = linear(len(features), seed) if rule is None else rule

@@ -35,10 +35,8 @@ def test_probabilities_are_those_of_the_classifiers(make):
         n_checked += 1
         if part.slip is not None:
             rule = part.slip.linear
-            phi, (offset, *weights) = rows[f"{own}_slip_features"], rule.raw_weights()[0]
-            mean, inverse, squares = rule.raw_squares()
-            deviations = np.minimum(np.abs((phi - mean) * inverse), 5.0)
-            expected = 1.0 / (1.0 + np.exp(-(offset + phi @ weights + deviations**2 @ squares)))
+            z = outputs(rule, rows[f"{own}_slip_features"])
+            expected = 1.0 / (1.0 + np.exp(-z))
             np.testing.assert_allclose(got[f"{own}_slip"][:, 0], expected, atol=1e-9)
             n_checked += 1
     assert n_checked == len(outputs)

@@ -71,10 +71,7 @@ def test_the_slip_rule_sees_them_in_own_units_and_so_do_its_squares():
     u = own_units(ROWS, SLIP_OWN)
     linear = rule.slope * (u @ rule.weights[0] + rule.intercepts[0]) + rule.offset
     squares = rule.slope * (np.minimum(np.abs(u), 5.0) ** 2 @ rule.squares[0])
-    (weights,), table = OWN.slip.rule.raw_weights(), OWN.slip.rule.raw_squares()
-    rows = ROWS[:, places(SLIP_OWN)]
-    of_squares = np.minimum(np.abs((rows - table[0]) * table[1]), 5.0) ** 2 @ table[2]
-    found = weights[0] + rows @ weights[1:] + of_squares
+    found = outputs(OWN.slip.rule, ROWS[:, places(SLIP_OWN)])
     assert found == pytest.approx(linear + squares, abs=1e-12, rel=1e-12)
     assert OWN.slip.threshold == 0.83
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.classifiers.linear import add_squares, speed_of
+from detector.build import outputs
 from holdfast.detector import detect
 from holdfast.features import parse_features
 from holdfast.features.specs import OF_TWO_TAXELS, SLIP_FEATURES
@@ -22,13 +22,7 @@ SETTING = Setting(
 
 
 def speeds_of(rule, highest, features):
-    (weights,), squares = rule.raw_weights(), rule.raw_squares()
-    return np.array(
-        [
-            speed_of(add_squares(weights[0] + weights[1:] @ row, row, squares), highest)
-            for row in features
-        ]
-    )
+    return np.minimum(np.maximum(outputs(rule, features), 0.0) ** 2, highest)
 
 
 @pytest.fixture(scope="module")

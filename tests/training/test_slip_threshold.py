@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from detector.build import outputs
 from holdfast.classifiers.fitting import Samples
-from holdfast.classifiers.linear import add_squares
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.contact import ContactState
 from holdfast.errors import ModelError, TrainingError
@@ -140,8 +140,7 @@ class TestTraining:
         squares = np.minimum(np.abs(deviation), 5.0) ** 2
         rows = Samples(np.hstack([deviation, squares]), slides, np.zeros(4000, dtype=np.int64))
         expected = LogisticRegression().fit(rows, {"C": 1.0, "class_weight": None}, 0).rule
-        (weights,), table = head.rule.raw_weights(), head.rule.raw_squares()
-        found = [add_squares(weights[0] + weights[1:] @ row, row, table) for row in features]
+        found = outputs(head.rule, features)
         expected_odds = expected.slope * expected.decision(rows.features) + expected.offset
         np.testing.assert_allclose(found, expected_odds, atol=1e-9)
         assert head.rule.squares[0][0] > 0.3  # it slides on either side of the mean
