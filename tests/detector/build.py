@@ -48,7 +48,7 @@ def linear(n_features, seed=0, **options):
     return Linear.of(**(fields | options))
 
 
-def outputs(rule, features):
+def z_of(rule, features):
     """Return z of each row of features by the first output of a rule, with its squares."""
     offset, *weights = rule.raw_weights()[0]
     mean, inverse, squares = rule.raw_squares()

@@ -35,7 +35,7 @@ def test_probabilities_are_those_of_the_classifiers(make):
         n_checked += 1
         if part.slip is not None:
             rule = part.slip.linear
-            z = outputs(rule, rows[f"{own}_slip_features"])
+            z = z_of(rule, rows[f"{own}_slip_features"])
             expected = 1.0 / (1.0 + np.exp(-z))
             np.testing.assert_allclose(got[f"{own}_slip"][:, 0], expected, atol=1e-9)
             n_checked += 1

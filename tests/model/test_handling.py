@@ -17,6 +17,7 @@ from detector.build import (
     sensor,
     squared_head,
     tactile,
+    z_of,
 )
 from holdfast.classifiers import Onnx
 from holdfast.detector import Detector, detect
@@ -71,7 +72,7 @@ def test_the_slip_rule_sees_them_in_own_units_and_so_do_its_squares():
     u = own_units(ROWS, SLIP_OWN)
     linear = rule.slope * (u @ rule.weights[0] + rule.intercepts[0]) + rule.offset
     squares = rule.slope * (np.minimum(np.abs(u), 5.0) ** 2 @ rule.squares[0])
-    found = outputs(OWN.slip.rule, ROWS[:, places(SLIP_OWN)])
+    found = z_of(OWN.slip.rule, ROWS[:, places(SLIP_OWN)])
     assert found == pytest.approx(linear + squares, abs=1e-12, rel=1e-12)
     assert OWN.slip.threshold == 0.83
 

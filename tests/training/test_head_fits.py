@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from detector.build import outputs
+from detector.build import z_of
 from holdfast.detector import detect
 from holdfast.features import parse_features
 from holdfast.features.specs import OF_TWO_TAXELS, SLIP_FEATURES
@@ -22,7 +22,7 @@ SETTING = Setting(
 
 
 def speeds_of(rule, highest, features):
-    return np.minimum(np.maximum(outputs(rule, features), 0.0) ** 2, highest)
+    return np.minimum(np.maximum(z_of(rule, features), 0.0) ** 2, highest)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from detector.build import outputs
+from detector.build import z_of
 from holdfast.classifiers.fitting import Samples
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.contact import ContactState
@@ -140,7 +140,7 @@ class TestTraining:
         squares = np.minimum(np.abs(deviation), 5.0) ** 2
         rows = Samples(np.hstack([deviation, squares]), slides, np.zeros(4000, dtype=np.int64))
         expected = LogisticRegression().fit(rows, {"C": 1.0, "class_weight": None}, 0).rule
-        found = outputs(head.rule, features)
+        found = z_of(head.rule, features)
         expected_odds = expected.slope * expected.decision(rows.features) + expected.offset
         np.testing.assert_allclose(found, expected_odds, atol=1e-9)
         assert head.rule.squares[0][0] > 0.3  # it slides on either side of the mean
