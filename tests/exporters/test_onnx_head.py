@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from detector.build import z_of
 from exporters.models import HAND, built_in, paper, rich
 from holdfast.classifiers import Onnx
 from holdfast.errors import ModelError
