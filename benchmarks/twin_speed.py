@@ -2,8 +2,8 @@
 
     python benchmarks/twin_speed.py [--objects can,ball,box] [--seed N]
 
-It prints the CPU time, so other work on the machine changes the figures less. The
-closing path of each object, which is computed once in a process, is not counted.
+It prints the CPU time, so other work on the machine changes the figures less. Imports and the
+closing path of each object, which is computed once in a process, are not counted.
 """
 
 import argparse
@@ -23,7 +23,7 @@ def main() -> None:
     parser.add_argument("--objects", default=",".join(load_objects(None)))
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    _closed_loop(Simulation(Grasp("can", 1, 1)), n_samples=1)  # loads MuJoCo
+    _closed_loop(Simulation(Grasp("can", 1, 1)), n_samples=1)  # imports what a sample needs
     for name in given.objects.split(","):
         grasp = Grasp(name, 2, 1, seed=given.seed)
         for way, run in {"whole grasp": _whole, "step and read": _closed_loop}.items():

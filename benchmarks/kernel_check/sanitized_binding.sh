@@ -18,4 +18,5 @@ CFLAGS="-g -fno-omit-frame-pointer $sanitizers" LDFLAGS="$sanitizers" CC=gcc \
 LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so)" \
     ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc PYTHONPATH="$copy/src" \
     "$python" -m pytest -s -o addopts= -q -p no:cacheprovider -p no:randomly \
-    tests/kernel/test_batch.py tests/kernel/test_stream.py tests/kernel/test_detector.py "$@"
+    tests/kernel/test_batch.py tests/kernel/test_stream.py tests/kernel/test_detector.py \
+    tests/twin/test_steps.py "$@"

@@ -12,6 +12,7 @@ from holdfast.twin.objects import object_named
 from holdfast.twin.operator import NO_GUIDE, draw_tremor
 from holdfast.twin.physics import (
     Action,
+    HalfSteps,
     addresses_work,
     advance_of,
     advance_sample_by_calls,
@@ -123,6 +124,21 @@ def test_a_sample_is_its_steps_called_from_python(words):
         np.testing.assert_array_equal(ours, theirs)
     assert loads > 0
     assert 0 < np.count_nonzero(worst) < len(worst)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n": -1}, "a number of a step or an axis is out of range"),
+        ({"per_control": 0}, "a number of a step or an axis is out of range"),
+        ({}, "engine: an address is 0"),
+    ],
+)
+def test_numbers_that_no_step_could_use_are_refused(change, message):
+    world = made_world()
+    given = world._physics._replace(steps=world._physics.steps._replace(**change))
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        advance_sample(HalfSteps(1, 1, 1, 0), given, 0, np.zeros(16), action(world))
 
 
 def test_worlds_beside_each_other_do_not_share_anything():

@@ -1,21 +1,24 @@
 """The binding of the steps in C: what it refuses."""
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from holdfast.sensors import sensor
 from holdfast.twin import steps
 from holdfast.twin.control import draw_controller
 from holdfast.twin.hand import HandModel
 from holdfast.twin.objects import object_named, solid
 from holdfast.twin.operator import draw_tremor
+from holdfast.twin.surface import curved_fingertip
+from holdfast.twin.uskin import Uskin, UskinParameters
 
 from .grip import Grip
 
 CAN = object_named("can")
-TREMOR = draw_tremor(np.random.default_rng(0))
+RANDOM = np.random.default_rng(0)
+TREMOR = draw_tremor(RANDOM)
 BODY = np.zeros(18)
 HALF = np.zeros(16)
 
@@ -43,9 +46,18 @@ def bodies_of(**changes):
     steps.fill_bodies(HandModel.build(CAN).arrays._replace(**changes), np.zeros((5, 18)))
 
 
-def sample(tick=0, **changes):
-    engine = SimpleNamespace(first_half=0, second_half=0, model=0, data=0, **changes)
-    steps.advance_sample(engine, None, tick, HALF, None)
+def read(n_drawn=91, **changes):
+    skin = Uskin(UskinParameters(), sensor("uskin-curved"), curved_fingertip().nodes, RANDOM)
+    readout = skin.readout()
+    constants = readout._constants._replace(**changes)
+    drawn, counts = np.zeros((1, n_drawn)), np.zeros((1, 30, 3), np.uint16)
+    steps.read_out(np.zeros((1, 30, 3)), np.ones(1), drawn, constants, readout._state, counts)
+
+
+def on_path(first=(12, 0, 4, 8), n=25):
+    numbers = np.linspace(0.1, 0.0, n)
+    joints = np.zeros((4, n, 4))
+    steps.fill_targets(numbers, joints, np.array(first, np.intc), np.zeros(4), HALF.copy())
 
 
 REFUSED = {
@@ -93,7 +105,18 @@ REFUSED = {
     "large tick": (lambda: controlled(tick=2**63), OverflowError, "int too big to convert"),
     "axis": (lambda: steps.tremor_at(TREMOR, 0.0, 3),
              ValueError, "a number of a step or an axis is out of range"),
-    "physics": (sample, AttributeError, "'NoneType' object has no attribute 'steps'"),
+    "physics": (lambda: steps.apply_all(None, 0, 0, HALF, None, 0.0),
+                AttributeError, "'NoneType' object has no attribute 'steps'"),
+    "line": (lambda: read(line=0),
+             ValueError, "line: at least 1 expected; drawn: 1 + 3 numbers for each taxel"),
+    "drawn": (lambda: read(90),
+              ValueError, "line: at least 1 expected; drawn: 1 + 3 numbers for each taxel"),
+    "readings": (lambda: read(limits=np.ones(3, np.uint16)),
+                 TypeError, "limits: float64 expected, the format H given"),
+    "finger": (lambda: on_path((12, 0, 4, 13)),
+               ValueError, "first, grid: joints of the hand and two points of a path expected"),
+    "path": (lambda: on_path(n=1),
+             ValueError, "first, grid: joints of the hand and two points of a path expected"),
     "pose": (lambda: steps.hold_wrench(BODY, np.zeros(3), 1.0, 0.0, TREMOR, 0.0, 0.0),
              ValueError, "anchor: axis 0 has the length 3, 12 expected"),
 }  # fmt: skip
@@ -109,4 +132,6 @@ def test_an_index_is_a_number_that_the_model_has():
     touched()
     controlled()
     bodies_of()
+    read()
+    on_path()
     assert steps.tremor_at(TREMOR, 0.0, 2)

@@ -210,56 +210,47 @@ static int read_struct(call *c, field *fields, PyObject *object, char *target)
     return 0;
 }
 
-static int refuse(const char *reason)
-{
-    PyErr_SetString(PyExc_ValueError, reason);
-    return -1;
-}
-
-/* Check the numbers by which steps index or divide, or set an exception and return -1. */
-static int check_numbers(const call *c, const function *f, const arguments *a)
+/* Return what is wrong with the numbers by which steps index or divide; NULL if they fit. */
+static const char *wrong_numbers(const call *c, const function *f, const arguments *a)
 {
     const hand *const h = &a->physics.arrays;
     const steps *const s = &a->physics.steps;
-    const Py_ssize_t n_tips = c->lengths[-N_TIPS], n_bodies = c->lengths[-N_BODIES];
-    if (n_tips >= 0 && n_bodies >= 0 && n_bodies != n_tips + 1) {
-        return refuse("bodies: a row for each fingertip and one for the object expected");
+    const half_steps *const e = &a->engine;
+    const int64_t most = INT64_MAX / 2; /* so that no sum overflows */
+    if (c->lengths[-N_TIPS] >= 0 && c->lengths[-N_BODIES] >= 0 &&
+        c->lengths[-N_BODIES] != c->lengths[-N_TIPS] + 1) {
+        return "bodies: a row for each fingertip and one for the object expected";
     }
-    if (h->tips != NULL) {
-        for (size_t i = 0; i <= h->n_tips; ++i) {
-            const int64_t body = i < h->n_tips ? h->tips[i] : h->object_body;
-            if (body < 0 || (size_t)body >= h->n_model || h->roots[body] < 0 ||
-                (size_t)h->roots[body] >= h->n_model) {
-                return refuse("tips, object_body, roots: a body that the model does not have");
-            }
+    for (size_t i = 0; h->tips != NULL && i <= h->n_tips; ++i) {
+        const int64_t body = i < h->n_tips ? h->tips[i] : h->object_body;
+        if (body < 0 || (size_t)body >= h->n_model || h->roots[body] < 0 ||
+            (size_t)h->roots[body] >= h->n_model) {
+            return "tips, object_body, roots: a body that the model does not have";
         }
     }
     for (int axis = N_QPOS; a->target != NULL && axis <= N_TORQUES; ++axis) {
         if (c->lengths[-axis] >= 0 && c->lengths[-axis] < N_JOINTS) {
-            return refuse("joints, bias or torques: at least 16 numbers expected");
+            return "joints, bias or torques: at least 16 numbers expected";
         }
     }
     for (size_t i = 0; a->first != NULL && i < a->m; ++i) {
         if (a->first[i] < 0 || a->first[i] > N_JOINTS - JOINTS_OF_FINGER || a->n < 2) {
-            return refuse("first, grid: joints of the hand and two points of a path expected");
+            return "first, grid: joints of the hand and two points of a path expected";
         }
     }
-    if (a->tick < 0 || a->step < 0 || (f->run == run_tremor_at && a->step > 2)) {
-        return refuse("a number of a step or an axis is out of range");
+    if (a->tick < 0 || a->tick > most || a->step < 0 || a->step > most ||
+        (f->run == run_tremor_at && a->step > 2) ||
+        (a->physics.bodies != NULL && (s->n < 0 || s->n > most || s->per_control < 1))) {
+        return "a number of a step or an axis is out of range";
     }
-    if (a->physics.bodies != NULL && (s->n < 0 || s->per_control < 1 || a->tick > INT64_MAX / 2 ||
-                                      s->n > INT64_MAX / 2 || a->step > INT64_MAX / 2)) {
-        return refuse("steps: a number is out of range");
-    }
-    if (f->run == run_advance_sample &&
-        !(a->engine.first_half && a->engine.second_half && a->engine.model && a->engine.data)) {
-        return refuse("engine: an address is 0");
+    if (f->run == run_advance_sample && !(e->first_half && e->second_half && e->model && e->data)) {
+        return "engine: an address is 0";
     }
     if (f->run == run_read_out &&
         (a->constants.line < 1 || c->lengths[-N_DRAWN] != 1 + 3 * c->lengths[-N_TAXELS])) {
-        return refuse("line: at least 1 expected; drawn: 1 + 3 numbers for each taxel");
+        return "line: at least 1 expected; drawn: 1 + 3 numbers for each taxel";
     }
-    return 0;
+    return NULL;
 }
 
 /* Return None, a number, or a tuple of numbers. */
@@ -304,7 +295,10 @@ static PyObject *run(PyObject *capsule, PyObject *const *args, Py_ssize_t n_args
         PyErr_Format(PyExc_TypeError, "%s: %zd arguments expected, %zd given", f->name, n, n_args);
         goto done;
     }
-    if (check_numbers(&c, f, &a) == 0) {
+    const char *const wrong = wrong_numbers(&c, f, &a);
+    if (wrong != NULL) {
+        PyErr_SetString(PyExc_ValueError, wrong);
+    } else {
         f->run(&a, numbers);
         result = results(numbers, f->n_results);
     }
@@ -315,53 +309,28 @@ done:
 
 /* Columns of arrays, and other whole numbers of the C files that Python uses too. */
 #define COLUMN(type, member) ((long)(offsetof(type, member) / sizeof(double)))
-static const struct {
-    const char *name;
-    long value;
-} whole_numbers[] = {
-    {"REVOLVED", REVOLVED},
-    {"BOX", BOX},
-    {"HEXAGON", HEXAGON},
-    {"CAPSULE", CAPSULE},
-    {"CODE", COLUMN(solid, code)},
-    {"SIDE_OUT", COLUMN(solid, side_out)},
-    {"SIDE_UP", COLUMN(solid, side_up)},
-    {"SIDE_LENGTH", COLUMN(solid, side_length)},
-    {"EXTENSION", COLUMN(solid, extension)},
-    {"CENTRE", COLUMN(solid, centre)},
-    {"TEXTURE_AMPLITUDE", COLUMN(solid, texture_amplitude)},
-    {"AROUND_2", COLUMN(solid, around_2)},
-    {"MU_STATIC", COLUMN(solid, mu_static)},
-    {"MU_KINETIC", COLUMN(solid, mu_kinetic)},
-    {"N_OBJECT_NUMBERS", N_NUMBERS(solid)},
-    {"N_BRISTLE", N_NUMBERS(bristle)},
-    {"TIP_SLIP", COLUMN(tip, slip)},
-    {"TIP_SLIPPING_SHARE", COLUMN(tip, slipping_share)},
-    {"TIP_LOAD", COLUMN(tip, load)},
-    {"N_TIP", N_NUMBERS(tip)},
-    {"GUIDE_STIFFNESS", COLUMN(guide, stiffness)},
-    {"N_GUIDE", N_NUMBERS(guide)},
-    {"PUSH", PUSH},
-    {"JERK", JERK},
-    {"SHAKE", SHAKE},
-    {"MOVE", MOVE},
+/* clang-format off */
+static const struct {const char *name; long value;} whole_numbers[] = {
+    {"REVOLVED", REVOLVED}, {"BOX", BOX}, {"HEXAGON", HEXAGON}, {"CAPSULE", CAPSULE},
+    {"CODE", COLUMN(solid, code)}, {"SIDE_OUT", COLUMN(solid, side_out)},
+    {"SIDE_UP", COLUMN(solid, side_up)}, {"SIDE_LENGTH", COLUMN(solid, side_length)},
+    {"EXTENSION", COLUMN(solid, extension)}, {"CENTRE", COLUMN(solid, centre)},
+    {"TEXTURE_AMPLITUDE", COLUMN(solid, texture_amplitude)}, {"AROUND_2", COLUMN(solid, around_2)},
+    {"MU_STATIC", COLUMN(solid, mu_static)}, {"MU_KINETIC", COLUMN(solid, mu_kinetic)},
+    {"N_OBJECT_NUMBERS", N_NUMBERS(solid)}, {"N_BRISTLE", N_NUMBERS(bristle)},
+    {"TIP_SLIP", COLUMN(tip, slip)}, {"TIP_SLIPPING_SHARE", COLUMN(tip, slipping_share)},
+    {"TIP_LOAD", COLUMN(tip, load)}, {"N_TIP", N_NUMBERS(tip)},
+    {"GUIDE_STIFFNESS", COLUMN(guide, stiffness)}, {"N_GUIDE", N_NUMBERS(guide)}, {"PUSH", PUSH},
+    {"JERK", JERK}, {"SHAKE", SHAKE}, {"MOVE", MOVE},
 };
 
-static const struct {
-    const char *name;
-    double value;
-} real_numbers[] = {
-    {"MAX_RELIEF", MAX_RELIEF},
-    {"DERIVATIVE", DERIVATIVE},
-    {"ENCODER_STEP", ENCODER_STEP},
-    {"TORQUE_STEP", TORQUE_STEP},
-    {"TORQUE_LIMIT", TORQUE_LIMIT},
-    {"HOLD_STIFFNESS", HOLD_STIFFNESS},
-    {"HOLD_TURN_STIFFNESS", HOLD_TURN_STIFFNESS},
-    {"PUSH_LIMIT", PUSH_LIMIT},
-    {"PUSH_GAP", PUSH_GAP},
-    {"MOVE_GRASP_TIME", MOVE_GRASP_TIME},
+static const struct {const char *name; double value;} real_numbers[] = {
+    {"MAX_RELIEF", MAX_RELIEF}, {"DERIVATIVE", DERIVATIVE}, {"ENCODER_STEP", ENCODER_STEP},
+    {"TORQUE_STEP", TORQUE_STEP}, {"TORQUE_LIMIT", TORQUE_LIMIT},
+    {"HOLD_STIFFNESS", HOLD_STIFFNESS}, {"HOLD_TURN_STIFFNESS", HOLD_TURN_STIFFNESS},
+    {"PUSH_LIMIT", PUSH_LIMIT}, {"PUSH_GAP", PUSH_GAP}, {"MOVE_GRASP_TIME", MOVE_GRASP_TIME},
 };
+/* clang-format on */
 
 /* Add an object, whose reference is taken, or return -1. */
 static int add_object(PyObject *module, const char *name, PyObject *object)

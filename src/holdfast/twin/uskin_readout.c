@@ -125,7 +125,7 @@ static double share_of_step(
 static void read_taxel(const readout_constants *c, size_t i, const double *drawn, readout_state *s)
 {
     const size_t place = (size_t)s->n_read[i] % s->n_averaged;
-    s->n_read[i] += 1;
+    s->n_read[i] += s->n_read[i] < INT32_MAX;
     const size_t n_known =
         (size_t)s->n_read[i] < s->n_averaged ? (size_t)s->n_read[i] : s->n_averaged;
     for (size_t axis = 0; axis < 3; ++axis) {
