@@ -57,18 +57,16 @@ static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
         hf_wide lowest = none, highest = none;
         for (size_t i = lane; i < n; i += HF_LANES) {
             const hf_vectors v = hf_load_vectors(readings, n, i);
-            hf_wide high = hf_where(v.x > v.y, v.x, v.y);
-            hf_wide low = hf_where(v.x < v.y, v.x, v.y);
-            high = hf_where(v.z > high, v.z, high);
-            low = -hf_where(v.z < low, v.z, low);
+            hf_wide high = hf_greater(v.z, hf_greater(v.x, v.y));
+            hf_wide low = -hf_smaller(v.z, hf_smaller(v.x, v.y));
             const hf_wide used = hf_load(f->used + i);
             high = hf_where(used > 0, high, none);
             low = hf_where(used > 0, low, none);
             x += v.x;
             y += v.y;
             z += v.z;
-            highest = hf_where(high > highest, high, highest);
-            lowest = hf_where(low > lowest, low, lowest);
+            highest = hf_greater(high, highest);
+            lowest = hf_greater(low, lowest);
         }
         hf_put(&sum_x, lane, x);
         hf_put(&sum_y, lane, y);
@@ -244,9 +242,10 @@ static bool hf_are_lively(const hf_finger *f, size_t i, hf_vectors now, hf_vecto
         const holdfast_taxel *const taxel = &f->taxels[i + l];
         are_lively &= taxel->n_changed > 0 && taxel->changed_at == f->state->n_changes - 1;
     }
-    return are_lively && hf_are_positive(hf_squares(hf_minus(now, then))) &&
-           hf_are_positive(hf_wide_abs(now.x) + hf_wide_abs(now.y) + hf_wide_abs(now.z)) &&
-           hf_are_positive(hf_wide_abs(then.x) + hf_wide_abs(then.y) + hf_wide_abs(then.z));
+    const hf_wide squares = hf_squares(hf_minus(now, then));
+    const hf_wide has = hf_wide_abs(now.x) + hf_wide_abs(now.y) + hf_wide_abs(now.z);
+    const hf_wide had = hf_wide_abs(then.x) + hf_wide_abs(then.y) + hf_wide_abs(then.z);
+    return are_lively && hf_are_positive(hf_smaller(squares, hf_smaller(has, had)));
 }
 
 /* As `hf_update_taxel`, for taxels in the usual case. */
@@ -291,7 +290,7 @@ static hf_changes hf_update_taxels(const hf_finger *f)
             }
             const hf_wide power = hf_load(f->powers + n + i);
             sum += power;
-            most = hf_where(power > most, power, most);
+            most = hf_greater(power, most);
         }
         hf_put(&total, lane, sum);
         hf_put(&largest, lane, most);

@@ -20,6 +20,12 @@
 
 #include "kernel.h"
 
+#if defined(__GNUC__) && defined(__SSE2__) && defined(HOLDFAST_SINGLE)
+#define HF_SSE2(name) __builtin_ia32_##name##ps
+#elif defined(__GNUC__) && defined(__SSE2__)
+#define HF_SSE2(name) __builtin_ia32_##name##pd
+#endif
+
 #if defined(__GNUC__)
 enum { HF_WIDTH = 16 / sizeof(hf_real) };
 typedef hf_real hf_wide __attribute__((vector_size(16)));
@@ -57,6 +63,26 @@ static inline hf_wide hf_wide_abs(hf_wide a)
     return hf_abs(a);
 }
 #endif
+
+/* Return a where it is smaller, else b. SSE2 has an instruction, which not all compilers find. */
+static inline hf_wide hf_smaller(hf_wide a, hf_wide b)
+{
+#ifdef HF_SSE2
+    return HF_SSE2(min)(a, b);
+#else
+    return hf_where(a < b, a, b);
+#endif
+}
+
+/* Return a where it is larger, else b. */
+static inline hf_wide hf_greater(hf_wide a, hf_wide b)
+{
+#ifdef HF_SSE2
+    return HF_SSE2(max)(a, b);
+#else
+    return hf_where(a > b, a, b);
+#endif
+}
 
 typedef struct {
     hf_real lane[HF_LANES];

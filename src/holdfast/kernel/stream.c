@@ -41,11 +41,18 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
 static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
 {
     const hf_real *const row = rows + 3 * f->finger->first_taxel;
+    const size_t n = f->n;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        const bool is_used = f->used[i] > 0;
-        lanes[i] = is_used ? row[3 * i] : 0;
-        lanes[f->n + i] = is_used ? row[3 * i + 1] : 0;
-        lanes[2 * f->n + i] = is_used ? row[3 * i + 2] : 0;
+        lanes[i] = row[3 * i];
+        lanes[n + i] = row[3 * i + 1];
+        lanes[2 * n + i] = row[3 * i + 2];
+    }
+    if (f->finger->n_used < (hf_real)f->n_taxels) {
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            if (f->used[i] == 0) {
+                lanes[i] = lanes[n + i] = lanes[2 * n + i] = 0;
+            }
+        }
     }
 }
 

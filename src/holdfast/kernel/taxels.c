@@ -29,10 +29,16 @@ static inline hf_wide hf_squares(hf_vectors v)
     return v.x * v.x + v.y * v.y + v.z * v.z;
 }
 
-/* Return v . u for a vector u that is the same for all taxels. */
-static inline hf_wide hf_along(hf_vectors v, const hf_real u[3])
+/* Return v . n for the normal n of the patch. In an exported header whose normals are all the same
+ * axis, that is a component: products with 0 and 1 change no finite number. */
+static inline hf_wide hf_along(hf_vectors v, const hf_real n[3])
 {
-    return v.x * u[0] + v.y * u[1] + v.z * u[2];
+#ifdef HOLDFAST_NORMAL_AXIS
+    (void)n;
+    return HOLDFAST_NORMAL_AXIS == 0 ? v.x : HOLDFAST_NORMAL_AXIS == 1 ? v.y : v.z;
+#else
+    return v.x * n[0] + v.y * n[1] + v.z * n[2];
+#endif
 }
 
 /* Return R_i v_i, with the rotations (9, n) from a lane on. */
@@ -243,7 +249,7 @@ static hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
             x += p * d.x;
             y += p * d.y;
             z += p * d.z;
-            most = hf_where(rival > most, rival, most);
+            most = hf_greater(rival, most);
         }
         hf_put(&squares, lane, dd);
         hf_put(&shared, lane, pdd);
@@ -273,7 +279,7 @@ static hf_real hf_risen(const hf_finger *f, size_t now)
         const hf_wide none = {0};
         for (size_t i = lane; i < n; i += HF_LANES) {
             const hf_wide pressed = hf_along(hf_load_vectors(ring, n, i), f->finger->normal);
-            part += hf_where(pressed > none, pressed, none);
+            part += hf_greater(pressed, none);
         }
         hf_put(&risen, lane, part);
     }

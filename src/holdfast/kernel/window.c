@@ -38,6 +38,7 @@ static void hf_append_pair(const hf_finger *f, size_t channel, hf_real older, hf
     block[1] = older - newer;
     block[2] = 0;
     size_t size = 1;
+    hf_real share = (hf_real)0.5; /* 1 / (2 n), exactly */
     for (size_t level = 0; level + 1 < HF_N_LEVELS(f->hand); ++level) {
         /* Two equal halves: S = S_a + S_b + (D_a - D_b)^2 / (2 n). */
         const hf_real *const half =
@@ -46,9 +47,10 @@ static void hf_append_pair(const hf_finger *f, size_t channel, hf_real older, hf
         const hf_real apart = half[1] - block[1];
         joined[0] = half[0] + block[0];
         joined[1] = half[1] + block[1];
-        joined[2] = half[2] + block[2] + apart * apart * ((hf_real)1 / (hf_real)(2 * size));
+        joined[2] = half[2] + block[2] + apart * apart * share;
         block = joined;
         size *= 2;
+        share /= 2;
     }
 }
 
