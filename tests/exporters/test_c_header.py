@@ -1,5 +1,6 @@
 """The exported header gives what `Detector` gives, and holds the files of the kernel."""
 
+import platform
 import re
 import shutil
 import subprocess
@@ -23,7 +24,7 @@ from holdfast.contact import ContactState, Fault
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
 from holdfast.exporters import header_of
-from holdfast.exporters.c_header import structs_of
+from holdfast.exporters.c_tables import structs_of
 from holdfast.io.importers import import_recordings
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import calibrate
@@ -234,6 +235,17 @@ def test_nothing_allocates_and_nothing_is_kept(tmp_path):
     maths = {"exp", "expm1", "log", "tanh", "sqrt", "nextafter", "fabs", "copysign", "lrint"}
     assert outside <= maths | {"memset", "memcpy", "memmove", "_GLOBAL_OFFSET_TABLE_"}
     assert not [name for kind, name in symbols if kind in "BbDdC"]  # data that can change
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="an option of compilers for x86-64")
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_no_multiplication_is_joined_with_an_addition(compiler, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"{compiler} is not installed")
+    (tmp_path / "model.h").write_text(header_of(paper(), HAND, 150.0).text)
+    words = [compiler, "-std=gnu99", "-O2", "-mfma", "-DHOLDFAST_API=extern", "-x", "c", "-S"]
+    subprocess.run([*words, tmp_path / "model.h", "-o", tmp_path / "model.s"], check=True)
+    assert "vfmadd" not in (tmp_path / "model.s").read_text()
 
 
 def test_a_detector_without_header_or_of_another_is_refused(tmp_path):

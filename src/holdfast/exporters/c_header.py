@@ -99,10 +99,7 @@ def _assembled(model: Model, plan: StreamPlan, rate: float, *, single: bool) -> 
         ),
         "RATE": f"{model.rate or rate:.6g}",
         "PRECISION": "single, times double" if single else "double",
-        "SIZES": "\n".join(
-            [*(f"#define HOLDFAST_{name.upper()} {n}" for name, n in tables.sizes.items()),
-             *["#define HOLDFAST_SINGLE"] * single]
-        ),
+        "SIZES": "\n".join(_sizes(tables.sizes, sensors, single=single)),
         "ENUMS": "\n\n".join(_enums(sensors)),
         "KERNEL": kernel,
         "TABLES": "\n\n".join(tables.texts),
@@ -127,6 +124,20 @@ def _times(structs: Mapping[str, Sequence[Field]]) -> tuple[str, ...]:
         for field in structs[name]
         if field.kind == "double"
     )  # fmt: skip
+
+
+def _sizes(
+    sizes: Mapping[str, int], sensors: Mapping[str, Sensor], *, single: bool
+) -> Iterator[str]:
+    """Yield the macros by which the kernel is compiled for one hand."""
+    for name, value in sizes.items():
+        yield f"#define HOLDFAST_{name.upper()} {value}"
+    normals = {tuple(sensor.normal.tolist()) for sensor in sensors.values()}
+    for axis, unit in enumerate(np.eye(3).tolist()):
+        if normals == {tuple(unit)}:
+            yield f"#define HOLDFAST_NORMAL_AXIS {axis}"
+    if single:
+        yield "#define HOLDFAST_SINGLE"
 
 
 def _plain(name: str) -> str:

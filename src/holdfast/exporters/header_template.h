@@ -40,6 +40,11 @@
 
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && defined(__OPTIMIZE__) && !defined(__OPTIMIZE_SIZE__)
+/* A tenth of the time less than at -O2. Not where you ask for small code (-Os). */
+#define HF_GCC_OPTIONS
+#pragma GCC push_options
+#pragma GCC optimize("O3", "fp-contract=off")
 #endif
 
 @SIZES@
@@ -158,6 +163,8 @@ HOLDFAST_API int holdfast_update(
 
 #ifdef __clang__
 #pragma STDC FP_CONTRACT DEFAULT
+#elif defined(HF_GCC_OPTIONS)
+#pragma GCC pop_options
 #endif
 
 #endif
