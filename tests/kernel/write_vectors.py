@@ -3,7 +3,7 @@
     python tests/kernel/write_vectors.py > tests/kernel/vectors.h
 
 `check_vectors.c` holds the kernel equal to them, without Python. Write them again only if the
-mathematics change.
+mathematics or the numbers of kinds change.
 """
 
 import re

@@ -106,7 +106,7 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     columns = part.indices(head)
     # A head reads the features up to the last that it uses; those of slips read all.
     is_slip = head.name in ("slip", "slip_speed")
-    n = len(part.features) if is_slip else int(columns.max(initial=-1)) + 1
+    n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
     rows = np.zeros((head.rule.n_outputs, n + 1))
     rows[:, np.append(0, columns + 1)] = head.rule.raw_weights()
     squares = np.zeros((3 if head.rule.squares else 0, n))

@@ -21,7 +21,7 @@ C_TYPES: dict[str, Any] = {
     "int32_t": ctypes.c_int32, "uint32_t": ctypes.c_uint32,
     "int64_t": ctypes.c_int64, "uint64_t": ctypes.c_uint64,
 }  # fmt: skip
-Rows = Sequence[Struct] | Sequence[float]
+TableRows = Sequence[Struct] | Sequence[float]
 
 
 class Field(NamedTuple):
@@ -119,7 +119,7 @@ class Tables:
         table = model_table(model, plan) | {"n_weights": len(weights)}
         self._add("holdfast_model", "model", [table], is_array=False)
 
-    def _add(self, kind: str, name: str, rows: Rows, *, is_array: bool = True) -> None:
+    def _add(self, kind: str, name: str, rows: TableRows, *, is_array: bool = True) -> None:
         self.n_bytes += len(rows) * ctypes.sizeof(self.types[kind])
         lines = [""]
         for row in [self._text(kind, row) for row in rows]:

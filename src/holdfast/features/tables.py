@@ -144,7 +144,7 @@ def _hand(
     plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Sequence[Struct]
 ) -> Struct:
     tare, specs = plan.used_tare, [spec for own in features for spec in own]
-    n_history = max(plan.window, *(spec.window for spec in specs))
+    n_history = max([plan.window, *(spec.window for spec in specs)])
     # A second difference looks back by two lags.
     reach = max([lag["samples"] * (1 + lag["has_seconds"]) for lag in lags], default=0)
     return {

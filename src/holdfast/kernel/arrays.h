@@ -1,6 +1,6 @@
 /* Arrays of Python by the buffer protocol, for the extension modules: they are checked here. */
-#ifndef HOLDFAST_ARRAYS_H
-#define HOLDFAST_ARRAYS_H
+#ifndef HF_ARRAYS_H
+#define HF_ARRAYS_H
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>

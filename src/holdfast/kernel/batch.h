@@ -4,8 +4,8 @@
  * Rows are computed by themselves: a caller may cut an array into parts, in any order and in
  * several threads, and gets the same bits. The caller owns all memory; nothing is allocated.
  */
-#ifndef HOLDFAST_BATCH_H
-#define HOLDFAST_BATCH_H
+#ifndef HF_BATCH_H
+#define HF_BATCH_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,6 +1,6 @@
 /* Counts of a sensor, parsed from the two forms that a packet of XELA's server has of them. */
-#ifndef HOLDFAST_COUNTS_H
-#define HOLDFAST_COUNTS_H
+#ifndef HF_COUNTS_H
+#define HF_COUNTS_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -3,8 +3,8 @@
 
 #include "finger.h"
 
-/* Time over which neighbouring samples say the same [s]: samples that come faster count less in the
- * forward filter, so that it does the same at any rate. */
+/* Time over which neighbouring samples are one piece of evidence [s]: samples that come faster
+ * count less in the forward filter, so that it does the same at any rate. */
 #define HF_EVIDENCE_SECONDS ((hf_real)(1.0 / 60))
 /* Bound of probabilities and thresholds in the forward filter, from 0 and from 1. */
 #ifdef HOLDFAST_SINGLE

@@ -44,16 +44,9 @@ enum {
     HOLDFAST_N_CAUSES = 6
 };
 
-/* Faults beside those of the kernel: of the tare, and of the arrival of samples, which a source of
- * samples finds and no detector. */
-enum {
-    HOLDFAST_TARE_DRIFT = 128, /* the force without contact crept over the threshold of contact */
-    HOLDFAST_TAXEL_COUNT = 256,
-    HOLDFAST_PACKET_GAP = 512,
-    HOLDFAST_LATE = 1024,
-    HOLDFAST_CLOCK_JUMP = 2048,
-    HOLDFAST_RATE = 4096
-};
+/* Fault beside those of the kernel: the force without contact crept over the threshold of contact.
+ * Other bits belong to the source of the samples. */
+enum { HOLDFAST_TARE_DRIFT = 128 };
 
 /* How contact is found. */
 enum {

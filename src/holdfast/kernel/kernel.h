@@ -62,7 +62,6 @@ typedef float hf_real;
 #define hf_expm1 expm1f
 #define hf_tanh tanhf
 #define hf_abs fabsf
-#define hf_copysign copysignf
 #define hf_nextafter nextafterf
 #define HF_TINY 1e-37f /* keeps a division finite; no load or weight is smaller */
 #else
@@ -73,7 +72,6 @@ typedef double hf_real;
 #define hf_expm1 expm1
 #define hf_tanh tanh
 #define hf_abs fabs
-#define hf_copysign copysign
 #define hf_nextafter nextafter
 #define HF_TINY 1e-300
 #endif
@@ -109,7 +107,7 @@ enum { HF_LANES = 4 };
 
 /* Why a finger has no features at a sample. */
 enum {
-    HOLDFAST_READY = 0,   /* it has */
+    HOLDFAST_READY = 0,   /* it has features */
     HOLDFAST_TARE = 1,    /* the tare, or the noise, is not complete */
     HOLDFAST_WARM_UP = 2, /* its windows are not full yet */
     HOLDFAST_GAP = 3,     /* they are not full again after a gap */

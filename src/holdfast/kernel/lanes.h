@@ -4,8 +4,8 @@
  * taxels l, l + 4, l + 8, ..., and the total is (lane 0 + lane 1) + (lane 2 + lane 3). So all
  * compilers get the same bits. Lanes without a taxel, and ignored taxels, add 0.
  *
- * A loop takes HF_WIDTH of the lanes at a time: with GCC and Clang 16 bytes, a vector register of
- * SSE2 and NEON, at any level of optimisation; else one number:
+ * A loop takes HF_WIDTH of the lanes at a time: with GCC and Clang on x86 with SSE2 and on
+ * 64-bit ARM 16 bytes, a vector register, at any level of optimisation; else one number:
  *
  *     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
  *         hf_wide part = {0};
@@ -15,18 +15,21 @@
  *         hf_put(&sum, lane, part);
  *     }
  */
-#ifndef HOLDFAST_LANES_H
-#define HOLDFAST_LANES_H
+#ifndef HF_LANES_H
+#define HF_LANES_H
 
 #include "kernel.h"
 
-#if defined(__GNUC__) && defined(__SSE2__) && defined(HOLDFAST_SINGLE)
-#define HF_SSE2(name) __builtin_ia32_##name##ps
-#elif defined(__GNUC__) && defined(__SSE2__)
-#define HF_SSE2(name) __builtin_ia32_##name##pd
+#ifdef __SSE2__
+#include <emmintrin.h>
+#ifdef HOLDFAST_SINGLE
+#define HF_SSE2(name) _mm_##name##_ps
+#else
+#define HF_SSE2(name) _mm_##name##_pd
+#endif
 #endif
 
-#if defined(__GNUC__)
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__))
 enum { HF_WIDTH = 16 / sizeof(hf_real) };
 typedef hf_real hf_wide __attribute__((vector_size(16)));
 /* The same in an array of numbers: compilers know that it aliases numbers alone. */

@@ -195,6 +195,19 @@ static void *allocate(stream *s, size_t n, size_t size)
     return block;
 }
 
+/* Fill a struct from item i of a list, or set an exception and return -1. */
+static int read_item(PyObject *list, size_t i, const field *fields, void *target)
+{
+    PyObject *const item = PyList_GetItem(list, (Py_ssize_t)i);
+    if (item == NULL) { /* a number of an item before, which is any object, cut the list */
+        return -1;
+    }
+    Py_INCREF(item);
+    const int result = read_struct(item, fields, target);
+    Py_DECREF(item);
+    return result;
+}
+
 /* Return n structs of a list of dictionaries; NULL with an exception. */
 static void *read_structs(stream *s, PyObject *list, size_t n, const field *fields, size_t size)
 {
@@ -206,14 +219,7 @@ static void *read_structs(stream *s, PyObject *list, size_t n, const field *fiel
     }
     char *const block = allocate(s, n, size);
     for (size_t i = 0; i < n && block != NULL; ++i) {
-        PyObject *const item = PyList_GetItem(list, (Py_ssize_t)i);
-        if (item == NULL) { /* a number of the item before, which is any object, cut the list */
-            return NULL;
-        }
-        Py_INCREF(item);
-        const int result = read_struct(item, fields, block + i * size);
-        Py_DECREF(item);
-        if (result < 0) {
+        if (read_item(list, i, fields, block + i * size) < 0) {
             return NULL;
         }
     }
@@ -362,6 +368,7 @@ static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_
         PyErr_SetString(PyExc_RuntimeError, "another thread is using this stream");
         return NULL;
     }
+    s->is_in_use = true; /* before an object that is no array may run Python */
     array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
     array *const times = &arrays[2], *const features = &arrays[3], *const amplitude = &arrays[4];
     PyObject *result = NULL;
@@ -384,17 +391,16 @@ static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_
     if (n > 0) {
         s->last_time = times->data[n - 1];
     }
-    s->is_in_use = true;
     /* To release the GIL takes longer than a sample. */
     PyThreadState *const released = n > 1 ? PyEval_SaveThread() : NULL;
     advance_all(s, readings, present, times, features, amplitude);
     if (released != NULL) {
         PyEval_RestoreThread(released);
     }
-    s->is_in_use = false;
     result = Py_NewRef(Py_None);
 done:
     release(arrays, 5);
+    s->is_in_use = false;
     return result;
 }
 

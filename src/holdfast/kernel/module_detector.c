@@ -63,12 +63,12 @@ static int fill_rules(PyObject *list, PyObject *heads, holdfast_rule *rules, siz
         return -1;
     }
     for (size_t i = 0; i < n; ++i) {
-        if (read_struct(PyList_GetItem(list, (Py_ssize_t)i), rule_fields, &rules[i]) < 0) {
+        if (read_item(list, i, rule_fields, &rules[i]) < 0) {
             return -1;
         }
         for (size_t name = 0; name < HOLDFAST_N_HEADS; ++name) {
-            PyObject *const head = PyList_GetItem(heads, (Py_ssize_t)(i * HOLDFAST_N_HEADS + name));
-            if (read_struct(head, head_fields, &rules[i].heads[name]) < 0) {
+            const size_t place = i * HOLDFAST_N_HEADS + name;
+            if (read_item(heads, place, head_fields, &rules[i].heads[name]) < 0) {
                 return -1;
             }
         }
@@ -184,13 +184,21 @@ static void detector_dealloc(PyObject *self)
     stream_dealloc(self);
 }
 
-static int check_free(const detector *s)
+/* Call a method, unless a call of the detector runs: what its arguments run, or another thread
+ * while the GIL is released, may call it. */
+static PyObject *call_alone(
+    PyObject *self, PyObject *const *args, Py_ssize_t n_args,
+    PyObject *(*method)(detector *, PyObject *const *, Py_ssize_t))
 {
+    detector *const s = (detector *)self;
     if (s->base.is_in_use) {
         PyErr_SetString(PyExc_RuntimeError, "another thread is using this detector");
-        return -1;
+        return NULL;
     }
-    return 0;
+    s->base.is_in_use = true;
+    PyObject *const result = method(s, args, n_args);
+    s->base.is_in_use = false;
+    return result;
 }
 
 /* Copy the numbers of a NumPy array (n_taxels, 3) of uint16 or float64 to the sample of a finger.
@@ -305,10 +313,9 @@ static PyObject *process(detector *s, const double *readings, double time)
 }
 
 /* update(samples, time): the estimate, or None if Python has to convert or to refuse them. */
-static PyObject *detector_update(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *update_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    detector *const s = (detector *)self;
-    if (check_count(n_args, 2) < 0 || check_free(s) < 0) {
+    if (check_count(n_args, 2) < 0) {
         return NULL;
     }
     const double time = PyFloat_AsDouble(args[1]);
@@ -316,22 +323,19 @@ static PyObject *detector_update(PyObject *self, PyObject *const *args, Py_ssize
         PyErr_Clear();
         return Py_NewRef(Py_None);
     }
-    s->base.is_in_use = true; /* a comparison of names may run Python, which may call this */
     PyObject *result = NULL;
     if (time > s->base.last_time && time <= DBL_MAX && copy_samples(s, args[0])) {
         result = process(s, s->readings, time);
     } else {
         result = Py_NewRef(Py_None);
     }
-    s->base.is_in_use = false;
     return result;
 }
 
 /* step(readings, present, time): the estimate of a sample that Python has converted. */
-static PyObject *detector_step(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *step_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    detector *const s = (detector *)self;
-    if (check_count(n_args, 3) < 0 || check_free(s) < 0) {
+    if (check_count(n_args, 3) < 0) {
         return NULL;
     }
     const double time = PyFloat_AsDouble(args[2]);
@@ -377,10 +381,9 @@ static void run_all(
 }
 
 /* run(readings, present, times, estimates, hand): as `update`, without events. */
-static PyObject *detector_run(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *run_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    detector *const s = (detector *)self;
-    if (check_count(n_args, 5) < 0 || check_free(s) < 0) {
+    if (check_count(n_args, 5) < 0) {
         return NULL;
     }
     array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
@@ -406,11 +409,9 @@ static PyObject *detector_run(PyObject *self, PyObject *const *args, Py_ssize_t 
     if (n > 0) {
         s->base.last_time = times->data[n - 1];
     }
-    s->base.is_in_use = true;
     Py_BEGIN_ALLOW_THREADS
     run_all(s, readings, present, times, out, hand);
     Py_END_ALLOW_THREADS
-    s->base.is_in_use = false;
     result = Py_NewRef(Py_None);
 done:
     release(arrays, 5);
@@ -418,21 +419,18 @@ done:
 }
 
 /* set_rules(rules, heads, weights): change them from the next sample on. */
-static PyObject *detector_set_rules(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *set_rules_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    detector *const s = (detector *)self;
-    if (check_count(n_args, 3) < 0 || check_free(s) < 0 ||
-        set_tables(s, args[0], args[1], args[2]) < 0) {
+    if (check_count(n_args, 3) < 0 || set_tables(s, args[0], args[1], args[2]) < 0) {
         return NULL;
     }
     return Py_NewRef(Py_None);
 }
 
 /* give(log_odds): z of the head `stable` of the next sample, where its classifier is not linear. */
-static PyObject *detector_give(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *give_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    detector *const s = (detector *)self;
-    if (check_count(n_args, 1) < 0 || check_free(s) < 0) {
+    if (check_count(n_args, 1) < 0) {
         return NULL;
     }
     array log_odds = {0};
@@ -450,10 +448,9 @@ static PyObject *detector_give(PyObject *self, PyObject *const *args, Py_ssize_t
 }
 
 /* baselines(out): fill (n_taxels, 3) and return for each finger whether its tare is complete. */
-static PyObject *detector_baselines(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
+static PyObject *baselines_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    detector *const s = (detector *)self;
-    if (check_count(n_args, 1) < 0 || check_free(s) < 0) {
+    if (check_count(n_args, 1) < 0) {
         return NULL;
     }
     array out = {0};
@@ -482,6 +479,18 @@ static PyObject *detector_last_time(PyObject *self, PyObject *const *args, Py_ss
     return check_count(n_args, 0) < 0 ? NULL
                                       : PyFloat_FromDouble(((detector *)self)->base.last_time);
 }
+
+#define ALONE(name)                                                                                \
+    static PyObject *detector_##name(PyObject *self, PyObject *const *args, Py_ssize_t n_args)     \
+    {                                                                                              \
+        return call_alone(self, args, n_args, name##_alone);                                       \
+    }
+ALONE(update)
+ALONE(step)
+ALONE(run)
+ALONE(set_rules)
+ALONE(give)
+ALONE(baselines)
 
 #define METHOD(name)                                                                               \
     {                                                                                              \

@@ -20,8 +20,7 @@ enum {
 
 /* Estimates of the fingers of a hand at one instant, by name. */
 typedef struct {
-    PyObject_VAR_HEAD
-    PyObject *makers; /* tuple of the objects above */
+    PyObject_VAR_HEAD PyObject *makers; /* tuple of the objects above */
     holdfast_finger_estimate fingers[1];
 } estimates;
 
@@ -32,7 +31,8 @@ static PyObject *maker(const estimates *e, Py_ssize_t i)
 
 static void estimates_dealloc(PyObject *self)
 {
-    PyTypeObject *const type = Py_TYPE(self); /* the class in Python, which has garbage collection */
+    PyTypeObject *const type =
+        Py_TYPE(self); /* the class in Python, which has garbage collection */
     void *const slot = PyType_GetSlot(type, Py_tp_free);
     freefunc free_object;
     memcpy(&free_object, &slot, sizeof slot); /* ISO C has no cast to a pointer to a function */
@@ -45,8 +45,7 @@ static void estimates_dealloc(PyObject *self)
 static PyObject *from_mask(PyObject *function, uint64_t mask)
 {
     PyObject *const number = PyLong_FromUnsignedLongLong(mask);
-    PyObject *const result =
-        number ? PyObject_CallFunctionObjArgs(function, number, NULL) : NULL;
+    PyObject *const result = number ? PyObject_CallFunctionObjArgs(function, number, NULL) : NULL;
     Py_XDECREF(number);
     return result;
 }
@@ -84,8 +83,8 @@ static PyObject *make_finger(const estimates *e, Py_ssize_t i)
     }
     if (n_made == N) {
         result = PyObject_CallFunctionObjArgs(
-            maker(e, MAKE_FINGER), fields[0], fields[1], fields[2], fields[3], fields[4],
-            fields[5], fields[6], fields[7], fields[8], fields[9], fields[10], fields[11], NULL);
+            maker(e, MAKE_FINGER), fields[0], fields[1], fields[2], fields[3], fields[4], fields[5],
+            fields[6], fields[7], fields[8], fields[9], fields[10], fields[11], NULL);
     }
     for (int k = 0; k < N; ++k) {
         Py_XDECREF(fields[k]);

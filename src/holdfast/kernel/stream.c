@@ -125,7 +125,8 @@ static int32_t hf_process_force(const hf_finger *f, bool enough, double time)
 /* Replace the readings of a sample that are not valid, if enough are. Return false if not. */
 static bool hf_replace_or_refuse(const hf_finger *f, bool is_finite)
 {
-    uint32_t faults = is_finite ? 0 : HOLDFAST_NOT_FINITE; /* also of taxels beyond the mask */
+    /* Also of taxels beyond the mask. */
+    uint32_t faults = is_finite ? HOLDFAST_OUT_OF_RANGE : HOLDFAST_NOT_FINITE;
     const uint64_t bits = hf_find_invalid(f, &faults);
     f->values->faults |= faults;
     f->values->taxels |= bits;

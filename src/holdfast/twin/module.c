@@ -146,6 +146,10 @@ static int read_array(call *c, const field *f, PyObject *value, void *target)
 {
     Py_ssize_t expected[4];
     int n_axes = 0;
+    if (c->n_arrays == MAX_ARRAYS) {
+        PyErr_SetString(PyExc_SystemError, "MAX_ARRAYS is too small");
+        return -1;
+    }
     array *const a = &c->arrays[c->n_arrays];
     while (n_axes < 4 && f->axes[n_axes] != 0) {
         ++n_axes;
@@ -167,7 +171,7 @@ static int read_array(call *c, const field *f, PyObject *value, void *target)
         }
         expected[axis] = *seen;
     }
-    *(void **)target = a->view.buf;
+    memcpy(target, &a->view.buf, sizeof a->view.buf);
     return check_shape(a, expected);
 }
 

@@ -8,9 +8,8 @@ from holdfast.io import load_recording
 from holdfast.live.documents import GripDocument
 from holdfast.live.web import service
 from live.estimates import FakeGrip
-from live.web.test_service import kernels, patient, run, served, wait_for
+from live.web.test_service import patient, run, served, wait_for
 
-__all__ = ["kernels"]
 pytestmark = pytest.mark.slow  # servers and sockets
 
 STOP, RESET = "/api/v1/grip/stop", "/api/v1/grip/reset"
