@@ -625,3 +625,13 @@ def test_a_recording_says_which_taxels():
     found = detect(model(("thumb",), which=TIP), made).fingers["thumb"]
     assert found.faulty_taxels[[199, 200]].tolist() == [0, 1 << 4]
     assert found.estimate(200).faulty_taxels == (4,)
+
+
+def test_a_reading_out_of_range_is_named_beyond_the_bits_of_a_mask():
+    which = sensor(70, "wide")
+    detector = Detector(model(("thumb",), which=which, tare="first"))
+    values = np.array(tactile(60, which=which).readings)
+    values[40, 66, 2] = 5000.0
+    found = feed(detector, values)
+    assert found[40].reason is Reason.FAULT
+    assert (found[40].faults, found[40].faulty_taxels) == ((Fault.OUT_OF_RANGE,), ())

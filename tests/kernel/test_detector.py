@@ -15,6 +15,7 @@ from holdfast.contact import Cause
 from holdfast.detector import Detector
 from holdfast.detector.tables import ESTIMATE, estimate_rows, rules_of
 from holdfast.errors import StreamError
+from holdfast.exporters.c_tables import ctypes_of, kernel_text, structs_of
 from holdfast.kernel import _extension
 
 N = 3000
@@ -116,8 +117,18 @@ class TestEstimates:
         with pytest.raises(KeyError):
             _extension.Estimates()["thumb"]
 
-    def test_they_have_the_size_of_the_struct(self):
+    def test_they_have_the_layout_of_the_struct(self):
         assert _extension.Estimates.__itemsize__ == ESTIMATE.itemsize
+        fields = {"estimate": structs_of(kernel_text())["holdfast_finger_estimate"]}
+        struct = ctypes_of(fields, {}, single=False)["estimate"]
+        offsets = {name: getattr(struct, name).offset for name, *_ in struct._fields_}
+        short = {
+            "faulty_taxels": "taxels", "stable_probability": "probability",
+            "slip_probability": "slip", "slip_speed": "speed", "slip_distance": "distance",
+            "instability": "sigma",
+        }  # fmt: skip
+        expected = {short.get(name, name): offset for name, offset in offsets.items()}
+        assert {name: ESTIMATE.fields[name][1] for name in ESTIMATE.names} == expected
 
 
 class TestDetector:
@@ -165,3 +176,32 @@ class TestDetector:
         detector = Detector(used)
         with pytest.raises(ValueError, match=wrong):
             detector._kernel.set_rules(*change(*rules_of(used, detector._stream.plan)))
+
+    def test_a_list_that_a_number_cuts_is_refused(self):
+        used = with_causes()
+        detector = Detector(used)._kernel
+        rules, heads, weights = rules_of(used, Detector(used)._stream.plan)
+
+        class Cutting:
+            def __float__(self):
+                heads.clear()
+                return 1.0
+
+        heads[0] = heads[0] | {"gain": Cutting()}
+        with pytest.raises(IndexError, match="list index out of range"):
+            detector.set_rules(rules, heads, weights)
+
+    def test_a_number_cannot_call_the_detector(self):
+        used = with_causes()
+        detector = Detector(used)._kernel
+        rules, heads, weights = rules_of(used, Detector(used)._stream.plan)
+
+        class Calling:
+            def __float__(self):
+                detector.update({}, 1.0)
+                return 1.0
+
+        heads[0] = heads[0] | {"gain": Calling()}
+        with pytest.raises(RuntimeError, match="another thread is using this detector"):
+            detector.set_rules(rules, heads, weights)
+        assert detector.update({}, 1.0) is not None

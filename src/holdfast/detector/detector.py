@@ -199,9 +199,12 @@ class Detector:
                 f"threshold of {', '.join(sorted(unknown))} given; "
                 f"the detector has {', '.join(self._slots)}"
             )
+        limits, heads, weights = self._rules
+        rules = limits, [dict(head) for head in heads], weights
         for finger, threshold in thresholds.items():
-            tables.stable_head(self._rules, self._slots[finger][0])["threshold"] = threshold
-        self._kernel.set_rules(*self._rules)
+            tables.stable_head(rules, self._slots[finger][0])["threshold"] = threshold
+        self._kernel.set_rules(*rules)
+        self._rules = rules
 
     @property
     def knows_zero(self) -> bool:
@@ -235,8 +238,8 @@ class Detector:
                 f"{model.name or 'the model'} decides by another rule than the model of the "
                 "detector; open the source again with it"
             )
-        self._parts, self._rules = parts, rules
         self._kernel.set_rules(*rules)
+        self._parts, self._rules = parts, rules
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.
