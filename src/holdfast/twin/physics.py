@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact
@@ -175,8 +175,9 @@ def _library() -> ctypes.CDLL:
     return ctypes.CDLL(str(windows) if sys.platform == "win32" else mujoco._functions.__file__)
 
 
-def _address(function: object) -> int:
-    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)  # type: ignore[arg-type]
+def _address(function: Any) -> int:  # noqa: ANN401 (a function of a library)
+    # Not by `ctypes.cast`: an interrupt within it becomes an error of its argument.
+    return ctypes.c_size_t.from_address(ctypes.addressof(function)).value
 
 
 def advance_sample_by_calls(
