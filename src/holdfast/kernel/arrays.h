@@ -1,4 +1,5 @@
-/* Arrays of Python by the buffer protocol, for the extension modules: they are checked here. */
+/* What the extension modules share: arrays of Python by the buffer protocol, which are checked
+ * here, and slots of types and modules. */
 #ifndef HF_ARRAYS_H
 #define HF_ARRAYS_H
 
@@ -91,5 +92,12 @@ static int check_shape(const array *a, const Py_ssize_t *expected)
     return 0;
 }
 #define SHAPE(...) ((const Py_ssize_t[]){__VA_ARGS__})
+
+/* ISO C has no cast from a function to an object pointer; every compiler of Python has one. */
+#if defined(__GNUC__)
+#define SLOT(function) (__extension__(void *)(function))
+#else
+#define SLOT(function) ((void *)(function))
+#endif
 
 #endif

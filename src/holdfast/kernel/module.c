@@ -414,13 +414,6 @@ static PyMethodDef functions[] = {
     {NULL, NULL, 0, NULL},
 };
 
-/* ISO C has no cast from a function to an object pointer; every compiler of Python has one. */
-#if defined(__GNUC__)
-#define SLOT(function) (__extension__(void *)(function))
-#else
-#define SLOT(function) ((void *)(function))
-#endif
-
 static PyMethodDef stream_methods[] = {
     {"advance", (PyCFunction)(void (*)(void))stream_advance, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},

@@ -369,11 +369,7 @@ static int add_contents(PyObject *module)
 }
 
 static PyModuleDef_Slot module_slots[] = {
-#if defined(__GNUC__) && defined(__STRICT_ANSI__)
-    {Py_mod_exec, __extension__(void *) add_contents},
-#else
-    {Py_mod_exec, (void *)add_contents},
-#endif
+    {Py_mod_exec, SLOT(add_contents)},
     {0, NULL},
 };
 
