@@ -51,6 +51,12 @@ PLUGIN_GROUPS = {
     "importers": ("io.importers", "IMPORTER_PLUGINS"),
     "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
     "laws": ("grip.laws", "LAW_PLUGINS"),
+    "verbs": ("cli.app", "VERB_PLUGINS"),
+    "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),
+    "publishers": ("cli.extensions", "PUBLISHER_PLUGINS"),
+    "panels": ("cli.extensions", "PANEL_PLUGINS"),
+    "players": ("cli.extensions", "PLAYER_PLUGINS"),
+    "simulators": ("cli.extensions", "SIMULATOR_PLUGINS"),
 }
 """Module and name of each group of plug-ins, by kind; a child imports one of them."""
 PLUGIN_TIMEOUT = 60.0
