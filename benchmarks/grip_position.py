@@ -20,12 +20,12 @@ from holdfast.devices.hands.ros.kinds import HAND_KINDS
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.uri import parse
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.ros.topic_messages import JointStates
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS
 from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD
+from holdfast_grip import FingerCommand, GripCommand, LoopState
 from holdfast_lab.trial.trials import Trial, draw_trial
 
 STIFFNESS = ",".join(map(str, PROPORTIONAL.tolist()))

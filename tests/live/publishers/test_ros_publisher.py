@@ -5,6 +5,7 @@ from functools import partial
 
 import pytest
 
+from grip.fakes import FakeGrip
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.devices.ros.link import Link, Publisher
 from holdfast.live.arrival_detector import StreamEstimate
@@ -20,7 +21,7 @@ from holdfast.live.publishers.ros_publisher import (
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.topic_messages import DIAGNOSTICS, VECTOR, WRENCH, topic_definition
-from live.estimates import UNITS, FakeGrip, estimate, finger
+from live.estimates import UNITS, estimate, finger
 
 
 class FakeLink(Link):

@@ -8,10 +8,10 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from devices.hands.rigs import RosRig, with_parameter
 from devices.sources.ros1_master import Master, needs_ros1
+from grip.hands.rigs import RosRig, with_parameter
 from holdfast import errors
-from holdfast.devices.hands import open_hand
+from holdfast_grip.hands import open_hand
 
 from .drivers import PATIENCE, ROS1
 

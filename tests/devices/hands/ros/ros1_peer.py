@@ -11,10 +11,10 @@ import threading
 import time
 
 from devices.hands.ros.drivers import ROS1, readings
-from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.ros.rospy_node import message_type, rospy_module
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip.hands import open_hand
 
 
 def emit(value):

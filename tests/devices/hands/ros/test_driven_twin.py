@@ -5,13 +5,13 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.topic_messages import FLOAT_ARRAY, array_message, topic_definition
+from holdfast_grip import FingerCommand, GripCommand, LoopState
+from holdfast_grip.hands import open_hand
 from ros.domains import new_domain
 
 PATIENCE = 60.0

@@ -10,12 +10,12 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE
-from holdfast.errors import HandError
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
-from holdfast.live.loop.watchdog import Watchdog
+from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands import open_hand
+from holdfast_grip.loop.watchdog import Watchdog
 
 from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, POSITIONS, ROS2, V4, home
 

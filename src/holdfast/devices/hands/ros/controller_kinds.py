@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.ros.joint_hand import JointHand, JointOutput, JointSetup, check_home
 from holdfast.devices.hands.ros.joints import JointOrder
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.width_hand import WidthHand, WidthSetup
 from holdfast.devices.ros.link import Link
 from holdfast.ros.topic_messages import FLOAT64, FLOAT_ARRAY, GRIPPER_COMMAND, JOINT_TRAJECTORY
+from holdfast_grip.hands.base import HandDevice
 
 JOINT_TYPES = {"JointTrajectory": JOINT_TRAJECTORY, "Float64MultiArray": FLOAT_ARRAY}
 """Message types of controllers of several joints, by the parameter `type`, the default first."""

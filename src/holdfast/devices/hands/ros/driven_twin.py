@@ -5,14 +5,14 @@ import numpy as np
 from holdfast.devices.hands.ros.joint_hand import JointHand, JointOutput
 from holdfast.devices.hands.ros.joints import JOINTS_PER_FINGER, N_JOINTS
 from holdfast.devices.hands.ros.kinds import ros_hand
-from holdfast.devices.live_twin import LiveTwin
 from holdfast.devices.ros import dds
 from holdfast.devices.sources import Arrival
 from holdfast.devices.uri import parse
-from holdfast.errors import HandError
-from holdfast.grip.command import FingerCommand, GripCommand, LoopState
 from holdfast.ros.cdr import MessageDecoder
 from holdfast.ros.topic_messages import topic_definition
+from holdfast_grip.command import FingerCommand, GripCommand, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.live_twin import LiveTwin
 
 
 class DrivenTwin(LiveTwin):

@@ -10,9 +10,6 @@ import numpy as np
 from holdfast.devices.hands.ros.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
 from holdfast.devices.hands.ros.ros_hand import RosHand
 from holdfast.devices.ros.link import Link
-from holdfast.errors import HandError
-from holdfast.grip.command import GripCommand
-from holdfast.grip.limits import Limits
 from holdfast.ros.topic_messages import (
     JOINT_STATE,
     JOINT_TRAJECTORY,
@@ -22,6 +19,9 @@ from holdfast.ros.topic_messages import (
     trajectory_message,
 )
 from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.limits import Limits
 
 SLACK = 1e-9
 """Rounding by which a torque may exceed its ceiling, as a share of it."""

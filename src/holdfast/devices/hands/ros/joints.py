@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.grip.command import GripCommand
 from holdfast.ros.topic_messages import JointStates
 from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
 
 N_JOINTS = 16
 JOINTS_PER_FINGER = 4

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.ros import joints
 from holdfast.devices.hands.ros.controller_kinds import ControllerKind, WidthKind
 from holdfast.devices.hands.ros.joint_hand import JointHand, JointOutput, JointSetup, check_home
@@ -29,6 +28,7 @@ from holdfast.ros.topic_messages import (
     JOINT_STATE,
 )
 from holdfast.sensors.types import Array
+from holdfast_grip.hands.base import HandDevice
 
 COMMON = ("shared",)
 """Parameters of every kind, besides `domain` (ROS 2) or `master` (ROS 1)."""

@@ -8,12 +8,13 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from holdfast.devices.hands.base import MAX_JOINT_REPORTS, HandDevice
 from holdfast.devices.ros.link import Link, Publisher, TakeStates
-from holdfast.errors import HandError, SourceError
-from holdfast.grip.command import GripCommand
+from holdfast.errors import SourceError
 from holdfast.ros.topic_messages import JointStates
 from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.base import MAX_JOINT_REPORTS, HandDevice
 
 HAND_OPEN_TIMEOUT = 5.0
 """Longest wait until the hand listens and sends its joint states [s]."""

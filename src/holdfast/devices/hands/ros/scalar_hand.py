@@ -4,18 +4,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from holdfast.devices.hands.local import largest_scale
 from holdfast.devices.hands.ros.ros_hand import RosHand
 from holdfast.devices.ros.link import Link
-from holdfast.errors import HandError
-from holdfast.grip.command import GripCommand
-from holdfast.grip.limits import Limits
 from holdfast.ros.topic_messages import (
     GRIPPER_COMMAND,
     STRING,
     gripper_message,
     number_message,
 )
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.local import largest_scale
+from holdfast_grip.limits import Limits
 
 SLACK = 1e-9
 """Rounding by which a value may exceed its ceiling, as a share of it."""

@@ -6,12 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.devices.hands.local import largest_scale
 from holdfast.devices.hands.ros.ros_hand import RosHand
 from holdfast.devices.ros.link import Link
-from holdfast.errors import HandError
-from holdfast.grip.command import GripCommand
-from holdfast.grip.limits import Limits
 from holdfast.ros.topic_messages import (
     FLOAT_ARRAY,
     GRIPPER_COMMAND,
@@ -22,6 +18,10 @@ from holdfast.ros.topic_messages import (
     number_message,
     trajectory_message,
 )
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.local import largest_scale
+from holdfast_grip.limits import Limits
 
 SLACK = 1e-9
 """Rounding by which a force may exceed its ceiling, as a share of it."""
