@@ -29,7 +29,6 @@ EXTRA_MODULES = {
     "bags": ("rosbags",),
     "serial": ("serial",),
     "hdf5": ("h5py",),
-    "bench": ("pywt", "tsflex", "pandas", "sklearn", "scipy"),
     "onnx": ("onnx", "onnxruntime"),
     "datasets": ("pooch", "requests"),
     "deep": ("torch",),
@@ -62,7 +61,7 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "options": ("serve --ros2", "serve --ros1", "play --hand"),
     },
     LABORATORY: {
-        "verbs": ("trial", "study"),
+        "verbs": ("bench", "study", "trial"),
         "simulators": ("randomized",),
         "options": ("simulate --randomize", "simulate --grasps", "simulate --measured"),
     },

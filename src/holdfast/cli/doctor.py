@@ -33,7 +33,6 @@ EXTRA_PURPOSES = {
     "label": "holdfast label",
     "onnx": "classifiers as ONNX files",
     "bags": "import of ROS 1 and ROS 2 bags",
-    "bench": "other libraries that holdfast bench compares with",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
     "ros2": "ROS 2 topics without a ROS installation",

@@ -5,9 +5,9 @@ import pytest
 
 from holdfast.cli import bench as verb
 from holdfast.cli import main
-from holdfast.cli.bench import _pywt_loop, _scipy, _tsflex, benchmark
 from holdfast.cli.terminal.console import print_json
 from holdfast.features import DEFAULT_WINDOW, haar_features
+from holdfast_lab.verbs.bench import _pywt_loop, _scipy, _tsflex, benchmark
 
 pytestmark = pytest.mark.slow
 
