@@ -25,6 +25,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 import holdfast
+import holdfast_grip
 from holdfast.cli.app import VERBS, main
 
 ROOT = Path(__file__).parents[1]
@@ -39,6 +40,8 @@ COMMAND = re.compile(
 )
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 GLOBAL_OPTIONS = {"--config", "--version", "--help", "--install-completion", "--show-completion"}
+GRIP_NAMES = [name for name in holdfast_grip.__all__ if name != "LAWS"]
+"""Public names of holdfast-grip with a docstring."""
 ASIDE = ("study", "decisions")
 """Folders of `docs/` whose pages enter the navigation by themselves."""
 
@@ -86,7 +89,7 @@ def _origin(source: str) -> Path:
 
 
 def _packages() -> list[str]:
-    return list(holdfast._NAMES)
+    return [*holdfast._NAMES, "holdfast_grip"]
 
 
 def _pages_of(folder: str) -> list[str]:
@@ -111,6 +114,9 @@ def _verb_page(verb: str) -> str:
 
 def _package_page(package: str) -> str:
     """Return a page with the public names of a package."""
+    if package == "holdfast_grip":
+        names = [f"::: {getattr(holdfast_grip, n).__module__}.{n}" for n in GRIP_NAMES]
+        return "\n\n".join(["# holdfast_grip\nOf the package holdfast-grip.", *names]) + "\n"
     parts = [f"# holdfast.{package}\nImport these names from `holdfast`."]
     for name in holdfast._NAMES[package]:
         module = getattr(getattr(holdfast, name), "__module__", f"holdfast.{package}")

@@ -12,9 +12,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("src/holdfast", "lab/holdfast_lab")
+PACKAGES = (
+    "src/holdfast",
+    *(str(path.relative_to(ROOT)) for path in sorted(ROOT.glob("packages/*/holdfast_*"))),
+    "lab/holdfast_lab",
+)
 PLUGIN_FOLDERS = (
-    "src/holdfast/grip/laws",
+    "packages/holdfast-grip/holdfast_grip/laws",
     "src/holdfast/io/importers",
     "src/holdfast/io/bag_storage",
     "src/holdfast/labelling/rules",

@@ -17,7 +17,8 @@ from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 
 PACKAGE = Path(holdfast.__file__).parent
-CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
+ROOT = Path(__file__).parents[1]
+CONTRIBUTING = ROOT / "CONTRIBUTING.md"
 
 
 VERB = ("-c", "import sys; from holdfast.cli import main; sys.exit(main())")
@@ -33,9 +34,11 @@ class Copy:
 
     def __init__(self, folder, title):
         ignored = shutil.ignore_patterns("static", "page")
-        shutil.copytree(PACKAGE, folder / "holdfast", ignore=ignored)
+        for package in (PACKAGE, *ROOT.glob("packages/*/holdfast_*")):
+            shutil.copytree(package, folder / package.name, ignore=ignored)
         section = CONTRIBUTING.read_text().split(f"### {title}\n")[1].split("\n### ")[0]
-        named = re.findall(r"`(?:src/)?(holdfast/[\w/<>.]+)`", section.replace("src/", ""))
+        prefixes = r"(?:src/|packages/[\w-]+/)?"
+        named = re.findall(rf"`{prefixes}(holdfast\w*/[\w/<>.]+)`", section)
         self.folder, self._named = folder, set(named)
 
     def add(self, name, kind, text):
@@ -248,9 +251,9 @@ class Double(Law):
 
 def test_add_a_grip_law(copy_of):
     copy = copy_of("Add a grip law")
-    copy.add("holdfast/grip/laws/double.py", "name", LAW)
+    copy.add("holdfast_grip/laws/double.py", "name", LAW)
     copy.change(
-        "holdfast/grip/laws/__init__.py",
+        "holdfast_grip/laws/__init__.py",
         ("from holdfast_grip.laws.friction_margin", "from holdfast_grip.laws.double import Double\n"
          "from holdfast_grip.laws.friction_margin"),
         ('    "fixed": Fixed,\n', '    "fixed": Fixed,\n    "double": Double,\n'),
@@ -402,5 +405,5 @@ def test_add_a_file_format(copy_of, tmp_path):
 
 def test_a_file_that_the_recipe_does_not_name_is_noticed(copy_of):
     copy = copy_of("Add a grip law")
-    with pytest.raises(AssertionError, match=r"does not name holdfast_grip.controller"):
-        copy.change("holdfast/grip/controller.py")
+    with pytest.raises(AssertionError, match=r"does not name holdfast_grip/controller"):
+        copy.change("holdfast_grip/controller.py")

@@ -25,7 +25,8 @@ def exists(path):
 
 @pytest.mark.parametrize("path", PATHS)
 def test_a_path_exists(path):
-    found = [root for root in (ROOT, PACKAGE) if exists(root / path)]
+    roots = (ROOT, PACKAGE, *ROOT.glob("packages/*/"))
+    found = [root for root in roots if exists(root / path)]
     assert bool(found) is (path not in NO_FILES)
 
 
