@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyarrow.parquet as pq
+from holdfast_interop.lerobot.layout import DATA_PATH, INFO_PATH
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from mcap.reader import make_reader
 
 from holdfast.contact import STABLE, UNSTABLE
-from holdfast.io.lerobot import DATA_PATH, INFO_PATH
 from holdfast.plots.style import (
     COLOURS,
     STATE_COLOURS,

@@ -15,11 +15,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from holdfast_interop.importers.eflesh import SEQUENCE_RATE
 
 from holdfast.contact import Cause, ContactState
 from holdfast.detector import FingerTrace, detect
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.eflesh import SEQUENCE_RATE
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.statistics import mann_whitney_u
 from holdfast.model import Model

@@ -91,8 +91,9 @@ def _hdf5(folder: Path) -> Path:
 
 
 def _lerobot(folder: Path) -> Path:
+    from holdfast_interop.lerobot.exporter import export
+
     from attack.recordings import make_recording
-    from holdfast.exporters.lerobot import export
 
     export([make_recording()], folder / "set")
     return folder / "set"

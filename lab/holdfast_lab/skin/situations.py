@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from holdfast_interop.importers.gtac import SERVO_POSITIONS
 
 from holdfast.contact import HELD_PHASES
 from holdfast.features import Tare, parse_features
@@ -16,7 +17,6 @@ from holdfast.features.stream import extract
 from holdfast.features.tables import StreamPlan
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.gtac import SERVO_POSITIONS
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.recordings import Recording, Tactile, Truth
