@@ -38,7 +38,7 @@ EXTRA_PURPOSES = {
     "ros2": "ROS 2 topics without a ROS installation",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
-    "datasets": "holdfast datasets get: downloads of public recordings",
+    "interop": "LeRobot, Foxglove, Label Studio and public data sets",
 }
 """Purpose of each extra."""
 PROBE_TIMEOUT = 0.3
@@ -49,8 +49,15 @@ PLUGIN_GROUPS = {
     "sources": ("devices.uri", "SOURCE_PLUGINS"),
     "hands": ("devices.hands", "HAND_PLUGINS"),
     "importers": ("io.importers", "IMPORTER_PLUGINS"),
+    "labels": ("labelling.exchange.read_labels", "LABEL_PLUGINS"),
     "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
     "laws": ("grip.laws", "LAW_PLUGINS"),
+    "verbs": ("cli.app", "VERB_PLUGINS"),
+    "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),
+    "publishers": ("cli.extensions", "PUBLISHER_PLUGINS"),
+    "panels": ("cli.extensions", "PANEL_PLUGINS"),
+    "players": ("cli.extensions", "PLAYER_PLUGINS"),
+    "simulators": ("cli.extensions", "SIMULATOR_PLUGINS"),
 }
 """Module and name of each group of plug-ins, by kind; a child imports one of them."""
 PLUGIN_TIMEOUT = 60.0

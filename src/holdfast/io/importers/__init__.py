@@ -1,6 +1,8 @@
 """Import of recordings in other formats; each format has a module, which is loaded by name.
 
-Formats of plug-ins have such a module too, in another package.
+Formats of plug-ins have such a module too, in another package. A module has `can_read(path)`,
+`parts(path)`, `read(path)`, and perhaps `HINT`, a text for the person who imports, and `EXTRA`, the
+extra of holdfast that it needs. A child process reads the recordings, see `foreign.py`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from holdfast.errors import RecordingError, require_extras
+from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.io.foreign import read_foreign
 from holdfast.io.importers.csv_columns import Columns
@@ -22,34 +24,23 @@ from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 FORMATS = {
-    "uskin-pick-move": "folders of uSkin 4x4 recordings with measured slip (imanlab)",
-    "eflesh": "tensors seq_N.pt of tugs at held objects with two eFlesh fingertips",
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
-    "gtac": "CSV of the GTac grippers, first and second version: 15 magnetic nodes",
-    "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
-    "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
-    "lerobot": "LeRobot data sets (v3.0) that holdfast export wrote (extra: parquet)",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
-"""Formats that can be imported, with a description; they are detected in this order."""
-EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags", "lerobot": "parquet"}
+"""Formats that can be imported, with a description; they are detected in this order, those of
+plug-ins before the last."""
+EXTRAS = {"rosbag": "bags"}
 """Extras that formats need."""
-_IN_CONTACT = (
+IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
     "read this, give --in-contact"
 )
-_IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
+IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
 HINTS = {
-    "uskin-pick-move": _IN_CONTACT,
-    "eflesh": f"{_IN_CONTACT}; whether the object slipped is in the metadata (slipped)",
-    "xela-log": _IF_IN_CONTACT,
-    "gtac": f"grasps of the second gripper begin with an open hand; {_IF_IN_CONTACT}",
-    "anyskin-slip": f"{_IF_IN_CONTACT}; check the labels of contact with holdfast label",
-    "arq-crisp": _IF_IN_CONTACT,
-    "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
-    "lerobot": f"metadata say how the recordings begin; {_IF_IN_CONTACT}",
-    "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
+    "xela-log": IF_IN_CONTACT,
+    "rosbag": f"{IF_IN_CONTACT}; bias a PapillArray before, without load",
+    "csv": f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
 }
 """Option that helps with the recordings of a format, for the person who imports them."""
 
@@ -89,14 +80,12 @@ def import_recordings(
     recordings: Iterator[Recording]
     with recording_errors(place):
         source = importer(name)
-        if name in EXTRAS:
-            require_extras(EXTRAS[name])
+        if extra := extra_of(name):
+            require_extras(extra)
         if name == "csv":
             recordings = read_foreign(place, name, sensors, given, report)
-        elif name in FORMATS:
+        else:
             recordings = _named_apart(source.parts(place), partial(read_foreign, name=name))
-        else:  # code of a plug-in is not kept apart
-            recordings = _named_apart(source.parts(place), source.read)
     return _guarded(place, recordings, labels=labels)
 
 
@@ -159,7 +148,7 @@ def _format_of(
     if name is None and (sensors or columns):
         name = "csv"
     if name is not None and name not in FORMATS and name not in IMPORTER_PLUGINS.names():
-        raise ValueError(
+        raise missing_part("importers", name, f"the format {name}") or ValueError(
             f"unknown format {name!r}; there are {', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
         )
     if name is not None and name not in FORMATS:
@@ -194,10 +183,14 @@ def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> It
 
 def import_hint(name: str) -> str | None:
     """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
-    if name in FORMATS:
-        return HINTS.get(name)
-    hint: str | None = getattr(importer(name), "HINT", None)
+    hint: str | None = HINTS.get(name) or getattr(importer(name), "HINT", None)
     return hint
+
+
+def extra_of(name: str) -> str | None:
+    """Return the extra that a format needs; None without one."""
+    extra: str | None = EXTRAS.get(name) or getattr(importer(name), "EXTRA", None)
+    return extra
 
 
 def importer(name: str) -> ModuleType:
@@ -216,12 +209,11 @@ def importer(name: str) -> ModuleType:
 
 
 def _detected_format(path: Path) -> str:
-    for name in FORMATS:
-        if importer(name).can_read(path):
-            return name
-    for name in IMPORTER_PLUGINS.names():
-        plugin = IMPORTER_PLUGINS.load(name)
-        if plugin is not None and plugin.can_read(path):
+    """Return the format of a path: one of holdfast, of a plug-in, CSV, in this order."""
+    own = [name for name in FORMATS if name != "csv"]
+    for name in [*own, *IMPORTER_PLUGINS.names(), "csv"]:
+        source = importer(name) if name in FORMATS else IMPORTER_PLUGINS.load(name)
+        if source is not None and source.can_read(path):
             return name
     if importer("csv").can_guess(path):
         return "csv"
