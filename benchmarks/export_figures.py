@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyarrow.parquet as pq
-from holdfast_interop.lerobot.layout import DATA_PATH, INFO_PATH
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -35,6 +34,7 @@ from holdfast.plots.style import (
     page_figure,
     style_axes,
 )
+from holdfast_interop.lerobot.layout import DATA_PATH, INFO_PATH
 from holdfast_lab.report.images import png_of
 
 EPISODE = 3

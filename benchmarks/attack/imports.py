@@ -91,9 +91,8 @@ def _hdf5(folder: Path) -> Path:
 
 
 def _lerobot(folder: Path) -> Path:
-    from holdfast_interop.lerobot.exporter import export
-
     from attack.recordings import make_recording
+    from holdfast_interop.lerobot.exporter import export
 
     export([make_recording()], folder / "set")
     return folder / "set"

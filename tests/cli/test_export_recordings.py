@@ -3,7 +3,7 @@ import json
 import pytest
 
 from holdfast.cli import main
-from holdfast.io import load_recording, save_recording
+from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
 

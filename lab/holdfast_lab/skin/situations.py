@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from holdfast_interop.importers.gtac import SERVO_POSITIONS
 
 from holdfast.contact import HELD_PHASES
 from holdfast.features import Tare, parse_features
@@ -21,6 +20,7 @@ from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors.types import Array, Flags
+from holdfast_interop.importers.gtac import SERVO_POSITIONS
 from holdfast_lab.skin.families import family_features, finger_of
 
 SITUATIONS = ("quiet", "moving", "pushed", "slip")

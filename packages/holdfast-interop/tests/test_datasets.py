@@ -4,12 +4,10 @@ import sys
 
 import pytest
 
-from holdfast_interop.datasets import PublicFile, PublicSet, find_set, public_sets
-
-from holdfast_interop.datasets import verb
 from holdfast.cli import main
 from holdfast.io import load_recording
 from holdfast.synthetic import synthetic_recording
+from holdfast_interop.datasets import PublicFile, PublicSet, find_set, public_sets, verb
 from loopback import serving
 
 FOLDERS = {

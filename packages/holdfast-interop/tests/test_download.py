@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("pooch", reason="pooch is not installed")
 
+from holdfast.errors import OutputError, SourceError
 from holdfast_interop.datasets import PublicFile, PublicSet
 from holdfast_interop.datasets.download import (
     DOWNLOAD_CHUNK,
@@ -16,8 +17,6 @@ from holdfast_interop.datasets.download import (
     download,
     download_folder,
 )
-
-from holdfast.errors import OutputError, SourceError
 from loopback import serving
 
 CONTENT = bytes(range(256)) * 1000

@@ -8,10 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from holdfast_interop.foxglove.exporter import LAYOUT_FILE, export
-from holdfast_interop.foxglove.layout import layout
-from holdfast_interop.foxglove.schemas import SCHEMAS
-from holdfast_interop.foxglove.taxel_arrows import LONGEST_ARROW, orientations
 from mcap.reader import make_reader
 
 from holdfast.detector import detect
@@ -20,6 +16,10 @@ from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
+from holdfast_interop.foxglove.exporter import LAYOUT_FILE, export
+from holdfast_interop.foxglove.layout import layout
+from holdfast_interop.foxglove.schemas import SCHEMAS
+from holdfast_interop.foxglove.taxel_arrows import LONGEST_ARROW, orientations
 
 
 class File:

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from holdfast_interop.foxglove.hand_frames import allegro_links, frames_of, quaternions
 from scipy.spatial.transform import Rotation
 
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import hand, sensor
+from holdfast_interop.foxglove.hand_frames import allegro_links, frames_of, quaternions
 
 
 def module(name):

@@ -4,6 +4,12 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.recordings import Label, Recording, Tactile
 from holdfast_interop.label_studio.reading import (
     annotations_of,
     is_label_studio,
@@ -12,12 +18,6 @@ from holdfast_interop.label_studio.reading import (
     state_of,
 )
 from holdfast_interop.label_studio.writing import task_of
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from holdfast.contact import Cause, ContactState
-from holdfast.errors import RecordingError
-from holdfast.recordings import Label, Recording, Tactile
 from labelling.tiny import TINY
 
 TIMES = np.arange(400) / 100.0

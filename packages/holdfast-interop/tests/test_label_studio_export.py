@@ -5,6 +5,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import OutputError, RecordingError
+from holdfast.features import haar_features
+from holdfast.recordings import Label, Recording, Tactile
 from holdfast_interop.label_studio.reading import annotations_of, labels_from_label_studio
 from holdfast_interop.label_studio.writing import (
     labelling_config,
@@ -12,11 +17,6 @@ from holdfast_interop.label_studio.writing import (
     signals_csv,
     task_of,
 )
-
-from holdfast.contact import Cause, ContactState
-from holdfast.errors import OutputError, RecordingError
-from holdfast.features import haar_features
-from holdfast.recordings import Label, Recording, Tactile
 from labelling.tiny import TINY, tiny_recording
 
 

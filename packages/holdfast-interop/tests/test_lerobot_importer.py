@@ -8,13 +8,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from holdfast_interop.lerobot import importer as lerobot
-from holdfast_interop.lerobot.exporter import export
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
+from holdfast_interop.lerobot import importer as lerobot
+from holdfast_interop.lerobot.exporter import export
 
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"

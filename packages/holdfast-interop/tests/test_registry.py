@@ -4,11 +4,11 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from holdfast_interop.datasets import find_set, public_sets
-from holdfast_interop.datasets.registry import Registry, other_sets
 
 from holdfast.io.importers import FORMATS, IMPORTER_PLUGINS
 from holdfast.sensors import built_in_hands, built_in_sensors
+from holdfast_interop.datasets import find_set, public_sets
+from holdfast_interop.datasets.registry import Registry, other_sets
 
 DOCUMENT = json.loads(
     resources.files("holdfast_interop.datasets").joinpath("registry.json").read_text()

@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from holdfast.io import labels_path, load_labels, load_recording, save_recording
+from holdfast.io import labels_path, load_recording, save_recording
 
 from .helpers import refusal, run_json, save_manual_labels
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from holdfast_interop.importers import uskin_pick_move
-
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import NETWORK, Results, method_titles

@@ -5,10 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
-from holdfast_interop.foxglove.hand_frames import frames_of
-from holdfast_interop.foxglove.layout import layout
-from holdfast_interop.foxglove.messages import Message, messages
-from holdfast_interop.foxglove.schemas import SCHEMAS, schema_of
 from mcap.writer import CompressionType, Writer
 
 from holdfast.detector import Detection, detect
@@ -16,6 +12,10 @@ from holdfast.errors import RecordingError
 from holdfast.exporters.output import whole_files
 from holdfast.files import file_stem
 from holdfast.recordings import Recording
+from holdfast_interop.foxglove.hand_frames import frames_of
+from holdfast_interop.foxglove.layout import layout
+from holdfast_interop.foxglove.messages import Message, messages
+from holdfast_interop.foxglove.schemas import SCHEMAS, schema_of
 
 if TYPE_CHECKING:
     from holdfast.model import Model

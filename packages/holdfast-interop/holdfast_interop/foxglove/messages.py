@@ -8,6 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from holdfast.contact import UNKNOWN, ContactState, faults_of
+from holdfast.detector import Detection, FingerTrace
+from holdfast.detector.detection import CAUSE_BY_CODE, REASON_BY_CODE, STATE_BY_CODE
+from holdfast.detector.slips import SlipWatch
+from holdfast.recordings import GAP_PERIODS, Recording
+from holdfast.sensors.types import Array, Integers
 from holdfast_interop.foxglove.hand_frames import Frame, module_frame
 from holdfast_interop.foxglove.schemas import (
     ARROWS_TOPIC,
@@ -35,13 +42,6 @@ from holdfast_interop.foxglove.taxel_arrows import (
     orientations,
     zeroed,
 )
-
-from holdfast.contact import UNKNOWN, ContactState, faults_of
-from holdfast.detector import Detection, FingerTrace
-from holdfast.detector.detection import CAUSE_BY_CODE, REASON_BY_CODE, STATE_BY_CODE
-from holdfast.detector.slips import SlipWatch
-from holdfast.recordings import GAP_PERIODS, Recording
-from holdfast.sensors.types import Array, Integers
 
 SCENE_RATE = 30.0
 """Arrows and moving frames per second [Hz]."""

@@ -7,6 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
+
+from holdfast.errors import RecordingError
+from holdfast.io.header import header_of
+from holdfast.io.timed_arrays import TRUTH_TIME, ArraySpec, array_specs, arrays_of
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Integers
 from holdfast_interop.lerobot.layout import (
     count_name,
     feature_name,
@@ -17,12 +23,6 @@ from holdfast_interop.lerobot.layout import (
     track_name,
     value_specs,
 )
-
-from holdfast.errors import RecordingError
-from holdfast.io.header import header_of
-from holdfast.io.timed_arrays import TRUTH_TIME, ArraySpec, array_specs, arrays_of
-from holdfast.recordings import Recording
-from holdfast.sensors.types import Array, Integers
 
 MAX_FRAMES_PER_SAMPLE = 100
 """Number of frames for a sample from which on a recording is refused: it is mostly gaps."""

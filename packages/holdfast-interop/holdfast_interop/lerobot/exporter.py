@@ -11,6 +11,10 @@ import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+
+from holdfast.exporters.output import whole_folder
+from holdfast.io.header import Header, encode_header, header_of
+from holdfast.recordings import Recording
 from holdfast_interop.lerobot.columns import ColumnSpec, SharedColumns, arrow_schema, nested
 from holdfast_interop.lerobot.frames import ColumnStatistics, EpisodeFrames
 from holdfast_interop.lerobot.layout import (
@@ -24,10 +28,6 @@ from holdfast_interop.lerobot.layout import (
     TEXTS_COLUMN,
     VERSION,
 )
-
-from holdfast.exporters.output import whole_folder
-from holdfast.io.header import Header, encode_header, header_of
-from holdfast.recordings import Recording
 
 DEFAULT_FPS = 30
 """Frames per second; that of most cameras [Hz]."""

@@ -4,6 +4,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from holdfast.io.header import Header
+from holdfast.io.timed_arrays import ArraySpec, TimedArray, array_specs, arrays_of
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array
 from holdfast_interop.lerobot.columns import FrameSpan, SharedColumns
 from holdfast_interop.lerobot.layout import (
     count_name,
@@ -15,11 +20,6 @@ from holdfast_interop.lerobot.layout import (
     window_rows,
     windows,
 )
-
-from holdfast.io.header import Header
-from holdfast.io.timed_arrays import ArraySpec, TimedArray, array_specs, arrays_of
-from holdfast.recordings import Recording
-from holdfast.sensors.types import Array
 
 
 class EpisodeFrames:

@@ -8,6 +8,19 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
+
+from holdfast.errors import RecordingError
+from holdfast.files import check_regular, read_input
+from holdfast.io.header import Header, decode_header
+from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.timed_arrays import (
+    TRUTH_TIME,
+    ArraySpec,
+    TimedArray,
+    array_specs,
+    recording_from,
+)
+from holdfast.recordings import Recording
 from holdfast_interop.lerobot.layout import (
     DATA_PATH,
     EPISODES_PATH,
@@ -23,19 +36,6 @@ from holdfast_interop.lerobot.layout import (
     track_name,
     value_specs,
 )
-
-from holdfast.errors import RecordingError
-from holdfast.files import check_regular, read_input
-from holdfast.io.header import Header, decode_header
-from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.timed_arrays import (
-    TRUTH_TIME,
-    ArraySpec,
-    TimedArray,
-    array_specs,
-    recording_from,
-)
-from holdfast.recordings import Recording
 
 EXTRA = "parquet"
 HINT = f"metadata say how the recordings begin; {IF_IN_CONTACT}"

@@ -54,7 +54,7 @@ def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
         return {name: module.labels for name, module in other.modules.items()}
     if file.suffix == ".csv":
         return labels_from_csv(file)
-    for source in [] if file.name.endswith(SUFFIX) else LABEL_PLUGINS.load_all():
+    for source in [] if file.name.endswith(SUFFIX) else LABEL_PLUGINS.load_all().values():
         if source.can_read(file):
             labels: Labels = source.read(file, recording, annotator)
             return labels
