@@ -25,7 +25,6 @@ from matplotlib.lines import Line2D
 from mcap.reader import make_reader
 
 from holdfast.contact import STABLE, UNSTABLE
-from holdfast.io.lerobot import DATA_PATH, INFO_PATH
 from holdfast.plots.style import (
     COLOURS,
     STATE_COLOURS,
@@ -35,6 +34,7 @@ from holdfast.plots.style import (
     page_figure,
     style_axes,
 )
+from holdfast_interop.lerobot.layout import DATA_PATH, INFO_PATH
 from holdfast_lab.report.images import png_of
 
 EPISODE = 3

@@ -19,11 +19,11 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.detector import FingerTrace, detect
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.eflesh import SEQUENCE_RATE
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.statistics import mann_whitney_u
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
+from holdfast_interop.importers.eflesh import SEQUENCE_RATE
 
 TUG_QUIET = (0.2, 0.5)
 """Interval in which every tug is quiet, after the first windows are full [s]."""

@@ -11,6 +11,7 @@ import pytest
 from holdfast import save_recording
 from holdfast.errors import (
     EXTRA_MODULES,
+    PACKAGE_PARTS,
     MissingExtra,
     is_installed,
     missing_extra,
@@ -38,7 +39,6 @@ CORE = [
     ["--version"],
     ["doctor"],
     ["sensors"],
-    ["datasets"],
     ["info", "builtin:any"],
     ["info", "grasp.mcap"],
     ["info", "."],
@@ -83,10 +83,11 @@ MISSING = {
     ],
     "plot": [["info", "grasp.mcap", "--plot", "a.png"], ["sensors", "anyskin", "--plot", "a.png"]],
     "bags": [["import", "run.bag", "others", "--format", "rosbag"]],
-    "hdf5": [["import", "a.h5", "others", "--format", "arq-crisp"]],
+    "hdf5": [
+        ["import", "a.h5", "others", "--format", "arq-crisp"],
+        ["datasets", "get", "arq-slip-2021"],
+    ],
     "ros2": [["detect", "builtin:any", "ros2:///xServTopic"]],
-    "datasets": [["datasets", "get", "uskin-pick-move"]],
-    "datasets,hdf5": [["datasets", "get", "arq-slip-2021"]],
     "serial": [["detect", "builtin:any", "serial:///dev/ttyACM0?sensor=anyskin"]],
     "cluster": [
         ["import", "log.csv", "others", "--sensor", "anyskin", "--engine", "dask:tcp://a:1"]
@@ -159,7 +160,8 @@ def requirements(extra):
 
 def test_the_table_of_modules_fits_the_metadata():
     declared = set(metadata.metadata("holdfast").get_all("Provides-Extra"))
-    assert declared == {*EXTRA_MODULES, "all"}
+    packages = {name.removeprefix("holdfast-") for name in PACKAGE_PARTS} - {"lab"}
+    assert declared == {*EXTRA_MODULES, *packages, "all"}
     (every,) = (text for text in metadata.requires("holdfast") if text.startswith("holdfast["))
     assert set(re.split(r"[\[\],]", every)[1:-1]) == declared - {"all", "deep"}
     assert every.endswith('; extra == "all"')

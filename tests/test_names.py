@@ -23,10 +23,11 @@ PLUGIN_FOLDERS = (
     "src/holdfast/io/bag_storage",
     "src/holdfast/labelling/rules",
     "src/holdfast/cli",
+    "packages/holdfast-interop/holdfast_interop",
     "lab/holdfast_lab/study",
 )
 """Folders of modules that are loaded by name: each may define the constants of their contract."""
-CONTRACT = {"AUTHOR", "SOURCE", "TASK", "TITLE"}
+CONTRACT = {"AUTHOR", "EXTRA", "HINT", "SOURCE", "TASK", "TITLE"}
 """Constants that every module of such a folder may have, as the contract of its kind."""
 TYPE_VARIABLE = "TypeVar("
 """Begin of the value of a type variable, whose name means nothing outside of its function."""

@@ -19,13 +19,15 @@ from holdfast.cli.extensions import (
     PLAYER_PLUGINS,
     PUBLISHER_PLUGINS,
     SIMULATOR_PLUGINS,
+    flags_of,
 )
 from holdfast.devices.uri import open_source, parse
-from holdfast.errors import RecordingError
+from holdfast.errors import PACKAGE_PARTS, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.importers import IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import SENSOR_PLUGINS, sensor, sensor_names
+from holdfast.synthetic import synthetic_recording
 from holdfast_grip.hands import open_hand
 from holdfast_grip.laws import law_named
 from installed import install, install_project, on_the_path
@@ -77,6 +79,23 @@ def __getattr__(name):
 def not_a_hand(uri):
     return Path(uri)
 '''
+MARKS = """
+from holdfast.contact import ContactState
+from holdfast.recordings import Label
+
+def can_read(path):
+    return path.suffix == ".marks"
+
+def read(path, recording, annotator):
+    return {path.read_text(): [Label(0.0, 0.5, ContactState.STABLE, author=annotator)]}
+
+def save(recordings, folder, *, force):
+    folder.mkdir()
+    paths = [folder / f"{recording.name}.marks" for recording in recordings]
+    for path in paths:
+        path.write_text("thumb")
+    return paths
+"""
 POINTS = {
     "holdfast.sensors": {"pad": "parts:pad", "gtac": "parts:pad", "other": "parts:pad"},
     "holdfast.classifiers": {"same": "parts:same", "none": "parts:pad"},
@@ -89,6 +108,7 @@ POINTS = {
         "odd": "parts:odd",
     },
     "holdfast.importers": {"broken": "broken", "half": "parts"},
+    "holdfast.labels": {"marks": "marks", "mute": "parts"},
     "holdfast.verbs": {"count": "parts:count", "sum": "parts:pad_name"},
 }
 
@@ -97,7 +117,8 @@ POINTS = {
 def parts(tmp_path, monkeypatch):
     """A package with plug-ins of all kinds, some of which cannot be used."""
     broken = "import sys\nprint('imported', file=sys.stderr)\nraise RuntimeError('no\\n\x1bdevice')"
-    install(tmp_path / "site", "acme", {"parts.py": PARTS, "broken.py": broken}, POINTS)
+    files = {"parts.py": PARTS, "broken.py": broken, "marks.py": MARKS}
+    install(tmp_path / "site", "acme", files, POINTS)
     for group in (SENSOR_PLUGINS, IMPORTER_PLUGINS):
         monkeypatch.setattr(group, "_reported", set())
     with on_the_path(tmp_path / "site", monkeypatch):
@@ -170,13 +191,53 @@ def test_what_is_no_hand_is_named_with_the_contract(parts):
 def test_a_broken_importer_does_not_hinder_the_others(parts, caplog, capsys):
     (parts / "a.txt").write_text("hello")
     for _ in range(2):
-        with pytest.raises(RecordingError, match=r"is of no supported format.*plug-ins: broken, h"):
+        with pytest.raises(
+            RecordingError, match=r"is of no supported format.*plug-ins:.* broken, .*half, "
+        ):
             import_recordings(parts / "a.txt")
     broken, half = reports(caplog)
     assert broken == "plug-in broken (importers of acme 1.2) is skipped: RuntimeError: no device"
     assert half.startswith("plug-in half (importers of acme 1.2) is skipped: TypeError: a module ")
     with pytest.raises(ValueError, match="the plug-in of half cannot be used; holdfast doctor"):
         import_recordings(parts / "a.txt", "half")
+
+
+def test_labels_of_a_plug_in(parts, capsys, caplog):
+    holdfast.save_recording(synthetic_recording("grasp", 0), parts / "grasp.mcap")
+    words = ["label", "--export", "marks", parts / "out", parts / "grasp.mcap", "--json"]
+    assert main([*map(str, words)]) == 0
+    (path,) = json.loads(capsys.readouterr().out)["written"]
+    words = ["label", "--import", path, parts / "grasp.mcap", "--annotator", "ann", "--json"]
+    assert main([*map(str, words)]) == 0
+    (label,) = holdfast.load_recording(parts / "grasp.mcap").modules["thumb"].labels
+    assert (label.state, label.end, label.author) == ("STABLE", 0.5, "ann")
+    assert main(["label", "--export", "mute", str(parts / "out"), str(parts / "grasp.mcap")]) == 2
+    assert "the plug-in of the format mute cannot be used" in capsys.readouterr().err
+    assert "a module with can_read, read and save expected for mute, <mod" in reports(caplog)[-1]
+    missing = ["label", "--export", "yaml", str(parts / "out"), str(parts / "grasp.mcap")]
+    assert main(missing) == 2
+    assert "--export label-studio or marks or mute or csv expected" in capsys.readouterr().err
+
+
+VERB_OF_KIND = {
+    "exporters": "export", "simulators": "simulate", "publishers": "serve", "panels": "serve",
+    "players": "play",
+}  # fmt: skip
+"""The verb that gets the options of a kind of plug-ins."""
+
+
+@pytest.mark.parametrize("package", PACKAGE_PARTS)
+def test_the_table_of_packages_has_their_entry_points(package):
+    parts, options = {}, []
+    for point in metadata.distribution(package).entry_points:
+        kind = point.group.removeprefix("holdfast.")
+        parts.setdefault(kind, set()).add(point.name)
+        if kind in VERB_OF_KIND:
+            flags = flags_of(point.load().OPTIONS)
+            options += [f"{VERB_OF_KIND[kind]} {flag}" for flag in flags]
+    if options:
+        parts["options"] = set(options)
+    assert {kind: set(names) for kind, names in PACKAGE_PARTS[package].items()} == parts
 
 
 def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
@@ -196,7 +257,7 @@ def test_doctor_lists_them(parts, capsys):
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
-    assert works == {"pad", "same", "twice", "grab", "hollow", "count"}
+    assert works == {"pad", "same", "twice", "grab", "hollow", "count", "marks"}
     assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
@@ -336,5 +397,5 @@ def test_the_format_of_the_template(run_with_template):
 
 def test_every_kind_is_described():
     page = (TEMPLATE.parents[1] / "docs" / "plugins.md").read_text("utf-8")
-    for kind in ("sensors", "sources", "importers", "classifiers", "laws", "hands"):
+    for kind in ("sensors", "sources", "importers", "labels", "classifiers", "laws", "hands"):
         assert f"`holdfast.{kind}`" in page

@@ -13,7 +13,7 @@ ROOMS = [
     for package, tests in (("src/holdfast", "tests"), ("lab/holdfast_lab", "lab/tests"))
     for path in sorted((ROOT / package).glob("*/__init__.py"))
 ]
-ELSEWHERE = {"tests/datasets/": "tests/public_datasets/", "tests/recorded/": "tests/cli/"}
+ELSEWHERE = {"tests/recorded/": "tests/cli/"}
 """Folders of tests with another name than that of their package."""
 
 
@@ -31,7 +31,8 @@ def selected(*paths):
 @pytest.fixture(scope="module")
 def quick(collected):
     """The number of quick tests of each file; another collection takes as long as many tests."""
-    n_files = sum(1 for tests in ("tests", "lab/tests") for _ in (ROOT / tests).rglob("test_*.py"))
+    folders = ("tests", "lab/tests", "packages")
+    n_files = sum(1 for tests in folders for _ in (ROOT / tests).rglob("test_*.py"))
     if len({file for file, _ in collected if "tests/" in file}) > 0.9 * n_files:
         return dict(Counter(file for file, is_quick in collected if is_quick))
     return selected()

@@ -92,7 +92,7 @@ def _hdf5(folder: Path) -> Path:
 
 def _lerobot(folder: Path) -> Path:
     from attack.recordings import make_recording
-    from holdfast.exporters.lerobot import export
+    from holdfast_interop.lerobot.exporter import export
 
     export([make_recording()], folder / "set")
     return folder / "set"

@@ -30,9 +30,9 @@ EXTRA_MODULES = {
     "serial": ("serial",),
     "hdf5": ("h5py",),
     "onnx": ("onnx", "onnxruntime"),
-    "datasets": ("pooch", "requests"),
     "deep": ("torch",),
     "grip": ("holdfast_grip",),
+    "interop": ("holdfast_interop", "pooch", "requests"),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
 
@@ -64,6 +64,13 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "verbs": ("bench", "study", "trial"),
         "simulators": ("randomized",),
         "options": ("simulate --randomize", "simulate --grasps", "simulate --measured"),
+    },
+    "holdfast-interop": {
+        "verbs": ("datasets",),
+        "importers": ("anyskin-slip", "arq-crisp", "eflesh", "gtac", "lerobot", "uskin-pick-move"),
+        "exporters": ("foxglove", "lerobot"),
+        "labels": ("label-studio",),
+        "options": ("export --fps", "export --model"),
     },
 }
 """Entry points of the packages beside the core, by distribution and kind, and the `options` that

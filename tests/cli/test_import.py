@@ -8,7 +8,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.io import load_recording, save_recording
-from holdfast.io.importers import FORMATS, HINTS
+from holdfast.io.importers import FORMATS, HINTS, IMPORTER_PLUGINS, import_hint
 from holdfast.synthetic import synthetic_recording
 
 HEADER = "# sensor: anyskin\ntime," + ",".join(
@@ -87,7 +87,8 @@ def test_a_folder_of_folders(capsys, table, tmp_path):
 
 def test_every_format_has_a_hint():
     assert list(HINTS) == list(FORMATS)
-    assert all("--in-contact" in hint and "\n" not in hint for hint in HINTS.values())
+    hints = [import_hint(name) for name in (*FORMATS, *IMPORTER_PLUGINS.names())]
+    assert all("--in-contact" in hint and "\n" not in hint for hint in hints)
 
 
 def test_the_table(capsys, table, tmp_path):
@@ -195,9 +196,7 @@ class TestOutputs:
 
 def test_refusals(capsys, table, tmp_path):
     out = tmp_path / "out"
-    formats = (
-        "uskin-pick-move, eflesh, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, lerobot, csv"
-    )
+    formats = f"{', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
     missing, empty, text = tmp_path / "none", tmp_path / "empty", tmp_path / "notes.txt"
     empty.mkdir()
     text.write_text("hello")

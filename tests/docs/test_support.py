@@ -2,7 +2,6 @@
 
 import pytest
 
-from holdfast.datasets import public_sets
 from holdfast.devices.hands.ros.kinds import HAND_KINDS
 from holdfast.devices.uri import SCHEMES
 from holdfast.sensors import built_in_hands, built_in_sensors
@@ -35,15 +34,3 @@ def test_no_hardware_is_claimed():
     rows = [line for line in text("support").splitlines() if line.startswith("| ")]
     last = {row.rstrip("|").rpartition("|")[2].strip() for row in rows}
     assert last == {"hardware", "none yet", "not needed"}
-
-
-def test_the_page_of_data_sets_has_those_that_can_be_downloaded():
-    page = text("datasets")
-    for name, public in public_sets().items():
-        if public.files:
-            assert f"| `{name}` |" in page
-            assert f"| {public.licence} | {'yes' if public.tried else 'untried'} |" in page
-    files = [file for public in public_sets().values() for file in public.files]
-    copies = sum(file.sha256 is not None for file in files) - 3
-    assert f"Checksums** of {copies} files" in page
-    assert f"The other {len(files) - copies - 3} files" in page

@@ -16,11 +16,11 @@ from holdfast.features.stream import extract
 from holdfast.features.tables import StreamPlan
 from holdfast.io import load_dataset
 from holdfast.io.importers import import_recordings
-from holdfast.io.importers.gtac import SERVO_POSITIONS
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors.types import Array, Flags
+from holdfast_interop.importers.gtac import SERVO_POSITIONS
 from holdfast_lab.skin.families import family_features, finger_of
 
 SITUATIONS = ("quiet", "moving", "pushed", "slip")

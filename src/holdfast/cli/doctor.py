@@ -38,8 +38,8 @@ EXTRA_PURPOSES = {
     "ros2": "ROS 2 topics without a ROS installation",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
-    "datasets": "holdfast datasets get: downloads of public recordings",
     "grip": "holdfast hold: control of the grip force of a hand",
+    "interop": "LeRobot, Foxglove, Label Studio and public data sets",
 }
 """Purpose of each extra."""
 PROBE_TIMEOUT = 0.3
@@ -49,6 +49,7 @@ PLUGIN_GROUPS = {
     "sensors": ("sensors", "SENSOR_PLUGINS"),
     "sources": ("devices.uri", "SOURCE_PLUGINS"),
     "importers": ("io.importers", "IMPORTER_PLUGINS"),
+    "labels": ("labelling.exchange.read_labels", "LABEL_PLUGINS"),
     "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
     "verbs": ("cli.app", "VERB_PLUGINS"),
     "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),

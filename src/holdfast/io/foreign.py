@@ -9,6 +9,7 @@ arrays of NumPy one after the other, of which the first is a document in JSON; n
 """
 
 import atexit
+import errno
 import os
 import re
 import signal
@@ -412,7 +413,9 @@ def _limit(name: str, value: int) -> None:
 
 
 def _is_of_memory(cause: BaseException | None) -> bool:
-    """Return whether an error, or what caused it, is that no memory is left."""
+    """Return whether an error, or what caused it, is that no memory is left, or no file for it."""
     while cause is not None and not isinstance(cause, MemoryError):
+        if isinstance(cause, OSError) and cause.errno == errno.EFBIG:
+            return True
         cause = cause.__cause__ or cause.__context__
     return cause is not None

@@ -1,24 +1,8 @@
 from dataclasses import replace
 
-from holdfast.io import labels_path, load_labels, load_recording, save_recording
+from holdfast.io import labels_path, load_recording, save_recording
 
 from .helpers import refusal, run_json, save_manual_labels
-
-
-def test_labels_go_to_label_studio_and_back(capsys, folder):
-    out = folder.parent / "studio"
-    found = run_json(capsys, "--export", "label-studio", out, folder)
-    assert (out / "label-studio.json") in map(type(out), found["written"])
-    assert "exists already" in refusal(capsys, "--export", "label-studio", out, folder)
-    before = {path.stem: load_recording(path).modules["thumb"].labels for path in folder.iterdir()}
-    taken = run_json(capsys, "--import", out / "label-studio.json", folder, "--author", "bob")
-    assert [each["name"] for each in taken["recordings"]] == ["one", "two"]
-    for path in sorted(folder.glob("[ot]*.[pm]*")):
-        labels = load_recording(path).modules["thumb"].labels
-        assert [(x.start, x.end, x.state, x.cause) for x in labels] == [
-            (x.start, x.end, x.state, x.cause) for x in before[path.stem]
-        ]
-        assert load_labels(labels_path(path)).author == "bob"
 
 
 def test_labels_go_to_csv_and_back(capsys, folder):

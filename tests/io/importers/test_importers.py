@@ -4,15 +4,16 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import FORMATS, import_recordings
+from holdfast.io.importers import IMPORTER_PLUGINS
 
+NAMES = (*FORMATS, *IMPORTER_PLUGINS.names())
+"""Formats of holdfast, and of the packages that are installed."""
 FOLDERS = ("uskin-pick-move", "lerobot")
 """Formats of folders only."""
 
 
 def test_unknown_formats(tmp_path):
-    with pytest.raises(
-        ValueError, match="unknown format 'bag'; there are uskin-pick-move, eflesh,"
-    ):
+    with pytest.raises(ValueError, match="unknown format 'bag'; there are xela-log, "):
         import_recordings(tmp_path, "bag")
 
 
@@ -22,9 +23,9 @@ def test_a_file_of_no_known_format(tmp_path):
         with pytest.raises(RecordingError) as caught:
             import_recordings(path)
         assert str(caught.value) == (
-            f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
-            "(choose one with --format; for a CSV file of any other logger give --sensor and "
-            "--columns)"
+            f"{path} is of no supported format; supported are {', '.join(FORMATS)}"
+            f"{IMPORTER_PLUGINS.text()} (choose one with --format; for a CSV file of any other "
+            "logger give --sensor and --columns)"
         )
 
 
@@ -33,13 +34,13 @@ def test_a_missing_path(tmp_path):
         import_recordings(tmp_path / "none", "csv")
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", NAMES)
 def test_an_empty_folder(tmp_path, name):
     with pytest.raises(RecordingError, match=r"^(no|.* has no) .* expected"):
         list(import_recordings(tmp_path, name))
 
 
-@pytest.mark.parametrize("name", [name for name in FORMATS if name not in FOLDERS])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in FOLDERS])
 def test_an_empty_file(tmp_path, name):
     (tmp_path / "a.csv").write_text("")
     with pytest.raises(RecordingError, match=r"a\.csv is (empty|not an HDF5 file)"):

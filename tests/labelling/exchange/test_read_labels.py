@@ -6,7 +6,6 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
 from holdfast.io import labels_to_csv, save_labels, save_recording
-from holdfast.labelling.exchange.label_studio_export import save_label_studio
 from holdfast.labelling.exchange.read_labels import read_labels
 from holdfast.recordings import Label
 from labelling.tiny import tiny_recording
@@ -53,11 +52,7 @@ def as_label_file(grasp, folder):
     return save_labels(grasp, folder / f"{grasp.name}.parquet")
 
 
-def as_label_studio(grasp, folder):
-    return save_label_studio([tiny_recording(4), grasp], folder)
-
-
-KINDS = (as_csv, as_recording, as_mcap, as_label_file, as_label_studio)
+KINDS = (as_csv, as_recording, as_mcap, as_label_file)
 
 
 @pytest.mark.parametrize("write", KINDS)
@@ -85,19 +80,6 @@ def test_labels_come_in_order_and_without_fingers_that_have_none(tmp_path, grasp
     path.write_text("finger,start,end,state,cause\nthumb,2,3,stable,\nthumb,1,2,unstable,slip\n")
     assert [x.start for x in read_labels(path, bare)["thumb"]] == [1.0, 2.0]
     assert list(read_labels(path, bare)) == ["thumb"]
-
-
-def test_an_annotator_may_be_chosen(tmp_path, grasp, bare):
-    path = as_label_studio(grasp, tmp_path)
-    tasks = json.loads(path.read_text())
-    result = tasks[1]["annotations"][0]["result"]
-    tasks[1]["annotations"] = [
-        {"completed_by": 1, "result": result[:1]},
-        {"completed_by": 2, "result": result},
-    ]
-    path.write_text(json.dumps(tasks))
-    assert len(read_labels(path, bare, "1")["thumb"]) == 1
-    assert len(read_labels(tmp_path, bare, "2")["thumb"]) == 4
 
 
 def refusal(path, recording):

@@ -7,7 +7,7 @@ that ships, `builtin:any`, is evaluated as it is, and adapted to the other recor
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from holdfast.io.importers import uskin_pick_move
+from holdfast_interop.importers import uskin_pick_move
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import NETWORK, Results, method_titles

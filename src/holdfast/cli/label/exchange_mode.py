@@ -8,42 +8,44 @@ from holdfast.cli.label.auto_mode import label_all, print_labelled
 from holdfast.cli.label.inputs import SaveOptions, login_name, recordings_at
 from holdfast.cli.terminal.console import print_json, print_line
 from holdfast.cli.terminal.progress import progress
+from holdfast.errors import missing_part
 
 if TYPE_CHECKING:
     from holdfast.recordings import Recording
-
-EXCHANGE_FORMATS = ("label-studio", "csv")
 
 
 def export_labels(
     paths: Sequence[Path], kind: str, out: Path, *, force: bool, as_json: bool
 ) -> None:
-    """Write labels for Label Studio, or as one CSV file per recording.
+    """Write labels for another program, or as one CSV file per recording.
 
     Args:
         paths: recordings, or folders of recordings.
-        kind: one of `EXCHANGE_FORMATS`.
+        kind: `csv`, or the format of a plug-in.
         out: folder for the files.
         force: overwrite existing files.
         as_json: print JSON.
 
     Raises:
         ValueError: an unknown format.
+        HoldfastError: the plug-in of the format cannot be used, or is not installed.
         OutputError: a file exists or cannot be written.
         RecordingError: a recording cannot be read.
     """
     from holdfast.io import Dataset
+    from holdfast.labelling.exchange.read_labels import LABEL_PLUGINS
 
-    if kind not in EXCHANGE_FORMATS:
-        raise ValueError(f"--export {' or '.join(EXCHANGE_FORMATS)} expected, {kind!r} given")
+    formats = (*LABEL_PLUGINS.names(), "csv")
+    if kind not in formats:
+        raise missing_part("labels", kind, f"the format {kind}") or ValueError(
+            f"--export {' or '.join(formats)} expected, {kind!r} given"
+        )
     recordings = Dataset(recordings_at(paths))
     if kind == "csv":
         written = _export_csv(recordings, out, force)
     else:
-        from holdfast.labelling.exchange.label_studio_export import CONFIG, save_label_studio
-
-        tasks = save_label_studio(progress(recordings, "exporting"), out, force=force)
-        written = [tasks, tasks.with_name(CONFIG)]
+        save = LABEL_PLUGINS.require(kind, f"the format {kind}").save
+        written = save(progress(recordings, "exporting"), out, force=force)
     if as_json:
         print_json({"format": kind, "written": [str(path) for path in written]})
     else:

@@ -24,34 +24,23 @@ from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 FORMATS = {
-    "uskin-pick-move": "folders of uSkin 4x4 recordings with measured slip (imanlab)",
-    "eflesh": "tensors seq_N.pt of tugs at held objects with two eFlesh fingertips",
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
-    "gtac": "CSV of the GTac grippers, first and second version: 15 magnetic nodes",
-    "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
-    "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
-    "lerobot": "LeRobot data sets (v3.0) that holdfast export wrote (extra: parquet)",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
-"""Formats that can be imported, with a description; they are detected in this order."""
-EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags", "lerobot": "parquet"}
+"""Formats that can be imported, with a description; they are detected in this order, those of
+plug-ins before the last."""
+EXTRAS = {"rosbag": "bags"}
 """Extras that formats need."""
-_IN_CONTACT = (
+IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
     "read this, give --in-contact"
 )
-_IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
+IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
 HINTS = {
-    "uskin-pick-move": _IN_CONTACT,
-    "eflesh": f"{_IN_CONTACT}; whether the object slipped is in the metadata (slipped)",
-    "xela-log": _IF_IN_CONTACT,
-    "gtac": f"grasps of the second gripper begin with an open hand; {_IF_IN_CONTACT}",
-    "anyskin-slip": f"{_IF_IN_CONTACT}; check the labels of contact with holdfast label",
-    "arq-crisp": _IF_IN_CONTACT,
-    "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
-    "lerobot": f"metadata say how the recordings begin; {_IF_IN_CONTACT}",
-    "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
+    "xela-log": IF_IN_CONTACT,
+    "rosbag": f"{IF_IN_CONTACT}; bias a PapillArray before, without load",
+    "csv": f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
 }
 """Option that helps with the recordings of a format, for the person who imports them."""
 

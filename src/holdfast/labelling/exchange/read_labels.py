@@ -1,13 +1,15 @@
 """Labels of a recording from a file of any known format, or from a folder of files."""
 
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from holdfast.errors import RecordingError
-from holdfast.files import file_stem, read_input
+from holdfast.files import file_stem
 from holdfast.io.header import label_of
-from holdfast.io.label_files import MAX_LABEL_FILE_SIZE, SUFFIX, labels_from_csv, load_labels
+from holdfast.io.label_files import SUFFIX, labels_from_csv, load_labels
 from holdfast.io.recording_files import SUFFIXES, load_recording
-from holdfast.labelling.exchange.label_studio import is_label_studio, labels_from_label_studio
+from holdfast.plugins import PluginGroup
 from holdfast.recordings import Label, Recording
 
 Labels = dict[str, tuple[Label, ...]]
@@ -17,14 +19,15 @@ def read_labels(path: str | Path, recording: Recording, annotator: str | None = 
     """Read the labels of a recording from a file, or from a file in a folder.
 
     A file is a label file (`.labels.json`), a recording with labels inside or beside it
-    (`.parquet`, `.mcap`), a table (`.csv`) or a JSON export of Label Studio (`.json`). In a folder
-    it is the first that exists of `NAME.labels.json`, `NAME.parquet`, `NAME.mcap`,
-    `NAME.labels.csv`, `NAME.csv`, `NAME.json`, and the only other `.json` file.
+    (`.parquet`, `.mcap`), a table (`.csv`) or a file of a plug-in, such as a JSON export of Label
+    Studio (`.json`). In a folder it is the first that exists of `NAME.labels.json`,
+    `NAME.parquet`, `NAME.mcap`, `NAME.labels.csv`, `NAME.csv`, `NAME.json`, and the only other
+    `.json` file.
 
     Args:
         path: of the file or folder.
         recording: the recording.
-        annotator: in an export of Label Studio; see `labels_from_label_studio`.
+        annotator: whose labels are read, where a format of a plug-in has those of several.
 
     Returns:
         By finger, in order of time; fingers without labels are left out.
@@ -51,9 +54,11 @@ def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
         return {name: module.labels for name, module in other.modules.items()}
     if file.suffix == ".csv":
         return labels_from_csv(file)
+    for source in [] if file.name.endswith(SUFFIX) else LABEL_PLUGINS.load_all().values():
+        if source.can_read(file):
+            labels: Labels = source.read(file, recording, annotator)
+            return labels
     if file.suffix == ".json":
-        if not file.name.endswith(SUFFIX) and _is_label_studio(file):
-            return labels_from_label_studio(file, recording, annotator)
         return _from_label_file(file, recording)
     raise RecordingError(
         f"cannot read labels from {file}: {file.suffix or 'no suffix'} given; {SUFFIX}, .json, "
@@ -81,13 +86,6 @@ def _check_digest(file: Path, digest: str, name: str, recording: Recording) -> N
         )
 
 
-def _is_label_studio(file: Path) -> bool:
-    try:
-        return is_label_studio(read_input(file, MAX_LABEL_FILE_SIZE))
-    except OSError as cause:
-        raise RecordingError(f"cannot read {file}: {cause.strerror}") from cause
-
-
 def _find_in_folder(folder: Path, recording: Recording) -> Path:
     endings = (SUFFIX, *SUFFIXES, ".labels.csv", ".csv", ".json")
     for ending in endings:
@@ -100,3 +98,17 @@ def _find_in_folder(folder: Path, recording: Recording) -> Path:
         f"no labels of {recording.name!r} in {folder}; "
         f"{file_stem(recording.name)} with one of {', '.join(endings)} expected"
     )
+
+
+def _label_format(name: str, loaded: Any) -> ModuleType:  # noqa: ANN401
+    """Return the module of a plug-in, with the functions that every format of labels has."""
+    functions = ("can_read", "read", "save")
+    if not isinstance(loaded, ModuleType) or not all(hasattr(loaded, part) for part in functions):
+        raise TypeError(
+            f"a module with can_read, read and save expected for {name}, {loaded!r} given"
+        )
+    return loaded
+
+
+LABEL_PLUGINS = PluginGroup("labels", ("csv",), _label_format)
+"""Formats of labels of other packages."""

@@ -1,0 +1,133 @@
+"""Registry of public recordings: the file `registry.json`, checked when it is read.
+
+No address in it was tried where it was written: there was no network. Paths and commits come from
+listings of the repositories. A sha256 is that of a copy, whose size equals that of the original
+where this could be compared, or that of a pointer of Git LFS in the repository.
+"""
+
+from functools import cache
+from importlib import resources
+from typing import Annotated
+
+import msgspec
+
+REGISTRY_SCHEMA = "holdfast.datasets/1"
+
+_Path = Annotated[str, msgspec.Meta(pattern=r"^(?!.*\.\.)[A-Za-z0-9_][A-Za-z0-9_./-]*$")]
+_Digest = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}$")]
+_Address = Annotated[str, msgspec.Meta(pattern=r"^https?://[^\s]+$")]
+_Size = Annotated[int, msgspec.Meta(ge=0)]
+
+
+class PublicFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """File of a public set.
+
+    Attributes:
+        path: where it is stored, inside the folder of the set.
+        remote: path after the address of the set; by default `path`.
+        size: size [bytes]; None if it is not known.
+        sha256: of the content; None if it is not known, and the file is not checked.
+    """
+
+    path: _Path
+    remote: _Path | None = None
+    size: _Size | None = None
+    sha256: _Digest | None = None
+
+
+class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Public set of recordings.
+
+    Attributes:
+        name: name on the command line.
+        title: what was recorded.
+        sensors: names of the sensors.
+        n_modules: number of modules of a recording; None if it is not known.
+        rate: sample rate [Hz]; None if it is not known.
+        labels: what is labelled, and how.
+        licence: SPDX name, `none`, or `not stated`.
+        page: address for people.
+        importer: format of the files; None if holdfast cannot read them.
+        size: about, of all files [bytes]; None if it is not known.
+        tried: whether recordings of the set went from a server to a decision in the tests.
+        address: of the files, ends with a slash.
+        in_contact: whether the object is held at the first sample.
+        files: files to download; empty if holdfast does not download them.
+        reason: why it does not.
+    """
+
+    name: _Path
+    title: str
+    sensors: tuple[str, ...]
+    labels: str
+    licence: str
+    tried: bool
+    n_modules: int | None = None
+    rate: float | None = None
+    page: _Address | None = None
+    importer: str | None = None
+    size: _Size | None = None
+    address: _Address = "https://none/"
+    in_contact: bool = False
+    files: tuple[PublicFile, ...] = ()
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        """Check what the types do not.
+
+        Raises:
+            ValueError: files or a reason are missing, or two files have one path.
+        """
+        if bool(self.files) is bool(self.reason):
+            raise ValueError(f"{self.name}: files or a reason expected, one of the two")
+        if self.files and not (self.importer and self.address.endswith("/")):
+            raise ValueError(f"{self.name}: an importer and an address with / at the end expected")
+        if len({file.path for file in self.files}) < len(self.files):
+            raise ValueError(f"{self.name}: two files have the same path")
+
+
+class Registry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Content of `registry.json`."""
+
+    schema: str
+    datasets: tuple[PublicSet, ...]
+
+    def __post_init__(self) -> None:
+        """Check the schema and the names.
+
+        Raises:
+            ValueError: the schema is another one, or two sets have one name.
+        """
+        if self.schema != REGISTRY_SCHEMA:
+            raise ValueError(f"schema {REGISTRY_SCHEMA} expected, {self.schema!r} given")
+        if len({public.name for public in self.datasets}) < len(self.datasets):
+            raise ValueError("two data sets have the same name")
+
+
+@cache
+def public_sets() -> dict[str, PublicSet]:
+    """Return all public sets by name."""
+    data = resources.files("holdfast_interop.datasets").joinpath("registry.json").read_bytes()
+    registry = msgspec.json.decode(data, type=Registry)
+    return {public.name: public for public in registry.datasets}
+
+
+def find_set(name: str) -> PublicSet:
+    """Return the public set of a name.
+
+    Raises:
+        ValueError: there is none.
+
+    Example:
+        >>> find_set("uskin-pick-move").licence
+        'MIT'
+    """
+    if name not in public_sets():
+        raise ValueError(f"unknown data set {name!r}; there are {', '.join(public_sets())}")
+    return public_sets()[name]
+
+
+def other_sets(name: str) -> str:
+    """Return the names of the sets that can be downloaded, but for one."""
+    names = [other.name for other in public_sets().values() if other.files and other.name != name]
+    return ", ".join(names)

@@ -1,0 +1,161 @@
+"""Export of recordings for Foxglove: MCAP files with JSON messages, and a layout of its panels."""
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+from mcap.writer import CompressionType, Writer
+
+from holdfast.detector import Detection, detect
+from holdfast.errors import RecordingError
+from holdfast.exporters.output import whole_files
+from holdfast.files import file_stem
+from holdfast.recordings import Recording
+from holdfast_interop.foxglove.hand_frames import frames_of
+from holdfast_interop.foxglove.layout import layout
+from holdfast_interop.foxglove.messages import Message, messages
+from holdfast_interop.foxglove.schemas import SCHEMAS, schema_of
+
+if TYPE_CHECKING:
+    from holdfast.model import Model
+
+LAYOUT_FILE = "holdfast-layout.json"
+EXPORT_CHUNK_SIZE = 1 << 20
+"""Number of bytes from which a chunk of the file ends."""
+MAX_SCENE_SECONDS = 86_400.0
+"""Longest recording that is exported [s]."""
+
+
+def export(
+    recordings: Sequence[Recording],
+    out: Path,
+    *,
+    model: "Model | None" = None,
+    force: bool = False,
+    progress: Callable[[Iterable[Recording]], Iterable[Recording]] = iter,
+) -> dict[str, int]:
+    """Write an MCAP file for each recording, and one layout for all of them, in a folder.
+
+    Args:
+        recordings: such as a `Dataset`; they are loaded one at a time.
+        out: the folder.
+        model: whose estimates are added.
+        force: replace existing files.
+        progress: wraps the recordings.
+
+    Returns:
+        Number of `files` and of `messages`.
+
+    Raises:
+        RecordingError: a recording is longer than a day.
+        ModelError: the model does not fit to a recording.
+        OutputError: a file exists already, or cannot be written.
+    """
+    fingers: dict[str, None] = {}
+    topics: set[str] = set()
+    n_messages = n_files = 0
+    with whole_files(out, force=force) as folder:
+        for recording in progress(recordings):
+            file = folder / f"{file_stem(recording.name)}.mcap"
+            used = write_recording(recording, file, model)
+            fingers |= dict.fromkeys(recording.modules)
+            topics |= used.keys()
+            n_messages += sum(used.values())
+            n_files += 1
+        text = msgspec.json.encode(layout(list(fingers), topics))
+        (folder / LAYOUT_FILE).write_bytes(msgspec.json.format(text) + b"\n")
+    return {"files": n_files, "messages": n_messages}
+
+
+def write_recording(recording: Recording, path: Path, model: "Model | None") -> dict[str, int]:
+    """Write the file of a recording.
+
+    Returns:
+        Number of messages by topic.
+
+    Raises:
+        RecordingError: the recording is longer than a day.
+        ModelError: the model does not fit to it.
+    """
+    if recording.duration > MAX_SCENE_SECONDS:
+        raise RecordingError(
+            f"{recording.name}: {recording.duration:.3g} s given, at most {MAX_SCENE_SECONDS:g} s "
+            "expected; cut it"
+        )
+    detection = None if model is None else detect(model, recording)
+    frames, origin = frames_of(recording)
+    with path.open("wb") as stream:
+        log = _MessageFile(Writer(stream, EXPORT_CHUNK_SIZE, CompressionType.ZSTD), recording)
+        log.describe(recording, detection, origin)
+        for message in messages(recording, frames, detection, log.stamp):
+            log.write(message)
+        log.close()
+    return log.n_messages
+
+
+class _MessageFile:
+    """MCAP file of JSON messages; a time before 1970 is shifted to it.
+
+    Attributes:
+        n_messages: number of messages by topic.
+    """
+
+    def __init__(self, writer: Writer, recording: Recording) -> None:
+        self._writer = writer
+        times = [recording.start, *(time for time, _ in recording.markers)]
+        if recording.truth is not None and len(recording.truth.times):
+            times.append(float(recording.truth.times[0]))
+        self._offset = max(0.0, -min(times))
+        self._encoder = msgspec.json.Encoder()
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self.n_messages: dict[str, int] = {}
+        writer.start("", "holdfast")
+
+    def describe(self, recording: Recording, detection: Detection | None, origin: str) -> None:
+        """Write what the messages do not say as metadata of the file."""
+        units = {name: str(module.unit) for name, module in recording.modules.items()}
+        facts = {
+            "name": recording.name,
+            "units": units,
+            "metadata": dict(recording.metadata),
+            "time_offset": self._offset,
+            "frames": origin,
+            "estimates": "none" if detection is None else sorted(detection.fingers),
+        }
+        encode = msgspec.json.Encoder(enc_hook=str).encode
+        texts = {key: x if isinstance(x, str) else encode(x).decode() for key, x in facts.items()}
+        self._writer.add_metadata("holdfast", texts)
+
+    def stamp(self, time: float) -> dict[str, int]:
+        """Return a time [s] as Foxglove's messages have it."""
+        seconds, nanoseconds = divmod(self._nanoseconds(time), 1_000_000_000)
+        return {"sec": seconds, "nsec": nanoseconds}
+
+    def write(self, message: Message) -> None:
+        """Write a message; the schema and the channel of its topic come before the first."""
+        topic = message.topic
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register_channel(
+                topic, "json", self._schema(schema_of(topic))
+            )
+        document = message.document
+        if "entities" not in document and "transforms" not in document:
+            document = {"timestamp": self.stamp(message.time), **document}
+        time = self._nanoseconds(message.time)
+        self._writer.add_message(self._channels[topic], time, self._encoder.encode(document), time)
+        self.n_messages[topic] = self.n_messages.get(topic, 0) + 1
+
+    def close(self) -> None:
+        """Write the end of the file."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def _schema(self, name: str) -> int:
+        if name not in self._schemas:
+            text = msgspec.json.encode({"title": name, **SCHEMAS[name]})
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
+        return self._schemas[name]
+
+    def _nanoseconds(self, time: float) -> int:
+        return max(0, round((time + self._offset) * 1e9))

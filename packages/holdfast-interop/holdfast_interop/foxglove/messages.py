@@ -1,0 +1,385 @@
+"""Messages for Foxglove of a recording and its estimates, as plain data."""
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import UNKNOWN, ContactState, faults_of
+from holdfast.detector import Detection, FingerTrace
+from holdfast.detector.detection import CAUSE_BY_CODE, REASON_BY_CODE, STATE_BY_CODE
+from holdfast.detector.slips import SlipWatch
+from holdfast.recordings import GAP_PERIODS, Recording
+from holdfast.sensors.types import Array, Integers
+from holdfast_interop.foxglove.hand_frames import Frame, module_frame
+from holdfast_interop.foxglove.schemas import (
+    ARROWS_TOPIC,
+    EMPTY_SHAPES,
+    FORCE_TOPIC,
+    INSTABILITY_TOPIC,
+    LABEL_TOPIC,
+    LOG_TOPIC,
+    PHASE_TOPIC,
+    SLIP_TOPIC,
+    SPEED_TOPIC,
+    STABLE_TOPIC,
+    STATE_TOPIC,
+    TAXELS_TOPIC,
+    TRANSFORMS_TOPIC,
+    TRUE_SPEED_TOPIC,
+    finger_topic,
+    series_label,
+)
+from holdfast_interop.foxglove.taxel_arrows import (
+    SHORTEST_ARROW,
+    ModuleArrows,
+    arrow_scale,
+    module_forces,
+    orientations,
+    zeroed,
+)
+
+SCENE_RATE = 30.0
+"""Arrows and moving frames per second [Hz]."""
+REPEAT_SECONDS = 1.0
+"""Time after which a state is sent again if it does not change [s]."""
+INFO, WARNING = 2, 3
+"""Levels of Foxglove's log."""
+
+Colour = dict[str, float]
+Track = tuple[Array, npt.NDArray[Any]]
+"""Times (n,) [s] and values (n,)."""
+Stamp = Callable[[float], dict[str, int]]
+
+
+def _colour(red: float, green: float, blue: float, alpha: float = 1.0) -> Colour:
+    return {"r": red, "g": green, "b": blue, "a": alpha}
+
+
+ARROW_COLOURS = {
+    ContactState.UNKNOWN: _colour(0.34, 0.71, 0.91),
+    ContactState.NO_CONTACT: _colour(0.78, 0.78, 0.78),
+    ContactState.UNSTABLE: _colour(0.88, 0.54, 0.24),
+    ContactState.STABLE: _colour(0.0, 0.62, 0.45),
+}
+"""Colours of the arrows of a finger, by its state (or, without a model, its label)."""
+TAXEL_COLOUR = _colour(0.4, 0.4, 0.4, 0.6)
+TAXEL_DIAMETER = 0.0012
+NAME_SIZE = 0.006
+"""Size of the name of a module [m]."""
+ARROW_WIDTHS = (0.0006, 0.0015)
+"""Diameters of the shaft and the head of an arrow [m]."""
+HEAD_SHARE = 0.3
+"""Length of the head of an arrow as a share of the arrow."""
+_STRAIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+
+
+class Message(NamedTuple):
+    """A message: time [s], topic and content as plain data without its time stamp."""
+
+    time: float
+    topic: str
+    document: dict[str, Any]
+
+
+def messages(
+    recording: Recording, frames: Sequence[Frame], detection: Detection | None, stamp: Stamp
+) -> Iterator[Message]:
+    """Yield all messages of a recording in the order of their times.
+
+    Args:
+        recording: the recording.
+        frames: of its modules.
+        detection: estimates of a model, or None.
+        stamp: makes the time stamp of a message of a time [s].
+    """
+    traces = {} if detection is None else detection.fingers
+    parts = [
+        _transforms(frames, recording, stamp),  # before what is drawn in these frames
+        _taxels(recording, stamp),
+        _arrows(recording, _coloured_by(recording, traces), stamp),
+        *_scalars(recording, traces),
+        *_states(recording, traces),
+        _log(recording, traces),
+    ]
+    return heapq.merge(*parts, key=attrgetter("time"))
+
+
+def _scalars(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Iterator[Message]]:
+    """Return the series of plots; a topic has the values of all fingers."""
+    forces: dict[str, Track] = {}
+    for name, module in recording.modules.items():
+        if name in traces:
+            forces[name] = traces[name].times, np.linalg.norm(traces[name].force, axis=1)
+        elif module.n_samples:
+            forces[name] = module.times, _amplitude(recording, name)
+    topics: dict[str, dict[str, Track]] = {FORCE_TOPIC: forces}
+    for topic, column in (
+        (INSTABILITY_TOPIC, "instability"),
+        (STABLE_TOPIC, "stable_probability"),
+        (SLIP_TOPIC, "slip_probability"),
+        (SPEED_TOPIC, "slip_speed"),
+    ):
+        columns = {name: (trace.times, getattr(trace, column)) for name, trace in traces.items()}
+        topics[topic] = {name: track for name, track in columns.items() if track[1] is not None}
+    topics[TRUE_SPEED_TOPIC] = _true_speeds(recording)
+    return [_series(topic, tracks) for topic, tracks in topics.items() if tracks]
+
+
+def _amplitude(recording: Recording, name: str) -> Array:
+    """Return F_a of a module, (n,)."""
+    module = recording.modules[name]
+    force = np.einsum("tij,ntj->ni", module.sensor.rotations, zeroed(recording, name))
+    return np.asarray(np.linalg.norm(force, axis=1))
+
+
+def _true_speeds(recording: Recording) -> dict[str, Track]:
+    """Return the true speed of the slip of each finger [mm/s], where it is known."""
+    truth = recording.truth
+    if truth is None:
+        return {}
+    return {
+        finger: (truth.times, 1000.0 * arrays["slip_speed"])
+        for finger, arrays in truth.fingers.items()
+        if "slip_speed" in arrays and arrays["slip_speed"].ndim == 1
+    }
+
+
+def _series(topic: str, tracks: Mapping[str, Track]) -> Iterator[Message]:
+    """Yield messages at the samples of the fastest finger; null where a finger has a gap."""
+    grid = max((times for times, _ in tracks.values()), key=len)
+    columns = [_held(times, values, grid) for times, values in tracks.values()]
+    labels = [series_label(finger) for finger in tracks]
+    for time, row in zip(grid.tolist(), np.column_stack(columns).tolist(), strict=True):
+        pairs = zip(labels, row, strict=True)
+        scalars = [{"label": label, "value": value} for label, value in pairs]
+        yield Message(time, topic, {"scalars": scalars})
+
+
+def _held(times: Array, values: npt.NDArray[Any], grid: Array) -> Array:
+    """Return the latest values at some times; NaN where they are more than 3 periods old."""
+    if not len(times):
+        return np.full(len(grid), np.nan)
+    rows = np.searchsorted(times, grid, side="right") - 1
+    period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+    is_old = (rows < 0) | (grid - times[rows] > GAP_PERIODS * period)
+    return np.where(is_old, np.nan, values[rows])
+
+
+def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Iterator[Message]]:
+    parts = [
+        _state_messages(
+            finger_topic(STATE_TOPIC, finger),
+            trace.times,
+            np.stack([trace.state, trace.reason, trace.cause]),
+            lambda state, reason, cause: {
+                "state": STATE_BY_CODE[state].value,
+                "reason": REASON_BY_CODE[reason].value,
+                "cause": CAUSE_BY_CODE[cause] or "",
+            },
+        )
+        for finger, trace in traces.items()
+    ]
+    for name, module in recording.modules.items():
+        if module.labels:
+            codes = module.label_states[None]
+            topic = finger_topic(LABEL_TOPIC, name)
+            parts.append(_state_messages(topic, module.times, codes, _state_of_label))
+    truth = recording.truth
+    if truth is not None and "phase" in truth.hand and truth.hand["phase"].dtype.kind == "U":
+        phases, numbers = np.unique(truth.hand["phase"], return_inverse=True)
+        parts.append(
+            _state_messages(
+                PHASE_TOPIC, truth.times, numbers[None], lambda code: {"state": str(phases[code])}
+            )
+        )
+    return parts
+
+
+def _state_of_label(code: int) -> dict[str, str]:
+    return {"state": STATE_BY_CODE[code].value if code != UNKNOWN else "no label"}
+
+
+def _state_messages(
+    topic: str, times: Array, codes: npt.NDArray[Any], document: Callable[..., dict[str, Any]]
+) -> Iterator[Message]:
+    """Yield a message at every change of the codes (n_codes, n), and at least once a second."""
+    latest, sent_at = None, -np.inf
+    for time, row in zip(times.tolist(), codes.T.tolist(), strict=True):
+        if row != latest or time - sent_at >= REPEAT_SECONDS:
+            latest, sent_at = row, time
+            yield Message(time, topic, document(*row))
+
+
+def _log(recording: Recording, traces: Mapping[str, FingerTrace]) -> Iterator[Message]:
+    """Yield markers, alarms, slips and faults."""
+    events = [(time, INFO, "marker", text) for time, text in recording.markers]
+    for finger, trace in traces.items():
+        events += [(time, WARNING, finger, text) for time, text in _alarms(trace)]
+        events += [(time, WARNING, finger, text) for time, text in _new_faults(trace)]
+        events += _slips(finger, trace)
+    for time, level, name, text in sorted(events):
+        document = {"level": level, "message": text, "name": name, "file": "", "line": 0}
+        yield Message(time, LOG_TOPIC, document)
+
+
+def _alarms(trace: FingerTrace) -> Iterator[tuple[float, str]]:
+    """Yield changes from STABLE to anything else but UNKNOWN."""
+    states = [STATE_BY_CODE[code] for code in trace.state.tolist()]
+    rows = zip(trace.times[1:].tolist(), pairwise(states), trace.cause[1:].tolist(), strict=True)
+    for time, (before, state), cause in rows:
+        if before is ContactState.STABLE and state not in (before, ContactState.UNKNOWN):
+            why = f" ({CAUSE_BY_CODE[cause]})" if CAUSE_BY_CODE[cause] else ""
+            yield time, f"alarm: {state.value}{why}, was {before.value}"
+
+
+def _new_faults(trace: FingerTrace) -> Iterator[tuple[float, str]]:
+    masks = trace.faults.astype(np.int64)
+    new = masks & ~np.concatenate([[0], masks[:-1]])
+    for k in np.flatnonzero(new):
+        yield float(trace.times[k]), f"fault: {', '.join(faults_of(int(new[k])))}"
+
+
+def _slips(finger: str, trace: FingerTrace) -> Iterator[tuple[float, int, str, str]]:
+    for slip in SlipWatch().update(finger, trace.estimates()):
+        if slip.end is None:
+            text = f"slip begins, probability {slip.max_probability:.2f}"
+            yield slip.begin, WARNING, finger, text
+        else:
+            far = "" if slip.distance is None else f", {slip.distance:.2f} mm"
+            yield slip.end, INFO, finger, f"slip ends after {slip.end - slip.begin:.3f} s{far}"
+
+
+def _coloured_by(
+    recording: Recording, traces: Mapping[str, FingerTrace]
+) -> dict[str, tuple[Array, npt.NDArray[np.int8]]]:
+    """Return the codes of the states that colour the arrows of each module."""
+    return {
+        name: (traces[name].times, traces[name].state)
+        if name in traces
+        else (module.times, module.label_states)
+        for name, module in recording.modules.items()
+        if module.n_samples
+    }
+
+
+def _instants(recording: Recording) -> Array:
+    n = int(recording.duration * SCENE_RATE) + 1
+    return recording.start + np.arange(n) / SCENE_RATE
+
+
+def _arrows(
+    recording: Recording, states: Mapping[str, tuple[Array, npt.NDArray[np.int8]]], stamp: Stamp
+) -> Iterator[Message]:
+    """Yield the arrows of all modules at each instant; none of a module in a gap."""
+    instants = _instants(recording)
+    arrows = module_forces(recording, instants)
+    scale = arrow_scale(arrows)
+    places = {name: recording.modules[name].sensor.positions for name in arrows}
+    for time in instants.tolist():
+        entities = []
+        for name, module in arrows.items():
+            k = module.sample_at(time, 1 / SCENE_RATE)
+            times, codes = states[name]
+            row = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
+            colour = ARROW_COLOURS[STATE_BY_CODE[codes[row]]]
+            drawn = [] if k is None else _module_arrows(module, k, scale, places[name], colour)
+            entities.append(_entity(name, stamp(time), arrows=drawn))
+        yield Message(time, ARROWS_TOPIC, {"deletions": [], "entities": entities})
+
+
+def _module_arrows(
+    module: ModuleArrows, k: int, scale: float, places: Array, colour: Colour
+) -> list[dict[str, Any]]:
+    lengths = scale * np.linalg.norm(module.forces[k], axis=1)
+    kept: Integers = np.flatnonzero(lengths > SHORTEST_ARROW)
+    if not len(kept):
+        return []
+    lengths = lengths[kept]
+    turned = orientations(module.forces[k][kept] * (scale / lengths[:, None]))
+    rows = np.round(np.column_stack([places[kept], turned, lengths]), 6).tolist()
+    shaft, head = ARROW_WIDTHS
+    return [
+        {
+            "pose": _pose(row[:3], row[3:7]),
+            "shaft_length": row[7] * (1 - HEAD_SHARE),
+            "shaft_diameter": shaft,
+            "head_length": row[7] * HEAD_SHARE,
+            "head_diameter": head,
+            "color": colour,
+        }
+        for row in rows
+    ]
+
+
+def _taxels(recording: Recording, stamp: Stamp) -> Iterator[Message]:
+    """Yield a dot for each taxel, and the name of each module, once."""
+    entities = []
+    size = dict.fromkeys("xyz", TAXEL_DIAMETER)
+    for name, module in recording.modules.items():
+        places = np.round(module.sensor.positions, 6).tolist()
+        dots = [{"pose": _pose(p), "size": size, "color": TAXEL_COLOUR} for p in places]
+        middle = (module.sensor.positions.mean(axis=0) - 0.02 * module.sensor.normal).tolist()
+        text = {
+            "pose": _pose(middle),
+            "billboard": True,
+            "font_size": NAME_SIZE,
+            "scale_invariant": False,
+            "color": _colour(0.2, 0.2, 0.2),
+            "text": name,
+        }
+        entities.append(_entity(name, stamp(recording.start), spheres=dots, texts=[text]))
+    yield Message(recording.start, TAXELS_TOPIC, {"deletions": [], "entities": entities})
+
+
+def _entity(
+    module: str,
+    time: dict[str, int],
+    *,
+    arrows: Sequence[object] = (),
+    spheres: Sequence[object] = (),
+    texts: Sequence[object] = (),
+) -> dict[str, Any]:
+    """Return shapes in the frame of a module, which stay until it has others."""
+    return {
+        "timestamp": time,
+        "frame_id": module_frame(module),
+        "id": module,
+        "lifetime": {"sec": 0, "nsec": 0},
+        "frame_locked": True,
+        "metadata": [],
+        "arrows": arrows,
+        "spheres": spheres,
+        "texts": texts,
+        **{shape: [] for shape in EMPTY_SHAPES},
+    }
+
+
+def _pose(place: Iterable[float], turned: Iterable[float] | None = None) -> dict[str, Any]:
+    quaternion = _STRAIGHT if turned is None else dict(zip("xyzw", turned, strict=True))
+    return {"position": dict(zip("xyz", place, strict=True)), "orientation": quaternion}
+
+
+def _transforms(frames: Sequence[Frame], recording: Recording, stamp: Stamp) -> Iterator[Message]:
+    """Yield all frames at the start, then those that move at each instant."""
+    moving = [frame for frame in frames if len(frame.times) > 1]
+    for k, time in enumerate(_instants(recording).tolist()):
+        sent = frames if k == 0 else moving
+        if sent:
+            transforms = [_transform(frame, time, stamp) for frame in sent]
+            yield Message(time, TRANSFORMS_TOPIC, {"transforms": transforms})
+
+
+def _transform(frame: Frame, time: float, stamp: Stamp) -> dict[str, Any]:
+    x, y, z, qw, qx, qy, qz = np.round(frame.at(time), 7).tolist()
+    return {
+        "timestamp": stamp(time),
+        "parent_frame_id": frame.parent,
+        "child_frame_id": frame.name,
+        "translation": {"x": x, "y": y, "z": z},
+        "rotation": {"x": qx, "y": qy, "z": qz, "w": qw},
+    }

@@ -1,0 +1,302 @@
+"""Import of the ARQ-CRISP slip data sets of 2021 (3 x 6 taxels) and 2023 (4 x 6), in HDF5.
+
+A group `{planner}/{object}/PoseN/ExpM` is a recording. The labels of the authors are: 0 nothing
+held, or held with the arm at rest; 1 slip with the arm at rest; 2 release; 3 grasp; 4 held with
+the arm in motion; 5 slip with the arm in motion; 6 anything else.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.importers.table import errors_named, natural_order, with_integer_type
+from holdfast.io.safe_reading import one_line
+from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
+from holdfast.sensors import Sensor, sensor
+from holdfast.sensors.types import Array
+
+EXTRA = "hdf5"
+HINT = IF_IN_CONTACT
+HDF5_SUFFIXES = (".h5", ".hdf5")
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+SOURCE = "ARQ-CRISP"
+RAW_DATA, TIMES_NAME, LABELS_NAME = (
+    "tactile_data_raw",
+    "tactile_timestamps",
+    "tactile_slips_label",
+)
+MILLISECOND = 1e-3
+MAX_GROUP_DEPTH = 16
+"""Maximum depth of groups inside groups; the data sets have four."""
+PATCH_PITCH = (7.24e-3, 7.17e-3)
+"""Distances between the taxels of the 4 x 6 patch [m]; those of the 3 x 6 patch are unknown, and
+the same are assumed."""
+
+_NOTHING, _SLIP_AT_REST, _RELEASE, _GRASP, _HELD_IN_MOTION, _SLIP_IN_MOTION, _OTHER = range(7)
+_State = tuple[ContactState, Cause | None]
+_STATES: dict[int, _State] = {
+    _SLIP_AT_REST: (ContactState.UNSTABLE, Cause.SLIP),
+    _SLIP_IN_MOTION: (ContactState.UNSTABLE, Cause.SLIP),
+    _RELEASE: (ContactState.UNSTABLE, Cause.RELEASED),
+    _GRASP: (ContactState.UNSTABLE, Cause.CLOSING),
+    _HELD_IN_MOTION: (ContactState.STABLE, None),
+}
+_HELD_AFTER = (_GRASP, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
+_HELD_BEFORE = (_RELEASE, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is an HDF5 file, or a folder with one."""
+    return any(file.suffix in HDF5_SUFFIXES or _is_hdf5(file) for file in _files(path))
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the HDF5 files of a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    files = _files(path)
+    if not files:
+        raise RecordingError(f"no HDF5 file in {path}; {' or '.join(HDF5_SUFFIXES)} expected")
+    return files
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    return sorted((p for p in path.glob("*") if p.suffix in HDF5_SUFFIXES), key=natural_order)
+
+
+def _is_hdf5(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recordings in an HDF5 file.
+
+    Raises:
+        RecordingError: it has another form.
+    """
+    import h5py
+
+    if not _is_hdf5(path):
+        raise RecordingError(f"{path} is not an HDF5 file")
+    try:
+        with h5py.File(path, "r") as file:
+            names = _names_of_recordings(path, file, h5py)
+            seen: set[int] = set()
+            if not names:
+                raise RecordingError(f"{path}: no group with {RAW_DATA} in it")
+            for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
+                arrays = _Arrays(path, file[name], h5py, seen)
+                yield _recording(f"{path}: {name}", name.split("/"), arrays)
+    except RecordingError:
+        raise
+    except Exception as cause:  # h5py raises errors of any type for a damaged file
+        raise RecordingError(
+            f"{path} is damaged or not a data set of ARQ-CRISP: {one_line(cause)}"
+        ) from cause
+
+
+def _names_of_recordings(path: Path, file: Any, h5py: ModuleType) -> list[str]:  # noqa: ANN401
+    """Return the names of the groups with data; a group with many names is visited once.
+
+    Raises:
+        RecordingError: groups are nested too deep, or there are too many.
+    """
+    names: list[str] = []
+    seen: set[int] = set()
+    waiting = [("", file["/"])]
+    while waiting:
+        name, group = waiting.pop()
+        address = h5py.h5o.get_info(group.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        if name.count("/") >= MAX_GROUP_DEPTH:
+            raise RecordingError(
+                f"{path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
+            )
+        if name and RAW_DATA in group:
+            names.append(name)
+            continue
+        waiting += [
+            (f"{name}/{key}".lstrip("/"), group[key])
+            for key in group
+            if _is_group(group, key, h5py)
+        ]
+    return names
+
+
+def _is_group(group: Any, key: str, h5py: ModuleType) -> bool:  # noqa: ANN401 (h5py.Group)
+    """Return whether a name in a group is a group inside the same file."""
+    is_inside = isinstance(group.get(key, getlink=True), h5py.HardLink)
+    return is_inside and group.get(key, getclass=True) is h5py.Group
+
+
+class _Arrays:
+    """Arrays of numbers in a group of an HDF5 file, by name.
+
+    Only arrays inside of the file itself are read. HDF5 can also store the names of other files
+    (external links, external storage, virtual arrays), and would read any file of the user.
+
+    Args:
+        path: path of the file.
+        group: the group.
+        h5py: the module.
+        seen: addresses of the arrays that were read.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        group: Any,  # noqa: ANN401 (h5py.Group)
+        h5py: ModuleType,
+        seen: set[int],
+    ) -> None:
+        self._path = path
+        self._group = group
+        self._h5py = h5py
+        self._seen = seen
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names()
+
+    def names(self) -> list[str]:
+        """Return the names in the group."""
+        return list(self._group)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return an array as float64.
+
+        Raises:
+            RecordingError: it is not stored in the file, is not of numbers, or is too large.
+        """
+        h5py = self._h5py
+        link = self._group.get(name, getlink=True)
+        item = self._group[name] if isinstance(link, h5py.HardLink) else None
+        if not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
+            raise RecordingError(
+                f"{self._path}: {self._group.name}/{name} is no array stored in this file; "
+                "links to other places and files are refused"
+            )
+        if item.dtype.kind not in "biuf":
+            raise RecordingError(f"{self._path}: numbers expected in {name}, {item.dtype} given")
+        if (address := h5py.h5o.get_info(item.id).addr) in self._seen:
+            raise RecordingError(
+                f"{self._path}: {self._group.name}/{name} is an array of another group too; each "
+                "group is a recording and has arrays of its own"
+            )
+        self._seen.add(address)
+        self._check_filters(name, item)
+        return np.asarray(item[()], dtype=np.float64)
+
+    def _check_filters(self, name: str, item: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
+        """Check that an array is packed by deflate only; other filters are loaded as plug-ins.
+
+        Raises:
+            RecordingError: it is packed in another way.
+        """
+        filters = item.id.get_create_plist()
+        kinds = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
+        h5z = self._h5py.h5z
+        known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
+        if not known.issuperset(kinds) or len(set(kinds)) < len(kinds):
+            raise RecordingError(
+                f"{self._path}: {name} is packed by the filters {kinds}; gzip, shuffle and "
+                "fletcher32 expected, each once"
+            )
+
+
+def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
+    if TIMES_NAME not in group:
+        raise RecordingError(f"{place} has no {TIMES_NAME}; it has {', '.join(group.names())}")
+    raw = group[RAW_DATA]
+    times = group[TIMES_NAME].ravel() * MILLISECOND
+    if raw.ndim != 3 or raw.shape[1:] != (3, len(times)):
+        raise RecordingError(
+            f"{place}: {RAW_DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
+        )
+    readings = with_integer_type(raw.transpose(2, 0, 1))
+    with errors_named(place):
+        module = Tactile(_sensor(readings.shape[1]), times, readings)
+        if LABELS_NAME in group:
+            labels = _labels(group[LABELS_NAME].ravel(), module)
+            module = replace(module, labels=labels)
+        return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
+
+
+def _metadata(parts: list[str]) -> dict[str, str]:
+    names = ("planner", "object", "pose", "repeat")
+    return {"source": SOURCE, **dict(zip(reversed(names), reversed(parts), strict=False))}
+
+
+def _sensor(n_taxels: int) -> Sensor:
+    if n_taxels == 24:
+        return sensor("uskin-4x6")
+    if n_taxels != 18:
+        raise RecordingError(
+            f"{n_taxels} taxels given; 18 (3 x 6, 2021) or 24 (4 x 6, 2023) expected"
+        )
+    positions = [
+        [(k % 6 - 2.5) * PATCH_PITCH[0], (1 - k // 6) * PATCH_PITCH[1], 0.0] for k in range(18)
+    ]
+    rotations = np.tile(np.eye(3), (18, 1, 1))
+    normal = np.array([0.0, 0.0, 1.0])
+    return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, range=(0.0, 65535.0))
+
+
+def _labels(codes: Array, module: Tactile) -> tuple[Label, ...]:
+    if len(codes) != module.n_samples:
+        raise RecordingError(f"{len(codes)} labels given for {module.n_samples} samples")
+    if not np.isin(codes, range(_OTHER + 1)).all():
+        raise RecordingError(f"labels 0 to {_OTHER} expected, {codes.max():g} given")
+    return labels_from_samples(
+        module.times,
+        _states([int(code) for code in codes]),
+        period=module.period,
+        evidence="annotated by hand",
+        author=SOURCE,
+    )
+
+
+def _states(codes: list[int]) -> list[_State | None]:
+    """Return the state of each sample; that of label 0 depends on the labels around it.
+
+    Label 0 means both "nothing held" and "held, arm at rest". It is stable between labels of a
+    held object, and no contact before a grasp or after a release. Otherwise it is unknown.
+    """
+    previous_events = _previous_events(codes)
+    next_events = _previous_events(codes[::-1])[::-1]
+    return [
+        _state_at_rest(before, after) if code == _NOTHING else _STATES.get(code)
+        for code, before, after in zip(codes, previous_events, next_events, strict=True)
+    ]
+
+
+def _previous_events(codes: list[int]) -> list[int | None]:
+    """Return the last label before each sample that is neither 0 nor 6."""
+    events: list[int | None] = []
+    last: int | None = None
+    for code in codes:
+        events.append(last)
+        if code not in (_NOTHING, _OTHER):
+            last = code
+    return events
+
+
+def _state_at_rest(before: int | None, after: int | None) -> _State | None:
+    if before in _HELD_AFTER and after in _HELD_BEFORE:
+        return ContactState.STABLE, None
+    if before in (None, _RELEASE) and after in (None, _GRASP) and (before, after) != (None, None):
+        return ContactState.NO_CONTACT, None
+    return None

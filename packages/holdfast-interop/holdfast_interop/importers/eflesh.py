@@ -1,0 +1,221 @@
+"""Import of tugs at held objects with eFlesh fingertips: a tensor of torch for each sequence.
+
+A file `seq_N.pt` is a zip archive. Its member `data/0` has the values as they are in memory, its
+member `data.pkl` the program of a pickle that would build the tensor. The values are read, and
+the pickle is never run: only the name of the number type is looked up in its bytes.
+`labels.csv` beside the files has one label for each sequence, or `labels`, as the authors have it:
+line N, from 0, is that of `seq_N`.
+"""
+
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import RecordingError
+from holdfast.files import check_regular, read_input
+from holdfast.io.importers import IN_CONTACT
+from holdfast.io.importers.table import (
+    SLIPPED,
+    natural_order,
+    read_table,
+)
+from holdfast.io.safe_reading import ReadBudget
+from holdfast.recordings import STARTS_LOADED, Recording, Tactile
+from holdfast.sensors import sensor
+
+HINT = f"{IN_CONTACT}; whether the object slipped is in the metadata (slipped)"
+SOURCE = "notvenky/eFlesh"
+TENSOR_SUFFIX = ".pt"
+LABELS_FILE, LABEL_LINES_FILE = "labels.csv", "labels"
+MAX_LABEL_LINES_SIZE = 1 << 20
+"""Size above which a file of label lines is refused [bytes]."""
+N_FINGERTIPS = 2
+N_MAGNETOMETERS = 5
+NUMBER_TYPE = np.dtype("<f4")
+ROW_SIZE = N_FINGERTIPS * N_MAGNETOMETERS * 3 * NUMBER_TYPE.itemsize
+"""Size of the values of one instant [bytes]."""
+SEQUENCE_RATE = 100.0
+"""Nominal rate; the files have no times [Hz]."""
+MAX_PICKLE_SIZE = 1 << 16
+"""Maximum size of the pickle of one tensor; it has some 200 [bytes]."""
+
+_ZIP_MAGIC = b"PK\x03\x04"
+_STORAGE = re.compile(rb"[A-Z][A-Za-z]{1,20}Storage\b")
+_FORM = f"{N_FINGERTIPS} fingertips x {N_MAGNETOMETERS} magnetometers x 3 axes of float32"
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is a file of torch, or a folder with sequences."""
+    if path.is_dir():
+        return bool(_sequences(path))
+    return path.suffix == TENSOR_SUFFIX and _is_zip(path)
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the sequences of a folder in natural order.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    files = [path] if path.is_file() else _sequences(path)
+    if not files:
+        raise RecordingError(f"no eflesh sequence in {path}; files seq_N{TENSOR_SUFFIX} expected")
+    return files
+
+
+def _sequences(folder: Path) -> list[Path]:
+    return sorted(folder.glob(f"seq_*{TENSOR_SUFFIX}"), key=natural_order)
+
+
+def _is_zip(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_ZIP_MAGIC)) == _ZIP_MAGIC
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recording in a file.
+
+    Raises:
+        RecordingError: it has another form, or is cut or damaged.
+    """
+    check_regular(path)
+    if not path.stat().st_size:
+        raise RecordingError(f"{path} is empty; a tensor saved by torch expected")
+    values = _values(path)
+    times = np.arange(len(values)) / SEQUENCE_RATE
+    skin = sensor("anyskin")
+    modules = {
+        f"finger{k + 1}": Tactile(skin, times, values[:, k].copy()) for k in range(N_FINGERTIPS)
+    }
+    yield Recording(path.stem, modules, _metadata(path))
+
+
+def _values(path: Path) -> npt.NDArray[np.float32]:
+    """Return (n_samples, n_fingertips, n_magnetometers, 3).
+
+    Raises:
+        RecordingError: the file is no such archive, or its values have another form.
+    """
+    budget = ReadBudget(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            budget.keep(0, len(archive.infolist()))
+            _check_types(path, archive, budget)
+            data = _content(path, archive, _storage(path, archive), budget)
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as cause:
+        raise RecordingError(f"{path} is cut or damaged: {cause}") from cause
+    return _shaped(path, data)
+
+
+def _storage(path: Path, archive: zipfile.ZipFile) -> zipfile.ZipInfo:
+    """Return the member with the values of the only tensor."""
+    storages = [info for info in archive.infolist() if re.search(r"(^|/)data/\d+$", info.filename)]
+    if len(storages) != 1 or not storages[0].filename.endswith("data/0"):
+        raise RecordingError(
+            f"{path}: one tensor, a member data/0, expected; {len(storages)} tensors given among "
+            f"{len(archive.infolist())} members"
+        )
+    return storages[0]
+
+
+def _check_types(path: Path, archive: zipfile.ZipFile, budget: ReadBudget) -> None:
+    """Check byte order and number type where the archive names them; nothing is unpickled."""
+    for info in archive.infolist():
+        name = info.filename.rpartition("/")[2]
+        if name not in ("byteorder", "data.pkl") or info.file_size > MAX_PICKLE_SIZE:
+            continue
+        content = _content(path, archive, info, budget)
+        if name == "byteorder" and content.strip() != b"little":
+            raise RecordingError(f"{path}: byte order {content[:20]!r} given, b'little' expected")
+        storages = {match.decode() for match in _STORAGE.findall(content)} - {"FloatStorage"}
+        if name == "data.pkl" and storages:
+            raise RecordingError(f"{path}: a {min(storages)} given; {_FORM} expected")
+
+
+def _content(
+    path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, budget: ReadBudget
+) -> bytes:
+    """Return the bytes of a member, which torch stores as they are.
+
+    Raises:
+        RecordingError: it is packed, or too large.
+    """
+    if info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size:
+        raise RecordingError(
+            f"{path}: {info.filename} is packed ({info.compress_size} bytes of {info.file_size}); "
+            "torch stores it as it is"
+        )
+    budget.unpack(info.file_size)
+    return archive.read(info)
+
+
+def _shaped(path: Path, data: bytes) -> npt.NDArray[np.float32]:
+    if not data or len(data) % ROW_SIZE:
+        raise RecordingError(
+            f"{path}: {len(data)} bytes of values given; rows of {ROW_SIZE} bytes expected "
+            f"({_FORM})"
+        )
+    values = np.frombuffer(data, NUMBER_TYPE)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        row, column = divmod(int(wrong[0]), ROW_SIZE // NUMBER_TYPE.itemsize)
+        raise RecordingError(
+            f"{path}, row {row}, value {column}: {values[wrong[0]]} given, a finite number expected"
+        )
+    return values.reshape(-1, N_FINGERTIPS, N_MAGNETOMETERS, 3)
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    metadata = {
+        "source": SOURCE,
+        "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
+        STARTS_LOADED: True,
+    }
+    labels = _labels(path.parent / LABELS_FILE) or _label_lines(path.parent / LABEL_LINES_FILE)
+    slipped = labels.get(path.stem)
+    return metadata if slipped is None else metadata | {SLIPPED: slipped}
+
+
+def _labels(path: Path) -> dict[str, bool]:
+    """Return whether the object slipped, by name of the sequence; empty without such a file.
+
+    Raises:
+        RecordingError: the file has another form, or a sequence has two labels.
+    """
+    if not path.is_file():
+        return {}
+    table, _ = read_table(path)
+    labels: dict[str, bool] = {}
+    for row, (number, slip) in enumerate(table.columns(["sequence", "slip"]), table.first_line):
+        name = f"seq_{number:.0f}"
+        if slip not in (0, 1) or number % 1 or name in labels:
+            raise RecordingError(
+                f"{path}, row {row}: sequence {number:g} with slip {slip:g} given; a whole number, "
+                "each once, with 0 or 1 expected"
+            )
+        labels[name] = bool(slip)
+    return labels
+
+
+def _label_lines(path: Path) -> dict[str, bool]:
+    """Return whether the object slipped, from lines of 0 or 1; empty without such a file.
+
+    Raises:
+        RecordingError: a line has something else.
+    """
+    if not path.is_file():
+        return {}
+    lines = read_input(path, MAX_LABEL_LINES_SIZE).decode("utf-8", "replace").split("\n")
+    labels: dict[str, bool] = {}
+    for number, line in enumerate(lines[:-1] if lines[-1] == "" else lines):
+        if line.strip() not in ("0", "1"):
+            raise RecordingError(
+                f"{path}, line {number + 1}: 0 or 1 expected, {line.strip()[:20]!r} given"
+            )
+        labels[f"seq_{number}"] = line.strip() == "1"
+    return labels

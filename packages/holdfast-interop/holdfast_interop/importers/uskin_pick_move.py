@@ -1,0 +1,168 @@
+"""Import of real uSkin recordings of picking and moving a box, with measured slip.
+
+The data of "Proactive slip control by learned slip model and trajectory adaptation" (Nazari,
+Mandil, Ghalamzan, CoRL 2022): each folder `data_sample_*` is a recording of five CSV files.
+"""
+
+import csv
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.files import read_input
+from holdfast.io.importers import IN_CONTACT
+from holdfast.io.importers.table import (
+    Table,
+    errors_named,
+    read_table,
+    with_integer_type,
+)
+from holdfast.recordings import STARTS_LOADED, Label, Recording, Tactile, Truth, labels_from_samples
+from holdfast.sensors import sensor
+from holdfast.sensors.types import Array
+
+HINT = IN_CONTACT
+FILES = {"finger1": "xela_sensor1.csv", "finger2": "xela_sensor2.csv"}
+N_ARM_JOINTS = 7
+MAX_METADATA_SIZE = 1 << 20
+"""Maximum size of the file of metadata [bytes]."""
+LOST_MARKER_VALUE = 10.0
+"""Value of all components of the pose of a marker that the camera has lost."""
+
+SOURCE = "imanlab/proactive-slip-control"
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is the folder of a recording, or a folder with some."""
+    return bool(_folders(path))
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the folder of a recording, or the folders of recordings in a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    folders = _folders(path)
+    if not folders:
+        raise RecordingError(
+            f"{path} has no uskin-pick-move recording: folders data_sample_* with "
+            f"{FILES['finger1']}, {FILES['finger2']}, robot_state.csv, marker.csv and "
+            "slip_label.csv expected"
+        )
+    return folders
+
+
+def _folders(path: Path) -> list[Path]:
+    if (path / FILES["finger1"]).is_file():
+        return [path]
+    return sorted(file.parent for file in path.glob(f"*/{FILES['finger1']}"))
+
+
+def read(folder: Path) -> Iterator[Recording]:
+    """Yield the recording in a folder `data_sample_*`.
+
+    Raises:
+        RecordingError: a file is missing, or files contradict each other.
+    """
+    robot, _ = read_table(folder / "robot_state.csv")
+    times = robot.columns(["time"])[:, 0]
+    with errors_named(folder):
+        modules = {name: _module(folder / file, times) for name, file in FILES.items()}
+        labels = _labels(folder / "slip_label.csv", modules["finger1"])
+        labelled = {name: replace(module, labels=labels) for name, module in modules.items()}
+        truth = Truth(times, {**_marker(folder / "marker.csv", len(times)), **_robot(robot)})
+        metadata = _metadata(folder / "meta_data.csv")
+        recording = Recording(folder.name, labelled, metadata, truth)
+    yield recording
+
+
+def _module(path: Path, times: Array) -> Tactile:
+    patch = sensor("uskin-4x4")
+    table, _ = read_table(path)
+    expected = [f"txl{taxel + 1}_{axis}" for taxel in range(patch.n_taxels) for axis in "xyz"]
+    if len(table.names) != len(expected):
+        raise RecordingError(
+            f"{path}: {len(table.names)} columns given, {len(expected)} expected "
+            f"({patch.n_taxels} taxels x 3 axes of {patch.name})"
+        )
+    readings = table.columns(expected)
+    _check_rows(table, len(times))
+    return Tactile(patch, times, with_integer_type(readings).reshape(-1, patch.n_taxels, 3))
+
+
+def _check_rows(table: Table, n_rows: int) -> None:
+    if len(table.values) != n_rows:
+        raise RecordingError(
+            f"{table.path}: {len(table.values)} rows given, {n_rows} expected as in robot_state.csv"
+        )
+
+
+def _labels(path: Path, module: Tactile) -> tuple[Label, ...]:
+    table, _ = read_table(path)
+    flags = table.columns(["slip", "fail"])
+    _check_rows(table, module.n_samples)
+    if not np.isin(flags, (0, 1)).all():
+        raise RecordingError(f"{path}: 0 or 1 expected in columns 'slip' and 'fail'")
+    states = [_state(slip, fail) for slip, fail in flags.astype(bool).tolist()]
+    return labels_from_samples(
+        module.times,
+        states,
+        period=module.period,
+        evidence="slip measured by a marker on the object",
+        author=SOURCE,
+    )
+
+
+def _state(slip: bool, fail: bool) -> tuple[ContactState, Cause | None]:
+    if fail:
+        return ContactState.NO_CONTACT, Cause.LOST
+    return (ContactState.UNSTABLE, Cause.SLIP) if slip else (ContactState.STABLE, None)
+
+
+def _marker(path: Path, n_rows: int) -> Mapping[str, npt.NDArray[Any]]:
+    """Return the pose of the marker in the frame of the wrist camera; NaN where it was lost."""
+    table, _ = read_table(path)
+    names = [f"marker_position_{axis}" for axis in "xyz"]
+    names += [f"marker_quaternion_{axis}" for axis in "wxyz"]
+    pose = table.columns(names).copy()
+    _check_rows(table, n_rows)
+    pose[(pose == LOST_MARKER_VALUE).all(axis=1)] = np.nan
+    return {"marker_pose": pose}
+
+
+def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
+    """Return joints and end effector pose (4 x 4) of the arm, and `v_x`, `v_y` unchanged."""
+    places = [(row, column) for row in range(4) for column in range(4)]
+    pose = table.columns([f"ee_T_{row}{column}" for row, column in places])
+    return {
+        "robot_joints": table.columns([f"position_joint{k + 1}" for k in range(N_ARM_JOINTS)]),
+        "robot_joint_velocities": table.columns(
+            [f"velocity_joint{k + 1}" for k in range(N_ARM_JOINTS)]
+        ),
+        "robot_ee_pose": pose.reshape(-1, 4, 4),
+        "robot_velocity": table.columns(["v_x", "v_y"]),
+    }
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    metadata: dict[str, Any] = {"object": "box", "source": SOURCE, STARTS_LOADED: True}
+    if path.is_file():
+        text = read_input(path, MAX_METADATA_SIZE).decode("utf-8-sig")
+        row = next(csv.DictReader(text.splitlines()), {})
+        metadata.update({key: _value(text) for key, text in row.items() if key})
+    return metadata
+
+
+def _value(text: str | None) -> str | float | None:
+    for number in (int, float):
+        with suppress(ValueError):
+            return number(text or "")
+    return text

@@ -1,0 +1,251 @@
+"""Import of LeRobot data sets (v3.0) that `holdfast export` wrote, without loss."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import RecordingError
+from holdfast.files import check_regular, read_input
+from holdfast.io.header import Header, decode_header
+from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.timed_arrays import (
+    TRUTH_TIME,
+    ArraySpec,
+    TimedArray,
+    array_specs,
+    recording_from,
+)
+from holdfast.recordings import Recording
+from holdfast_interop.lerobot.layout import (
+    DATA_PATH,
+    EPISODES_PATH,
+    HEADER_COLUMN,
+    INFO_PATH,
+    TEXTS_COLUMN,
+    VERSION,
+    count_name,
+    feature_name,
+    joined_windows,
+    texts_of,
+    time_name,
+    track_name,
+    value_specs,
+)
+
+EXTRA = "parquet"
+HINT = f"metadata say how the recordings begin; {IF_IN_CONTACT}"
+MAX_INFO_SIZE = 1 << 24
+"""Maximum size of the description of a data set [bytes]."""
+EPISODES_AT_ONCE = 64
+"""Number of headers of recordings that are in memory at a time."""
+
+_EPISODE_COLUMNS = (
+    "episode_index", "length", "data/chunk_index", "data/file_index", HEADER_COLUMN, TEXTS_COLUMN
+)  # fmt: skip
+
+
+class _Info(msgspec.Struct, frozen=True):
+    """What is read of `meta/info.json`."""
+
+    codebase_version: str
+    data_path: str
+    total_episodes: int
+
+
+class _Episode(NamedTuple):
+    """An episode: its number and length, its data file, and the recording without its arrays."""
+
+    number: int
+    length: int
+    path: Path
+    header: Header
+    texts: dict[str, list[str]]
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is the folder of a LeRobot data set."""
+    return path.is_dir() and (path / INFO_PATH).is_file()
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the folder of the data set; its episodes are read one at a time.
+
+    Raises:
+        RecordingError: it is none.
+    """
+    if not can_read(path):
+        raise RecordingError(f"{path} has no {INFO_PATH}; a LeRobot data set expected")
+    return [path]
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recording of each episode.
+
+    Raises:
+        RecordingError: the data set is of another version, was not written by holdfast, or is
+            damaged.
+    """
+    for episode in _episodes(path, _info(path)):
+        yield _recording(path, episode)
+
+
+def _info(path: Path) -> _Info:
+    try:
+        info = msgspec.json.decode(read_input(path / INFO_PATH, MAX_INFO_SIZE), type=_Info)
+    except msgspec.DecodeError as cause:
+        raise RecordingError(f"{path / INFO_PATH} is not that of a data set: {cause}") from cause
+    if info.codebase_version != VERSION:
+        raise RecordingError(
+            f"{path}: LeRobot {info.codebase_version} given, {VERSION} expected (lerobot converts "
+            "older data sets)"
+        )
+    if info.data_path != DATA_PATH:  # no other text is used as a pattern
+        raise RecordingError(
+            f"{path / INFO_PATH}: data_path {info.data_path[:80]!r} given, {DATA_PATH!r} expected"
+        )
+    return info
+
+
+def _episodes(path: Path, info: _Info) -> Iterator[_Episode]:
+    import pyarrow.parquet as pq
+
+    n_episodes = 0
+    pattern = EPISODES_PATH.replace("{chunk_index:03d}", "*").replace("{file_index:03d}", "*")
+    for file in sorted(path.glob(pattern)):
+        check_regular(file)
+        parquet = pq.ParquetFile(file)
+        if missing := [name for name in _EPISODE_COLUMNS if name not in parquet.schema_arrow.names]:
+            raise RecordingError(
+                f"{path}: its episodes have no column {missing[0]!r}, which holdfast export "
+                "writes; a data set of another program has no sensors and times of samples"
+            )
+        for batch in parquet.iter_batches(EPISODES_AT_ONCE, columns=list(_EPISODE_COLUMNS)):
+            for row in batch.to_pylist():
+                yield _episode(path, row)
+                n_episodes += 1
+    if n_episodes != info.total_episodes:
+        raise RecordingError(
+            f"{path} is damaged: {n_episodes} episodes, its {INFO_PATH} names {info.total_episodes}"
+        )
+
+
+def _episode(path: Path, row: dict[str, Any]) -> _Episode:
+    place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in ("chunk", "file")}
+    file = path / DATA_PATH.format(**place)
+    return _Episode(
+        int(row["episode_index"]),
+        int(row["length"]),
+        file,
+        decode_header(row[HEADER_COLUMN], path),
+        msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
+    )
+
+
+def _recording(path: Path, episode: _Episode) -> Recording:
+    table = _EpisodeTable(episode)
+    specs = array_specs(episode.header)
+    arrays = {spec.topic: table.array(spec) for spec in specs if spec.topic != TRUTH_TIME}
+    if episode.header.truth is not None:
+        times = table.times("truth")
+        arrays[TRUTH_TIME] = (times, times)
+    recording = recording_from(episode.header, arrays, path)
+    if recording.digest != episode.header.digest:
+        raise RecordingError(
+            f"{path} is damaged: the samples of episode {episode.number} do not match their digest"
+        )
+    return replace(recording, name=episode.header.name)
+
+
+class _EpisodeTable:
+    """Columns of the frames of one episode.
+
+    Args:
+        episode: the episode.
+
+    Raises:
+        RecordingError: a column is missing, or the number of frames is another.
+    """
+
+    def __init__(self, episode: _Episode) -> None:
+        import pyarrow.parquet as pq
+
+        self._episode = episode
+        specs = value_specs(array_specs(episode.header))
+        tracks = dict.fromkeys(map(track_name, array_specs(episode.header)))
+        names = [feature_name(spec) for spec in specs]
+        names += [name(track) for track in tracks for name in (time_name, count_name)]
+        check_regular(episode.path)
+        file = pq.ParquetFile(episode.path)
+        if missing := [name for name in names if name not in file.schema_arrow.names]:
+            raise RecordingError(f"{episode.path}: column {missing[0]!r} is missing")
+        self._table = _rows_of(file, episode.number, names)
+        if len(self._table) != episode.length:
+            raise RecordingError(
+                f"{episode.path} is damaged: {len(self._table)} frames of episode "
+                f"{episode.number}, {episode.length} expected"
+            )
+
+    def times(self, track: str) -> npt.NDArray[Any]:
+        """Return the times of the samples of a track [s]."""
+        return self._joined(time_name(track), track, ())
+
+    def array(self, spec: ArraySpec) -> TimedArray:
+        """Return times and values of an array, in its own number type."""
+        track = track_name(spec)
+        times = self.times(track)
+        if not spec.n_components:
+            return times, np.empty((len(times), *spec.shape), _memory_type(spec))
+        values = self._joined(feature_name(spec), track, spec.shape)
+        if spec.number == "str":
+            return times, texts_of(self._episode.texts, spec.column, values)
+        with np.errstate(invalid="ignore"):  # the digest finds what does not fit
+            return times, values.astype(_memory_type(spec))
+
+    def _joined(self, name: str, track: str, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+        n_new = self._flat(count_name(track)).astype(np.int64)
+        values = self._flat(name).reshape(len(n_new), -1, *shape)
+        return joined_windows(values, n_new)
+
+    def _flat(self, name: str) -> npt.NDArray[Any]:
+        """Return all values of a column, without the nesting of its lists.
+
+        Raises:
+            ValueError: a value is missing.
+        """
+        import pyarrow as pa
+
+        array = self._table.column(name).combine_chunks()
+        while not (pa.types.is_primitive(array.type) or pa.types.is_boolean(array.type)):
+            if array.null_count:
+                raise ValueError(f"column {name!r} has missing values")
+            array = array.storage if isinstance(array, pa.ExtensionArray) else array.flatten()
+        if array.null_count:
+            raise ValueError(f"column {name!r} has missing values")
+        values: npt.NDArray[Any] = array.to_numpy(zero_copy_only=False)
+        return values
+
+
+def _rows_of(file: Any, episode: int, names: list[str]) -> Any:  # noqa: ANN401 (of pyarrow)
+    """Return the rows of an episode.
+
+    Filters of pyarrow use the statistics in the footer; if these are damaged, they abort.
+    """
+    import pyarrow.compute as pc
+
+    column = "episode_index"
+    groups = [
+        number
+        for number in range(file.num_row_groups)
+        if pc.index(file.read_row_group(number, columns=[column])[column], episode).as_py() >= 0
+    ]
+    table = file.read_row_groups(groups, columns=[*names, column])
+    return table.filter(pc.equal(table[column], episode))
+
+
+def _memory_type(spec: ArraySpec) -> str:
+    return "U1" if spec.number == "str" else spec.number or "float64"

@@ -1,0 +1,87 @@
+"""The formats of `holdfast export` that this package has."""
+
+import json
+
+import pytest
+
+from holdfast.cli import main
+from holdfast.io import load_recording, save_recording
+from holdfast.synthetic import synthetic_recording
+
+
+@pytest.fixture(scope="module")
+def grasps(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("grasps")
+    for k in range(2):
+        recording = synthetic_recording(f"grasp{k}", k, ("thumb", "index"))
+        save_recording(recording, folder / f"grasp{k}.parquet")
+    return folder
+
+
+def exported(capsys, *words):
+    assert main(["export", *map(str, words), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def refusal(capsys, *words):
+    assert main(["export", *map(str, words)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def test_a_data_set_goes_and_comes_back(capsys, grasps, tmp_path):
+    out = tmp_path / "set"
+    document = exported(capsys, grasps, out, "--format", "lerobot", "--fps", "15")
+    assert document == {
+        "out": str(out),
+        "format": "lerobot",
+        "fps": 15,
+        "episodes": 2,
+        "frames": 348,
+        "tasks": 2,
+    }
+    assert main(["import", str(out), str(tmp_path / "back")]) == 0
+    for k in range(2):
+        back = load_recording(tmp_path / "back" / f"grasp{k}.parquet")
+        first = load_recording(grasps / f"grasp{k}.parquet")
+        assert back.digest == first.digest
+        assert back.metadata == first.metadata
+        assert back.modules["thumb"].labels == first.modules["thumb"].labels
+
+
+def test_files_for_foxglove_have_a_layout(capsys, grasps, tmp_path):
+    out = tmp_path / "view"
+    document = exported(
+        capsys, grasps, out, "--format", "foxglove", "--model", "builtin:noise-floor"
+    )
+    assert document["files"] == 2
+    assert document["layout"] == str(out / "holdfast-layout.json")
+    names = sorted(path.name for path in out.iterdir())
+    assert names == ["grasp0.mcap", "grasp1.mcap", "holdfast-layout.json"]
+
+
+def test_a_model_that_does_not_fit_leaves_nothing(capsys, grasps, tmp_path):
+    message = refusal(
+        capsys, grasps, tmp_path / "out", "--format", "foxglove", "--model", tmp_path / "no.json"
+    )
+    assert "no.json" in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_options_must_fit(capsys, grasps, tmp_path):
+    out = tmp_path / "out"
+    cases = {
+        ("--format", "csv", "--fps", "3"): "--fps belongs to --format lerobot; csv given",
+        ("--format", "csv", "--model", "x"): "--model belongs to --format foxglove; csv given",
+        ("--format", "lerobot", "--fps", "0"): "--fps: a whole number from 1 to 1000 expected, 0 "
+        "given",
+    }
+    for words, message in cases.items():
+        assert refusal(capsys, grasps, out, *words) == message
+    message = refusal(capsys, grasps, tmp_path / "a.mcap", "--format", "foxglove")
+    assert (
+        message == f"{tmp_path / 'a.mcap'}: a folder expected for the format foxglove, a file given"
+    )
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,260 @@
+"""A LeRobot data set has the form that LeRobot expects."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from holdfast.errors import OutputError, RecordingError
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import flat_sensor, sensor
+from holdfast.synthetic import synthetic_recording
+from holdfast_interop.lerobot.exporter import export
+from holdfast_interop.lerobot.frames import ColumnStatistics
+
+DATA = "data/chunk-000/file-000.parquet"
+EPISODES = "meta/episodes/chunk-000/file-000.parquet"
+COUNTERS = ("frame_index", "episode_index", "index", "task_index")
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    """Two grasps; the second has no thumb and another rate of the index finger."""
+    first = synthetic_recording("a", 0, ("thumb", "index"))
+    index = synthetic_recording("b", 1, ("index",)).modules["index"]
+    slow = Tactile(index.sensor, index.times[::3] + 100.0, index.readings[::3])
+    return [first, Recording("b", {"index": slow}, {"task": "lift the cup"})]
+
+
+@pytest.fixture(scope="module")
+def data_set(recordings, tmp_path_factory):
+    out = tmp_path_factory.mktemp("lerobot") / "set"
+    assert export(recordings, out) == {"episodes": 2, "frames": 692, "tasks": 2}
+    return out
+
+
+@pytest.fixture(scope="module")
+def info(data_set):
+    return json.loads((data_set / "meta/info.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def table(data_set):
+    return pq.read_table(data_set / DATA)
+
+
+def column(table, name):
+    """Return a column as an array, nested lists as its axes."""
+    return np.array(table.column(name).to_pylist())
+
+
+def test_info_has_all_fields(info):
+    features = info.pop("features")
+    assert info == {
+        "codebase_version": "v3.0",
+        "robot_type": None,
+        "total_episodes": 2,
+        "total_frames": 692,
+        "total_tasks": 2,
+        "chunks_size": 1000,
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "fps": 30,
+        "splits": {"train": "0:2"},
+        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        "video_path": None,
+    }
+    one = {"shape": [1], "names": None}
+    assert features["timestamp"] == {"dtype": "float32", **one}
+    assert all(features[name] == {"dtype": "int64", **one} for name in COUNTERS)
+    assert features["observation.tactile.thumb"]["shape"] == [5, 30, 3]
+    assert features["observation.tactile.thumb"]["dtype"] == "float32"
+    assert features["observation.tactile.index.time"]["shape"] == [5]
+    assert not any("/" in name for name in features)
+    info["features"] = features
+
+
+def test_columns_have_the_types_and_shapes_of_the_features(info, table):
+    assert table.column_names == list(info["features"])
+    for name, feature in info["features"].items():
+        values = column(table, name)
+        shape = tuple(feature["shape"])
+        assert values.shape == (692, *(() if shape == (1,) else shape)), name
+        kind = table.schema.field(name).type
+        while pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
+            kind = kind.value_type
+        assert str(kind).replace("double", "float64").replace("float", "float32").replace(
+            "float3264", "float64"
+        ) == feature["dtype"]  # fmt: skip
+
+
+def test_counters_run_on_and_times_are_those_of_frames(table):
+    assert column(table, "index").tolist() == list(range(692))
+    episodes = column(table, "episode_index")
+    for episode, n in ((0, 346), (1, 346)):
+        frames = column(table, "frame_index")[episodes == episode]
+        assert frames.tolist() == list(range(n))
+        stamps = column(table, "timestamp")[episodes == episode]
+        assert np.abs(stamps - frames / 30).max() < 1e-5
+    assert (column(table, "task_index") == episodes).all()
+
+
+def test_an_episode_is_a_row_group(data_set):
+    file = pq.ParquetFile(data_set / DATA)
+    assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [346, 346]
+
+
+def test_episodes_say_where_they_are(data_set):
+    rows = pq.read_table(data_set / EPISODES).to_pylist()
+    plain = [{k: v for k, v in row.items() if not k.startswith("holdfast.")} for row in rows]
+    places = {
+        f"{what}/{part}_index": 0
+        for what in ("data", "meta/episodes")
+        for part in ("chunk", "file")
+    }
+    assert plain == [
+        {"episode_index": 0, "tasks": ["grasp object 0"], "length": 346, **places,
+         "dataset_from_index": 0, "dataset_to_index": 346},
+        {"episode_index": 1, "tasks": ["lift the cup"], "length": 346, **places,
+         "dataset_from_index": 346, "dataset_to_index": 692},
+    ]  # fmt: skip
+
+
+def test_tasks_are_the_index_that_pandas_reads(data_set):
+    pandas = pytest.importorskip("pandas")
+    tasks = pandas.read_parquet(data_set / "meta/tasks.parquet")
+    assert tasks.index.tolist() == ["grasp object 0", "lift the cup"]
+    assert tasks["task_index"].tolist() == [0, 1]
+    assert tasks.index.name == "task"
+
+
+def test_a_frame_has_the_newest_samples_up_to_it(recordings, table):
+    index = recordings[0].modules["index"]
+    start = recordings[0].start
+    times = column(table, "observation.tactile.index.time")
+    values = column(table, "observation.tactile.index")
+    for frame in (0, 7, 200, 345):
+        last = int(np.searchsorted(index.times, start + frame / 30 + 1e-9, side="right"))
+        rows = np.maximum(np.arange(last - 5, last), 0)
+        assert times[frame].tolist() == index.times[rows].tolist()
+        assert values[frame].tolist() == index.readings[rows].tolist()
+
+
+def test_a_missing_finger_has_no_new_samples(table):
+    missing = column(table, "episode_index") == 1
+    assert (column(table, "observation.tactile.thumb.new")[missing] == 0).all()
+    assert np.isnan(column(table, "observation.tactile.thumb")[missing]).all()
+    assert (column(table, "label.thumb")[missing] == 0).all()
+
+
+def test_labels_are_those_of_the_newest_sample(recordings, table):
+    states = recordings[0].modules["thumb"].label_states
+    new = column(table, "observation.tactile.thumb.new")[:346]
+    assert column(table, "label.thumb")[:346].tolist() == states[np.cumsum(new) - 1].tolist()
+
+
+def test_statistics_are_those_of_the_frames_without_nan(data_set, info, table):
+    stats = json.loads((data_set / "meta/stats.json").read_text())
+    assert list(stats) == list(info["features"])
+    for name in ("observation.tactile.thumb", "observation.tactile.index.time", "timestamp"):
+        values = column(table, name).astype(np.float64)
+        for key, function in (("mean", np.nanmean), ("std", np.nanstd), ("max", np.nanmax)):
+            got, want = np.array(stats[name][key]), function(values, axis=0)
+            assert np.allclose(got.reshape(want.shape), want, rtol=1e-9), (name, key)
+        assert stats[name]["count"] == [692]
+
+
+def test_a_signalling_nan_is_no_number():
+    statistics = ColumnStatistics((1,))
+    statistics.add(np.array([[0x3F800000], [0x7FA00000]], dtype=np.uint32).view(np.float32))
+    assert statistics.result()["mean"] == [1.0]
+
+
+def test_the_library_datasets_reads_it(data_set, info, recordings, tmp_path):
+    datasets = pytest.importorskip("datasets")
+    features = {}
+    for name, feature in info["features"].items():
+        shape, value = tuple(feature["shape"]), datasets.Value(feature["dtype"])
+        if shape == (1,):
+            features[name] = value
+        elif len(shape) == 1:
+            features[name] = datasets.Sequence(value, length=shape[0])
+        else:
+            kind = getattr(datasets, f"Array{len(shape)}D")
+            features[name] = kind(shape=shape, dtype=feature["dtype"])
+    read = datasets.Dataset.from_parquet(
+        [str(data_set / DATA)], features=datasets.Features(features), cache_dir=str(tmp_path)
+    )
+    frame = read.with_format("numpy")[100]
+    assert frame["observation.tactile.index"].shape == (5, 30, 3)
+    last = recordings[0].modules["index"].readings[500]
+    assert (frame["observation.tactile.index"][-1] == last).all()
+
+
+def refusal(error, recordings, out, **options):
+    with pytest.raises(error) as caught:
+        export(recordings, out, **options)
+    assert list(out.parent.iterdir()) == []
+    return str(caught.value)
+
+
+def test_a_rate_is_a_whole_number_from_1(recordings, tmp_path):
+    assert "--fps: a whole number" in refusal(ValueError, recordings, tmp_path / "set", fps=0)
+
+
+def test_recordings_that_do_not_fit_together_are_named(recordings, tmp_path):
+    out = tmp_path / "set"
+    other = Tactile(flat_sensor("small", 2, 2, 0.004), [0.0, 0.1], np.zeros((2, 4, 3)))
+    message = refusal(RecordingError, [recordings[0], Recording("c", {"index": other})], out)
+    assert message.startswith("c: observation.tactile.index has float64 of shape (4, 3)")
+    newtons = replace(recordings[1].modules["index"], unit="N")
+    message = refusal(RecordingError, [recordings[0], Recording("c", {"index": newtons})], out)
+    assert message == ("c: index is in N, in the recordings before in count; export them apart")
+
+
+def test_two_modules_that_would_share_a_column_are_refused(recordings, tmp_path):
+    module = recordings[1].modules["index"]
+    clash = Recording("c", {"index/1": module, "index.1": module})
+    message = refusal(RecordingError, [clash], tmp_path / "set")
+    assert "two arrays would share the column 'observation.tactile.index.1'" in message
+
+
+def test_a_recording_of_gaps_is_refused(tmp_path):
+    module = Tactile(sensor("anyskin"), [0.0, 1e9], np.zeros((2, 5, 3)))
+    message = refusal(RecordingError, [Recording("c", {"index": module})], tmp_path / "set")
+    assert "c: 3e+10 frames at 30 Hz for 2 samples; it is mostly gaps" in message
+
+
+def test_only_a_data_set_is_replaced(recordings, tmp_path):
+    out = tmp_path / "set"
+    export(recordings[1:], out)
+    with pytest.raises(OutputError, match="exists already"):
+        export(recordings[1:], out)
+    export(recordings[1:], out, fps=10, force=True)
+    assert json.loads((out / "meta/info.json").read_text())["fps"] == 10
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+    (out / "data" / "video.mp4").write_text("of a camera")
+    with pytest.raises(OutputError, match="is not such an export"):
+        export(recordings[1:], out, force=True)
+    assert (out / "data" / "video.mp4").read_text() == "of a camera"
+    (tmp_path / "other" / "meta").mkdir(parents=True)
+    (tmp_path / "other" / "meta" / "info.json").write_text("{}")
+    with pytest.raises(OutputError, match="is not such an export"):
+        export(recordings[1:], tmp_path / "other", force=True)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("all of it")
+    with pytest.raises(OutputError, match="is not such an export"):
+        export(recordings[1:], tmp_path / "mine", force=True)
+    assert (tmp_path / "mine" / "thesis.txt").read_text() == "all of it"
+
+
+def test_a_full_disk_leaves_nothing(recordings, tmp_path, monkeypatch):
+    def full(*_args, **_options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
+    message = refusal(OutputError, recordings, tmp_path / "set")
+    assert message == f"cannot write {tmp_path / 'set'}: No space left on device"
