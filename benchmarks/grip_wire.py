@@ -25,8 +25,8 @@ import numpy as np
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
 from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
 from holdfast.live.publishers.xela_server import XelaServer
-from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.topic_messages import FLOAT_ARRAY, JOINT_STATE, joint_message, topic_definition
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind

@@ -13,7 +13,7 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 from devices.hands.ros.drivers import PATIENCE, POSITIONS, ROS2, Ros2Driver, width_meaning
 from holdfast.devices.ros import dds
 from holdfast.io import save_recording
-from holdfast.ros.cdr import MessageEncoder
+from holdfast.io.cdr import MessageEncoder
 from holdfast.ros.topic_messages import JOINT_TRAJECTORY, topic_definition, trajectory_message
 from holdfast.synthetic import synthetic_recording
 from ros.domains import new_domain

@@ -11,8 +11,8 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from holdfast.contact import ContactState
+from holdfast.io.definitions import NUMBER_CODES
 from holdfast.live.publishers.ros_publisher import Ros2Publisher, diagnostics_of
-from holdfast.ros.definitions import NUMBER_CODES
 from holdfast.ros.topic_messages import (
     DIAGNOSTICS,
     FLOAT64,

@@ -2,8 +2,8 @@ import re
 
 import pytest
 
-from holdfast.ros.cdr import MessageEncoder
-from holdfast.ros.definitions import parse_definition
+from holdfast.io.cdr import MessageEncoder
+from holdfast.io.definitions import parse_definition
 from holdfast.ros.pose_messages import (
     PoseDecoder,
     StampedPose,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.ros.definitions import parse_definition
+from holdfast.io.definitions import parse_definition
 from holdfast.ros.sensor_messages import SENS_STREAM, SampleDecoder, known_definition
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")

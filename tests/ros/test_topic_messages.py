@@ -7,8 +7,8 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from rosbags.typesys import Stores, get_typestore
 
-from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.definitions import parse_definition
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
+from holdfast.io.definitions import parse_definition
 from holdfast.ros.topic_messages import (
     FLOAT_ARRAY,
     GRIPPER_COMMAND,

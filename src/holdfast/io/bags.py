@@ -18,10 +18,10 @@ from holdfast.io.bag_storage.folder import METADATA, open_folder
 from holdfast.io.bag_storage.mcap import open_mcap
 from holdfast.io.bag_storage.ros1 import open_ros1
 from holdfast.io.bag_storage.sqlite import open_sqlite
+from holdfast.io.definitions import Definition, parse_definition, short_name
 from holdfast.io.foreign import read_foreign_arrays
 from holdfast.io.importers.table import natural_order
 from holdfast.io.safe_reading import ReadBudget, one_line
-from holdfast.ros.definitions import Definition, parse_definition, short_name
 from holdfast.ros.pose_messages import PoseDecoder, has_poses, known_pose_definition
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors.types import Array

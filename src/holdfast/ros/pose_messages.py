@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from holdfast.ros.cdr import MessageDecoder
-from holdfast.ros.definitions import (
+from holdfast.io.cdr import MessageDecoder
+from holdfast.io.definitions import (
     ROS1_HEADER,
     ROS2_HEADER,
     SEPARATOR,

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.cdr import MessageDecoder
-from holdfast.ros.definitions import (
+from holdfast.io.cdr import MessageDecoder
+from holdfast.io.definitions import (
     ROS1_HEADER,
     ROS2_HEADER,
     SEPARATOR,

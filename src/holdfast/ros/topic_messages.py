@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from holdfast.ros.definitions import ROS2_HEADER, SEPARATOR, Definition, parse_definition
+from holdfast.io.definitions import ROS2_HEADER, SEPARATOR, Definition, parse_definition
 from holdfast.sensors.types import Array
 
 FLOAT32, FLOAT64, STRING = "std_msgs/Float32", "std_msgs/Float64", "std_msgs/String"

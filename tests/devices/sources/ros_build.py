@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from holdfast.ros.definitions import NUMBER_CODES
+from holdfast.io.definitions import NUMBER_CODES
 
 SENSOR_FULL = """uint32 message
 float64 time

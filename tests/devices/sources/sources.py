@@ -17,9 +17,9 @@ import holdfast.devices.sources.twin
 from devices.sources.board import Board, packet, some
 from holdfast.devices.sources import Source, open_source
 from holdfast.io import save_recording
+from holdfast.io.cdr import MessageEncoder
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.recordings import Recording, Tactile
-from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.twin.simulation import simulate

@@ -7,6 +7,7 @@ import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.devices.ros.link import Link, Publisher
+from holdfast.io.cdr import MessageEncoder
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.publishers import ros_publisher
 from holdfast.live.publishers.ros_publisher import (
@@ -18,7 +19,6 @@ from holdfast.live.publishers.ros_publisher import (
     topic_names,
 )
 from holdfast.live.stream_detector import StreamUpdate
-from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.topic_messages import DIAGNOSTICS, VECTOR, WRENCH, topic_definition
 from live.estimates import UNITS, FakeGrip, estimate, finger
 

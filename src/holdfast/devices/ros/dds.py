@@ -7,8 +7,8 @@ from typing import Any, Self
 
 from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.errors import MissingExtra, SourceError
-from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.definitions import NUMBER_CODES, Definition, MessageField
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
+from holdfast.io.definitions import NUMBER_CODES, Definition, MessageField
 from holdfast.ros.topic_messages import JOINT_STATE, JointStates, topic_definition
 
 try:

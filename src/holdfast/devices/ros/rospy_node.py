@@ -25,7 +25,7 @@ from xmlrpc.client import Error, ServerProxy, Transport
 
 from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.errors import SourceError
-from holdfast.ros.definitions import Definition
+from holdfast.io.definitions import Definition
 from holdfast.ros.topic_messages import JOINT_STATE, JointStates, topic_definition
 
 DEFAULT_MASTER = "http://localhost:11311"

@@ -198,7 +198,7 @@ class Ros2Driver:
 
     def __init__(self, driver, domain, **changes):
         from holdfast.devices.ros import dds
-        from holdfast.ros.cdr import MessageDecoder, MessageEncoder
+        from holdfast.io.cdr import MessageDecoder, MessageEncoder
         from holdfast.ros.topic_messages import JOINT_STATE, joint_message, topic_definition
 
         self.driver = driver

@@ -10,7 +10,7 @@ from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
 from holdfast.grip import FingerCommand, GripCommand, LoopState
-from holdfast.ros.cdr import MessageEncoder
+from holdfast.io.cdr import MessageEncoder
 from holdfast.ros.topic_messages import FLOAT_ARRAY, array_message, topic_definition
 from ros.domains import new_domain
 

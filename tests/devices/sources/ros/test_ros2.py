@@ -17,7 +17,7 @@ from holdfast.devices.ros import dds
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.ros import topic
 from holdfast.errors import MissingExtra, SourceError, install_command
-from holdfast.ros.definitions import parse_definition
+from holdfast.io.definitions import parse_definition
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
 from ros.domains import new_domain

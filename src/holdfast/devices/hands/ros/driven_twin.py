@@ -11,7 +11,7 @@ from holdfast.devices.sources import Arrival
 from holdfast.devices.uri import parse
 from holdfast.errors import HandError
 from holdfast.grip.command import FingerCommand, GripCommand, LoopState
-from holdfast.ros.cdr import MessageDecoder
+from holdfast.io.cdr import MessageDecoder
 from holdfast.ros.topic_messages import topic_definition
 
 

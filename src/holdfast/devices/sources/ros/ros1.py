@@ -20,7 +20,7 @@ from holdfast.devices.sources.ros.topic import (
 )
 from holdfast.devices.uri import Address
 from holdfast.errors import SourceError
-from holdfast.ros.definitions import parse_definition
+from holdfast.io.definitions import parse_definition
 from holdfast.ros.sensor_messages import (
     SUPPORTED_MESSAGES,
     DeviceSample,

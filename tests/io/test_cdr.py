@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.definitions import parse_definition
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
+from holdfast.io.definitions import parse_definition
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 

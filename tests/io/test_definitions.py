@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from holdfast.ros.definitions import MAX_FIELDS, MessageField, field_paths, parse_definition
+from holdfast.io.definitions import MAX_FIELDS, MessageField, field_paths, parse_definition
 
 
 def nested(n_fields, depth):

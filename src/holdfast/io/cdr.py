@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.definitions import FIELD_SIZES, NUMBER_CODES, Definition, MessageField
+from holdfast.io.definitions import FIELD_SIZES, NUMBER_CODES, Definition, MessageField
 
 HEAD = b"\x00\x01\x00\x00"
 """First bytes of a CDR message: little endian, no options. Alignment counts from their end."""
@@ -36,7 +36,7 @@ class MessageDecoder:
         ros2: whether messages are CDR, as in ROS 2; otherwise they are encoded as in ROS 1.
 
     Example:
-        >>> from holdfast.ros.definitions import parse_definition
+        >>> from holdfast.io.definitions import parse_definition
         >>> point = parse_definition("pkg/Point", "float32 x\nfloat32 y")
         >>> decode = MessageDecoder(point, ros2=False)
         >>> decode(np.array([1, 2], "<f4").tobytes())
@@ -92,7 +92,7 @@ class MessageEncoder:
         definition: definition of the messages.
 
     Example:
-        >>> from holdfast.ros.definitions import parse_definition
+        >>> from holdfast.io.definitions import parse_definition
         >>> encode = MessageEncoder(parse_definition("pkg/Named", "string name\nfloat64 value"))
         >>> encode({"name": "a", "value": 0.5}).hex(" ", 4)
         '00010000 02000000 61000000 00000000 0000e03f'
