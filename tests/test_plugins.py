@@ -171,7 +171,7 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     group = PluginGroup("things", (), lambda name, loaded: loaded)
     with on_the_path(tmp_path, monkeypatch):
         assert (group.load("thing"), group.load("thing")) == ("alpha", "alpha")
-        states = [(plugin.package, plugin.error) for plugin in group.states(lambda *_: "")]
+        states = [(plugin.package, plugin.error) for plugin in group.states(lambda *_: ("", ""))]
     refusal = "alpha 1.2 has thing as well; another name expected"
     assert sorted(states) == [("alpha 1.2", ""), ("zeta 1.2", refusal)]
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]

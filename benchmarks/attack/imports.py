@@ -14,7 +14,7 @@ from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.cdr import MessageEncoder
 from holdfast.io.definitions import parse_definition
-from holdfast.ros.sensor_messages import SENS_STREAM
+from holdfast_ros.sensor_messages import SENS_STREAM
 
 KIND = "xela_server_ros2/msg/SensStream"
 

@@ -27,12 +27,14 @@ class Plugin(NamedTuple):
         name: name under which it is used.
         package: name and version of the package.
         error: why it is skipped; empty if it can be used.
+        state: what a source found out about its devices in a few words; empty for others.
     """
 
     kind: str
     name: str
     package: str
     error: str
+    state: str = ""
 
 
 class PluginGroup(Generic[T]):
@@ -79,16 +81,19 @@ class PluginGroup(Generic[T]):
         loaded = (self.load(name) for name in self.names())
         return [plugin for plugin in loaded if plugin is not None]
 
-    def states(self, error: Callable[[str, str], str]) -> list[Plugin]:
-        """Return all plug-ins, each with the reason why it is skipped, if it is.
+    def states(self, probe: Callable[[str, str], tuple[str, str]]) -> list[Plugin]:
+        """Return all plug-ins, each with the reason why it is skipped, if it is, and its state.
 
         Args:
-            error: returns that reason for a kind and a name; `doctor` loads them elsewhere.
+            probe: returns both for a kind and a name; `doctor` loads plug-ins elsewhere.
         """
         return [
-            Plugin(self.kind, point.name, _package(point), refusal or error(self.kind, point.name))
+            Plugin(
+                self.kind, point.name, _package(point),
+                *((refusal, "") if refusal else probe(self.kind, point.name)),
+            )
             for point, refusal in self._points()
-        ]
+        ]  # fmt: skip
 
     def error(self, name: str) -> str:
         """Load a plug-in, and return the reason why it is skipped; empty if it can be used."""

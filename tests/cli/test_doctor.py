@@ -120,7 +120,7 @@ def test_missing_extras_are_reported(monkeypatch):
 
 
 def test_a_bad_master_is_reported(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.devices.ros.rospy_node.rospy_module", lambda: None)
+    monkeypatch.setattr("holdfast_ros.rospy_node.rospy_module", lambda: None)
     monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
     assert report(capsys)["sources"]["ros1"] == (
         "a ROS master like http://localhost:11311 expected, 'nonsense' given"

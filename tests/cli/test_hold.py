@@ -11,12 +11,12 @@ from holdfast.cli.app import spread_groups
 from holdfast.cli.grip_options import GripSettings
 from holdfast.cli.hold import hold
 from holdfast.cli.serve import serve
-from holdfast.devices.hands.ros import ros_hand
 from holdfast.grip import GripCommand, Limits
 from holdfast.io import load_recording, save_recording
 from holdfast.live.loop import watchdog
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.trial.run import LIMITS
+from holdfast_ros.hands import ros_hand
 
 pytestmark = pytest.mark.slow
 

@@ -4,9 +4,9 @@ import pytest
 
 from holdfast.datasets import public_sets
 from holdfast.devices.hands import HAND_SCHEMES
-from holdfast.devices.hands.ros.kinds import HAND_KINDS
 from holdfast.devices.uri import SCHEMES
 from holdfast.sensors import built_in_hands, built_in_sensors
+from holdfast_ros.hands.kinds import HAND_KINDS
 
 from . import blocks
 

@@ -11,7 +11,7 @@ from holdfast.io.definitions import parse_definition
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
-from devices.sources.ros_build import INNER, OUTER, message_of, plain, store, values
+from ros_messages import INNER, OUTER, message_of, plain, store, values
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["ros1", "ros2"])

@@ -89,7 +89,7 @@ def test_an_iterator_that_is_left_ends_its_child(make_recording, tmp_path, file)
 def test_a_child_ends_with_its_parent(tmp_path, kind):
     """Also while it waits for a pipe that nobody writes to."""
     os.mkfifo(tmp_path / "pipe")
-    hanging = "from holdfast.io import bags; bags.poses_of = lambda *_: open('pipe'); "
+    hanging = "from holdfast_ros import bags; bags.poses_of = lambda *_: open('pipe'); "
     program = (
         "from pathlib import Path; from holdfast.io import foreign\n"
         f"foreign._PROGRAM = {hanging!r} + foreign._PROGRAM\n"

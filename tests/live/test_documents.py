@@ -22,7 +22,7 @@ from holdfast.live.documents import (
     document_type,
     finger_document,
 )
-from holdfast.live.publishers.ros_publisher import NOT_IN_DIAGNOSTICS, diagnostics_of
+from holdfast_ros.publisher import NOT_IN_DIAGNOSTICS, diagnostics_of
 from live import estimates
 
 PACKAGE = Path(holdfast.__file__).parent
@@ -34,7 +34,7 @@ import holdfast
 from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.live.documents import finger_document
-from holdfast.live.publishers.ros_publisher import diagnostics_of
+from holdfast_ros.publisher import diagnostics_of
 from holdfast.live.web.schema import EstimateDocument
 from live import estimates
 import msgspec

@@ -1,11 +1,13 @@
 """`holdfast doctor`: check the installation and the live sources."""
 
+import json
 import os
 import platform
 import re
 import socket
 import subprocess
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from importlib import import_module, metadata
 from pathlib import Path
@@ -31,11 +33,10 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "onnx": "classifiers as ONNX files",
-    "bags": "import of ROS 1 and ROS 2 bags",
     "bench": "other libraries that holdfast bench compares with",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
-    "ros2": "ROS 2 topics without a ROS installation",
+    "ros": "ROS topics, without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "datasets": "holdfast datasets get: downloads of public recordings",
@@ -56,10 +57,10 @@ PLUGIN_GROUPS = {
 PLUGIN_TIMEOUT = 60.0
 """Time in which a plug-in must be imported [s]."""
 
-_ANSWER = "error of the plug-in: "
+_ANSWER = "state of the plug-in: "
 _LOAD_PLUGIN = (
-    "from holdfast.cli.doctor import plugin_group\n"
-    f"print({_ANSWER!r} + plugin_group(sys.argv[1]).error(sys.argv[2]), end='')"
+    "from holdfast.cli.doctor import probe_plugin\n"
+    f"print({_ANSWER!r} + probe_plugin(sys.argv[1], sys.argv[2]), end='')"
 )
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
@@ -86,7 +87,7 @@ def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
 def _report(context: typer.Context) -> dict[str, Any]:
     from holdfast.io.foreign import limits
 
-    packages = _packages()
+    packages, plugins = _packages(), _plugins()
     return {
         "holdfast": metadata.version("holdfast"),
         "python": platform.python_version(),
@@ -98,27 +99,43 @@ def _report(context: typer.Context) -> dict[str, Any]:
         "limits": limits(),
         "data": _data(),
         "config": _config(context.obj),
-        "sources": check_sources(),
-        "plugins": [plugin._asdict() for plugin in _plugins()],
+        "sources": check_sources(plugins),
+        "plugins": [plugin._asdict() for plugin in plugins],
     }
 
 
 def _plugins() -> "list[Plugin]":
     """Return the plug-ins of other packages, and why some of them are skipped."""
-    return [plugin for kind in PLUGIN_GROUPS for plugin in plugin_group(kind).states(_plugin_error)]
+    return [plugin for kind in PLUGIN_GROUPS for plugin in plugin_group(kind).states(_probe)]
 
 
-def _plugin_error(kind: str, name: str) -> str:
-    """Return why a plug-in is skipped; a child process loads it, which it may end or block."""
+def _probe(kind: str, name: str) -> tuple[str, str]:
+    """Return why a plug-in is skipped, and its state.
+
+    A child process loads it, which it may end or block.
+    """
     try:
         done = subprocess.run(
             python_command(_LOAD_PLUGIN, kind, name), stdin=subprocess.DEVNULL,
             capture_output=True, text=True, errors="replace", timeout=PLUGIN_TIMEOUT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return f"its import takes longer than {PLUGIN_TIMEOUT:.0f} s"
-    _, answered, error = done.stdout.rpartition(_ANSWER)
-    return error if answered else f"its import ends the process (exit code {done.returncode})"
+        return f"its import takes longer than {PLUGIN_TIMEOUT:.0f} s", ""
+    _, answered, answer = done.stdout.rpartition(_ANSWER)
+    if not answered:
+        return f"its import ends the process (exit code {done.returncode})", ""
+    error, state = json.loads(answer)
+    return error, state
+
+
+def probe_plugin(kind: str, name: str) -> str:
+    """Load a plug-in here, and return its error and state as JSON; called in a child process."""
+    from holdfast.devices.uri import source_module
+
+    error, state = plugin_group(kind).error(name), ""
+    if kind == "sources" and not error:
+        state = getattr(source_module(name), "state", str)()
+    return json.dumps([error, state])
 
 
 def plugin_group(kind: str) -> "PluginGroup[Any]":
@@ -259,9 +276,11 @@ def _extra_text(extra: dict[str, Any]) -> str:
     return "installed" if extra["installed"] else extra["install"]
 
 
-def check_sources() -> dict[str, str]:
+def check_sources(plugins: "Iterable[Plugin]" = ()) -> dict[str, str]:
     """Return a short description of the state of each kind of live source."""
-    return {"xela": _xela(), "ros1": _ros1(), "ros2": _ros2(), "serial": _serial()}
+    others = {one.name: one.error or one.state for one in plugins if one.kind == "sources"}
+    known = {name: text for name, text in others.items() if text}
+    return {"xela": _xela(), **known, "serial": _serial()}
 
 
 def _xela() -> str:
@@ -273,24 +292,6 @@ def _xela() -> str:
         with suppress(OSError), socket.create_connection(address, PROBE_TIMEOUT):
             return f"a server listens at {address}"
     return f"no server listens at {' or '.join(map(str, addresses))}"
-
-
-def _ros1() -> str:
-    from holdfast.devices.ros.rospy_node import check_master, master_uri, rospy_module
-    from holdfast.errors import HoldfastError
-
-    try:
-        rospy_module()
-        check_master(master := master_uri(None))
-    except (HoldfastError, ValueError) as error:  # ValueError: ROS_MASTER_URI is invalid
-        return str(error)
-    return f"rospy is installed; ROS master at {master}"
-
-
-def _ros2() -> str:
-    if not is_installed("cyclonedds"):
-        return f"not installed: {install_command('ros2')}"
-    return f"cyclonedds, domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
 
 
 def _serial() -> str:

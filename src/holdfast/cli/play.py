@@ -110,7 +110,7 @@ def _open(source: str, hand: str, speed: float, *, loop: bool) -> "Source":
     if hand:
         if not source.startswith("twin:"):
             raise ValueError(f"--hand needs the source twin:..., {source} given")
-        from holdfast.devices.hands.ros.driven_twin import DrivenTwin
+        from holdfast_ros.hands.driven_twin import DrivenTwin
 
         return DrivenTwin(source, hand, speed=speed)
     from holdfast.devices.sources import open_source

@@ -39,11 +39,11 @@ if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.loop.watchdog import Watchdog
-    from holdfast.live.publishers.ros_publisher import RosPublisher
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.web.guard import Guard
+    from holdfast_ros.publisher import RosPublisher
 
 ADDRESS = ServerOptions(LOCALHOST, port=8080)
 
@@ -190,7 +190,7 @@ def _create_publishers(
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2 or ros1:
-        from holdfast.live.publishers.ros_publisher import Ros1Publisher, Ros2Publisher
+        from holdfast_ros.publisher import Ros1Publisher, Ros2Publisher
     if ros2:
         yield Ros2Publisher(units, grip=grip)
     if ros1:

@@ -1,10 +1,12 @@
 """Sources by name: the path of a recording, or a URI, also of a plug-in."""
 
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
@@ -18,13 +20,12 @@ if TYPE_CHECKING:
 SCHEMES = {
     "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
     "twin": "the twin: twin:?object=can&seed=1&case=2&profile=reference",
-    "ros2": "a ROS 2 topic: ros2:///xServTopic",
-    "ros1": "a ROS 1 topic: ros1:///xServTopic",
     "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
 }
 """URI schemes of the sources, with a description and an example of each."""
-DEVICE_MODULES = {"xela": "xela", "ros2": "ros.ros2", "ros1": "ros.ros1", "serial": "serial"}
-"""Modules of `holdfast.devices.sources` whose function `source(address)` makes a source."""
+DEVICE_SCHEMES = ("xela", "serial")
+"""Those of devices: the module `holdfast.devices.sources.<scheme>` has a function `source(address)`
+that makes a source, and the names of the parameters of its URI in `PARAMETERS`."""
 VALUES = ("counts", "calibrated")
 """Readings to take from a packet: uint16 counts, or newtons if the device sends them."""
 
@@ -182,14 +183,26 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
     return _source_maker(scheme)(address)
 
 
+def source_module(scheme: str) -> ModuleType | None:
+    """Return the module of the sources of a scheme, None of the twin.
+
+    It may have `PARAMETERS`, names of parameters of the URI, and a function `state()`, which
+    returns in a few words whether such a source can be reached.
+
+    Raises:
+        ValueError: the plug-in of the scheme cannot be used.
+    """
+    return None if scheme == "twin" else sys.modules.get(_source_maker(scheme).__module__)
+
+
 def _source_maker(scheme: str) -> "Callable[[Address], Source]":
     """Return the function that makes the sources of a scheme.
 
     Raises:
         ValueError: the plug-in of the scheme cannot be used.
     """
-    if scheme in DEVICE_MODULES:
-        module = import_module(f"holdfast.devices.sources.{DEVICE_MODULES[scheme]}")
+    if scheme in DEVICE_SCHEMES:
+        module = import_module(f"holdfast.devices.sources.{scheme}")
         make: Callable[[Address], Source] = module.source
         return make
     plugin = SOURCE_PLUGINS.load(scheme)

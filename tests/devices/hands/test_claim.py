@@ -163,7 +163,7 @@ class TestResource:
         assert ScalarGripper(print, "call:x").resource == "call:x"
 
     def test_a_ros_1_topic_by_any_name_of_this_machine(self, monkeypatch):
-        monkeypatch.setattr("holdfast.devices.ros.rospy_node.gethostname", lambda: "Robot")
+        monkeypatch.setattr("holdfast_ros.rospy_node.gethostname", lambda: "Robot")
         hosts = ("localhost", "127.0.0.1", "127.0.1.1", "[::1]", "LOCALHOST", "robot")
         uri = "ros1:gripper?topic=/grip&effort=1&max_effort=2&master=http://{}:11311"
         found = {open_hand(uri.format(host)).resource for host in hosts}

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from holdfast.devices.hands import open_hand
-from holdfast.devices.hands.ros import ros_hand
 from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_ros.hands import ros_hand
 
 from .rigs import LOCAL, NAMES, WITH_STATES, Rigs
 from .ros.drivers import POSITIONS

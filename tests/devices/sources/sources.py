@@ -20,9 +20,9 @@ from holdfast.io import save_recording
 from holdfast.io.cdr import MessageEncoder
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.recordings import Recording, Tactile
-from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.twin.simulation import simulate
+from holdfast_ros.sensor_messages import known_definition
 
 N_SOON = 40
 """Number of samples of every source before it may become silent."""
@@ -174,7 +174,7 @@ def ros2(folder, monkeypatch):
     if find_spec("cyclonedds") is None:
         pytest.skip("cyclonedds is not installed")
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    from holdfast.devices.ros import dds
+    from holdfast_ros import dds
 
     domain = 201 + os.getpid() % 30  # tests of ROS 2 itself take those below
     definition = known_definition("xela_server_ros2/SensStream", ros2=True)

@@ -7,12 +7,12 @@ import pytest
 
 from grip.build import RATE, hand, holding
 from holdfast.contact import ContactState
-from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.sources.timeline import MIN_LATE_DELAY
 from holdfast.grip import Limits, LoopState, repeats
 from holdfast.grip.controller import OVERLOAD
 from holdfast.live.loop import grip_loop as loop
 from holdfast.live.loop import runner, watchdog
+from holdfast_ros.hands import ros_hand
 
 LIMITS = Limits()
 STUCK_SECONDS = 0.5

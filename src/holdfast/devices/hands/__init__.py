@@ -9,10 +9,6 @@ from holdfast.plugins import PluginGroup
 
 HAND_SCHEMES = {
     "twin": "the twin, with the source twin:...",
-    "ros2": "a hand on topics of ROS 2: ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop, "
-    "ros2:gripper, ros2:width-gripper, ros2:controller",
-    "ros1": "a hand on topics of ROS 1: ros1:positions, ros1:efforts, ros1:envelop, ros1:gripper, "
-    "ros1:width-gripper",
     "log": "a file, for dry runs: log:PATH",
     "call": "a function of Python: call:MODULE:FUNCTION",
 }
@@ -25,8 +21,8 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
     """Return the hand of a URI; entering it connects.
 
     Args:
-        uri: `ros2:KIND?...`, `ros1:KIND?...`, `log:PATH`, `call:MODULE:FUNCTION`, or that of a
-            plug-in. `twin:` is a hand and a source at once, see `holdfast.devices.live_twin`.
+        uri: `log:PATH`, `call:MODULE:FUNCTION`, or that of a plug-in. `twin:` is a hand and a
+            source at once, see `holdfast.devices.live_twin`.
         standby: whether a watchdog opens it, beside the controller that commands the hand.
 
     Raises:
@@ -43,15 +39,11 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
         from holdfast.devices.hands.local import ScalarGripper
 
         return ScalarGripper.from_path(rest, uri)
-    if scheme in ("ros1", "ros2") and rest:
-        from holdfast.devices.hands.ros.kinds import ros_hand
-
-        return ros_hand(uri, standby=standby)
     make = HAND_PLUGINS.load(scheme)
     if make is None:
         raise ValueError(
-            f"{uri!r} is no hand; there are twin:, log:PATH, call:MODULE:FUNCTION, ros2:KIND and "
-            f"ros1:KIND{HAND_PLUGINS.text()}"
+            f"{uri!r} is no hand; there are twin:, log:PATH and call:MODULE:FUNCTION"
+            f"{HAND_PLUGINS.text()}"
         )
     hand: Any = make(uri)
     if not isinstance(hand, HandDevice):
@@ -59,6 +51,7 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
             f"{uri}: the plug-in {scheme} must return a subclass of HandDevice, as the contract "
             f"of hands says; {type(hand).__name__} returned"
         )
+    hand.standby = standby
     return hand
 
 

@@ -13,13 +13,14 @@ from typing import Any
 
 from holdfast.errors import RecordingError, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
-from holdfast.io.foreign import read_foreign
+from holdfast.io.foreign import read_foreign, read_foreign_arrays
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
 from holdfast.plugins import PluginGroup
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
 
 FORMATS = {
     "uskin-pick-move": "folders of uSkin 4x4 recordings with measured slip (imanlab)",
@@ -28,12 +29,11 @@ FORMATS = {
     "gtac": "CSV of the GTac grippers, first and second version: 15 magnetic nodes",
     "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
-    "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
     "lerobot": "LeRobot data sets (v3.0) that holdfast export wrote (extra: parquet)",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order."""
-EXTRAS = {"arq-crisp": "hdf5", "rosbag": "bags", "lerobot": "parquet"}
+EXTRAS = {"arq-crisp": "hdf5", "lerobot": "parquet"}
 """Extras that formats need."""
 _IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
@@ -47,7 +47,6 @@ HINTS = {
     "gtac": f"grasps of the second gripper begin with an open hand; {_IF_IN_CONTACT}",
     "anyskin-slip": f"{_IF_IN_CONTACT}; check the labels of contact with holdfast label",
     "arq-crisp": _IF_IN_CONTACT,
-    "rosbag": f"{_IF_IN_CONTACT}; bias a PapillArray before, without load",
     "lerobot": f"metadata say how the recordings begin; {_IF_IN_CONTACT}",
     "csv": f"{_IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
 }
@@ -131,6 +130,25 @@ def import_parts(
     return name, parts
 
 
+def read_poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
+    """Read the poses of bodies from a file or folder, in a child process.
+
+    Args:
+        path: path of the file or folder.
+        bodies: name in the file of each body.
+
+    Returns:
+        For each body (n, 8): time [s], position [m], quaternion w x y z.
+
+    Raises:
+        RecordingError: no format fits, its importer has no poses, or a body is missing.
+    """
+    name = _format_of(path, None, None, None)
+    if not hasattr(importer(name), "poses"):
+        raise RecordingError(f"{path} is of the format {name}, from which no poses can be read")
+    return read_foreign_arrays("poses", path, {"format": name, "bodies": dict(bodies)})
+
+
 def _named_apart(
     parts: Sequence[Path], read: Callable[[Path], Iterator[Recording]]
 ) -> Iterator[Recording]:
@@ -211,7 +229,7 @@ def importer(name: str) -> ModuleType:
         if plugin is None:
             raise ValueError(f"the plug-in of {name} cannot be used; holdfast doctor says why")
         return plugin
-    module = {"csv": "generic_csv", "rosbag": "ros_bag"}.get(name, name.replace("-", "_"))
+    module = "generic_csv" if name == "csv" else name.replace("-", "_")
     return import_module(f"holdfast.io.importers.{module}")
 
 
