@@ -27,8 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.io import save_recording
-from holdfast.twin.randomized.drawing import SENSOR_KINDS
-from holdfast.twin.randomized.simulation import RandomHold, simulate_random
+from holdfast_lab.randomized.drawing import SENSOR_KINDS
+from holdfast_lab.randomized.simulation import RandomHold, simulate_random
 from holdfast_lab.skin.readout import ReadoutFigures, readout_figures
 from holdfast_lab.skin.situations import (
     SITUATIONS,

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,13 @@ import pytest
 import holdfast
 from holdfast.classifiers import recipe, recipe_names
 from holdfast.cli import doctor, main
+from holdfast.cli.extensions import (
+    EXPORTER_PLUGINS,
+    PANEL_PLUGINS,
+    PLAYER_PLUGINS,
+    PUBLISHER_PLUGINS,
+    SIMULATOR_PLUGINS,
+)
 from holdfast.devices.hands import open_hand
 from holdfast.devices.uri import open_source, parse
 from holdfast.errors import RecordingError
@@ -34,6 +42,12 @@ from holdfast.grip.laws import Fixed
 from holdfast.sensors import flat_sensor
 
 same = LogisticRegression(name="same")
+
+pad_name = "pad"
+
+def count(to: int = 1) -> None:
+    """Count."""
+    print(*range(1, to + 1))
 
 class Twice(Fixed):
     """Law."""
@@ -75,6 +89,7 @@ POINTS = {
         "odd": "parts:odd",
     },
     "holdfast.importers": {"broken": "broken", "half": "parts"},
+    "holdfast.verbs": {"count": "parts:count", "sum": "parts:pad_name"},
 }
 
 
@@ -171,7 +186,7 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     group = PluginGroup("things", (), lambda name, loaded: loaded)
     with on_the_path(tmp_path, monkeypatch):
         assert (group.load("thing"), group.load("thing")) == ("alpha", "alpha")
-        states = [(plugin.package, plugin.error) for plugin in group.states(lambda *_: ("", ""))]
+        states = [(plugin.package, plugin.error) for plugin in group.states(lambda *_: "")]
     refusal = "alpha 1.2 has thing as well; another name expected"
     assert sorted(states) == [("alpha 1.2", ""), ("zeta 1.2", refusal)]
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
@@ -181,7 +196,7 @@ def test_doctor_lists_them(parts, capsys):
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
-    assert works == {"pad", "same", "twice", "grab", "hollow"}
+    assert works == {"pad", "same", "twice", "grab", "hollow", "count"}
     assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
@@ -207,13 +222,56 @@ def test_doctor_outlives_a_plug_in(parts, monkeypatch, name, error):
     assert error in found[name]
 
 
-def test_help_does_not_look_for_plug_ins():
-    code = (
-        "import sys; from holdfast.cli import main; main(['--help']); "
-        "print({'importlib.metadata', 'holdfast.plugins'} & set(sys.modules), file=sys.stderr)"
+def test_help_lists_verbs_of_plug_ins_and_imports_none(parts, capsys):
+    assert main(["--help"]) == 0
+    assert " count A verb of a plug-in. " in " ".join(capsys.readouterr().out.split())
+    assert "parts" not in sys.modules
+    assert main(["count", "--to", "3"]) == 0
+    assert capsys.readouterr().out == "1 2 3\n"
+
+
+def test_a_verb_that_cannot_be_used_is_one_line(parts, capsys, caplog):
+    assert main(["sum"]) == 2
+    assert capsys.readouterr().err.endswith(
+        "holdfast: the plug-in of the verb sum cannot be used; the line before, and holdfast "
+        "doctor, have the reason\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr == "set()\n"
+    assert "a function expected for the verb sum" in reports(caplog)[-1]
+
+
+EXTENSIONS = (
+    (PUBLISHER_PLUGINS, "publisher"), (PANEL_PLUGINS, "panel"), (PLAYER_PLUGINS, "source"),
+    (EXPORTER_PLUGINS, "export"), (SIMULATOR_PLUGINS, "simulate"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("group", "function"), EXTENSIONS, ids=[f for _, f in EXTENSIONS])
+def test_what_adds_options_needs_them_and_its_function(group, function, tmp_path, monkeypatch):
+    site, kind = tmp_path / "site", group.kind
+    text = (
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\nclass Options:\n    x: int = 1\n"
+        f"class whole:\n    OPTIONS = Options()\n    {function} = print\n"
+        "class empty:\n    OPTIONS = Options()\n"
+        f"class odd:\n    OPTIONS = Options\n    {function} = print\n"
+    )
+    points = {name: f"adding:{name}" for name in ("whole", "empty", "odd")}
+    install(site, "acme", {"adding.py": text}, {f"holdfast.{kind}": points})
+    with on_the_path(site, monkeypatch):
+        assert group.error("whole") == ""
+        for name in ("empty", "odd"):
+            wanted = f"OPTIONS, a dataclass with its defaults, and {function} expected for {name}"
+            assert wanted in group.error(name)
+
+
+def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog):
+    """`install` writes version 1.2."""
+    points = {"holdfast.verbs": {"trial": "nothing:trial"}}
+    install(tmp_path / "site", "holdfast-lab", {}, points)
+    with on_the_path(tmp_path / "site", monkeypatch):
+        assert main(["trial", "--help"]) == 2
+    version = metadata.version("holdfast")
+    assert f"holdfast-lab 1.2 given, {version} expected as of holdfast itself: clone" in caplog.text
 
 
 @pytest.fixture(scope="module")

@@ -26,8 +26,6 @@ EXTRA_MODULES = {
     "plot": ("matplotlib",),
     "label": ("scipy",),
     "cluster": ("dask", "distributed", "threadpoolctl"),
-    "ros2": ("cyclonedds",),
-    "bags": ("rosbags",),
     "serial": ("serial",),
     "hdf5": ("h5py",),
     "bench": ("pywt", "tsflex", "pandas", "sklearn", "scipy"),
@@ -36,6 +34,27 @@ EXTRA_MODULES = {
     "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
+
+LABORATORY = "holdfast-lab"
+PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
+    "holdfast-ros": {
+        "sources": ("ros1", "ros2"),
+        "importers": ("rosbag",),
+        "publishers": ("ros1", "ros2"),
+        "players": ("driven",),
+        "hands": ("ros1", "ros2"),
+        "options": ("serve --ros2", "serve --ros1", "play --hand"),
+    },
+    LABORATORY: {
+        "verbs": ("trial", "study"),
+        "simulators": ("randomized",),
+        "options": ("simulate --randomize", "simulate --grasps", "simulate --measured"),
+    },
+}
+"""Entry points of the packages beside the core, by distribution and kind, and the `options` that
+they add to verbs: so that what is not installed is a line with the command. A test compares it
+with the packages. The extra of holdfast that installs a distribution has its name, without
+`holdfast-`; the laboratory has none."""
 
 
 class HoldfastError(Exception):
@@ -119,6 +138,42 @@ def missing_extra(cause: ModuleNotFoundError) -> MissingExtra | None:
     extras = (extra for extra, modules in EXTRA_MODULES.items() if module in modules)
     extra = next(extras, None)
     return None if extra is None else MissingExtra(module, extra)
+
+
+def missing_part(kind: str, name: str, what: str) -> HoldfastError | None:
+    """Return the error of a part of another package; None if no package has such a part.
+
+    Args:
+        kind: of the plug-in: `verbs`, `sources`, ..., or `options`.
+        name: of the plug-in.
+        what: what the name stands for, as in "the verb hold".
+    """
+    for distribution, parts in PACKAGE_PARTS.items():
+        if name in parts.get(kind, ()):
+            return HoldfastError(
+                f"{what} is part of {distribution}, which is not installed: "
+                f"{_package_command(distribution)}"
+            )
+    return None
+
+
+def other_version(distribution: str, version: str) -> str:
+    """Return why a package beside the core does not fit it; empty if it fits, or is no such."""
+    from importlib.metadata import version as version_of
+
+    if distribution not in PACKAGE_PARTS or version == (core := version_of("holdfast")):
+        return ""
+    return (
+        f"{distribution} {version} given, {core} expected as of holdfast itself: "
+        f"{_package_command(distribution)}"
+    )
+
+
+def _package_command(distribution: str) -> str:
+    """Return the command that installs a package beside the core."""
+    if distribution == LABORATORY:
+        return "clone the repository of holdfast, and run `uv run holdfast` there"
+    return install_command(distribution.removeprefix("holdfast-"))
 
 
 def install_command(extra: str) -> str:

@@ -173,7 +173,9 @@ def read_input(path: str | Path, max_size: int) -> bytes:
     """
     check_regular(path)
     with Path(path).open("rb") as file:
-        data = file.read(max_size + 1)
+        # As long as it says, not `max_size`: Python takes that memory before it reads.
+        size = min(os.fstat(file.fileno()).st_size, max_size)
+        data = file.read(size + 1)
     if len(data) > max_size:
         raise OSError(errno.EFBIG, f"it has more than {max_size} bytes", str(path))
     return data

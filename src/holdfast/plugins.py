@@ -1,13 +1,16 @@
-"""Plug-ins: sensors, sources, importers, classifiers, laws and hands of other packages.
+"""Plug-ins of other packages: sensors, sources, importers, classifiers, verbs, exporters, ...
 
 A package declares them as entry points (docs/plugins.md). Its code is imported when a name is
 used that holdfast itself does not have, and by `holdfast doctor`. A plug-in that fails is named
-once by the logger `holdfast.plugins`, which prints on stderr by default, and is skipped.
+once by the logger `holdfast.plugins`, which prints on stderr by default, and is skipped. The
+packages beside the core (`PACKAGE_PARTS` of `errors.py`) use nothing else.
 """
 
 import logging
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+
+from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_part, other_version
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -27,14 +30,12 @@ class Plugin(NamedTuple):
         name: name under which it is used.
         package: name and version of the package.
         error: why it is skipped; empty if it can be used.
-        state: what a source found out about its devices in a few words; empty for others.
     """
 
     kind: str
     name: str
     package: str
     error: str
-    state: str = ""
 
 
 class PluginGroup(Generic[T]):
@@ -76,24 +77,47 @@ class PluginGroup(Generic[T]):
             self._report(point, _reason(cause))
             return None
 
-    def load_all(self) -> list[T]:
-        """Return all plug-ins that are not skipped."""
-        loaded = (self.load(name) for name in self.names())
-        return [plugin for plugin in loaded if plugin is not None]
-
-    def states(self, probe: Callable[[str, str], tuple[str, str]]) -> list[Plugin]:
-        """Return all plug-ins, each with the reason why it is skipped, if it is, and its state.
+    def require(self, name: str, what: str, known: Iterable[str] = ()) -> T:
+        """Return a plug-in.
 
         Args:
-            probe: returns both for a kind and a name; `doctor` loads plug-ins elsewhere.
+            name: of the plug-in.
+            what: what the name stands for, as in "the verb hold".
+            known: all names that there are, for the message.
+
+        Raises:
+            HoldfastError: it is skipped, or its package is not installed.
+            ValueError: neither holdfast nor a plug-in has the name.
+        """
+        if name in self.names():
+            if (plugin := self.load(name)) is not None:
+                return plugin
+            raise HoldfastError(
+                f"the plug-in of {what} cannot be used; the line before, and holdfast doctor, "
+                "have the reason"
+            )
+        raise missing_part(self.kind, name, what) or ValueError(
+            f"{what} is unknown; there are {', '.join(known) or 'none'}"
+        )
+
+    def load_all(self) -> dict[str, T]:
+        """Return all plug-ins that are not skipped, by name."""
+        loaded = {name: self.load(name) for name in self.names()}
+        return {name: plugin for name, plugin in loaded.items() if plugin is not None}
+
+    def states(self, error: Callable[[str, str], str]) -> list[Plugin]:
+        """Return the plug-ins, each with the reason why it is skipped, if it is.
+
+        Those of the packages beside the core are no guests: they are left out if they fit.
+
+        Args:
+            error: returns that reason for a kind and a name; `doctor` loads them elsewhere.
         """
         return [
-            Plugin(
-                self.kind, point.name, _package(point),
-                *((refusal, "") if refusal else probe(self.kind, point.name)),
-            )
+            Plugin(self.kind, point.name, _package(point), refusal or error(self.kind, point.name))
             for point, refusal in self._points()
-        ]  # fmt: skip
+            if refusal or point.dist is None or point.dist.name not in ("holdfast", *PACKAGE_PARTS)
+        ]
 
     def error(self, name: str) -> str:
         """Load a plug-in, and return the reason why it is skipped; empty if it can be used."""
@@ -132,7 +156,7 @@ class PluginGroup(Generic[T]):
             return f"holdfast itself has {point.name}; another name expected"
         if _package(first) != _package(point):
             return f"{_package(first)} has {point.name} as well; another name expected"
-        return ""
+        return "" if point.dist is None else other_version(point.dist.name, point.dist.version)
 
     def _report(self, point: "EntryPoint", reason: str) -> None:
         """Report that a plug-in is skipped, each reason once."""

@@ -70,7 +70,7 @@ def test_tables_say_what_they_leave_out(capsys, grasps, tmp_path):
 def test_options_must_fit(capsys, grasps, tmp_path):
     out = tmp_path / "out"
     cases = {
-        (): "--format: lerobot, foxglove, csv expected for recordings",
+        (): "--format: csv, foxglove, lerobot expected for recordings",
         ("--format", "csv", "--fps", "3"): "--fps belongs to --format lerobot; csv given",
         ("--format", "csv", "--model", "x"): "--model belongs to --format foxglove; csv given",
         ("--format", "lerobot", "--fps", "0"): "--fps: a whole number from 1 to 1000 expected, 0 "

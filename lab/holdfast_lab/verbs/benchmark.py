@@ -101,17 +101,17 @@ def _text(row: "Row | None", digits: int) -> str:
 
 
 def _simulate(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
-    from holdfast.cli.simulate import GraspOptions, plan_grasps, simulate_grasps, simulate_hands
+    from holdfast.cli.simulate import GraspOptions, plan_grasps, simulate_grasps
     from holdfast.twin.objects import OTHER_OBJECTS
     from holdfast_lab.study.benchmark.protocol import MEASURED_ALL
+    from holdfast_lab.verbs.randomized import HandOptions, RandomizedHands
 
     folder.mkdir(parents=True, exist_ok=True)
     if split.randomized:
-        options = GraspOptions(
-            repeats=split.repeats, seed=split.seed, randomize=True, measured=MEASURED_ALL
-        )
-        simulate_hands(folder, options, engine=engine, force=False)
+        grasps = GraspOptions(repeats=split.repeats, seed=split.seed)
+        hands = HandOptions(randomize=True, measured=MEASURED_ALL)
+        RandomizedHands.simulate(folder, grasps, hands, engine=engine, force=False)
         return
     table = OTHER_OBJECTS if split.other_objects else None
-    grasps = plan_grasps("", "1,2", split.repeats, "reference", split.seed, table=table)
-    simulate_grasps(grasps, folder, engine=engine, force=False)
+    planned = plan_grasps("", "1,2", split.repeats, "reference", split.seed, table=table)
+    simulate_grasps(planned, folder, engine=engine, force=False)

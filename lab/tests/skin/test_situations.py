@@ -6,7 +6,7 @@ from scipy.stats import ks_2samp
 
 from holdfast.io import save_recording
 from holdfast.metrics.slip_truth import SLIDING, slip_truth
-from holdfast.twin.randomized.simulation import RandomHold, simulate_random
+from holdfast_lab.randomized.simulation import RandomHold, simulate_random
 from holdfast_lab.skin.situations import (
     MAX_SAMPLES_SHOWN,
     SITUATIONS,

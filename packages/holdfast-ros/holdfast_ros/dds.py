@@ -5,38 +5,35 @@ from collections.abc import Mapping
 from functools import cache, partial
 from typing import Any, Self
 
-from holdfast.errors import MissingExtra, SourceError
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import (
+    DDSException,
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import make_idl_struct
+from cyclonedds.idl import types as idl
+from cyclonedds.internal import InvalidSample
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from holdfast.errors import SourceError
 from holdfast.io.cdr import MessageDecoder, MessageEncoder
 from holdfast.io.definitions import NUMBER_CODES, Definition, MessageField
 from holdfast_ros.link import Link, Publisher, TakeStates
 from holdfast_ros.topic_messages import JOINT_STATE, JointStates, topic_definition
-
-try:
-    from cyclonedds.builtin import (
-        BuiltinDataReader,
-        BuiltinTopicDcpsPublication,
-        BuiltinTopicDcpsSubscription,
-    )
-    from cyclonedds.core import (
-        DDSException,
-        InstanceState,
-        Policy,
-        Qos,
-        ReadCondition,
-        SampleState,
-        ViewState,
-        WaitSet,
-    )
-    from cyclonedds.domain import Domain, DomainParticipant
-    from cyclonedds.idl import make_idl_struct
-    from cyclonedds.idl import types as idl
-    from cyclonedds.internal import InvalidSample
-    from cyclonedds.pub import DataWriter
-    from cyclonedds.sub import DataReader
-    from cyclonedds.topic import Topic
-    from cyclonedds.util import duration
-except ImportError as cause:
-    raise MissingExtra("cyclonedds", "ros") from cause
 
 READER_QUEUE_SIZE = 256
 """Maximum number of messages that wait for a busy reader."""

@@ -9,7 +9,7 @@ import keyword
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -18,8 +18,10 @@ from typing import Annotated, Any
 import typer
 from typer.main import get_command
 
+from holdfast.cli.extensions import PluginOptions
 from holdfast.cli.terminal.console import print_error, print_line
-from holdfast.errors import HoldfastError, missing_extra
+from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
+from holdfast.plugins import PluginGroup
 
 VERBS = {
     "demo": "Detect on a real recording and on simulated grasps, train, and replay one grasp.",
@@ -44,15 +46,8 @@ VERBS = {
     "sensors": "List the known sensors and hands, or show one of them.",
     "doctor": "Check the installation and the reachable sources.",
 }
-"""All verbs in the order of the help, with the first line of their docstrings."""
-
-LAB_VERBS = ("trial", "study")
-"""Verbs of the laboratory, the package `holdfast_lab`."""
-ENTRY_POINTS = "holdfast.verbs"
-"""Group of the entry points of verbs of other packages."""
-
-CONFIGURED_VERBS = ("detect", "serve", "record", "hold", "calibrate")
-"""Verbs that read the configuration file of `cli/config.py`."""
+"""Verbs in the order of the help, with the first line of their docstrings. Those that are plug-ins
+of the packages beside the core are listed as well; verbs of other plug-ins follow them."""
 
 HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or
 disturbed, from its tactile sensors, at every sample.
@@ -63,9 +58,17 @@ EPILOG = (
     "doctor finds it, and holdfast serve builtin:any xela://auto shows it. The tutorials and all "
     "pages: docs/ of the repository."
 )
+CONFIGURED_VERBS = ("detect", "serve", "record", "calibrate")
+"""Verbs that read the configuration file of `cli/config.py`; see `_is_configured`."""
 COMPLETE_VARIABLE = "_HOLDFAST_COMPLETE"
 """Is set by the completion script of a shell."""
 
+OWN_VERBS = tuple(
+    verb
+    for verb in VERBS
+    if all(verb not in parts.get("verbs", ()) for parts in PACKAGE_PARTS.values())
+)
+"""Verbs of the core; the others of `VERBS` are plug-ins."""
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
@@ -116,7 +119,8 @@ def _app(words: list[str]) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_root)
-    for name, summary in VERBS.items():
+    others = {name: "A verb of a plug-in." for name in VERB_PLUGINS.names() if name not in VERBS}
+    for name, summary in {**VERBS, **others}.items():
         if name in words:
             verb = load_verb(name)
             app.command(name, help=_help(verb))(spread_groups(verb))
@@ -141,37 +145,36 @@ def _version(value: bool) -> None:
         raise typer.Exit
 
 
+def _verb_of_plugin(name: str, loaded: Any) -> Callable[..., None]:  # noqa: ANN401
+    """Return the function of a verb of another package."""
+    if not inspect.isfunction(loaded):
+        raise TypeError(f"a function expected for the verb {name}, {loaded!r} given")
+    return loaded
+
+
+VERB_PLUGINS = PluginGroup("verbs", OWN_VERBS, _verb_of_plugin)
+"""Verbs of other packages."""
+
+
 def load_verb(name: str) -> Callable[..., None]:
     """Import the function of a verb.
 
     Raises:
-        HoldfastError: the verb is one of the laboratory, which is not installed.
+        HoldfastError: it is a verb of another package, which cannot be used, or is not installed.
     """
-    if name in LAB_VERBS:
-        return _load_entry_point(name)
+    if name not in OWN_VERBS:
+        return VERB_PLUGINS.require(name, f"the verb {name}")
     module = f"{name}_" if keyword.iskeyword(name) else name
     verb: Callable[..., None] = getattr(import_module(f"holdfast.cli.{module}"), module)
     return verb
-
-
-def _load_entry_point(name: str) -> Callable[..., None]:
-    """Import the function of a verb of another package."""
-    from importlib.metadata import entry_points
-
-    for entry_point in entry_points(group=ENTRY_POINTS, name=name):
-        verb: Callable[..., None] = entry_point.load()
-        return verb
-    raise HoldfastError(
-        f"{name} needs the laboratory: clone the repository of holdfast, and run `uv run holdfast "
-        f"{name}` there, or `pip install ./lab`"
-    )
 
 
 def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
     """Return a function with the options of a verb, and those of its groups one by one.
 
     A group is a parameter whose type is a dataclass; the fields are its options. The default of
-    the parameter, or else those of the fields, are the defaults of the options.
+    the parameter, or else those of the fields, are the defaults of the options. The options of
+    plug-ins are a group as well, see `PluginOptions`.
 
     Example:
         >>> from dataclasses import dataclass
@@ -188,20 +191,18 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
         grip 0.75
     """
     parameters: list[inspect.Parameter] = []
-    groups: dict[str, Callable[..., object]] = {}
+    groups: dict[str, tuple[Callable[[Values], object], list[str]]] = {}
     for name, parameter in inspect.signature(verb, eval_str=True).parameters.items():
-        group = parameter.annotation
-        if isinstance(group, type) and is_dataclass(group):
-            groups[name] = group
-            parameters += _group_options(parameter)
+        if _is_group(parameter.annotation):
+            options = _options_of(parameter.annotation, parameter.default)
+            groups[name] = _maker_of(parameter.annotation), [option.name for option in options]
+            parameters += options
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 
     def run(**values: Any) -> None:  # noqa: ANN401
-        for name, group in groups.items():
-            values[name] = group(
-                *[values.pop(option) for option in inspect.signature(group).parameters]
-            )
+        for name, (make, options) in groups.items():
+            values[name] = make({option: values.pop(option) for option in options})
         verb(**values)
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -209,11 +210,43 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def _group_options(group: inspect.Parameter) -> Iterator[inspect.Parameter]:
-    """Yield the options of a group as parameters."""
-    for name, option in inspect.signature(group.annotation, eval_str=True).parameters.items():
-        default = option.default if group.default is group.empty else getattr(group.default, name)
-        yield option.replace(kind=inspect.Parameter.KEYWORD_ONLY, default=default)
+Values = dict[str, Any]
+"""Values of options, by name."""
+
+
+def _is_group(kind: object) -> bool:
+    return isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, PluginOptions))
+
+
+def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[inspect.Parameter]:
+    """Return the options of a group as parameters; those of plug-ins one after the other."""
+    if issubclass(group, PluginOptions):
+        plugins = group.plugins().values()
+        return [
+            option
+            for plugin in plugins
+            for option in _options_of(type(plugin.OPTIONS), plugin.OPTIONS)
+        ]
+    return [
+        option.replace(
+            kind=inspect.Parameter.KEYWORD_ONLY,
+            default=option.default if default is option.empty else getattr(default, name),
+        )
+        for name, option in inspect.signature(group, eval_str=True).parameters.items()
+    ]
+
+
+def _maker_of(group: type) -> Callable[[Values], object]:
+    """Return the function that makes the value of a group from those of its options."""
+    if not issubclass(group, PluginOptions):
+        return lambda values: group(**values)
+    kinds = {name: type(plugin.OPTIONS) for name, plugin in group.plugins().items()}
+    return lambda values: group(
+        {
+            name: kind(**{option.name: values[option.name] for option in _options_of(kind)})
+            for name, kind in kinds.items()
+        }
+    )
 
 
 def _root(
@@ -231,13 +264,27 @@ def _root(
     ] = False,
 ) -> None:
     """Read the configuration file, for the verbs that use it."""
-    if context.invoked_subcommand in CONFIGURED_VERBS or config is not None:
+    verb = context.invoked_subcommand or ""
+    if _is_configured(verb) or config is not None:
         from holdfast.cli.config import find_config, load_config
 
         path = find_config(config)
         if path is not None:
             context.obj = load_config(path)
-            context.default_map = context.obj.defaults()
+            context.default_map = {verb: context.obj.defaults()} if _is_configured(verb) else {}
+
+
+def _is_configured(verb: str) -> bool:
+    """Return whether a verb has its defaults from the configuration file of `cli/config.py`.
+
+    A verb of a plug-in has them if it takes a `SourceArgument`.
+    """
+    if verb in VERBS and verb in OWN_VERBS:
+        return verb in CONFIGURED_VERBS
+    from holdfast.cli.options import SourceArgument
+
+    parameters = inspect.signature(load_verb(verb), eval_str=True).parameters.values()
+    return any(parameter.annotation == SourceArgument for parameter in parameters)
 
 
 def _placeholder() -> None:
@@ -277,6 +324,10 @@ def _report(failure: BaseException) -> int:
 
 
 def _usage_text(failure: BaseException) -> str:
+    option = getattr(failure, "option_name", "")
+    verb = getattr(getattr(failure, "ctx", None), "info_name", "")
+    if missing := missing_part("options", f"{verb} {option}", f"the option {option}"):
+        return str(missing)
     text: str = failure.format_message()  # type: ignore[attr-defined]
     path = getattr(getattr(failure, "ctx", None), "command_path", "holdfast")
     return f"{text.rstrip('.')} (see {path} --help)"

@@ -6,7 +6,6 @@ from urllib.parse import urlencode
 
 import msgspec
 
-from holdfast.cli.app import CONFIGURED_VERBS
 from holdfast.files import read_toml
 
 CONFIG_NAME, CONFIG_VARIABLE = "holdfast.toml", "HOLDFAST_CONFIG"
@@ -58,15 +57,15 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return source
         return f"{source}{'&' if '?' in source else '?'}{urlencode(missing, safe=':,/')}"
 
-    def defaults(self) -> dict[str, dict[str, str]]:
-        """Return the default value of each argument and option, by verb."""
+    def defaults(self) -> dict[str, str]:
+        """Return the default values of arguments and options."""
         defaults: dict[str, str] = {"source": HAND}
         if self.model is not None:
             defaults["model"] = self.model
         if self.ignore:
             taxels = (f"{finger}:{k}" for finger, ks in self.ignore.items() for k in ks)
             defaults["ignore"] = ",".join(taxels)
-        return dict.fromkeys(CONFIGURED_VERBS, defaults)
+        return defaults
 
     def _parameters(self) -> dict[str, str | None]:
         fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items()) or None

@@ -1,14 +1,13 @@
 """`holdfast doctor`: check the installation and the live sources."""
 
-import json
 import os
 import platform
 import re
 import socket
 import subprocess
 import time
-from collections.abc import Iterable
 from contextlib import suppress
+from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,7 +35,7 @@ EXTRA_PURPOSES = {
     "bench": "other libraries that holdfast bench compares with",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
-    "ros": "ROS topics, without a ROS 2 installation, and bags",
+    "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "datasets": "holdfast datasets get: downloads of public recordings",
@@ -52,15 +51,21 @@ PLUGIN_GROUPS = {
     "importers": ("io.importers", "IMPORTER_PLUGINS"),
     "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
     "laws": ("grip.laws", "LAW_PLUGINS"),
+    "verbs": ("cli.app", "VERB_PLUGINS"),
+    "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),
+    "publishers": ("cli.extensions", "PUBLISHER_PLUGINS"),
+    "panels": ("cli.extensions", "PANEL_PLUGINS"),
+    "players": ("cli.extensions", "PLAYER_PLUGINS"),
+    "simulators": ("cli.extensions", "SIMULATOR_PLUGINS"),
 }
 """Module and name of each group of plug-ins, by kind; a child imports one of them."""
 PLUGIN_TIMEOUT = 60.0
 """Time in which a plug-in must be imported [s]."""
 
-_ANSWER = "state of the plug-in: "
-_LOAD_PLUGIN = (
-    "from holdfast.cli.doctor import probe_plugin\n"
-    f"print({_ANSWER!r} + probe_plugin(sys.argv[1], sys.argv[2]), end='')"
+_ANSWER = "answer of the plug-in: "
+_CHILD = (
+    "from holdfast.cli.doctor import plugin_error, source_state\n"
+    f"print({_ANSWER!r} + %s(*sys.argv[1:]), end='')"
 )
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
@@ -87,7 +92,7 @@ def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
 def _report(context: typer.Context) -> dict[str, Any]:
     from holdfast.io.foreign import limits
 
-    packages, plugins = _packages(), _plugins()
+    packages = _packages()
     return {
         "holdfast": metadata.version("holdfast"),
         "python": platform.python_version(),
@@ -99,43 +104,43 @@ def _report(context: typer.Context) -> dict[str, Any]:
         "limits": limits(),
         "data": _data(),
         "config": _config(context.obj),
-        "sources": check_sources(plugins),
-        "plugins": [plugin._asdict() for plugin in plugins],
+        "sources": check_sources(),
+        "plugins": [plugin._asdict() for plugin in _plugins()],
     }
 
 
 def _plugins() -> "list[Plugin]":
     """Return the plug-ins of other packages, and why some of them are skipped."""
-    return [plugin for kind in PLUGIN_GROUPS for plugin in plugin_group(kind).states(_probe)]
+    return [
+        plugin
+        for kind in PLUGIN_GROUPS
+        for plugin in plugin_group(kind).states(partial(_ask_child, "plugin_error"))
+    ]
 
 
-def _probe(kind: str, name: str) -> tuple[str, str]:
-    """Return why a plug-in is skipped, and its state.
+def plugin_error(kind: str, name: str) -> str:
+    """Return why a plug-in is skipped; empty if it can be used."""
+    return plugin_group(kind).error(name)
 
-    A child process loads it, which it may end or block.
-    """
+
+def source_state(name: str) -> str:
+    """Return what a source of a plug-in finds, or why it is skipped; empty without a state."""
+    from holdfast.devices.uri import source_module
+
+    return plugin_error("sources", name) or getattr(source_module(name), "state", str)()
+
+
+def _ask_child(function: str, *words: str) -> str:
+    """Return what a function gives in a child process, which a plug-in may end or block."""
     try:
         done = subprocess.run(
-            python_command(_LOAD_PLUGIN, kind, name), stdin=subprocess.DEVNULL,
+            python_command(_CHILD % function, *words), stdin=subprocess.DEVNULL,
             capture_output=True, text=True, errors="replace", timeout=PLUGIN_TIMEOUT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return f"its import takes longer than {PLUGIN_TIMEOUT:.0f} s", ""
+        return f"its import takes longer than {PLUGIN_TIMEOUT:.0f} s"
     _, answered, answer = done.stdout.rpartition(_ANSWER)
-    if not answered:
-        return f"its import ends the process (exit code {done.returncode})", ""
-    error, state = json.loads(answer)
-    return error, state
-
-
-def probe_plugin(kind: str, name: str) -> str:
-    """Load a plug-in here, and return its error and state as JSON; called in a child process."""
-    from holdfast.devices.uri import source_module
-
-    error, state = plugin_group(kind).error(name), ""
-    if kind == "sources" and not error:
-        state = getattr(source_module(name), "state", str)()
-    return json.dumps([error, state])
+    return answer if answered else f"its import ends the process (exit code {done.returncode})"
 
 
 def plugin_group(kind: str) -> "PluginGroup[Any]":
@@ -276,10 +281,12 @@ def _extra_text(extra: dict[str, Any]) -> str:
     return "installed" if extra["installed"] else extra["install"]
 
 
-def check_sources(plugins: "Iterable[Plugin]" = ()) -> dict[str, str]:
+def check_sources() -> dict[str, str]:
     """Return a short description of the state of each kind of live source."""
-    others = {one.name: one.error or one.state for one in plugins if one.kind == "sources"}
-    known = {name: text for name, text in others.items() if text}
+    from holdfast.devices.uri import SOURCE_PLUGINS
+
+    others = {name: _ask_child("source_state", name) for name in SOURCE_PLUGINS.names()}
+    known = {name: state for name, state in others.items() if state}
     return {"xela": _xela(), **known, "serial": _serial()}
 
 

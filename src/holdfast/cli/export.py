@@ -7,6 +7,7 @@ import typer
 
 from holdfast.cli.export_model import HeaderOptions, export_model
 from holdfast.cli.export_recordings import RecordingOptions, export_recordings
+from holdfast.cli.extensions import ExporterOptions
 from holdfast.cli.options import ForceOption, JsonOption
 
 MODEL_OUTPUTS = (".h", ".onnx")
@@ -22,6 +23,7 @@ def export(
     ],
     header: HeaderOptions,
     recordings: RecordingOptions,
+    formats: ExporterOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -46,7 +48,7 @@ def export(
       holdfast export grasp.parquet grasp.csv --format csv
     """
     if _is_model(source, out):
-        if recordings != RecordingOptions():
+        if recordings != RecordingOptions() or formats.chosen():
             raise ValueError(f"--format, --fps and --model are for recordings; {source} is a model")
         export_model(source, out, header, force=force, as_json=as_json)
         return
@@ -55,7 +57,7 @@ def export(
             "--like, --sensor, --fingers, --float and --in-contact are for models; "
             f"{source} is a recording or a folder"
         )
-    export_recordings(Path(source), out, recordings, force=force, as_json=as_json)
+    export_recordings(Path(source), out, recordings.format, formats, force=force, as_json=as_json)
 
 
 def _is_model(source: str, out: Path) -> bool:

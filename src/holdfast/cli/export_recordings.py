@@ -1,15 +1,14 @@
 """`holdfast export RECORDINGS OUT`: recordings in the formats of other tools."""
 
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from holdfast.cli.extensions import EXPORTER_PLUGINS, ExporterOptions, flags_of
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
-from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -17,17 +16,10 @@ if TYPE_CHECKING:
     from holdfast.io import Dataset
     from holdfast.recordings import Recording
 
-
-class ExportFormat(StrEnum):
-    """Formats of other tools."""
-
-    LEROBOT = "lerobot"
-    FOXGLOVE = "foxglove"
-    CSV = "csv"
-
-
 FILE_SUFFIXES = (".csv", ".json", ".mcap", ".parquet")
 """Suffixes that a folder is not given."""
+CSV = "csv"
+"""The format that holdfast itself has."""
 
 
 @dataclass(frozen=True)
@@ -35,28 +27,32 @@ class RecordingOptions:
     """Group of options: how recordings are exported."""
 
     format: Annotated[
-        ExportFormat | None,
-        typer.Option("--format", help="Format of exported recordings.", show_default=False),
-    ] = None
-    fps: Annotated[
-        int | None,
-        typer.Option(help="Frames per second of a LeRobot data set.", show_default="30"),
-    ] = None
-    model: Annotated[
         str | None,
-        typer.Option(help="Model whose estimates Foxglove shows: a file or builtin:NAME."),
+        typer.Option(
+            "--format",
+            metavar="NAME",
+            help="Format of exported recordings: csv, or one of a plug-in.",
+            show_default=False,
+        ),
     ] = None
 
 
 def export_recordings(
-    source: Path, out: Path, options: RecordingOptions, *, force: bool, as_json: bool
+    source: Path,
+    out: Path,
+    name: str | None,
+    others: ExporterOptions,
+    *,
+    force: bool,
+    as_json: bool,
 ) -> None:
     """Export a recording, or the recordings of a folder.
 
     Args:
         source: path of the recording or the folder.
         out: folder to write.
-        options: format, and what belongs to it.
+        name: of the format.
+        others: options of the formats of plug-ins.
         force: replace existing files.
         as_json: print JSON.
 
@@ -66,65 +62,45 @@ def export_recordings(
     """
     from holdfast.io import load_dataset
 
-    _check(out, options)
+    plugin = _check(out, name, others)
     recordings = load_dataset(source)
-    match options.format:
-        case ExportFormat.LEROBOT:
-            document = _to_lerobot(recordings, out, options.fps, force=force)
-        case ExportFormat.FOXGLOVE:
-            document = _to_foxglove(recordings, out, options.model, force=force)
-        case _:
-            document = _to_csv(recordings, out, force=force)
+    if plugin is None:
+        document = _to_csv(recordings, out, force=force)
+    else:
+        options = others.of(str(name))
+        document = plugin.export(recordings, out, options, force=force, progress=_writing)
     if as_json:
-        print_json({"out": out, "format": options.format, **document})
+        print_json({"out": out, "format": name, **document})
         return
     counts = [
-        f"{n} {name.removesuffix('s') if n == 1 and name != 'fps' else name}"
-        for name, n in document.items()
+        f"{n} {what.removesuffix('s') if n == 1 and what != 'fps' else what}"
+        for what, n in document.items()
         if isinstance(n, int)
     ]
     print_line(f"{out}: {', '.join(counts)}")
 
 
-def _check(out: Path, options: RecordingOptions) -> None:
-    """Check that the options fit together."""
-    if options.format is None:
-        raise ValueError(f"--format: {', '.join(ExportFormat)} expected for recordings")
-    for value, name, wanted in (
-        (options.fps, "--fps", ExportFormat.LEROBOT),
-        (options.model, "--model", ExportFormat.FOXGLOVE),
-    ):
-        if value is not None and options.format is not wanted:
-            raise ValueError(f"{name} belongs to --format {wanted}; {options.format} given")
-    if out.suffix in FILE_SUFFIXES and options.format != out.suffix[1:]:
-        raise ValueError(f"{out}: a folder expected for the format {options.format}, a file given")
+def _check(out: Path, name: str | None, others: ExporterOptions) -> Any:  # noqa: ANN401
+    """Check that the options fit together; return the plug-in of the format, None for CSV."""
+    names = sorted({CSV, *EXPORTER_PLUGINS.names()})
+    if name is None:
+        raise ValueError(f"--format: {', '.join(names)} expected for recordings")
+    plugin = None if name == CSV else EXPORTER_PLUGINS.require(name, f"the format {name}", names)
+    for other, chosen, values in others.chosen():
+        if other != name:
+            given = [
+                flag
+                for flag, value in zip(flags_of(values), astuple(values), strict=True)
+                if value != getattr(chosen.OPTIONS, flag[2:].replace("-", "_"))
+            ]
+            raise ValueError(f"{given[0]} belongs to --format {other}; {name} given")
+    if out.suffix in FILE_SUFFIXES and name != out.suffix[1:]:
+        raise ValueError(f"{out}: a folder expected for the format {name}, a file given")
+    return plugin
 
 
 def _writing(recordings: "Iterable[Recording]") -> "Iterable[Recording]":
     return progress(recordings, "exporting")
-
-
-def _to_lerobot(
-    recordings: "Dataset", out: Path, fps: int | None, *, force: bool
-) -> dict[str, Any]:
-    require_extras("parquet")
-    from holdfast.exporters import lerobot
-
-    rate = lerobot.DEFAULT_FPS if fps is None else fps
-    totals = lerobot.export(recordings, out, fps=rate, force=force, progress=_writing)
-    return {**totals, "fps": rate}
-
-
-def _to_foxglove(
-    recordings: "Dataset", out: Path, model: str | None, *, force: bool
-) -> dict[str, Any]:
-    from holdfast.exporters import foxglove
-    from holdfast.model import Model
-
-    loaded = None if model is None else Model.load(model)
-    totals = foxglove.export(recordings, out, model=loaded, force=force, progress=_writing)
-    print_message(f"hint: import the layout {out / foxglove.LAYOUT_FILE} in Foxglove")
-    return {**totals, "layout": out / foxglove.LAYOUT_FILE}
 
 
 def _to_csv(recordings: "Dataset", out: Path, *, force: bool) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.extensions import PlayerOptions
 from holdfast.cli.options import (
     LOCALHOST,
     HostOption,
@@ -33,6 +34,7 @@ PLAY_REFRESH_INTERVAL = 1.0
 
 def play(
     source: SourceArgument,
+    *,
     version: Annotated[str, typer.Option(help="Version of the server: 1.7 or 1.8.")] = "1.8",
     host: HostOption = LOCALHOST,
     port: PortOption = 5000,
@@ -49,13 +51,7 @@ def play(
             show_default="whole hand if the modules have the names of an Allegro hand",
         ),
     ] = None,
-    hand: Annotated[
-        str,
-        typer.Option(
-            help="The twin takes commands as this hand does: ros2:plexus?effort=E&max_effort=M. "
-            "It plays once, for the first client.",
-        ),
-    ] = "",
+    players: PlayerOptions,
     as_json: JsonOption = False,
 ) -> None:
     """Send a recording or the twin as a XELA server does.
@@ -83,13 +79,13 @@ def play(
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
     if source.startswith("twin:"):
         require_extras("twin", "parquet")
-    once = once or bool(hand)
+    once = once or bool(players.chosen())
     with ExitStack() as stack:
         with message_if_slow(awaited(source)):
             from holdfast.devices.sources.xela.encoder import is_part_of_hand
             from holdfast.live.publishers.xela_server import XelaServer
 
-            opened = stack.enter_context(_open(source, hand, speed, loop=not once))
+            opened = stack.enter_context(_open(source, players, speed, loop=not once))
         whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
             opened, version=version, host=host, port=port, whole_hand=whole,
@@ -105,14 +101,11 @@ def play(
     print_message(f"{server.n_packets} packets sent")
 
 
-def _open(source: str, hand: str, speed: float, *, loop: bool) -> "Source":
-    """Return the source; the twin with the topics of a hand, if one is given."""
-    if hand:
-        if not source.startswith("twin:"):
-            raise ValueError(f"--hand needs the source twin:..., {source} given")
-        from holdfast_ros.hands.driven_twin import DrivenTwin
-
-        return DrivenTwin(source, hand, speed=speed)
+def _open(source: str, players: PlayerOptions, speed: float, *, loop: bool) -> "Source":
+    """Return the source; that of a player, if its options are given. It plays once."""
+    for _, player, options in players.chosen():
+        opened: Source = player.source(source, options, speed=speed)
+        return opened
     from holdfast.devices.sources import open_source
 
     return open_source(source, speed=speed, loop=loop)

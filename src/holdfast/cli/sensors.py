@@ -154,7 +154,7 @@ def _show_all(as_json: bool) -> None:
     from holdfast import sensors as known
 
     all_sensors = [known.sensor(name) for name in known.built_in_sensors()]
-    all_sensors += known.SENSOR_PLUGINS.load_all()
+    all_sensors += known.SENSOR_PLUGINS.load_all().values()
     all_hands = [known.hand(name) for name in known.built_in_hands()]
     if as_json:
         print_json(

@@ -11,6 +11,7 @@ from urllib.parse import quote
 
 import typer
 
+from holdfast.cli.extensions import PublisherOptions
 from holdfast.cli.grip_options import (
     NO_HAND,
     GripSettings,
@@ -40,10 +41,8 @@ if TYPE_CHECKING:
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.loop.watchdog import Watchdog
     from holdfast.live.session import Session
-    from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.web.guard import Guard
-    from holdfast_ros.publisher import RosPublisher
 
 ADDRESS = ServerOptions(LOCALHOST, port=8080)
 
@@ -60,8 +59,7 @@ def serve(
     once: OnceOption = False,
     options: DetectorOptions,
     settings: GripSettings = NO_HAND,
-    ros2: Annotated[bool, typer.Option("--ros2", help="Also publish on ROS 2 topics.")] = False,
-    ros1: Annotated[bool, typer.Option("--ros1", help="Also publish on ROS 1 topics.")] = False,
+    publishers: PublisherOptions,
     as_json: JsonOption = False,
 ) -> None:
     r"""Show the estimates of a source on a web page, and publish them.
@@ -101,7 +99,7 @@ def serve(
     check_armed(settings)
     with (
         _open_session(options, loaded, opened, settings, commanded) as (session, grip),
-        _publish(session, grip, ros2=ros2, ros1=ros1),
+        _publish(session, grip, publishers),
     ):
         run_page(
             session, announce, host=access.host, port=access.port,
@@ -166,13 +164,14 @@ def _live_grip(
 
 @contextmanager
 def _publish(
-    session: "Session", grip: "LiveGrip | None", *, ros2: bool, ros1: bool
+    session: "Session", grip: "LiveGrip | None", options: PublisherOptions
 ) -> "Iterator[None]":
-    """Publish the estimates of a session; at the end, print how many are missing on the topics."""
+    """Publish the estimates of a session; at the end, print how many are missing."""
+    panels = {} if grip is None else {"grip": grip}
     with ExitStack() as stack:
         publishers = [
-            stack.enter_context(publisher)
-            for publisher in _create_publishers(session.stream, grip=grip, ros2=ros2, ros1=ros1)
+            stack.enter_context(plugin.publisher(session.stream, panels, chosen))
+            for _, plugin, chosen in options.chosen()
         ]
         for publisher in publishers:
             session.add_listener(publisher.put)
@@ -180,21 +179,9 @@ def _publish(
         for publisher in publishers:
             if publisher.n_failed or publisher.n_dropped:
                 print_message(
-                    f"{type(publisher).__name__}: ROS refused {publisher.n_failed} estimates, "
+                    f"{type(publisher).__name__}: {publisher.n_failed} estimates were refused, "
                     f"{publisher.n_dropped} were dropped because it was too slow"
                 )
-
-
-def _create_publishers(
-    stream: "StreamDetector", *, grip: "LiveGrip | None", ros2: bool, ros1: bool
-) -> "Iterator[RosPublisher]":
-    units = {name: sensor.unit for name, sensor in stream.fingers.items()}
-    if ros2 or ros1:
-        from holdfast_ros.publisher import Ros1Publisher, Ros2Publisher
-    if ros2:
-        yield Ros2Publisher(units, grip=grip)
-    if ros1:
-        yield Ros1Publisher(units, grip=grip)
 
 
 def run_page(

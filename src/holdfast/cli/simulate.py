@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from holdfast.cli.extensions import SimulatorOptions
 from holdfast.cli.options import (
     EngineOption,
     ForceOption,
@@ -24,7 +25,6 @@ from holdfast.twin.profile import GRASP_ATTEMPTS
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
-    from holdfast.twin.randomized.simulation import RandomHold
     from holdfast.twin.simulation import Grasp
 
 
@@ -51,22 +51,6 @@ class GraspOptions:
         ),
     ] = "reference"
     seed: SeedOption = 0
-    randomize: Annotated[
-        bool,
-        typer.Option(
-            "--randomize", help="Draw another hand, sensor, object and arm motion each time."
-        ),
-    ] = False
-    grasps: Annotated[
-        int, typer.Option(help="Number of grasps of each --randomize hand, of other objects.")
-    ] = 1
-    measured: Annotated[
-        str,
-        typer.Option(
-            help="Mechanisms of real skins and arms for --randomize hands, separated by commas: "
-            "scan, filter, noise, vibration, colour, steps, updates, stamps, carry, person; or all."
-        ),
-    ] = ""
     server: Annotated[
         bool,
         typer.Option(
@@ -80,13 +64,6 @@ class GraspOptions:
         Raises:
             ValueError: an unknown object, case or profile, or a number out of range.
         """
-        if self.measured:
-            raise ValueError("--measured is for the hands of --randomize")
-        if self.grasps != 1:
-            raise ValueError(
-                f"--grasps is for the hands of --randomize, {self.grasps} given; --repeats "
-                "repeats grasps"
-            )
         table = None if self.table is None else engine.path(self.table)
         return plan_grasps(
             self.objects, self.cases, self.repeats, self.profile, self.seed,
@@ -100,6 +77,7 @@ def simulate(
     ],
     *,
     options: GraspOptions,
+    simulators: SimulatorOptions,
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     video: Annotated[
@@ -135,9 +113,10 @@ def simulate(
     """
     require_extras("twin", "parquet")
     started = start_engine(engine, jobs)
-    if options.randomize:
-        names = simulate_hands(out, options, engine=started, force=force)
-        profile, text = "randomized", f"{len(names)} recordings of randomized hands in {out}"
+    if chosen := simulators.chosen():
+        profile, simulator, values = chosen[0]
+        names = simulator.simulate(out, options, values, engine=started, force=force)
+        text = f"{len(names)} recordings of {profile} hands in {out}"
     else:
         names = _simulate_planned(options, out, video, engine=started, force=force)
         n_failed = len(_failed(names))
@@ -172,61 +151,6 @@ def _simulate_planned(
     return names
 
 
-def simulate_hands(out: Path, options: GraspOptions, *, engine: "Engine", force: bool) -> list[str]:
-    """Simulate randomized hands whose recordings do not exist; return the names of new ones.
-
-    Raises:
-        ValueError: a number is out of range.
-        OutputError: an existing recording has another seed or profile.
-    """
-    from holdfast.twin.randomized.simulation import RandomHold
-
-    n_grasps, seed = options.grasps, options.seed
-    _check_numbers(options.repeats, seed)
-    if n_grasps < 1:
-        raise ValueError(f"--grasps of at least 1 expected, {n_grasps} given")
-    mechanisms = mechanisms_of(options.measured)
-    out.mkdir(parents=True, exist_ok=True)
-    numbers = [None] if n_grasps == 1 else range(1, n_grasps + 1)
-    holds = [
-        RandomHold(hand, seed, grasp=grasp, measured=mechanisms)
-        for hand in range(options.repeats)
-        for grasp in numbers
-    ]
-    expected: dict[str, object] = {
-        "profile": "randomized", "seed": seed, "measured": list(mechanisms) or None
-    }  # fmt: skip
-    missing = [
-        hold for hold in holds if force or not _is_recorded(_path_of(hold.name, out), expected)
-    ]
-    return _simulate_all(simulate_hand, missing, len(holds), out, engine=engine, force=force)
-
-
-def mechanisms_of(text: str) -> tuple[str, ...]:
-    """Return the mechanisms of `--measured`, in a fixed order.
-
-    Raises:
-        ValueError: a name is unknown.
-    """
-    from holdfast.twin.randomized.drawing import MEASURED
-
-    names = {name.strip() for name in text.split(",") if name.strip()}
-    if unknown := sorted(names - {*MEASURED, "all"}):
-        raise ValueError(
-            f"--measured: unknown mechanism {unknown[0]!r}; there are {', '.join(MEASURED)}, all"
-        )
-    return tuple(name for name in MEASURED if name in names or "all" in names)
-
-
-def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> list[str]:
-    """Simulate a randomized hand; return the name of the recording."""
-    from holdfast.io import save_recording
-    from holdfast.twin.randomized.simulation import simulate_random
-
-    save_recording(simulate_random(hold), _path_of(hold.name, out), force=force)
-    return [hold.name]
-
-
 def simulate_grasps(
     grasps: "Sequence[Grasp]",
     out: Path,
@@ -247,15 +171,15 @@ def simulate_grasps(
     from holdfast.parallel import Engine
 
     missing = [grasp for grasp in grasps if force or not _is_finished(grasp, out)]
-    return _simulate_all(
+    return simulate_all(
         simulate_grasp, missing, len(grasps), out,
         engine=engine or Engine(jobs), force=force, report=report,
     )  # fmt: skip
 
 
-def _simulate_all(
+def simulate_all(
     simulate_one: Callable[..., list[str]],
-    missing: "Sequence[Grasp | RandomHold]",
+    missing: "Sequence[Any]",
     n_wanted: int,
     out: Path,
     *,
@@ -263,7 +187,17 @@ def _simulate_all(
     force: bool,
     report: Callable[[list[str]], None] = lambda _: None,
 ) -> list[str]:
-    """Simulate what is missing, in parallel; return the names of the recordings."""
+    """Simulate what is missing, in parallel; return the names of the recordings.
+
+    Args:
+        simulate_one: called with one of `missing`, the folder and `force`; returns names.
+        missing: what is to be simulated.
+        n_wanted: how many there are with those that exist.
+        out: folder for the recordings.
+        engine: makes the calls.
+        force: overwrite recordings.
+        report: called with the names of the recordings of each finished call.
+    """
     if len(missing) < n_wanted:
         print_message(f"{n_wanted - len(missing)} of {n_wanted} recordings exist already")
     if len(missing) == 1 and engine.scheduler is None:
@@ -272,7 +206,7 @@ def _simulate_all(
     written = []
     with ProgressBar("simulating", len(missing)) as bar:
         for names in engine.map_ordered(simulate_one, tasks):
-            check_shared(_path_of(names[-1], out), engine)
+            check_shared(path_of(names[-1], out), engine)
             written += names
             report(names)
             bar.advance()
@@ -289,10 +223,10 @@ def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:
     names = []
     for attempt in range(GRASP_ATTEMPTS):
         trial = replace(grasp, attempt=attempt)
-        if not force and _exists(trial, _path_of(trial.failed_name, out)):
+        if not force and _exists(trial, path_of(trial.failed_name, out)):
             continue
         recording = run(trial)
-        save_recording(recording, _path_of(recording.name, out), force=force)
+        save_recording(recording, path_of(recording.name, out), force=force)
         names.append(recording.name)
         if recording.metadata["case"] != "failed":
             break
@@ -324,7 +258,7 @@ def plan_grasps(
     check_profile(profile)
     if not {case.strip() for case in cases.split(",")} <= {str(case) for case in GRASP_CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
-    _check_numbers(repeats, seed)
+    check_numbers(repeats, seed)
     chosen = sorted({int(case) for case in cases.split(",")})
     source = None if table is None else str(table)
     grasps = [
@@ -336,14 +270,19 @@ def plan_grasps(
     return grasps
 
 
-def _check_numbers(repeats: int, seed: int) -> None:
+def check_numbers(repeats: int, seed: int) -> None:
+    """Check the number of repeats and the seed.
+
+    Raises:
+        ValueError: one is out of range.
+    """
     if repeats < 1 or seed < 0:
         raise ValueError(
             f"repeats of at least 1 and a seed of at least 0 expected; {repeats} and {seed} given"
         )
 
 
-def _path_of(name: str, out: Path) -> Path:
+def path_of(name: str, out: Path) -> Path:
     """Return the path of the recording of that name."""
     from holdfast.files import file_stem
 
@@ -353,16 +292,16 @@ def _path_of(name: str, out: Path) -> Path:
 def _is_finished(grasp: "Grasp", out: Path) -> bool:
     """Return whether the recording of the grasp, or of its last failed attempt, exists."""
     last_failed = f"{grasp.name}-failed{GRASP_ATTEMPTS}"
-    return any(_exists(grasp, _path_of(name, out)) for name in (grasp.name, last_failed))
+    return any(_exists(grasp, path_of(name, out)) for name in (grasp.name, last_failed))
 
 
 def _exists(grasp: "Grasp", path: Path) -> bool:
     """Return whether the recording of a grasp exists; see `_is_recorded`."""
     expected = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
-    return _is_recorded(path, expected)
+    return is_recorded(path, expected)
 
 
-def _is_recorded(path: Path, expected: "dict[str, object]") -> bool:
+def is_recorded(path: Path, expected: "dict[str, object]") -> bool:
     """Return whether a recording exists, and check that it has the expected settings.
 
     Raises:
@@ -396,7 +335,7 @@ def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
     failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(GRASP_ATTEMPTS)]
     for name in (grasp.name, *failed):
         if name not in names:
-            _path_of(name, out).unlink(missing_ok=True)
+            path_of(name, out).unlink(missing_ok=True)
 
 
 def _write_video(grasp: "Grasp", video: Path, force: bool) -> None:

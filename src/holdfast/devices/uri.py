@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast.errors import require_extras
+from holdfast.errors import missing_part, require_extras
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import Sensor, sensor, sensor_names
 
@@ -116,6 +116,7 @@ def parse(text: str) -> tuple[str, Address]:
 
     Raises:
         ValueError: the scheme is not known, or a parameter occurs twice or has no value.
+        HoldfastError: the scheme is of a package that is not installed.
 
     Example:
         >>> parse("twin:?object=can")[1].parameters
@@ -124,7 +125,7 @@ def parse(text: str) -> tuple[str, Address]:
     match = _SCHEME.match(text)
     scheme = match["scheme"] if match else ""
     if scheme not in SCHEMES and scheme not in (others := SOURCE_PLUGINS.names()):
-        raise ValueError(
+        raise missing_part("sources", scheme, f"the source {scheme}:") or ValueError(
             f"{text!r} is neither the path of a recording nor the URI of a source; there are "
             + ", ".join(f"{name}:" for name in (*SCHEMES, *others))
         )

@@ -333,12 +333,12 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 
 def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    from holdfast.io.importers import EXTRAS, importer
+    from holdfast.io.importers import extra_of, importer
     from holdfast.io.importers.csv_columns import Columns
 
     name = str(request.options["format"])
     source = importer(name)
-    for module in EXTRA_MODULES.get(EXTRAS.get(name, ""), ()):  # of an idle process
+    for module in EXTRA_MODULES.get(extra_of(name) or "", ()):  # of an idle process
         import_module(module)
     _limit_memory(request)
     lines: list[str] = []

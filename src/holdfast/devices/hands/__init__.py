@@ -5,6 +5,7 @@ from typing import Any
 
 from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.claim import Claim
+from holdfast.errors import missing_part
 from holdfast.plugins import PluginGroup
 
 HAND_SCHEMES = {
@@ -41,7 +42,7 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
         return ScalarGripper.from_path(rest, uri)
     make = HAND_PLUGINS.load(scheme)
     if make is None:
-        raise ValueError(
+        raise missing_part("hands", scheme, f"the hand {scheme}:") or ValueError(
             f"{uri!r} is no hand; there are twin:, log:PATH and call:MODULE:FUNCTION"
             f"{HAND_PLUGINS.text()}"
         )

@@ -1,6 +1,8 @@
 """Import of recordings in other formats; each format has a module, which is loaded by name.
 
-Formats of plug-ins have such a module too, in another package.
+Formats of plug-ins have such a module too, in another package. A module has `can_read(path)`,
+`parts(path)`, `read(path)`, and perhaps `HINT`, a text for the person who imports, and `EXTRA`, the
+extra of holdfast that it needs. A child process reads the recordings, see `foreign.py`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from holdfast.errors import RecordingError, require_extras
+from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.io.foreign import read_foreign, read_foreign_arrays
 from holdfast.io.importers.csv_columns import Columns
@@ -88,14 +90,12 @@ def import_recordings(
     recordings: Iterator[Recording]
     with recording_errors(place):
         source = importer(name)
-        if name in EXTRAS:
-            require_extras(EXTRAS[name])
+        if extra := extra_of(name):
+            require_extras(extra)
         if name == "csv":
             recordings = read_foreign(place, name, sensors, given, report)
-        elif name in FORMATS:
+        else:
             recordings = _named_apart(source.parts(place), partial(read_foreign, name=name))
-        else:  # code of a plug-in is not kept apart
-            recordings = _named_apart(source.parts(place), source.read)
     return _guarded(place, recordings, labels=labels)
 
 
@@ -177,7 +177,7 @@ def _format_of(
     if name is None and (sensors or columns):
         name = "csv"
     if name is not None and name not in FORMATS and name not in IMPORTER_PLUGINS.names():
-        raise ValueError(
+        raise missing_part("importers", name, f"the format {name}") or ValueError(
             f"unknown format {name!r}; there are {', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
         )
     if name is not None and name not in FORMATS:
@@ -212,10 +212,14 @@ def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> It
 
 def import_hint(name: str) -> str | None:
     """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
-    if name in FORMATS:
-        return HINTS.get(name)
-    hint: str | None = getattr(importer(name), "HINT", None)
+    hint: str | None = HINTS.get(name) or getattr(importer(name), "HINT", None)
     return hint
+
+
+def extra_of(name: str) -> str | None:
+    """Return the extra that a format needs; None without one."""
+    extra: str | None = EXTRAS.get(name) or getattr(importer(name), "EXTRA", None)
+    return extra
 
 
 def importer(name: str) -> ModuleType:
@@ -234,12 +238,11 @@ def importer(name: str) -> ModuleType:
 
 
 def _detected_format(path: Path) -> str:
-    for name in FORMATS:
-        if importer(name).can_read(path):
-            return name
-    for name in IMPORTER_PLUGINS.names():
-        plugin = IMPORTER_PLUGINS.load(name)
-        if plugin is not None and plugin.can_read(path):
+    """Return the format of a path: one of holdfast, of a plug-in, CSV, in this order."""
+    own = [name for name in FORMATS if name != "csv"]
+    for name in [*own, *IMPORTER_PLUGINS.names(), "csv"]:
+        source = importer(name) if name in FORMATS else IMPORTER_PLUGINS.load(name)
+        if source is not None and source.can_read(path):
             return name
     if importer("csv").can_guess(path):
         return "csv"

@@ -13,11 +13,11 @@ from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
 from holdfast.twin.grasp import PAD_MIDDLE
 from holdfast.twin.objects import SHAPES, GraspObject, make_object
-from holdfast.twin.randomized.gripper import Drives, PadLayout, flat_patch, pad_layout
-from holdfast.twin.randomized.palm import log_uniform, uniform
 from holdfast.twin.skin import Skin, Three
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin_readout import UskinParameters
+from holdfast_lab.randomized.gripper import Drives, PadLayout, flat_patch, pad_layout
+from holdfast_lab.randomized.palm import log_uniform, uniform
 
 SENSOR_KINDS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin", "papillarray", "grid-3x3")
 """Sensors of randomized hands."""
@@ -78,14 +78,14 @@ class SensorDraw:
 @cache
 def ranges() -> dict[str, dict[str, Any]]:
     """Return the ranges of `ranges.toml`, by section."""
-    text = resources.files("holdfast.twin.randomized").joinpath("ranges.toml").read_text("utf-8")
+    text = resources.files("holdfast_lab.randomized").joinpath("ranges.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 
 @cache
 def measured_ranges() -> dict[str, dict[str, Any]]:
     """Return the ranges of `measured.toml`, by mechanism."""
-    text = resources.files("holdfast.twin.randomized").joinpath("measured.toml").read_text("utf-8")
+    text = resources.files("holdfast_lab.randomized").joinpath("measured.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 

@@ -16,8 +16,12 @@ from holdfast.twin.hand import FINGERS
 from holdfast.twin.operator import draw_tremor
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol
-from holdfast.twin.randomized.arms import carrying_legs, draw_carrier, person_acceleration
-from holdfast.twin.randomized.drawing import (
+from holdfast.twin.simulation import generator_of
+from holdfast.twin.steps import hold_wrench
+from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
+from holdfast.twin.world import TruthLog
+from holdfast_lab.randomized.arms import carrying_legs, draw_carrier, person_acceleration
+from holdfast_lab.randomized.drawing import (
     MEASURED,
     SENSOR_KINDS,
     SensorDraw,
@@ -32,13 +36,9 @@ from holdfast.twin.randomized.drawing import (
     ranges,
     with_measured,
 )
-from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
-from holdfast.twin.randomized.palm import Segment, log_uniform, palm_motion, uniform
-from holdfast.twin.randomized.scenario import Scenario, draw_events
-from holdfast.twin.simulation import generator_of
-from holdfast.twin.steps import hold_wrench
-from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
-from holdfast.twin.world import TruthLog
+from holdfast_lab.randomized.gripper import GripperWorld, OperatorForce
+from holdfast_lab.randomized.palm import Segment, log_uniform, palm_motion, uniform
+from holdfast_lab.randomized.scenario import Scenario, draw_events
 
 MAX_TRIES = 12
 """Draws of an object and a place of the pads until the pads reach it."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from holdfast.sensors.types import Array
-from holdfast.twin.randomized.palm import GRID_RATE, Segment, log_uniform, uniform
+from holdfast_lab.randomized.palm import GRID_RATE, Segment, log_uniform, uniform
 
 CARRIERS = ("carry", "person")
 """Mechanisms of what carries a hand; a hand has one of them at most."""

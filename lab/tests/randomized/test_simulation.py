@@ -4,8 +4,8 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
-from holdfast.twin.randomized import simulation
-from holdfast.twin.randomized.drawing import (
+from holdfast_lab.randomized import simulation
+from holdfast_lab.randomized.drawing import (
     MEASURED,
     SENSOR_KINDS,
     StreamEffects,
@@ -13,8 +13,8 @@ from holdfast.twin.randomized.drawing import (
     draw_sensor,
     with_measured,
 )
-from holdfast.twin.randomized.scenario import EVENT_KINDS, draw_events
-from holdfast.twin.randomized.simulation import RandomHold, simulate_random
+from holdfast_lab.randomized.scenario import EVENT_KINDS, draw_events
+from holdfast_lab.randomized.simulation import RandomHold, simulate_random
 
 pytestmark = pytest.mark.slow
 
@@ -218,7 +218,7 @@ def test_friction_holds_every_object(seed):
 
 
 def test_events_fill_the_hold_and_do_not_overlap():
-    from holdfast.twin.randomized.drawing import ranges
+    from holdfast_lab.randomized.drawing import ranges
 
     found = set()
     for seed in range(40):

@@ -14,11 +14,11 @@ from holdfast.twin.hand import HandModel, object_xml
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, reach_of
 from holdfast.twin.protocol import OPEN_GAP
-from holdfast.twin.randomized.palm import PalmMotion
 from holdfast.twin.skin import Skin
 from holdfast.twin.steps import apply_forces, fill_bodies, on_object, touch
 from holdfast.twin.surface import Surface
 from holdfast.twin.world import ContactWorld
+from holdfast_lab.randomized.palm import PalmMotion
 
 STEP_RATE = 1500.0
 """Least rate of the physics [Hz]: stiff skins on light objects need more than soft fingertips."""

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.randomized.drawing import ranges
-from holdfast.twin.randomized.palm import GRAVITY, GRID_RATE, PALM_KINDS, draw_segment, palm_motion
+from holdfast_lab.randomized.drawing import ranges
+from holdfast_lab.randomized.palm import GRAVITY, GRID_RATE, PALM_KINDS, draw_segment, palm_motion
 
 ARM = ranges()["arm"]
 

@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.randomized.arms import (
+from holdfast_lab.randomized.arms import (
     BOUT_FADE,
     CARRIERS,
     carrying_legs,
     draw_carrier,
     person_acceleration,
 )
-from holdfast.twin.randomized.drawing import measured_ranges, random_rotation
-from holdfast.twin.randomized.palm import GRAVITY, GRID_RATE, palm_motion
+from holdfast_lab.randomized.drawing import measured_ranges, random_rotation
+from holdfast_lab.randomized.palm import GRAVITY, GRID_RATE, palm_motion
 
 RANGES = measured_ranges()
 LEVEL = np.eye(3)

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from holdfast.sensors.types import Array
 from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import Span
-from holdfast.twin.randomized.gripper import OperatorForce
-from holdfast.twin.randomized.palm import PALM_KINDS, Segment, draw_segment, log_uniform, uniform
 from holdfast.twin.steps import HOLD_STIFFNESS, MOVE, disturb_wrench, hold_wrench
+from holdfast_lab.randomized.gripper import OperatorForce
+from holdfast_lab.randomized.palm import PALM_KINDS, Segment, draw_segment, log_uniform, uniform
 
 OPERATOR_KINDS = ("move", "push", "pull", "twist", "drag", "spin", "weight")
 """A person acts on the object: moves it to and fro, pushes it with a finger, pulls or twists it

@@ -1,0 +1,108 @@
+"""What plug-ins add to verbs: formats of `export`, publishers and panels of `serve`, and others.
+
+Such a plug-in is an object with `OPTIONS`, an instance of a frozen dataclass: its fields are the
+options that the verb gets, with their defaults, and the plug-in is used if one of them differs.
+docs/plugins.md has what each kind does besides.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, ClassVar
+
+from holdfast.plugins import PluginGroup
+
+
+class PluginOptions:
+    """Options of all plug-ins of a kind; as the type of a parameter of a verb, its options.
+
+    Attributes:
+        group: the plug-ins.
+        built_in: plug-ins that holdfast itself has, by name.
+    """
+
+    group: ClassVar[PluginGroup[Any]]
+    built_in: ClassVar[Mapping[str, Any]] = {}
+
+    def __init__(self, values: Mapping[str, object]) -> None:
+        self._values = values
+
+    @classmethod
+    def plugins(cls) -> dict[str, Any]:
+        """Return the plug-ins by name; the code of all is imported."""
+        return {**cls.built_in, **cls.group.load_all()}
+
+    def chosen(self) -> "list[tuple[str, Any, Any]]":
+        """Return name, plug-in and options of those whose options are given."""
+        return [
+            (name, plugin, self._values[name])
+            for name, plugin in self.plugins().items()
+            if name in self._values and self._values[name] != plugin.OPTIONS
+        ]
+
+    def of(self, name: str) -> Any:  # noqa: ANN401 (a dataclass of the plug-in)
+        """Return the options of a plug-in."""
+        return self._values[name]
+
+
+def flags_of(options: object) -> list[str]:
+    """Return the names of the options of a plug-in as words of the command line."""
+    return [f"--{field.name.replace('_', '-')}" for field in fields(options)]  # type: ignore[arg-type]
+
+
+def _extension(*functions: str) -> Any:  # noqa: ANN401 (the function that converts a plug-in)
+    def convert(name: str, loaded: Any) -> Any:  # noqa: ANN401
+        """Return a plug-in that adds options to a verb."""
+        options = getattr(loaded, "OPTIONS", None)
+        lacking = [
+            function for function in functions if not callable(getattr(loaded, function, None))
+        ]
+        if not is_dataclass(options) or isinstance(options, type) or lacking:
+            raise TypeError(
+                f"OPTIONS, a dataclass with its defaults, and {', '.join(functions)} expected for "
+                f"{name}, {loaded!r} given"
+            )
+        return loaded
+
+    return convert
+
+
+EXPORTER_PLUGINS = PluginGroup("exporters", ("csv",), _extension("export"))
+"""Formats of `holdfast export RECORDINGS`."""
+PUBLISHER_PLUGINS = PluginGroup("publishers", (), _extension("publisher"))
+"""What `holdfast serve` also publishes to."""
+PANEL_PLUGINS = PluginGroup("panels", (), _extension("panel"))
+"""Panels of the live page."""
+PLAYER_PLUGINS = PluginGroup("players", (), _extension("source"))
+"""Sources of `holdfast play` that react to other programs."""
+SIMULATOR_PLUGINS = PluginGroup("simulators", (), _extension("simulate"))
+"""What `holdfast simulate` simulates besides the grasps of an Allegro hand."""
+
+
+class ExporterOptions(PluginOptions):
+    """Options of the formats of recordings."""
+
+    group = EXPORTER_PLUGINS
+
+
+class PublisherOptions(PluginOptions):
+    """Options of publishers."""
+
+    group = PUBLISHER_PLUGINS
+
+
+class PanelOptions(PluginOptions):
+    """Options of panels of the live page."""
+
+    group = PANEL_PLUGINS
+
+
+class PlayerOptions(PluginOptions):
+    """Options of players."""
+
+    group = PLAYER_PLUGINS
+
+
+class SimulatorOptions(PluginOptions):
+    """Options of simulators."""
+
+    group = SIMULATOR_PLUGINS
