@@ -196,7 +196,8 @@ class TestOutputs:
 def test_refusals(capsys, table, tmp_path):
     out = tmp_path / "out"
     formats = (
-        "uskin-pick-move, eflesh, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, lerobot, csv"
+        "uskin-pick-move, eflesh, xela-log, gtac, anyskin-slip, arq-crisp, lerobot, csv; "
+        "of plug-ins: rosbag"
     )
     missing, empty, text = tmp_path / "none", tmp_path / "empty", tmp_path / "notes.txt"
     empty.mkdir()

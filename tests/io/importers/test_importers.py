@@ -4,6 +4,7 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import FORMATS, import_recordings
+from holdfast.io.importers import IMPORTER_PLUGINS, read_poses
 
 FOLDERS = ("uskin-pick-move", "lerobot")
 """Formats of folders only."""
@@ -22,9 +23,9 @@ def test_a_file_of_no_known_format(tmp_path):
         with pytest.raises(RecordingError) as caught:
             import_recordings(path)
         assert str(caught.value) == (
-            f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
-            "(choose one with --format; for a CSV file of any other logger give --sensor and "
-            "--columns)"
+            f"{path} is of no supported format; supported are {', '.join(FORMATS)}"
+            f"{IMPORTER_PLUGINS.text()} (choose one with --format; for a CSV file of any other "
+            "logger give --sensor and --columns)"
         )
 
 
@@ -50,3 +51,11 @@ def test_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "a.csv")
     with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
         import_recordings(tmp_path / "a.csv")
+
+
+def test_a_format_without_poses(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,finger1:1:x,finger1:1:y,finger1:1:z\n0,1,2,3\n")
+    with pytest.raises(RecordingError) as refusal:
+        read_poses(path, {"object": "object"})
+    assert str(refusal.value) == f"{path} is of the format csv, from which no poses can be read"

@@ -45,7 +45,7 @@ class Master:
             "ROS_MASTER_URI": self.uri,
             "ROS_IP": "127.0.0.1",
             "ROS_HOME": str(folder),
-            "PYTHONPATH": str(PEER.parents[2]),
+            "PYTHONPATH": os.pathsep.join(path for path in sys.path if path.endswith("tests")),
         }
         self._children = []
         self._master = None

@@ -8,7 +8,9 @@ import pytest
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import RecordingError
-from holdfast_ros.bags import find_bags, open_bag, poses_of, read_poses
+from holdfast.io.importers import read_poses
+from holdfast.labelling.rules.poses import poses_from_bag
+from holdfast_ros.bags import find_bags, open_bag, poses_of
 from ros.pose_bags import PoseBagWriter
 
 
@@ -111,13 +113,22 @@ def test_a_bag_without_poses(tmp_path):
 def test_no_bag(tmp_path):
     path = tmp_path / "no.bag"
     path.write_bytes(b"nothing")
-    for given in (path, tmp_path, tmp_path / "missing"):
-        with pytest.raises(RecordingError) as refusal:
+    for given in (path, tmp_path):
+        with pytest.raises(RecordingError, match=f"^{given} is of no supported format"):
             read_poses(given, {"object": "object"})
-        assert str(refusal.value) == (
-            f"one bag of ROS expected at {given}, 0 found; a .bag, .db3 or .mcap file, or a "
-            "folder with metadata.yaml"
-        )
+    with pytest.raises(RecordingError, match="missing does not exist; a file or folder"):
+        read_poses(tmp_path / "missing", {"object": "object"})
+
+
+def test_two_bags(tmp_path):
+    for name in ("a.bag", "b.bag"):
+        (tmp_path / name).write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(RecordingError) as refusal:
+        read_poses(tmp_path, {"object": "object"})
+    assert str(refusal.value) == (
+        f"one bag of ROS expected at {tmp_path}, 2 found; a .bag, .db3 or .mcap file, or a folder "
+        "with metadata.yaml"
+    )
 
 
 def test_a_damaged_bag(bag):
@@ -127,3 +138,17 @@ def test_a_damaged_bag(bag):
     file.write_bytes(data[: len(data) // 2])
     with pytest.raises(RecordingError, match=r"bag is cut or damaged: [^\n]+$"):
         read_poses(path, {"object": "/marker"})
+
+
+def test_tracks_of_a_label_rule(tmp_path):
+    bag = PoseBagWriter(tmp_path / "bag", ros1=False)
+    path = bag.write(
+        [("/marker", bag.pose(1e9 + k / 4, float(k))) for k in range(4)]
+        + [("/tf", bag.frames(1e9 + k / 4, k / 2, "thumb_tip", "camera")) for k in range(4)]
+    )
+    poses = poses_from_bag(path, "/marker", {"thumb": "thumb_tip"})
+    assert (poses.object_track.times - 1e9).tolist() == [0, 0.25, 0.5, 0.75]
+    assert poses.object_track.positions[:, 0].tolist() == [0, 1, 2, 3]
+    assert poses.tip_tracks["thumb"].positions[:, 0].tolist() == [0, 0.5, 1, 1.5]
+    assert poses.tip_tracks["thumb"].quaternions[0].tolist() == [1, 0, 0, 0]
+    assert not poses.same_clock

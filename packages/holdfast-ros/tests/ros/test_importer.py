@@ -1,12 +1,9 @@
-import re
-import sys
-
 import numpy as np
 import pytest
 
 from holdfast.cli import main
 from holdfast.devices.sources.xela.decoder import XelaDecoder
-from holdfast.errors import MissingExtra, RecordingError, install_command
+from holdfast.errors import RecordingError
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.recording_files import is_recording
 from holdfast.sensors import hand
@@ -448,11 +445,3 @@ class TestRefusals:
             (folder / "metadata.yaml").write_text(text)
             with pytest.raises(RecordingError, match=r"bag is cut or damaged: [^\n]+$"):
                 read(folder)
-
-    def test_without_rosbags(self, bag, monkeypatch):
-        with bag() as given:
-            given.text(EPOCH)
-        for name in [name for name in sys.modules if name.split(".")[0] == "rosbags"]:
-            monkeypatch.setitem(sys.modules, name, None)
-        with pytest.raises(MissingExtra, match=re.escape(install_command("bags"))):
-            import_recordings(given.path)

@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from holdfast.contact import ContactState, Fault, Reason
+from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.io.cdr import MessageEncoder
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.stream_detector import StreamUpdate
@@ -21,6 +21,13 @@ from holdfast_ros.publisher import (
 )
 from holdfast_ros.topic_messages import DIAGNOSTICS, VECTOR, WRENCH, topic_definition
 from live.estimates import UNITS, FakeGrip, estimate, finger
+
+
+def test_the_diagnostic_has_the_fields_of_the_estimate_without_a_topic():
+    names = list(ContactEstimate.__struct_fields__)
+    diagnostic = dict(diagnostics_of((estimate(), 1.0), 1.0)[1].values)
+    assert list(diagnostic) == [name for name in names if name not in module.NOT_IN_DIAGNOSTICS]
+    assert set(names) >= module.NOT_IN_DIAGNOSTICS
 
 
 class FakeLink(Link):

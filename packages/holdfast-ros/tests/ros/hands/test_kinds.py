@@ -15,7 +15,7 @@ JOINTS = "ros2:controller?topic=/h&joints=thumb:a:b,index:c&max_effort=1"
 @pytest.mark.parametrize(
     ("uri", "message"),
     [
-        ("ros2:", "is no hand; there are twin:"),
+        ("ros2:", "there are the hands ros2:plexus"),
         (
             "ros2:magic",
             "there are the hands ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop",

@@ -12,8 +12,10 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
+from holdfast.cli.config import Config
 from holdfast.devices.sources import open_source
-from holdfast.errors import MissingExtra, SourceError, install_command
+from holdfast.devices.uri import parse
+from holdfast.errors import SourceError
 from holdfast.io.definitions import parse_definition
 from holdfast.sensors import sensor
 from holdfast_ros import dds
@@ -183,12 +185,11 @@ def test_unknown_parameters():
         open_source("ros2:///a?master=x")
 
 
-def test_without_cyclonedds(monkeypatch):
-    monkeypatch.delitem(sys.modules, "holdfast_ros.sources.ros2", raising=False)
-    monkeypatch.delitem(sys.modules, "holdfast_ros.dds")
-    monkeypatch.delattr("holdfast_ros.dds", raising=False)
-    for name in [name for name in sys.modules if name.split(".")[0] == "cyclonedds"]:
-        monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(MissingExtra) as caught:
-        open_source("ros2:///a")
-    assert install_command("ros2") in str(caught.value)
+def test_the_path_is_the_topic():
+    scheme, address = parse("ros2:///xServTopic")
+    assert (scheme, address.host, address.path) == ("ros2", "", "/xServTopic")
+
+
+def test_the_file_of_the_hand_completes_the_uri():
+    config = Config(source="ros2:///a?domain=1", fingers={"1": "thumb"}, values="counts")
+    assert config.complete("hand") == "ros2:///a?domain=1&fingers=1:thumb&values=counts"
