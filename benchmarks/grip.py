@@ -11,9 +11,9 @@ import time
 import numpy as np
 
 from holdfast.detector import Detector
-from holdfast.grip import LAWS, GripController, Limits
 from holdfast.model import Model
 from holdfast.sensors import sensor
+from holdfast_grip import LAWS, GripController, Limits
 
 FINGERS = ("thumb", "index", "middle", "ring")
 RATE = 150.0

@@ -17,11 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from holdfast.devices.uri import parse
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS
 from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD
+from holdfast_grip import FingerCommand, GripCommand, LoopState
 from holdfast_lab.trial.trials import Trial, draw_trial
 from holdfast_ros.hands.kinds import HAND_KINDS
 from holdfast_ros.hands.parameters import Parameters

@@ -16,10 +16,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
-from holdfast.grip import LAWS, LoopState
 from holdfast.parallel import Engine
 from holdfast.twin.hand import RATE
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
+from holdfast_grip import LAWS, LoopState
 from holdfast_lab.trial.run import SLIP_MEMORY, START_TIME, RunningTrial
 from holdfast_lab.trial.trials import Trial, draw_trials
 

@@ -22,11 +22,11 @@ from unittest.mock import patch
 
 import msgspec
 
-from holdfast.grip.laws import Law
-from holdfast.grip.laws.costanzo import Costanzo
-from holdfast.grip.laws.friction_margin import FrictionMargin
-from holdfast.grip.laws.pr2 import Pr2
-from holdfast.grip.laws.wong_zhu import WongZhu
+from holdfast_grip.laws import Law
+from holdfast_grip.laws.costanzo import Costanzo
+from holdfast_grip.laws.friction_margin import FrictionMargin
+from holdfast_grip.laws.pr2 import Pr2
+from holdfast_grip.laws.wong_zhu import WongZhu
 from holdfast_lab.trial import run
 from holdfast_lab.trial.reference_rows import V5Reflex
 from holdfast_lab.trial.run import TrialResult, run_trial

@@ -1,6 +1,6 @@
 """Make a finger press harder while it is unstable, in a loop without a device.
 
-The loop shows what a controller reads from an estimate. holdfast.grip has grip controllers
+The loop shows what a controller reads from an estimate. holdfast_grip has grip controllers
 with limits, faults and a watchdog: docs/grip.md.
 """
 

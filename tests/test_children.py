@@ -11,9 +11,9 @@ import pytest
 
 from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
 from holdfast.io import save_recording
-from holdfast.live.loop.watchdog import N_SAFE_COMMANDS
 from holdfast.parallel import Engine
 from holdfast.synthetic import synthetic_recording
+from holdfast_grip.loop.watchdog import N_SAFE_COMMANDS
 
 OTHER_MODULES = (
     "cloudpickle", "cyclonedds", "glfw", "holdfast", "joblib", "matplotlib", "mcap", "msgspec",
@@ -31,9 +31,9 @@ print(TaskRunner(Path(sys.argv[1]), Engine(2)).run(tasks))
 """
 WATCHDOG = """
 import sys
-from holdfast.grip import FingerCommand, GripCommand, LoopState
-from holdfast.devices.hands import open_hand
-from holdfast.live.loop.watchdog import Watchdog
+from holdfast_grip import FingerCommand, GripCommand, LoopState
+from holdfast_grip.hands import open_hand
+from holdfast_grip.loop.watchdog import Watchdog
 open_hand(sys.argv[1])
 watchdog = Watchdog(sys.argv[1], "open", timeout=3600.0)
 watchdog.start()

@@ -8,14 +8,12 @@ import pytest
 
 import holdfast
 import holdfast.sensors
-from holdfast.openable import Openable
 
 PUBLIC = [
     *("FEATURE_NAMES", "fingertip_force", "haar_features"),
     *("Hand", "Sensor", "sensor", "Label", "Recording", "Tactile", "Truth"),
     *("load_dataset", "load_recording", "save_recording"),
     *("Model", "Detector", "StreamDetector", "detect", "export"),
-    *("GripController", "GripCommand", "GripLoop", "HandDevice", "Limits"),
     *("ContactEstimate", "ContactEvent", "ContactState", "HandEstimate"),
     *("Cause", "Fault", "Reason"),
     *(
@@ -27,7 +25,7 @@ PUBLIC = [
         "event_metrics",
         "sample_metrics",
     ),
-    *("EngineError", "HandError", "HoldfastError", "MissingExtra", "ModelError", "OutputError"),
+    *("EngineError", "HoldfastError", "MissingExtra", "ModelError", "OutputError"),
     *("RecordingError", "SourceError", "StreamError", "TrainingError"),
     *("Arrival", "Source", "open_source"),
 ]
@@ -51,12 +49,6 @@ def test_the_order_of_fields_is_fixed():
     assert [field.name for field in fields(holdfast.Tactile)] == [
         *("sensor", "times", "readings", "unit", "labels"),
     ]
-
-
-def test_a_hand_is_a_layout_and_a_hand_device_takes_commands():
-    assert isinstance(holdfast.sensors.hand("allegro-uskin"), holdfast.Hand)
-    assert issubclass(holdfast.HandDevice, Openable)
-    assert not issubclass(holdfast.HandDevice, holdfast.Hand)
 
 
 def test_version_is_that_of_the_distribution():

@@ -20,14 +20,14 @@ from holdfast.cli.extensions import (
     PUBLISHER_PLUGINS,
     SIMULATOR_PLUGINS,
 )
-from holdfast.devices.hands import open_hand
 from holdfast.devices.uri import open_source, parse
 from holdfast.errors import RecordingError
-from holdfast.grip.laws import law_named
 from holdfast.io import import_recordings
 from holdfast.io.importers import IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import SENSOR_PLUGINS, sensor, sensor_names
+from holdfast_grip.hands import open_hand
+from holdfast_grip.laws import law_named
 from installed import install, install_project, on_the_path
 
 TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
@@ -37,8 +37,8 @@ PARTS = '''
 import os, time
 from pathlib import Path
 from holdfast.classifiers import LogisticRegression
-from holdfast.devices.hands.local import LogFile
-from holdfast.grip.laws import Fixed
+from holdfast_grip.hands.local import LogFile
+from holdfast_grip.laws import Fixed
 from holdfast.sensors import flat_sensor
 
 same = LogisticRegression(name="same")
@@ -121,7 +121,7 @@ def test_names_are_listed_after_our_own(parts, caplog):
     assert recipe_names() == ("logreg", "svm", "none", "same")
     with pytest.raises(ValueError, match=r"there are fixed.*holdfast; of plug-ins: twice, wrong$"):
         law_named("thrice")
-    with pytest.raises(ValueError, match=r"ros1:KIND; of plug-ins: grab, hollow$"):
+    with pytest.raises(ValueError, match=r"FUNCTION; of plug-ins: grab, hollow, ros1, ros2$"):
         open_hand("grip:left")
     assert reports(caplog) == [
         "plug-in gtac (sensors of acme 1.2) is skipped: holdfast itself has gtac; another name "

@@ -230,8 +230,8 @@ LAW = '''
 """A law that wants twice the force from the start."""
 
 from holdfast.contact import Cause
-from holdfast.grip.command import GripReason
-from holdfast.grip.laws.base import Law
+from holdfast_grip.command import GripReason
+from holdfast_grip.laws.base import Law
 
 
 class Double(Law):
@@ -251,12 +251,12 @@ def test_add_a_grip_law(copy_of):
     copy.add("holdfast/grip/laws/double.py", "name", LAW)
     copy.change(
         "holdfast/grip/laws/__init__.py",
-        ("from holdfast.grip.laws.friction_margin", "from holdfast.grip.laws.double import Double\n"
-         "from holdfast.grip.laws.friction_margin"),
+        ("from holdfast_grip.laws.friction_margin", "from holdfast_grip.laws.double import Double\n"
+         "from holdfast_grip.laws.friction_margin"),
         ('    "fixed": Fixed,\n', '    "fixed": Fixed,\n    "double": Double,\n'),
     )  # fmt: skip
     program = (
-        "from holdfast.grip.laws import law_named, Touch\n"
+        "from holdfast_grip.laws import law_named, Touch\n"
         "print(law_named('double').wishes([Touch('thumb')], 0.0, 0.01)[0][0])"
     )
     assert copy.run("-c", program) == "2.0\n"
@@ -402,5 +402,5 @@ def test_add_a_file_format(copy_of, tmp_path):
 
 def test_a_file_that_the_recipe_does_not_name_is_noticed(copy_of):
     copy = copy_of("Add a grip law")
-    with pytest.raises(AssertionError, match=r"does not name holdfast.grip.controller"):
+    with pytest.raises(AssertionError, match=r"does not name holdfast_grip.controller"):
         copy.change("holdfast/grip/controller.py")

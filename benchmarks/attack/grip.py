@@ -15,14 +15,14 @@ import msgspec
 
 from attack.result import Result
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.devices.hands import HandDevice, open_hand
-from holdfast.errors import HandError
-from holdfast.grip import GripCommand, GripController, GripReason, Limits, LoopState
 from holdfast.live.arrival_detector import StreamEstimate
-from holdfast.live.loop.grip_loop import GripLoop
-from holdfast.live.loop.runner import LoopRunner
-from holdfast.live.loop.watchdog import Watchdog
 from holdfast.live.stream_detector import StreamUpdate
+from holdfast_grip import GripCommand, GripController, GripReason, Limits, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands import HandDevice, open_hand
+from holdfast_grip.loop.grip_loop import GripLoop
+from holdfast_grip.loop.runner import LoopRunner
+from holdfast_grip.loop.watchdog import Watchdog
 
 BENCHMARKS = Path(__file__).parents[1]
 RATE = 150.0

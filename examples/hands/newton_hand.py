@@ -11,9 +11,8 @@ import time
 from collections.abc import Iterable
 from contextlib import suppress
 
-from holdfast import HandDevice, Limits
-from holdfast.errors import HandError
-from holdfast.grip import GripCommand
+from holdfast_grip import GripCommand, HandDevice, Limits
+from holdfast_grip.errors import HandError
 
 FINGERS = ("thumb", "index", "middle", "ring")
 """Fingers of the hand, named as in the estimates."""

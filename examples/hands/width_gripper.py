@@ -12,9 +12,8 @@ import math
 from collections.abc import Iterable
 from typing import Protocol
 
-from holdfast import HandDevice, Limits
-from holdfast.errors import HandError
-from holdfast.grip import GripCommand
+from holdfast_grip import GripCommand, HandDevice, Limits
+from holdfast_grip.errors import HandError
 
 
 class Driver(Protocol):

@@ -24,12 +24,10 @@ if TYPE_CHECKING:
     from holdfast.contact import Reason as Reason
     from holdfast.detector import Detector as Detector
     from holdfast.detector import detect as detect
-    from holdfast.devices.hands import HandDevice as HandDevice
     from holdfast.devices.sources import Arrival as Arrival
     from holdfast.devices.sources import Source as Source
     from holdfast.devices.sources import open_source as open_source
     from holdfast.errors import EngineError as EngineError
-    from holdfast.errors import HandError as HandError
     from holdfast.errors import HoldfastError as HoldfastError
     from holdfast.errors import MissingExtra as MissingExtra
     from holdfast.errors import ModelError as ModelError
@@ -42,13 +40,9 @@ if TYPE_CHECKING:
     from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
     from holdfast.features import fingertip_force as fingertip_force
     from holdfast.features import haar_features as haar_features
-    from holdfast.grip import GripCommand as GripCommand
-    from holdfast.grip import GripController as GripController
-    from holdfast.grip import Limits as Limits
     from holdfast.io import load_dataset as load_dataset
     from holdfast.io import load_recording as load_recording
     from holdfast.io import save_recording as save_recording
-    from holdfast.live.loop.grip_loop import GripLoop as GripLoop
     from holdfast.live.stream_detector import StreamDetector as StreamDetector
     from holdfast.metrics import event_metrics as event_metrics
     from holdfast.metrics import sample_metrics as sample_metrics
@@ -83,16 +77,12 @@ _NAMES = {
         "HandEstimate",
         "Reason",
     ),
-    "grip": ("GripCommand", "GripController", "Limits"),
-    "live.loop.grip_loop": ("GripLoop",),
-    "devices.hands": ("HandDevice",),
     "live.stream_detector": ("StreamDetector",),
     "devices.sources": ("Arrival", "Source", "open_source"),
     "training": ("Setting", "StabilityClassifier", "calibrate", "evaluate", "train"),
     "metrics": ("event_metrics", "sample_metrics"),
     "errors": (
         "EngineError",
-        "HandError",
         "HoldfastError",
         "MissingExtra",
         "ModelError",

@@ -6,7 +6,6 @@
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
     ├── StreamError      a detector cannot process the samples
     ├── SourceError      a source cannot be reached, sends nothing, or is not the expected one
-    ├── HandError        a hand cannot be commanded: it does not answer, or has another controller
     ├── EngineError      the processes or the cluster that make parallel calls fail
     ├── OutputError      an output exists already or cannot be written
     └── MissingExtra     an optional package is not installed
@@ -28,25 +27,42 @@ EXTRA_MODULES = {
     "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),
-    "bench": ("pywt", "tsflex", "pandas", "sklearn", "scipy"),
     "onnx": ("onnx", "onnxruntime"),
     "datasets": ("pooch", "requests"),
     "deep": ("torch",),
+    "grip": ("holdfast_grip",),
+    "ros": ("holdfast_ros",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
 
 LABORATORY = "holdfast-lab"
 PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
+    "holdfast-grip": {
+        "verbs": ("hold",),
+        "panels": ("grip",),
+        "groups": ("hands", "laws"),
+        "options": (
+            "serve --hand",
+            "serve --law",
+            "serve --armed",
+            "serve --confirm",
+            "serve --max-scale",
+            "serve --min-scale",
+            "serve --max-force",
+            "serve --on-fault",
+            "serve --newtons",
+        ),
+    },
     "holdfast-ros": {
         "sources": ("ros1", "ros2"),
         "importers": ("rosbag",),
         "publishers": ("ros1", "ros2"),
-        "players": ("driven",),
         "hands": ("ros1", "ros2"),
+        "players": ("driven",),
         "options": ("serve --ros2", "serve --ros1", "play --hand"),
     },
     LABORATORY: {
-        "verbs": ("trial", "study"),
+        "verbs": ("bench", "study", "trial"),
         "simulators": ("randomized",),
         "options": ("simulate --randomize", "simulate --grasps", "simulate --measured"),
     },
@@ -79,10 +95,6 @@ class StreamError(HoldfastError):
 
 class SourceError(HoldfastError):
     """A source cannot be reached, or sends nothing or other data: repair it, then try again."""
-
-
-class HandError(HoldfastError):
-    """A hand cannot be commanded: see that it is left in a safe state, then repair it."""
 
 
 class EngineError(HoldfastError):

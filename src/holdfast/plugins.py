@@ -179,3 +179,14 @@ def _reason(cause: BaseException) -> str:
         text = ""
     printable = "".join(character for character in text if character.isprintable())
     return f"{type(cause).__name__}: {printable}" if printable else type(cause).__name__
+
+
+def _group_of_plugin(name: str, loaded: Any) -> PluginGroup[Any]:  # noqa: ANN401
+    """Return the group of a kind that another package has."""
+    if not isinstance(loaded, PluginGroup) or loaded.kind != name:
+        raise TypeError(f"a PluginGroup of {name} expected, {loaded!r} given")
+    return loaded
+
+
+GROUP_PLUGINS = PluginGroup("groups", (), _group_of_plugin)
+"""Kinds of plug-ins of other packages, such as hands: so that `holdfast doctor` lists them."""

@@ -69,5 +69,4 @@ def test_the_options_of_a_group_have_the_defaults_of_the_verb(words, port, monke
     assert app.main(["serve", "builtin:any", "twin:", *words]) == 0
     (values,) = seen
     assert str(values["access"].port) == port
-    assert values["settings"].hand == ""
     assert values["options"].debounce is None

@@ -3,9 +3,9 @@
 import pytest
 
 from holdfast.datasets import public_sets
-from holdfast.devices.hands import HAND_SCHEMES
 from holdfast.devices.uri import SCHEMES
 from holdfast.sensors import built_in_hands, built_in_sensors
+from holdfast_grip.hands import HAND_SCHEMES
 
 from . import blocks
 

@@ -10,9 +10,9 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from devices.hands.rigs import EXAMPLES, NewtonRig, WidthRig
-from holdfast.errors import HandError
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
+from grip.hands.rigs import EXAMPLES, NewtonRig, WidthRig
+from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip.errors import HandError
 
 
 def command(scale, **changes):

@@ -14,14 +14,7 @@ from msgspec.structs import fields
 import holdfast
 from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactEstimate
-from holdfast.grip import FingerCommand, Limits
-from holdfast.live.documents import (
-    FingerDocument,
-    GripFinger,
-    GripLimits,
-    document_type,
-    finger_document,
-)
+from holdfast.live.documents import FingerDocument, document_type, finger_document
 from live import estimates
 
 PACKAGE = Path(holdfast.__file__).parent
@@ -105,20 +98,17 @@ def test_numbers_may_be_null_where_a_value_may_have_none():
     assert nullable(FingerDocument) == {
         "stable_probability", "instability", "slip_probability", "slip_speed", "slip_distance",
     }  # fmt: skip
-    assert nullable(GripLimits) == {"max_force", "recovery"}
     force = next(field.type for field in fields(FingerDocument) if field.name == "force")
     assert get_args(force) == (float | None,) * 3
 
 
-def test_documents_of_the_grip_have_the_fields_of_its_values():
-    assert GripLimits.__struct_fields__ == Limits.__struct_fields__
-    assert set(GripFinger.__struct_fields__) == {*FingerCommand.__struct_fields__, "highest"}
-    document = json.loads(msgspec.json.encode(Limits(recovery=float("inf"))))
-    assert msgspec.convert(document, GripLimits).recovery is None
+class Wish(msgspec.Struct):
+    scale: float
+    reason: str = ""
 
 
 def test_an_optional_field_of_a_value_is_required_in_its_document():
-    kind = document_type("Command", FingerCommand, "A command.")
+    kind = document_type("Wish", Wish, "A wish.")
     with pytest.raises(TypeError, match=r"Missing required argument 'reason'"):
         kind(1.0)
-    assert kind.__doc__ == "A command."
+    assert kind.__doc__ == "A wish."

@@ -8,12 +8,12 @@ import msgspec
 
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
-from holdfast.grip import laws
-from holdfast.grip.laws import LAWS
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.plant import MILD, plant_named
+from holdfast_grip import laws
+from holdfast_grip.laws import LAWS
 from holdfast_lab.source_digest import source_digest
 from holdfast_lab.tasks import Task
 from holdfast_lab.trial.course import TrialCourse, follow

@@ -20,13 +20,13 @@ from holdfast.contact import (
     HandEstimate,
     hand_state,
 )
-from holdfast.grip.command import GripReason
-from holdfast.grip.laws import LAWS, Law, Touch, law_named
-from holdfast.grip.laws.base import Wish, stay
-from holdfast.grip.limits import Limits
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
+from holdfast_grip.command import GripReason
+from holdfast_grip.laws import LAWS, Law, Touch, law_named
+from holdfast_grip.laws.base import Wish, stay
+from holdfast_grip.limits import Limits
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.trials import Trial
 

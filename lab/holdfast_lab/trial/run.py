@@ -11,9 +11,6 @@ import numpy.typing as npt
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
 from holdfast.detector import Detector
-from holdfast.grip.command import GripCommand, LoopState
-from holdfast.grip.controller import GripController
-from holdfast.grip.limits import Limits
 from holdfast.model import Model
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT, NEWTONS_PER_SHEAR_COUNT
@@ -23,6 +20,9 @@ from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast.twin.uskin_readout import Counts
+from holdfast_grip.command import GripCommand, LoopState
+from holdfast_grip.controller import GripController
+from holdfast_grip.limits import Limits
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.reference_rows import (
     TRUE_SLIPS,

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from holdfast.errors import OutputError
-from holdfast.grip import LoopState
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.simulation import Grasp
+from holdfast_grip import LoopState
 from holdfast_lab.trial.course import FALL_TIME, LEAD_TIME, Instant, TrialCourse, follow
 from holdfast_lab.trial.film import (
     BELOW,

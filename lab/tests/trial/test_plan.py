@@ -8,8 +8,8 @@ import pytest
 
 import holdfast
 from holdfast.errors import ModelError
-from holdfast.grip import laws
 from holdfast.model import Model
+from holdfast_grip import laws
 from holdfast_lab.source_digest import PACKAGES, _closure
 from holdfast_lab.trial import plan as trial_plan
 from holdfast_lab.trial.plan import SIMULATION, TrialPlan, run_numbered
@@ -94,8 +94,8 @@ class TestVersion:
 
     def test_it_does_not_depend_on_files_of_other_laws(self):
         modules = trial_modules("pr2")
-        assert {"holdfast.grip.laws.pr2", "holdfast.grip.laws.base"} <= modules
-        assert not {"holdfast.grip.laws", "holdfast.grip.laws.stability"} & modules
+        assert {"holdfast_grip.laws.pr2", "holdfast_grip.laws.base"} <= modules
+        assert not {"holdfast_grip.laws", "holdfast_grip.laws.stability"} & modules
 
     def test_it_depends_on_all_that_a_trial_imports(self):
         code = "import sys, holdfast_lab.trial.run; print(*sys.modules)"
@@ -103,7 +103,7 @@ class TestVersion:
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
         )
         loaded = {name for name in done.stdout.split() if name.split(".")[0] in PACKAGES}
-        other_laws = {name for name in loaded if name.startswith("holdfast.grip.laws")}
+        other_laws = {name for name in loaded if name.startswith("holdfast_grip.laws")}
         # their C files count beside the packages
         compiled = {"holdfast.kernel._extension", "holdfast.twin.steps"}
         assert loaded - other_laws - compiled <= trial_modules("holdfast")

@@ -1,7 +1,7 @@
 import pytest
 
-from holdfast.grip import GripReason, Limits
-from holdfast.grip.laws import Stability, Touch
+from holdfast_grip import GripReason, Limits
+from holdfast_grip.laws import Stability, Touch
 from holdfast_lab.trial.reference_rows import V5Reflex, limits_of, row_named
 
 

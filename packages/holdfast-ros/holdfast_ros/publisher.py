@@ -26,9 +26,9 @@ from holdfast_ros.topic_messages import (
 )
 
 if TYPE_CHECKING:
-    from holdfast.live.documents import GripDocument
-    from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.stream_detector import StreamUpdate
+    from holdfast_grip.documents import GripDocument
+    from holdfast_grip.loop.live_grip import LiveGrip
 
 MAX_QUEUED_ESTIMATES = 64
 """Maximum number of estimates that wait for ROS; the oldest is dropped first."""

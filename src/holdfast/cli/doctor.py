@@ -18,11 +18,12 @@ from holdfast.children import python_command
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_table
 from holdfast.errors import install_command, is_installed
+from holdfast.plugins import GROUP_PLUGINS, PluginGroup
 from holdfast.threads import usable_processors
 
 if TYPE_CHECKING:
     from holdfast.cli.config import Config
-    from holdfast.plugins import Plugin, PluginGroup
+    from holdfast.plugins import Plugin
 
 EXTRA_PURPOSES = {
     "all": "all of the others but deep",
@@ -32,13 +33,13 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "onnx": "classifiers as ONNX files",
-    "bench": "other libraries that holdfast bench compares with",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
     "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "datasets": "holdfast datasets get: downloads of public recordings",
+    "grip": "holdfast hold: control of the grip force of a hand",
 }
 """Purpose of each extra."""
 PROBE_TIMEOUT = 0.3
@@ -47,10 +48,8 @@ PROBE_TIMEOUT = 0.3
 PLUGIN_GROUPS = {
     "sensors": ("sensors", "SENSOR_PLUGINS"),
     "sources": ("devices.uri", "SOURCE_PLUGINS"),
-    "hands": ("devices.hands", "HAND_PLUGINS"),
     "importers": ("io.importers", "IMPORTER_PLUGINS"),
     "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
-    "laws": ("grip.laws", "LAW_PLUGINS"),
     "verbs": ("cli.app", "VERB_PLUGINS"),
     "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),
     "publishers": ("cli.extensions", "PUBLISHER_PLUGINS"),
@@ -58,7 +57,8 @@ PLUGIN_GROUPS = {
     "players": ("cli.extensions", "PLAYER_PLUGINS"),
     "simulators": ("cli.extensions", "SIMULATOR_PLUGINS"),
 }
-"""Module and name of each group of plug-ins, by kind; a child imports one of them."""
+"""Module and name of each group of plug-ins, by kind; a child imports one of them. Packages may
+have kinds of their own, see `GROUP_PLUGINS`."""
 PLUGIN_TIMEOUT = 60.0
 """Time in which a plug-in must be imported [s]."""
 
@@ -111,11 +111,9 @@ def _report(context: typer.Context) -> dict[str, Any]:
 
 def _plugins() -> "list[Plugin]":
     """Return the plug-ins of other packages, and why some of them are skipped."""
-    return [
-        plugin
-        for kind in PLUGIN_GROUPS
-        for plugin in plugin_group(kind).states(partial(_ask_child, "plugin_error"))
-    ]
+    kinds = (*PLUGIN_GROUPS, *GROUP_PLUGINS.load_all())
+    ask = partial(_ask_child, "plugin_error")
+    return [plugin for kind in kinds for plugin in plugin_group(kind).states(ask)]
 
 
 def plugin_error(kind: str, name: str) -> str:
@@ -145,6 +143,8 @@ def _ask_child(function: str, *words: str) -> str:
 
 def plugin_group(kind: str) -> "PluginGroup[Any]":
     """Return the plug-ins of a kind."""
+    if kind not in PLUGIN_GROUPS:
+        return GROUP_PLUGINS.require(kind, f"the kind {kind} of plug-ins")
     module, name = PLUGIN_GROUPS[kind]
     group: PluginGroup[Any] = getattr(import_module(f"holdfast.{module}"), name)
     return group

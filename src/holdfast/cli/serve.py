@@ -3,7 +3,7 @@
 import os
 import sys
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,15 +11,7 @@ from urllib.parse import quote
 
 import typer
 
-from holdfast.cli.extensions import PublisherOptions
-from holdfast.cli.grip_options import (
-    NO_HAND,
-    GripSettings,
-    check_armed,
-    connect_hand,
-    find_source_and_hand,
-    open_loop,
-)
+from holdfast.cli.extensions import PanelOptions, PublisherOptions
 from holdfast.cli.options import (
     LOCALHOST,
     DetectorOptions,
@@ -36,10 +28,8 @@ from holdfast.cli.options import (
 from holdfast.cli.terminal.console import message_if_slow, print_json, print_message
 
 if TYPE_CHECKING:
-    from holdfast.devices.hands import HandDevice
     from holdfast.devices.sources import Source
-    from holdfast.live.loop.live_grip import LiveGrip
-    from holdfast.live.loop.watchdog import Watchdog
+    from holdfast.live.panels import Panel, PanelOpener
     from holdfast.live.session import Session
     from holdfast.model import Model
     from holdfast.web.guard import Guard
@@ -58,7 +48,7 @@ def serve(
     speed: SpeedOption = 1.0,
     once: OnceOption = False,
     options: DetectorOptions,
-    settings: GripSettings = NO_HAND,
+    panels: PanelOptions,
     publishers: PublisherOptions,
     as_json: JsonOption = False,
 ) -> None:
@@ -84,7 +74,10 @@ def serve(
     """
     from holdfast.web.guard import Guard
 
-    settings.check()
+    openers = [
+        plugin.panel(chosen, source, speed=speed, loop=not once)
+        for _, plugin, chosen in panels.chosen()
+    ]
     token = access.find_token()
     guard = Guard(access.host, token)
     check_speed(source, speed)
@@ -95,15 +88,14 @@ def serve(
         report_missing_slip_rules(loaded)
         _announce(page_url(url, token), loaded, source, as_json=as_json)
 
-    opened, commanded = _find(source, settings.hand, speed=speed, loop=not once)
-    check_armed(settings)
+    opened = _find(source, openers, speed=speed, loop=not once)
     with (
-        _open_session(options, loaded, opened, settings, commanded) as (session, grip),
-        _publish(session, grip, publishers),
+        _open_session(options, loaded, opened, openers) as (session, shown),
+        _publish(session, shown, publishers),
     ):
         run_page(
             session, announce, host=access.host, port=access.port,
-            guard=guard, folder=record_to, grip=grip, stay=not once,
+            guard=guard, folder=record_to, panels=shown, stay=not once,
         )  # fmt: skip
 
 
@@ -114,60 +106,37 @@ def _announce(page: str, model: "Model", source: str, *, as_json: bool) -> None:
     print_message(f"{page} shows the estimates of {model.name} for {source}; Ctrl-C stops it")
 
 
+def _find(source: str, openers: "Sequence[PanelOpener]", *, speed: float, loop: bool) -> "Source":
+    """Return the source: that of a panel if one makes it. It is not open yet."""
+    from holdfast.devices.sources import open_source
+
+    made = [opener.source() for opener in openers]
+    own = next((one for one in made if one is not None), None)
+    return own or open_source(source, speed=speed, loop=loop)
+
+
 @contextmanager
 def _open_session(
-    options: DetectorOptions,
-    model: "Model",
-    source: "Source",
-    settings: GripSettings,
-    hand: "HandDevice | None",
-) -> "Iterator[tuple[Session, LiveGrip | None]]":
-    """Yield the session of a source, and the loop of the hand if there is one."""
+    options: DetectorOptions, model: "Model", source: "Source", openers: "Sequence[PanelOpener]"
+) -> "Iterator[tuple[Session, Sequence[Panel]]]":
+    """Yield the session of a source, and the panels that run beside it."""
     from holdfast.live.session import Session
 
     with ExitStack() as stack:
-        watchdog = None if hand is None else connect_hand(stack, settings, hand)
+        for opener in openers:
+            opener.connect(stack)
         with message_if_slow(awaited(source.name)):
             stack.enter_context(source)
         session = stack.enter_context(Session(options.create_stream(model, source)))
-        grip = None
-        if hand is not None:
-            grip = stack.enter_context(_live_grip(settings, hand, session, watchdog))
-        yield session, grip
-
-
-def _find(
-    source: str, hand: str, *, speed: float, loop: bool
-) -> "tuple[Source, HandDevice | None]":
-    """Return the source, and the hand if one is given; neither is open yet."""
-    from holdfast.devices.sources import open_source
-
-    if hand:
-        return find_source_and_hand(source, hand, speed=speed, loop=loop)
-    return open_source(source, speed=speed, loop=loop), None
-
-
-@contextmanager
-def _live_grip(
-    settings: GripSettings, hand: "HandDevice", session: "Session", watchdog: "Watchdog | None"
-) -> "Iterator[LiveGrip]":
-    """Yield the loop of a hand, which runs in a thread. Without `--armed` nothing is sent."""
-    from holdfast.live.loop.live_grip import EventLog, LiveGrip
-
-    log = EventLog()
-    with (
-        open_loop(settings, hand, session.stream, watchdog, log) as loop,
-        LiveGrip(settings.law, loop, session, log) as grip,
-    ):
-        yield grip
+        yield session, [stack.enter_context(opener.open(session)) for opener in openers]
 
 
 @contextmanager
 def _publish(
-    session: "Session", grip: "LiveGrip | None", options: PublisherOptions
+    session: "Session", shown: "Sequence[Panel]", options: PublisherOptions
 ) -> "Iterator[None]":
     """Publish the estimates of a session; at the end, print how many are missing."""
-    panels = {} if grip is None else {"grip": grip}
+    panels = {panel.name: panel for panel in shown}
     with ExitStack() as stack:
         publishers = [
             stack.enter_context(plugin.publisher(session.stream, panels, chosen))
@@ -192,7 +161,7 @@ def run_page(
     port: int,
     guard: "Guard | None" = None,
     folder: Path,
-    grip: "LiveGrip | None" = None,
+    panels: "Sequence[Panel]" = (),
     stay: bool,
 ) -> None:
     """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
@@ -204,7 +173,7 @@ def run_page(
         port: port to listen on; 0 selects a free one.
         guard: access control; by default only this machine can connect.
         folder: folder for recordings.
-        grip: the loop that controls the hand.
+        panels: that run beside the session.
         stay: continue when the source has ended.
 
     Raises:
@@ -215,7 +184,7 @@ def run_page(
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
-    service = LiveService(session, guard or Guard(host), folder, print_message, grip)
+    service = LiveService(session, guard or Guard(host), folder, print_message, panels)
     session.start()
     run_server(
         service.app, host, port, announce,

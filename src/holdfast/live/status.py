@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch, Problem
 from holdfast.live.handling import SessionCalibration
-from holdfast.live.loop.live_grip import LiveGrip
+from holdfast.live.panels import Panel
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate
@@ -40,19 +40,21 @@ class StatusPublisher:
     Args:
         session: to publish.
         report: called with the text of each notice about a fault or by the service.
-        grip: the grip loop; None if no hand is controlled.
+        panels: that run beside the session.
         calibration: of the session; None where it is not possible.
+        document_type: type of the documents, with a field for each panel.
     """
 
     def __init__(
         self,
         session: Session,
         report: Callable[[str], None] = lambda _: None,
-        grip: LiveGrip | None = None,
+        panels: Sequence[Panel] = (),
         calibration: SessionCalibration | None = None,
+        document_type: type[schema.LiveDocument] = schema.LiveDocument,
     ) -> None:
         self._session = session
-        self._grip = grip
+        self._panels, self._document_type = panels, document_type
         self._calibration = calibration
         self._told = ""
         self._report = report
@@ -85,7 +87,7 @@ class StatusPublisher:
             self._update_taxels([update for _, update in updates])
         newest = self._newest
         fingers = {} if newest is None else newest.fingers
-        return schema.LiveDocument(
+        return self._document_type(
             time=np.nan if newest is None else newest.time,
             hand=ContactState.UNKNOWN if newest is None else newest.state,
             fingers={
@@ -103,7 +105,7 @@ class StatusPublisher:
                 for problem in self._faults.current
             ],
             thresholds=dict(self._session.stream.thresholds),
-            grip=None if self._grip is None else self._grip.document(),
+            locked=bool(self._session.lock),
             calibration=None if self._calibration is None else self._calibration.document(),
             slips=[
                 schema.SlipDocument(*slip)
@@ -111,6 +113,7 @@ class StatusPublisher:
                 for name in updated
                 for slip in self._slips.update(name, [estimate.fingers[name]])
             ],
+            **{panel.name: panel.document() for panel in self._panels},
         )
 
     def _watch_calibration(self) -> None:

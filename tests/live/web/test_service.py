@@ -27,14 +27,14 @@ PATIENCE = 30.0
 
 @asynccontextmanager
 async def served(
-    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, grip=None,
+    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, panels=(),
     model=None,
 ):  # fmt: skip
     """Yield a client of the service of a source, and the session."""
     model = model or build.model()
     session = Session(StreamDetector(model, source))
     report = [].append if reports is None else reports.append
-    service = LiveService(session, Guard(host, token), folder, report, grip)
+    service = LiveService(session, Guard(host, token), folder, report, panels)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from holdfast.devices.hands.base import HandDevice
+from holdfast_grip.hands.base import HandDevice
 from holdfast_ros.hands.joint_hand import JointHand, JointOutput, JointSetup, check_home
 from holdfast_ros.hands.joints import JointOrder
 from holdfast_ros.hands.parameters import Parameters

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from holdfast.devices.live_twin import LiveTwin
 from holdfast.devices.sources import Arrival
 from holdfast.devices.uri import parse
-from holdfast.errors import HandError
-from holdfast.grip.command import FingerCommand, GripCommand, LoopState
 from holdfast.io.cdr import MessageDecoder
+from holdfast_grip.command import FingerCommand, GripCommand, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.live_twin import LiveTwin
 from holdfast_ros import dds
 from holdfast_ros.hands.joint_hand import JointHand, JointOutput
 from holdfast_ros.hands.joints import JOINTS_PER_FINGER, N_JOINTS

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.errors import HandError
-from holdfast.grip.command import GripCommand
-from holdfast.grip.limits import Limits
 from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.limits import Limits
 from holdfast_ros.hands.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
 from holdfast_ros.hands.ros_hand import RosHand
 from holdfast_ros.link import Link

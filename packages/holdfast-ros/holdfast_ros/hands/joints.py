@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.grip.command import GripCommand
 from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
 from holdfast_ros.topic_messages import JointStates
 
 N_JOINTS = 16

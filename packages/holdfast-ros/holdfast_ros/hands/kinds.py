@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.uri import Address, parse
 from holdfast.sensors.types import Array
+from holdfast_grip.hands.base import HandDevice
 from holdfast_ros.hands import joints
 from holdfast_ros.hands.controller_kinds import ControllerKind, WidthKind
 from holdfast_ros.hands.joint_hand import JointHand, JointOutput, JointSetup, check_home

@@ -8,10 +8,11 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from holdfast.devices.hands.base import MAX_JOINT_REPORTS, HandDevice
-from holdfast.errors import HandError, SourceError
-from holdfast.grip.command import GripCommand
+from holdfast.errors import SourceError
 from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.base import MAX_JOINT_REPORTS, HandDevice
 from holdfast_ros.link import Link, Publisher, TakeStates
 from holdfast_ros.topic_messages import JointStates
 

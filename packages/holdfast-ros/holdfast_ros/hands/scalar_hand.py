@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from holdfast.devices.hands.local import largest_scale
-from holdfast.errors import HandError
-from holdfast.grip.command import GripCommand
-from holdfast.grip.limits import Limits
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.local import largest_scale
+from holdfast_grip.limits import Limits
 from holdfast_ros.hands.ros_hand import RosHand
 from holdfast_ros.link import Link
 from holdfast_ros.topic_messages import (

@@ -143,8 +143,9 @@ def read():
 
 
 def estimates():
+    from grip.fakes import FakeGrip
     from holdfast_ros.publisher import Ros1Publisher
-    from live.estimates import UNITS, FakeGrip, estimate
+    from live.estimates import UNITS, estimate
 
     with Ros1Publisher(UNITS, grip=FakeGrip()) as publisher:
         emit("open")

@@ -5,6 +5,7 @@ from functools import partial
 
 import pytest
 
+from grip.fakes import FakeGrip
 from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.io.cdr import MessageEncoder
 from holdfast.live.arrival_detector import StreamEstimate
@@ -20,7 +21,7 @@ from holdfast_ros.publisher import (
     topic_names,
 )
 from holdfast_ros.topic_messages import DIAGNOSTICS, VECTOR, WRENCH, topic_definition
-from live.estimates import UNITS, FakeGrip, estimate, finger
+from live.estimates import UNITS, estimate, finger
 
 
 def test_the_diagnostic_has_the_fields_of_the_estimate_without_a_topic():

@@ -8,8 +8,9 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
+from grip.fakes import FakeGrip
 from holdfast_ros.publisher import Ros2Publisher
-from live.estimates import UNITS, FakeGrip, check_received, estimate
+from live.estimates import UNITS, check_received, estimate
 from ros.domains import new_domain
 
 PEER = Path(__file__).with_name("ros2_peer.py")

@@ -3,12 +3,15 @@
 New fields may be added under this name; existing ones do not change.
 """
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Any, Literal
 
+import msgspec
 from msgspec import Struct
 
 from holdfast.contact import ContactState, Fault
-from holdfast.live.documents import FingerDocument, GripDocument, Number, Vector
+from holdfast.live.documents import FingerDocument, Number, Vector
+from holdfast.live.panels import Panel
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):
@@ -257,7 +260,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
         ended: whether the source has ended.
         problems: faults that last.
         thresholds: probability from which each finger is stable now.
-        grip: the grip loop; null if no hand is controlled.
+        locked: whether the tare, the thresholds and the model cannot be changed.
         slips: that began or ended since the previous document.
         calibration: by own handling; null where it is not possible.
     """
@@ -273,9 +276,23 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
     ended: bool
     problems: list[ProblemDocument] = []
     thresholds: dict[str, float] = {}
-    grip: GripDocument | None = None
+    locked: bool = False
     slips: list[SlipDocument] = []
     calibration: CalibrationDocument | None = None
+
+
+def live_document_type(panels: Sequence[Panel]) -> type[LiveDocument]:
+    """Return the type of live documents with a field for each panel, of its name.
+
+    Args:
+        panels: their documents are in the fields.
+    """
+    fields = [(panel.name, panel.document_type | None, None) for panel in panels]
+    kind: type[Any] = msgspec.defstruct(
+        "LiveDocument", fields, bases=(LiveDocument,), namespace={"__doc__": LiveDocument.__doc__},
+        module=__name__, frozen=True, kw_only=True, tag_field="type", tag="live",
+    )  # fmt: skip
+    return kind
 
 
 class EstimateDocument(

@@ -2,8 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
-from concurrent.futures import Future
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
 from http import HTTPStatus
 from importlib import resources
@@ -16,7 +15,7 @@ from aiohttp import WSMsgType, web
 from holdfast.errors import HoldfastError
 from holdfast.live.documents import finger_document
 from holdfast.live.handling import SessionCalibration
-from holdfast.live.loop.live_grip import LiveGrip
+from holdfast.live.panels import Panel
 from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
 from holdfast.live.status import StatusPublisher, hello_document, recording_info
@@ -45,8 +44,19 @@ SHARED_FOLDER = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
 
 _encode = msgspec.json.Encoder().encode
-ANSWER_TIMEOUT = 1.0
-"""Longest wait for the loop after a request [s]."""
+
+
+def page_with(panels: Sequence[Panel]) -> str:
+    """Return the page with its panels; `main.js` imports their scripts by their names."""
+    page = (PAGE_FOLDER / "index.html").read_text("utf-8")
+    names = " ".join(panel.name for panel in panels)
+    styles = "".join(
+        f'<link rel="stylesheet" href="panels/{panel.name}/panel.css">' for panel in panels
+    )
+    parts = "".join((panel.folder / "panel.html").read_text("utf-8") for panel in panels)
+    for mark, text in {"styles": styles, "panels": parts, "names": names}.items():
+        page = page.replace(f"<!--{mark}-->" if mark != "names" else "{names}", text)
+    return page
 
 
 class WebSocketClient:
@@ -96,7 +106,7 @@ class LiveService:
         guard: check of every request.
         folder: for recordings; None if the service may not record.
         report: called with the text of each notice about a fault or by the service.
-        grip: the loop that controls the hand; None if there is none.
+        panels: that run beside the session.
 
     Attributes:
         app: the web application.
@@ -108,15 +118,16 @@ class LiveService:
         guard: Guard,
         folder: Path | None = None,
         report: Callable[[str], None] = lambda _: None,
-        grip: LiveGrip | None = None,
+        panels: Sequence[Panel] = (),
     ) -> None:
         self._session = session
         self._recorder = SessionRecorder(session, folder)
         self._calibration = SessionCalibration(session, folder)
-        self._status = StatusPublisher(session, report, grip, self._calibration)
-        self._grip = grip
-        if grip is not None:
-            grip.add_listener(self._mark)
+        self._panels = panels
+        self._live_type = schema.live_document_type(panels)
+        self._status = StatusPublisher(session, report, panels, self._calibration, self._live_type)
+        for panel in panels:
+            panel.add_listener(self._mark)
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
         self._newest_document = b"{}"
@@ -127,14 +138,14 @@ class LiveService:
 
     def _routes(self) -> list[web.AbstractRouteDef]:
         return [
-            web.get("/", _get_page),
+            web.get("/", self._get_page),
             web.static("/page", PAGE_FOLDER),
             web.static("/web", SHARED_FOLDER),
             web.get("/api/v1/live", self._serve_live),
             web.get("/api/v1/estimates", self._serve_estimates),
             web.get("/api/v1/info", self._get_info),
             web.get("/api/v1/state", self._get_state),
-            web.get("/api/v1/schema", _get_schema),
+            web.get("/api/v1/schema", self._get_schema),
             web.post("/api/v1/tare", self._post_tare),
             web.post("/api/v1/threshold", self._post_threshold),
             web.delete("/api/v1/threshold", self._delete_threshold),
@@ -142,11 +153,12 @@ class LiveService:
             web.delete("/api/v1/recording", self._delete_recording),
             web.post("/api/v1/markers", self._post_marker),
             *CalibrationRoutes(self._calibration, self._bodies).routes(),
-            *GripRoutes(self._grip, self._status.add_notice).routes(),
+            *(web.static(f"/panels/{panel.name}", panel.folder) for panel in self._panels),
+            *(route for panel in self._panels for route in panel.routes(self._status.add_notice)),
         ]
 
     def _mark(self, text: str, time: float) -> None:
-        """Add an event of the grip loop to the recording, if one is running."""
+        """Add an event of a panel to the recording, if one is running."""
         recorder = self._recorder.current
         if recorder is not None:
             recorder.add_marker(text, time)
@@ -233,6 +245,15 @@ class LiveService:
     def _hello(self) -> schema.HelloDocument:
         return hello_document(self._session, self._started, self._recorder.enabled)
 
+    async def _get_page(self, _: web.Request) -> web.Response:
+        return web.Response(text=page_with(self._panels), content_type="text/html")
+
+    async def _get_schema(self, _: web.Request) -> web.Response:
+        """Return the JSON Schema of all documents of the WebSockets."""
+        documents = (schema.HelloDocument, self._live_type, schema.EstimateDocument)
+        schemas, components = msgspec.json.schema_components(documents)
+        return _json({"anyOf": schemas, "$defs": components})
+
     async def _get_info(self, _: web.Request) -> web.Response:
         return _json(self._hello())
 
@@ -261,10 +282,8 @@ class LiveService:
 
     def _start_recording(self, name: str) -> dict[str, str]:
         path = self._recorder.start(name)
-        if self._grip is not None:
-            grip = self._grip.document()
-            armed = "armed" if grip.armed else "dry run"
-            self._recorder.add_marker(f"grip {grip.state} ({grip.law}, {grip.hand}, {armed})")
+        for panel in self._panels:
+            self._recorder.add_marker(panel.summary())
         return {"path": str(path)}
 
     async def _delete_recording(self, _: web.Request) -> web.Response:
@@ -297,17 +316,6 @@ async def _answer(work: Callable[[], object]) -> web.Response:
 
 def _json(value: object, status: int = 200) -> web.Response:
     return web.Response(body=_encode(value), content_type="application/json", status=status)
-
-
-async def _get_page(_: web.Request) -> web.FileResponse:
-    return web.FileResponse(PAGE_FOLDER / "index.html")
-
-
-async def _get_schema(_: web.Request) -> web.Response:
-    """Return the JSON Schema of all documents of the WebSockets."""
-    documents = (schema.HelloDocument, schema.LiveDocument, schema.EstimateDocument)
-    schemas, components = msgspec.json.schema_components(documents)
-    return _json({"anyOf": schemas, "$defs": components})
 
 
 class CalibrationRoutes:
@@ -361,63 +369,3 @@ class CalibrationRoutes:
             return self._calibration.document()
 
         return await _answer(changed)
-
-
-class GripRoutes:
-    """Routes of the grip loop. A stop waits for nothing: no socket, no sample, no other request.
-
-    Args:
-        grip: the loop; None if no hand is controlled.
-        report: is called with the text of a notice.
-    """
-
-    def __init__(self, grip: LiveGrip | None, report: Callable[[str], None]) -> None:
-        self._found = grip
-        self._report = report
-
-    def routes(self) -> list[web.AbstractRouteDef]:
-        """Return the routes."""
-        return [
-            web.get("/api/v1/grip", self._get),
-            web.post("/api/v1/grip/stop", self._post_stop),
-            web.post("/api/v1/grip/reset", self._post_reset),
-        ]
-
-    @property
-    def _grip(self) -> LiveGrip:
-        if self._found is None:
-            text = "no hand is controlled: start with holdfast serve ... --hand URI"
-            raise json_error(web.HTTPNotFound, text)
-        return self._found
-
-    async def _get(self, _: web.Request) -> web.Response:
-        return self._answer()
-
-    async def _post_stop(self, request: web.Request) -> web.Response:
-        stopped = self._grip.stop()
-        self._report(f"emergency stop by {request.remote}")
-        return await self._wait(
-            stopped,
-            "the stop is set, but the loop does not answer: use the emergency stop of the hand",
-        )
-
-    async def _post_reset(self, request: web.Request) -> web.Response:
-        reset = self._grip.reset()
-        self._report(f"stop or fault of the grip reset by {request.remote}")
-        return await self._wait(reset, "the loop does not answer")
-
-    async def _wait(self, request: "Future[None]", late: str) -> web.Response:
-        """Return the state when a request has been carried out; 409 if it was not."""
-        try:
-            await asyncio.wait_for(asyncio.wrap_future(request), ANSWER_TIMEOUT)
-        except TimeoutError:
-            return self._answer(late)
-        except HoldfastError as failure:
-            return self._answer(str(failure))
-        return self._answer()
-
-    def _answer(self, error: str = "") -> web.Response:
-        value = {"error": error} if error else self._grip.document()
-        status = HTTPStatus.CONFLICT if error else HTTPStatus.OK
-        body = msgspec.json.encode(value)
-        return web.Response(body=body, content_type="application/json", status=status)

@@ -13,16 +13,14 @@ import time
 from importlib import resources
 from pathlib import Path
 
-import msgspec
 import numpy as np
 from aiohttp import WSCloseCode, web
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
-from holdfast.grip import Limits
 from holdfast.io import load_recording
 from holdfast.live.fault_notices import FAULT_TEXTS
-from holdfast.live.loop.grip_faults import explain_fault
+from holdfast.live.web.service import page_with
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.web.guard import SECURITY_HEADERS
@@ -215,43 +213,6 @@ class Tape:
         }
 
 
-def gripping(names=("thumb", "index", "middle", "ring"), **fields):
-    """Document of a grip loop that reacts."""
-    scales = [1.24, 1.5, 1.0, 2.0, 1.75, 1.9]
-    return {
-        "hand": "ros2:plexus?namespace=/allegro_hand", "law": "friction-margin", "armed": True,
-        "limits": {
-            "min_scale": 1.0, "max_scale": 2.0, "rise": 30.0, "fall": 0.3, "cooldown": 0.5,
-            "max_force": 12.5, "stale_after": 0.05, "fault_after": 0.03, "recovery": None,
-            "on_fault": "open", "max_rate": 400.0,
-        },
-        "state": "REACT", "reason": "", "stopped": False, "released": False, "time": 4.2,
-        "fingers": {
-            name: {"scale": scales[k], "highest": 1.75 if k else 2.0, "reason": "unstable"}
-            for k, name in enumerate(names)
-        },
-        "n_sent": 1234, "failure": "",
-        "events": [
-            {"time": 3.9, "text": "grip HOLD"},
-            {"time": 4.1, "text": "grip REACT: index rises from 1.000 (unstable)"},
-        ],
-    } | fields  # fmt: skip
-
-
-def explained(grip):
-    """Return the document of a grip loop with the explanation of its fault."""
-    if grip is None or grip["state"] != "FAULT":
-        return grip
-    limits = dict(grip["limits"])
-    if limits["recovery"] is None:  # infinite
-        limits["recovery"] = math.inf
-    fault = explain_fault(
-        grip["reason"], Limits(**limits),
-        armed=grip["armed"], released=grip["released"], failure=grip["failure"],
-    )  # fmt: skip
-    return grip | {"fault": msgspec.to_builtins(fault)}
-
-
 IDLE = {
     "state": "idle", "seconds": 0.0, "least": 5.5, "enough": 30.0, "most": 60.0,
     "calibrated": False, "refused": False, "text": "", "warnings": [],
@@ -263,7 +224,13 @@ SEEN = (
 
 
 class Service:
-    """Fake service with its own port and thread."""
+    """Fake service with its own port and thread.
+
+    Attributes:
+        panels: panels of the page; of a subclass.
+    """
+
+    panels = ()
 
     def __init__(self, tape, token=None, speed=1.0, port=0):
         self.tape, self.token, self.speed, self.port = tape, token, speed, port
@@ -271,9 +238,7 @@ class Service:
         self.calls = []
         self.recording = None
         self.threshold = 0.5
-        self.grip = None  # document of the grip loop
         self.calibration = dict(IDLE)
-        self.stop_fails = False  # drop the connection of a stop without an answer
         self.patch = {}  # fields that replace those of every message
         self.notices = []
         self.muted = False
@@ -329,9 +294,8 @@ class Service:
         app.router.add_post("/api/v1/calibration/finish", self.finish_calibration)
         app.router.add_get("/api/v1/calibration/model", self.get_model)
         app.router.add_post("/api/v1/calibration/model", self.save_model)
-        app.router.add_get("/api/v1/grip", self.get_grip)
-        app.router.add_post("/api/v1/grip/stop", self.stop_grip)
-        app.router.add_post("/api/v1/grip/reset", self.reset_grip)
+        for panel in self.panels:
+            app.router.add_static(f"/panels/{panel.name}", panel.folder)
         return app
 
     @web.middleware
@@ -355,7 +319,7 @@ class Service:
         return answer
 
     async def index(self, _):
-        return web.FileResponse(PAGE / "index.html")
+        return web.Response(text=page_with(self.panels), content_type="text/html")
 
     async def info(self, _):
         return web.json_response(self.tape.hello())
@@ -410,20 +374,6 @@ class Service:
     async def save_model(self, _):
         return web.json_response({"path": "recordings/model-20261123-081500.json"})
 
-    async def get_grip(self, _):
-        return web.json_response(explained(self.grip))
-
-    async def stop_grip(self, request):
-        if self.stop_fails:
-            request.transport.abort()
-            return web.Response()
-        self.grip |= {"state": "FAULT", "reason": "stopped", "stopped": True}
-        return web.json_response(explained(self.grip))
-
-    async def reset_grip(self, _):
-        self.grip |= {"state": "HOLD", "reason": "", "stopped": False}
-        return web.json_response(explained(self.grip))
-
     async def live(self, request):
         socket = web.WebSocketResponse()
         await socket.prepare(request)
@@ -436,16 +386,19 @@ class Service:
             self.sockets.discard(socket)
         return socket
 
+    def fields(self):
+        """Fields that a subclass adds to every message."""
+        return {}
+
     async def play(self):
         while True:
             await asyncio.sleep(PERIOD)
             if self.muted:
                 continue
             start, self.at = self.at, self.at + PERIOD * self.speed
-            message = self.tape.message(start, self.at) | self.patch
+            message = self.tape.message(start, self.at) | self.fields() | self.patch
             message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
             message["notices"], self.notices = self.notices, []
-            message["grip"] = explained(self.grip)
             message["calibration"] = self.calibration
             if self.recording:
                 self.recording["seconds"] += PERIOD

@@ -105,9 +105,7 @@ def test_an_armed_hand_locks_it(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
     page.keyboard.press("c")
-    from live.web.page.fake_service import gripping
-
-    service.grip = gripping()
+    service.patch = {"locked": True}
     until(page, "document.querySelector('#calibration-undo').disabled")
     assert page.locator("#calibration-again").is_disabled()
     assert "model are locked" in page.locator("#calibrate").get_attribute("title")

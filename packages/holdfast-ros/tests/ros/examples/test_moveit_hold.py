@@ -26,7 +26,7 @@ DRIVER = ROS2["width-gripper"]
 PROGRAM = """#!{python}
 import sys
 from holdfast.cli import main
-from holdfast.live.loop import watchdog
+from holdfast_grip.loop import watchdog
 watchdog.Watchdog.__init__.__defaults__ = (300.0,)
 sys.exit(main())
 """

@@ -8,12 +8,12 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from devices.hands.rigs import RosRig, with_parameter
 from holdfast import errors
-from holdfast.devices.hands import open_hand
+from holdfast_grip.hands import open_hand
 from ros.ros1_master import Master, needs_ros1
 
 from .drivers import PATIENCE, ROS1
+from .rigs import RosRig, with_parameter
 
 PEER = Path(__file__).with_name("ros1_peer.py")
 

@@ -10,8 +10,8 @@ import sys
 import threading
 import time
 
-from holdfast.devices.hands import open_hand
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip.hands import open_hand
 from holdfast_ros.hands import ros_hand
 from holdfast_ros.rospy_node import message_type, rospy_module
 from ros.hands.drivers import ROS1, readings

@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.devices.hands import open_hand
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.io.cdr import MessageEncoder
+from holdfast_grip import FingerCommand, GripCommand, LoopState
+from holdfast_grip.hands import open_hand
 from holdfast_ros import dds
 from holdfast_ros.hands import ros_hand
 from holdfast_ros.hands.driven_twin import DrivenTwin

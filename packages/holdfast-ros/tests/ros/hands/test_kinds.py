@@ -4,8 +4,8 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.devices.hands import open_hand
-from holdfast.grip import Limits
+from holdfast_grip import Limits
+from holdfast_grip.hands import open_hand
 
 SIXTEEN = ",".join(["0.1"] * 16)
 WIDTH = "ros2:width-gripper?topic=/g&joint=f&open=0.08&effort=4&max_effort=12&stiffness=2000"

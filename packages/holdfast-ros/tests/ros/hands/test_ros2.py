@@ -10,10 +10,10 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.devices.hands import open_hand
-from holdfast.errors import HandError
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
-from holdfast.live.loop.watchdog import Watchdog
+from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands import open_hand
+from holdfast_grip.loop.watchdog import Watchdog
 from holdfast_ros.hands import ros_hand
 from holdfast_ros.hands.joints import LIMIT_TOLERANCE
 

@@ -6,9 +6,9 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.devices.hands import open_hand
-from holdfast.errors import HandError
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands import open_hand
 
 from .drivers import AH_NAMES, POSITIONS, ROS2
 

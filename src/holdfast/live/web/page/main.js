@@ -11,7 +11,6 @@ import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { STATES, duration, hasSlipRule } from "./format.js";
 import { FrameLimiter } from "./frame_rate.js";
-import { GripPanel } from "./grip.js";
 import { listenToKeys } from "./keys.js";
 import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
@@ -22,7 +21,8 @@ const WINDOWS = [5, 10, 30, 60]; // [s]
 const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
 
 class Page {
-  constructor() {
+  /** @param kinds classes of the panels of plug-ins, by name. */
+  constructor(kinds) {
     this.banner = new HandBanner();
     this.health = new HealthLine(byId("health"));
     this.events = new EventLog(byId("events"));
@@ -33,8 +33,10 @@ class Page {
     this.threshold = new ThresholdPanel();
     this.calibration = new CalibrationPanel(() => this.refreshModel());
     this.advised = new Set(); // advice that the list of notices has
-    this.grip = new GripPanel((time, text) => this.events.addMarker(time, text, "grip"),
-      (text) => this.notices.add({ time: Date.now() / 1000, text }));
+    this.panels = new Map(Object.entries(kinds).map(([name, Panel]) => [name, new Panel({
+      addEvent: (time, text) => this.events.addMarker(time, text, name),
+      addNotice: (text) => this.notices.add({ time: Date.now() / 1000, text }),
+    })]));
     this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused
@@ -65,7 +67,7 @@ class Page {
     this.store = new SampleStore(names, capacityFor(hello.rate));
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.banner, this.cards, this.controls, this.threshold, this.calibration, this.grip]) part.start(hello);
+    for (const part of [this.banner, this.cards, this.controls, this.threshold, this.calibration, ...this.panels.values()]) part.start(hello);
     this.plots.start(hello, this.store);
     const hasSlips = Object.values(hello.fingers).some(hasSlipRule);
     document.body.classList.toggle("has-slips", hasSlips);
@@ -100,7 +102,7 @@ class Page {
     this.status.silent = Boolean(message.health?.silent);
     this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
     this.plots.thresholds = message.thresholds ?? {};
-    for (const part of [this.controls, this.threshold, this.calibration]) part.setLocked(Boolean(message.grip?.armed));
+    for (const part of [this.controls, this.threshold, this.calibration]) part.setLocked(Boolean(message.locked));
     this.threshold.update(message.thresholds);
     this.calibration.update(message.calibration);
     this.now = message.time;
@@ -116,7 +118,7 @@ class Page {
     for (const notice of message.notices ?? []) this.notices.add(notice);
     if (message.health) this.health.update(message.health);
     this.controls.update(message.recording);
-    this.grip.update(message.grip);
+    for (const [name, panel] of this.panels) panel.update(message[name]);
     this.showLink();
     this.dirty = true;
   }
@@ -128,7 +130,7 @@ class Page {
     this.controls.setConnected(link === "open");
     this.threshold.setConnected(link === "open");
     this.calibration.setConnected(link === "open");
-    this.grip.setLink(link);
+    for (const panel of this.panels.values()) panel.setLink(link);
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
@@ -236,5 +238,11 @@ class Page {
   }
 }
 
+async function importPanels() {
+  const names = document.body.dataset.panels.split(" ").filter(Boolean);
+  const modules = await Promise.all(names.map((name) => import(`../panels/${name}/panel.js`)));
+  return Object.fromEntries(names.map((name, k) => [name, modules[k].Panel]));
+}
+
 // For the browser's console, and for tests.
-window.holdfast = new Page();
+window.holdfast = new Page(await importPanels());

@@ -1,0 +1,447 @@
+"""The grip controller: from the estimates of a hand to a command. No I/O and no clock."""
+
+import math
+from collections import defaultdict, deque
+from collections.abc import Mapping
+
+from holdfast.contact import ContactState, HandEstimate, Reason
+from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
+from holdfast_grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
+from holdfast_grip.jerks import JerkMonitor
+from holdfast_grip.laws import Law, Touch, law_named
+from holdfast_grip.laws.base import Three
+from holdfast_grip.limits import Limits
+from holdfast_grip.repeats import RepeatMonitor
+from holdfast_grip.waiting import GripWait
+
+MAX_EVENTS = 1000
+"""Number of events that a controller keeps until `events` is called; the oldest are dropped."""
+OVERLOAD = 1.5
+"""Multiple of `Limits.max_force` at which a measured force is a fault."""
+STABLE_TIME_BEFORE_GRIP = 0.2
+"""Time for which the hand has been STABLE when the grip begins [s]."""
+CALM_TIME_BEFORE_GRIP = 1.0
+"""The same, for which fingers with `CALM_SHARE` of the force have been STABLE: longer than a person
+takes to let go of the object [s]."""
+CALM_SHARE = 0.7
+"""Share of the normal force on STABLE fingers from which a grip may begin."""
+DETECTOR_RATE = 150.0
+"""Rate of the samples, if no sensor is given [Hz]."""
+MIN_FINGERS = 2
+"""Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
+LASTING_FAULTS = (GripReason.LOST, GripReason.STOPPED)
+"""Faults that only a reset ends; they replace the reason of one that ends by itself."""
+KEEP = FingerCommand(1.0)
+
+_NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
+_HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
+
+
+class GripController:
+    """Controller of the grip force of one hand, estimate by estimate.
+
+    The grip begins when the hand has been STABLE for 0.2 s, or when for 1 s the fingers that are
+    STABLE, two at least, carried 70 % of the normal force and no finger was UNKNOWN. Forces and
+    scales refer to this moment, and the fingers in contact are the loaded fingers. The controller
+    reads the raw probability of every sample, not the debounced state. UNKNOWN never lowers a
+    force, and no force changes without a new sample. No input raises an exception or gives a
+    command outside the limits.
+
+    Args:
+        limits: limits of the commands.
+        law: name of a law, one of `LAWS`, or a law.
+        sensors: sensor of each finger, for its normal, rate and unit; without it, the normal is
+            x and the unit is that of counts.
+        newtons_per_unit: calibration, one factor or one for each axis of the fingertip frame;
+            None if the readings are in N, or for laws that need none.
+        thumb: finger opposite to all others, which balances them; None if there is none.
+
+    Raises:
+        ValueError: there is no such law, it needs newtons and the readings are counts without a
+            calibration, or there is a calibration and readings are in newtons.
+
+    Example:
+        >>> from holdfast.contact import ContactEstimate
+        >>> controller = GripController(Limits(max_scale=2.0))
+        >>> finger = ContactEstimate(0.0, ContactState.NO_CONTACT, Reason.NONE, 0.1, 0.0, (0, 0, 0))
+        >>> hand = HandEstimate(0.0, ContactState.NO_CONTACT, {"thumb": finger})
+        >>> controller.update(hand, 0.0).state
+        <LoopState.IDLE: 'IDLE'>
+    """
+
+    def __init__(
+        self,
+        limits: Limits,
+        law: str | Law = "holdfast",
+        *,
+        sensors: Mapping[str, Sensor] | None = None,
+        newtons_per_unit: float | tuple[float, float, float] | None = None,
+        thumb: str | None = "thumb",
+    ) -> None:
+        self.limits = limits
+        self.law = law_named(law) if isinstance(law, str) else law
+        sensors = sensors or {}
+        _check_unit(self.law, sensors, newtons_per_unit)
+        given = 1.0 if newtons_per_unit is None else newtons_per_unit
+        self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
+        self._normals = {name: _three(one.normal) for name, one in sensors.items()}
+        rates = [sensor.rate for sensor in sensors.values()]
+        self._max_age = 1 / min(rates, default=DETECTOR_RATE) + limits.stale_after
+        self._thumb = thumb
+        ceiling = math.inf if limits.max_force is None else limits.max_force
+        self._ceiling = OVERLOAD * ceiling
+        self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
+        self._waiting = GripWait(MIN_FINGERS)
+        self._jerks = JerkMonitor()
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to IDLE: forget the grip and its faults."""
+        self.state = LoopState.IDLE
+        self._waiting.reset()
+        self._touches: list[Touch] = []
+        self._jerked = False
+        self._jerks.reset()
+        self._bad_since: list[float] = []
+        self._highest: list[float] = []
+        self._commands: dict[str, FingerCommand] = {}
+        self._latched = self._stopped = False
+        self._all_known = False
+        self._repeats: list[RepeatMonitor] = []
+        self._time = self._estimated_at = math.nan
+        self._shift = 0.0  # of the law's clock, which continues where that of the source jumped
+        self._clock_is_new = False
+        self._stable_since = self._calm_since = math.nan
+        self._valid_since = math.nan
+        self._raised_at = -math.inf
+        self._fault = self._reported = GripReason.NONE
+        self._events: deque[GripEvent] = deque(maxlen=MAX_EVENTS)
+
+    def stop(self) -> None:
+        """Stop: from the next update on, in FAULT (stopped) until `resume` or `reset`."""
+        if not self._stopped:
+            self._stopped, self._fault = True, _NONE
+
+    def resume(self) -> None:
+        """End a stop or a fault, by the decision of a person. It has no effect elsewhere.
+
+        A grip that still touches the object goes on with its scales. After "open", or without
+        contact, the controller returns to IDLE, as by `reset`. The time of the next update may be
+        any: that is how a clock that has jumped is accepted.
+        """
+        self._clock_is_new = True
+        if not self._stopped and self._fault is _NONE:
+            return
+        touching = any(touch.touching for touch in self._touches)
+        if self.limits.on_fault == "open" or not touching:
+            self.reset()
+            return
+        self._latched = self._stopped = False
+        self._fault = _NONE
+        self._bad_since = [math.inf] * len(self._bad_since)
+        self._change(_HOLD, self._time)
+
+    @property
+    def loaded_fingers(self) -> tuple[str, ...]:
+        """Fingers of the grip; none while IDLE."""
+        return tuple(touch.finger for touch in self._touches)
+
+    @property
+    def highest_scales(self) -> dict[str, float]:
+        """Highest scale that each finger of the grip may get; none while IDLE."""
+        return dict(zip(self.loaded_fingers, self._highest, strict=False))
+
+    @property
+    def waits_for(self) -> str:
+        """What the hand lacks before the grip begins, in words; empty from when it has begun."""
+        return self._waiting.text if self.state is LoopState.IDLE else ""
+
+    def events(self) -> list[GripEvent]:
+        """Return states and rises since the last call, at most `MAX_EVENTS`, oldest first."""
+        events = list(self._events)
+        self._events.clear()
+        return events
+
+    def report(self, fault: GripReason) -> None:
+        """Report a fault outside the estimates, as that of a silent hand, to the next update."""
+        self._reported = fault
+
+    def observe(self, angles: Array) -> None:
+        """Process the joint angles that the hand's driver reports, before the next `update`.
+
+        A hand whose own controller jerks shakes its contacts. A law may wait with its reaction
+        then, see `Touch.jerked`. Without this call no jerk is known, and nothing else changes.
+
+        Args:
+            angles: (n_joints,) measured angle of each joint, in any order that stays [rad].
+        """
+        self._jerks.update(angles)
+        self._jerked |= self._jerks.jerked
+
+    def update(self, estimate: HandEstimate, time: float) -> GripCommand:
+        """Process an estimate, or the passing of time if the estimate is the last one again.
+
+        Args:
+            estimate: the newest estimate of the hand.
+            time: time now, on the clock of the source [s]; it exceeds the time of the estimate
+                where samples are late.
+
+        Returns:
+            The command. Its scales change only in the states REACT and RELAX, and only with a new
+            estimate: otherwise it is the last command again, with the time of that one.
+
+        Raises:
+            ValueError: the law breaks its contract, as with a scale of NaN; no estimate raises it.
+        """
+        is_new = self._is_new(estimate)
+        fault, self._reported = self._reported, _NONE
+        if self._clock_is_new and math.isfinite(time):
+            self._accept_clock(time)
+        dt = time - self._time
+        if self._stopped:
+            return self._in_stop(estimate, time, dt)
+        if self.state is LoopState.IDLE:
+            return self._idle(estimate, time)
+        problem = self._problem(estimate, time, dt)
+        if problem is not GripReason.CLOCK:
+            problem = fault or problem
+        if problem is not _NONE or self._fault is not _NONE:
+            return self._in_fault(problem, time)
+        if not is_new or any(monitor.repeating for monitor in self._repeats):
+            return GripCommand(self._time, self.state, self._commands.copy())
+        self._time = time
+        return self._control(time, min(dt, self.limits.stale_after))
+
+    def _is_new(self, estimate: HandEstimate) -> bool:
+        """Return whether an estimate is not the last one again; update the monitors if so."""
+        if estimate.time == self._estimated_at:
+            return False
+        self._estimated_at = estimate.time
+        for name, finger in estimate.fingers.items():
+            self._monitors[name].update(finger)
+        return True
+
+    def _accept_clock(self, time: float) -> None:
+        """Continue at another time; that of the law goes on as if none had passed."""
+        self._clock_is_new = False
+        if not math.isnan(self._time):
+            self._shift += self._time - time
+            self._time = time
+
+    def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
+        """Wait for a grip; begin it when the hand has been stable for long enough."""
+        self._waiting.update(estimate, time)
+        commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
+        self._commands = commands
+        is_stable = estimate.state is ContactState.STABLE
+        self._stable_since = _since(self._stable_since, time, still=is_stable)
+        is_calm = is_stable or self._is_calm(estimate)
+        self._calm_since = _since(self._calm_since, time, still=is_calm)
+        if (
+            time - self._stable_since >= STABLE_TIME_BEFORE_GRIP
+            or time - self._calm_since >= CALM_TIME_BEFORE_GRIP
+        ):
+            self._begin(estimate, time)
+        return GripCommand(time, self.state, dict(commands))
+
+    def _is_calm(self, estimate: HandEstimate) -> bool:
+        """Return whether the fingers that are STABLE carry nearly all of an UNSTABLE hand."""
+        if estimate.state is not ContactState.UNSTABLE:
+            return False
+        total = calm = 0.0
+        n_stable = 0
+        for name, finger in estimate.fingers.items():
+            touch = self._new_touch(name)
+            if finger.state is _UNKNOWN or not touch.read(finger):
+                return False
+            total += touch.normal
+            if finger.state is ContactState.STABLE:
+                calm, n_stable = calm + touch.normal, n_stable + 1
+        return n_stable >= MIN_FINGERS and calm >= CALM_SHARE * total
+
+    def _new_touch(self, name: str) -> Touch:
+        return Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
+
+    def _begin(self, estimate: HandEstimate, time: float) -> None:
+        held = (ContactState.STABLE, ContactState.UNSTABLE)
+        touches = [
+            self._new_touch(name)
+            for name, finger in estimate.fingers.items()
+            if finger.state in held
+        ]
+        finite = all(touch.read(estimate.fingers[touch.finger]) for touch in touches)
+        if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
+            return
+        self._touches, self._time, self._jerked = touches, time, False
+        for touch in touches:
+            touch.start()
+        self._highest = [self.limits.highest_scale(touch.start_normal) for touch in touches]
+        self._bad_since = [math.inf] * (len(touches) + 1)  # of each finger, and of the grip
+        self._repeats = [self._monitors[touch.finger] for touch in touches]
+        names = self.loaded_fingers
+        opposed = self._thumb in names and len(names) > 1
+        self.law.start(touches, names.index(str(self._thumb)) if opposed else -1)
+        self._change(LoopState.HOLD, time)
+
+    def _problem(self, estimate: HandEstimate, time: float, dt: float) -> GripReason:
+        """Read the loaded fingers; return why this update is a fault, NONE if it is not."""
+        if not 0.0 <= dt < math.inf:
+            return GripReason.CLOCK
+        fingers, due = estimate.fingers, time - self._max_age
+        touching, known, problem = False, True, _NONE
+        for k, touch in enumerate(self._touches):
+            finger = fingers.get(touch.finger)
+            if finger is None or not finger.time >= due:
+                problem = GripReason.STALE
+            elif finger.state is _UNKNOWN:
+                touch.known = known = False
+                problem = self._unknown(k, finger.reason, time)
+            elif not touch.read(finger):
+                problem = GripReason.NOT_FINITE
+            elif touch.normal > self._ceiling:
+                problem = GripReason.OVERLOAD
+            elif self._repeats[k].frozen:
+                problem = GripReason.FROZEN
+            else:
+                self._bad_since[k] = math.inf
+            if problem is not _NONE:
+                return problem
+            touching = touching or touch.touching
+        self._all_known = known
+        if touching:
+            self._bad_since[-1] = math.inf
+            return _NONE
+        return GripReason.LOST if self._lasts(-1, time) else _NONE
+
+    def _unknown(self, k: int, reason: Reason, time: float) -> GripReason:
+        """Return the fault of a finger without an estimate; NONE as long as it is short."""
+        if not self._lasts(k, time):
+            return _NONE
+        return GripReason.STALE if reason is Reason.GAP else GripReason.FINGER_FAULT
+
+    def _lasts(self, k: int, time: float) -> bool:
+        """Return whether what is bad now has been bad for `fault_after`."""
+        self._bad_since[k] = min(self._bad_since[k], time)
+        return time - self._bad_since[k] >= self.limits.fault_after
+
+    def _in_stop(self, estimate: HandEstimate, time: float, dt: float) -> GripCommand:
+        """Hold or open, and follow the contacts of the grip, if there is one."""
+        if self._touches:
+            self._problem(estimate, time, dt)
+        return self._in_fault(GripReason.STOPPED, time)
+
+    def _in_fault(self, problem: GripReason, time: float) -> GripCommand:
+        """Hold or open; recover after enough valid data, where that is allowed."""
+        if problem is not GripReason.CLOCK:
+            self._time = time
+        if problem is not GripReason.NONE:
+            self._valid_since = math.nan
+            lasting = problem in LASTING_FAULTS
+            if self._fault is GripReason.NONE or (lasting and self._fault not in LASTING_FAULTS):
+                self._fault = problem
+                self._change(LoopState.FAULT, time, problem)
+            self._latched |= self.limits.on_fault == "open" or lasting
+        elif not self._valid_since <= time:
+            self._valid_since = time
+        if not self._latched and time - self._valid_since >= self.limits.recovery:
+            self._fault = GripReason.NONE
+            self._change(LoopState.HOLD, time)
+        released = self._fault is not GripReason.NONE and self.limits.on_fault == "open"
+        self._settle_commands()
+        return GripCommand(time, self.state, dict(self._commands), released, self._fault)
+
+    def _control(self, time: float, dt: float) -> GripCommand:
+        """Apply the law within the limits."""
+        limits, commands, highest = self.limits, self._commands, self._highest
+        clock = time + self._shift
+        if self._jerked is not self._touches[0].jerked:
+            for touch in self._touches:
+                touch.jerked = self._jerked
+        self._jerked = False
+        wishes = self.law.wishes(self._touches, clock, dt)
+        if len(wishes) != len(self._touches):
+            raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))
+        may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
+        rising = falling = False
+        for k, touch in enumerate(self._touches):
+            scale = touch.scale
+            wanted, reason = wishes[k]
+            if math.isnan(wanted):
+                raise ValueError(_broken_law(self.law, len(self._touches), "a scale of nan"))
+            wanted = min(max(wanted, limits.min_scale), highest[k])
+            if wanted > scale and reason is not _NONE:
+                self._set(touch, min(wanted, scale + limits.rise * dt), reason, time)
+                rising = True
+            elif wanted < scale and may_fall:
+                self._set(touch, max(wanted, scale - limits.fall * dt), GripReason.RELAX, time)
+                falling = True
+            elif commands[touch.finger].reason is not _NONE:
+                commands[touch.finger] = FingerCommand(scale)
+        if rising:
+            self._raised_at = clock
+        state = _REACT if rising else _RELAX if falling else _HOLD
+        if state is not self.state:
+            self._change(state, time)
+        return GripCommand(time, state, commands.copy())
+
+    def _set(self, touch: Touch, scale: float, reason: GripReason, time: float) -> None:
+        """Set a scale, and log the beginning of a rise."""
+        before = self._commands[touch.finger]
+        if scale > touch.scale and before.reason is not reason:
+            event = GripEvent(time, LoopState.REACT, touch.finger, touch.scale, reason)
+            self._events.append(event)
+        touch.scale = scale
+        self._commands[touch.finger] = FingerCommand(scale, reason)
+
+    def _settle_commands(self) -> None:
+        """Keep every scale; nothing rises or falls in a fault."""
+        self._commands = {
+            name: FingerCommand(command.scale) for name, command in self._commands.items()
+        }
+
+    def _change(self, state: LoopState, time: float, reason: GripReason = GripReason.NONE) -> None:
+        self.state = state
+        self._events.append(GripEvent(time, state, "", math.nan, reason))
+
+
+def _since(since: float, time: float, *, still: bool) -> float:
+    """Return when stillness began, NaN if there is none. If the clock went back, start again."""
+    if not (still and math.isfinite(time)):
+        return math.nan
+    return since if since <= time else time
+
+
+def _broken_law(law: Law, n: int, given: str) -> str:
+    """Return a message about what a law returned."""
+    return (
+        f"law {type(law).__name__}: the contract of laws expects a scale and a reason for each of "
+        f"{n} fingers, {given} given"
+    )
+
+
+def _three(vector: Array) -> Three:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _check_unit(
+    law: Law,
+    sensors: Mapping[str, Sensor],
+    newtons_per_unit: float | tuple[float, float, float] | None,
+) -> None:
+    in_newtons = bool(sensors) and all(sensor.unit == "N" for sensor in sensors.values())
+    if law.needs_newtons and not in_newtons and newtons_per_unit is None:
+        raise ValueError(
+            f"the law {type(law).__name__} needs forces in N and the readings are counts: give "
+            "newtons_per_unit, the calibration of the sensor"
+        )
+    measured = [name for name, sensor in sensors.items() if sensor.unit == "N"]
+    if measured and newtons_per_unit is not None:
+        raise ValueError(
+            f"newtons_per_unit: readings in counts expected, those of {', '.join(measured)} are in "
+            "N already: leave the calibration out"
+        )
+    given = newtons_per_unit if isinstance(newtons_per_unit, tuple) else (newtons_per_unit,)
+    if any(one is not None and not (math.isfinite(one) and one > 0) for one in given):
+        raise ValueError(f"newtons_per_unit: numbers above 0 expected, {newtons_per_unit} given")

@@ -1,0 +1,16 @@
+"""The law of a hand without control: the force of the start, with which others are compared."""
+
+from collections.abc import Sequence
+
+from holdfast_grip.laws.base import Law, Touch, Wish, stay
+
+
+class Fixed(Law):
+    """Law that keeps the force with which the grip began."""
+
+    def start(self, touches: Sequence[Touch], thumb: int) -> None:
+        """Do nothing."""
+
+    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+        """Return the scales as they are."""
+        return stay(touches)

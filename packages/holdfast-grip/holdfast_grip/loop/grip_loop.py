@@ -1,0 +1,228 @@
+"""The loop: from estimates to a hand, with guard, watchdog and log."""
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from msgspec import structs
+
+from holdfast.contact import HandEstimate
+from holdfast_grip.command import GripCommand, GripReason, LoopState
+from holdfast_grip.controller import GripController
+from holdfast_grip.errors import HandError
+from holdfast_grip.guard import CommandGuard, safe_command
+from holdfast_grip.hands import HandDevice
+from holdfast_grip.loop.watchdog import Watchdog
+
+MAX_CLOCK_STEP = 0.5
+"""Time by which the clock of a source may go ahead from one step to the next [s]. The loop is
+stepped while nothing arrives, so a larger step is a jump."""
+
+Log = Callable[[str, float], None]
+"""Function that gets each event of the loop as a text and its time [s]."""
+
+
+class GripLoop:
+    """Loop that commands one hand, estimate by estimate.
+
+    Leaving it as a context manager sends a last command: the scales as they are after a normal
+    end, the safe command after an exception. Before each command, the watchdog gets a heartbeat;
+    without one in time, the loop sends only the safe command.
+
+    Args:
+        controller: makes the commands.
+        hand: an open hand; it gets commands only if `armed`.
+        armed: whether commands are sent; otherwise it is a dry run.
+        watchdog: started watchdog; None for a hand that needs none, as the twin.
+        log: gets all events of the loop.
+
+    Attributes:
+        last: the last command; None before the first.
+        n_sent: number of commands that were sent; a hand gets no command twice, see `HandDevice`.
+    """
+
+    _now = -math.inf
+    _ahead = math.nan  # the time of the last step, if the clock jumped to it
+    _sent: GripCommand | None = None
+
+    def __init__(
+        self,
+        controller: GripController,
+        hand: HandDevice,
+        *,
+        armed: bool = False,
+        watchdog: Watchdog | None = None,
+        log: Log | None = None,
+    ) -> None:
+        self.controller, self.hand, self.armed = controller, hand, armed
+        self.guard = CommandGuard(controller.limits)
+        self.last: GripCommand | None = None
+        self.n_sent = 0
+        self._stays_open = False  # after a stop or fault that opened the hand and was ended
+        self._watchdog = watchdog
+        self._log = log or (lambda text, time: None)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether `stop` was called, and not `resume` after it."""
+        return self.guard.stopped
+
+    def stop(self) -> None:
+        """Replace every command by the safe one, from the next step until `resume`.
+
+        It may be called in any thread, also while `step` runs. Only `step` sends: call it next,
+        without data with an estimate that has no fingers.
+        """
+        self.guard.stop()
+
+    def resume(self) -> None:
+        """End a stop or a fault, by the decision of a person.
+
+        A hand that was opened is released once more, which ends its grip, and gets no command
+        until it holds something again: a reset must not close it. The next step may have any
+        time: a clock that has jumped is accepted.
+        """
+        self._now, self._ahead = -math.inf, math.nan
+        self._stays_open = self.last is not None and self.last.release
+        self.controller.resume()
+        self.guard.resume()
+
+    def step(
+        self,
+        estimate: HandEstimate,
+        time: float,
+        fault: GripReason = GripReason.NONE,
+        clock: float = math.nan,
+    ) -> GripCommand:
+        """Update the controller, check its command and send it.
+
+        Args:
+            estimate: the newest estimate, or the last one again.
+            time: time now, on the clock of the source [s]. One before that of an earlier step
+                counts as the same: a sample may be late by more than the time between two
+                steps. If the clock of the source jumps back, its samples become stale; if it
+                jumps ahead, that is a fault, and only the second time in a row is accepted.
+            fault: a fault outside the estimates, as that of a loop which is behind.
+            clock: time now on a clock of the host, for the highest rate of commands [s]; NaN
+                where time passes by the samples alone.
+
+        Raises:
+            HandError: the hand refuses the command, or the watchdog has taken over.
+        """
+        if self.armed and self.hand.silent:
+            fault = fault or GripReason.HAND
+        for angles in self.hand.joint_reports():
+            self.controller.observe(angles)
+        self.controller.report(fault)
+        command = self._update(estimate, time)
+        violated = self.guard.violation
+        admitted = self.guard.admit(command, clock)
+        if self.guard.violation != violated:
+            self._log(f"grip FAULT (limit): {self.guard.violation}", command.time)
+        before, self.last = self.last, admitted or self.last or command
+        self._stays_open = self._stays_open and self.last.state is LoopState.IDLE
+        if self._stays_open:
+            self.last = structs.replace(self.last, release=True)
+        repeats = self._stays_open and before is not None and before.state is LoopState.IDLE
+        if self.armed:
+            self._send(self.last, is_new=admitted is not None and not repeats)
+        return self.last
+
+    def follow(self, estimate: HandEstimate, time: float) -> None:
+        """Update the controller with an estimate that is not the newest, and send nothing.
+
+        So a loop that is behind misses no slip, contact or fault, and sends no old command.
+
+        Args:
+            estimate: an estimate; a newer one follows at once.
+            time: of the estimate, on the clock of the source [s].
+        """
+        violated = self.guard.violation
+        command = self.guard.check(self._update(estimate, time))
+        if self.guard.violation != violated:
+            self._log(f"grip FAULT (limit): {self.guard.violation}", command.time)
+
+    def make_safe(self) -> None:
+        """Send the safe command, and no heartbeat; it makes no difference whether the hand fails.
+
+        It holds the scales that were sent last, not those of a command that never left.
+        """
+        base = self._sent or self.last
+        if not self.armed or base is None:
+            return
+        release = base.release or self.controller.limits.on_fault == "open"
+        if release or self._sent is not None:
+            with suppress(Exception):
+                self.hand.send(safe_command(base, GripReason.NONE, release=release))
+
+    def _update(self, estimate: HandEstimate, time: float) -> GripCommand:
+        """Update the controller; return its command, whose time is finite."""
+        if self.stopped:
+            self.controller.stop()
+        command = self.controller.update(estimate, self._advance(time))
+        for event in self.controller.events():
+            self._log(str(event), self._finite(event.time))
+        if not math.isfinite(command.time):  # JSON and the messages of hands have no NaN
+            command = structs.replace(command, time=self._finite(command.time))
+        return command
+
+    def _advance(self, time: float) -> float:
+        """Return the time of a step, which never decreases; NaN if the clock jumped ahead."""
+        if not math.isfinite(time):
+            return math.nan
+        if -math.inf < self._now < time - MAX_CLOCK_STEP:
+            ahead, self._ahead = self._ahead, time
+            if not ahead <= time <= ahead + MAX_CLOCK_STEP:
+                return math.nan
+        self._ahead = math.nan
+        self._now = max(self._now, time)
+        return self._now
+
+    def _finite(self, time: float) -> float:
+        """Return a time, or that of the last good step if it is no number; 0 without one."""
+        if math.isfinite(time):
+            return time
+        return self._now if math.isfinite(self._now) else 0.0
+
+    def _send(self, command: GripCommand, *, is_new: bool) -> None:
+        """Send a heartbeat, and the command if it is new.
+
+        If the process was stopped between heartbeat and command, the watchdog has taken over
+        before the command left. The check after it finds this, and the loop ends with the safe
+        command.
+        """
+        self._beat(command)
+        if is_new:
+            self.n_sent += self.hand.send(command)
+            self._sent = command
+            if self._watchdog is not None:
+                self._watchdog.check()
+
+    def _beat(self, command: GripCommand) -> None:
+        if self._watchdog is not None:
+            self._watchdog.beat(command)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the hand in a safe state."""
+        if not self.armed or self.last is None:
+            return
+        if kind is not None:
+            self.make_safe()
+            return
+        try:
+            self._beat(self.last)
+        except HandError:
+            self.make_safe()
+            raise
+        command = safe_command(self.last, GripReason.NONE, release=self.last.release)
+        self.hand.send(command)

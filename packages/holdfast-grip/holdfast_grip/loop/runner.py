@@ -1,0 +1,160 @@
+"""Step a grip loop with every estimate of a source, and while nothing arrives."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from threading import Event
+from typing import NamedTuple
+
+from holdfast.contact import ContactState, HandEstimate
+from holdfast.live.session import RequestQueue
+from holdfast.live.stream_detector import StreamUpdate
+from holdfast_grip.command import GripCommand, GripReason
+from holdfast_grip.loop.grip_loop import GripLoop
+
+TICK = 0.01
+"""Time without samples after which the loop is stepped, so that it detects silence [s]."""
+MAX_PAUSE = 0.1
+"""Longest time between two steps of the loop; a longer one is the fault `behind` [s]."""
+MAX_PENDING = 512
+"""Number of newest updates that wait for the next step: more than come in `MAX_PAUSE`."""
+NO_DATA = HandEstimate(0.0, ContactState.UNKNOWN, {})
+"""Estimate with which a loop is stepped that is stopped before the first one."""
+
+
+class _Arrived(NamedTuple):
+    """Update, and the time at which its last byte was received, by `time.monotonic` [s]."""
+
+    update: StreamUpdate
+    received: float
+
+
+class LoopRunner:
+    """Step a loop with the updates that it gets, in one thread.
+
+    `put`, `stop` and `reset` may be called in any thread and return at once. A stop does not
+    wait for the updates that are pending.
+
+    A paced source goes on while the hand takes a command. So each step takes all pending updates:
+    the controller gets every estimate, and the hand only the command of the newest one. Its age
+    counts from the arrival of its samples.
+
+    Args:
+        loop: the loop to step.
+        speed: ratio of the source's time to real time; 0 for a source that is not paced: then
+            each estimate has its command, and only the times of the samples count.
+        on_command: is called with every command.
+    """
+
+    def __init__(
+        self,
+        loop: GripLoop,
+        speed: float = 1.0,
+        on_command: Callable[[GripCommand], None] = lambda _: None,
+    ) -> None:
+        self.loop = loop
+        self._speed = speed
+        self._on_command = on_command
+        self._pending: deque[_Arrived] = deque(maxlen=MAX_PENDING)
+        self._wake = Event()
+        self._requests = RequestQueue()
+        self._estimate: HandEstimate | None = None
+        self._received = 0.0
+        self._stepped_at: float | None = None
+
+    def put(self, update: StreamUpdate) -> None:
+        """Append an update to those that are pending; a listener of a session."""
+        self._pending.append(_arrived(update))
+        self._wake.set()
+
+    def stop(self) -> "Future[None]":
+        """Bring the hand into its safe state; the result is there when the command was sent."""
+        self.loop.stop()
+        # Once more after a reset that is in the queue already.
+        return self._request(self.loop.stop)
+
+    def reset(self) -> "Future[None]":
+        """End a stop or a fault, by the decision of a person."""
+        return self._request(self.loop.resume)
+
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Step the loop until `is_over` and nothing is pending.
+
+        Raises:
+            HandError: as `GripLoop.step`.
+        """
+        while not is_over() or self._pending:
+            self._wake.wait(TICK)
+            self._wake.clear()
+            self._process([self._pending.popleft() for _ in range(len(self._pending))])
+
+    def process(self, update: StreamUpdate | None) -> None:
+        """Carry out the requests, and step the loop with an update; None if nothing arrived.
+
+        Raises:
+            HandError: as `GripLoop.step`; waiting requests get it too.
+        """
+        self._process([] if update is None else [_arrived(update)])
+
+    def _process(self, arrived: Sequence[_Arrived]) -> None:
+        step = self._step if self._speed else self._step_each
+        self._requests.carry_out(lambda: step(arrived))
+
+    def _step(self, arrived: Sequence[_Arrived]) -> None:
+        """Step the loop of a paced source once, with the newest estimate."""
+        now = time.monotonic()
+        behind = self._stepped_at is not None and now - self._stepped_at > MAX_PAUSE
+        estimates = _estimates(arrived)
+        for estimate in estimates[:-1]:
+            self.loop.follow(estimate, estimate.time)
+        if estimates:
+            newest = estimates[-1]
+            if self._estimate is None or newest.time != self._estimate.time:
+                self._received = max(received for update, received in arrived if update.estimates)
+            self._estimate = newest
+        if self._estimate is None:
+            self._step_without_samples()
+            return
+        self._stepped_at = now
+        fault = GripReason.BEHIND if behind else GripReason.NONE
+        at = self._estimate.time + self._age(now)
+        self._on_command(self.loop.step(self._estimate, at, fault, now))
+
+    def _age(self, now: float) -> float:
+        """Return the age of the newest estimate by the clock of the source; 0 if it is new [s]."""
+        age = now - self._received
+        return 0.0 if age < TICK else self._speed * age
+
+    def _step_each(self, arrived: Sequence[_Arrived]) -> None:
+        """Step the loop of a source that is not paced, with each estimate."""
+        estimates = _estimates(arrived)
+        for estimate in estimates:
+            self._estimate = estimate
+            self._on_command(self.loop.step(estimate, estimate.time))
+        if not estimates:
+            self._step_without_samples()
+
+    def _step_without_samples(self) -> None:
+        """Send the safe command of a stop, where no time passes without samples."""
+        if self.loop.stopped:
+            estimate = self._estimate or NO_DATA
+            self._on_command(self.loop.step(estimate, estimate.time))
+
+    def _request(self, work: Callable[[], None]) -> "Future[None]":
+        """Run `work` before the next step, and step at once."""
+        result = self._requests.append(work, cancellable=False)
+        self._wake.set()
+        return result
+
+
+def _estimates(arrived: Sequence[_Arrived]) -> list[HandEstimate]:
+    """Return all estimates of updates, oldest first."""
+    return [estimate for update, _ in arrived for estimate, _ in update.estimates]
+
+
+def _arrived(update: StreamUpdate) -> _Arrived:
+    """Return an update with the time of its arrival: now, if it has no samples."""
+    now = time.monotonic()
+    arrival = update.arrival
+    return _Arrived(update, now if arrival is None else min(arrival.received, now))

@@ -1,0 +1,469 @@
+from typing import NamedTuple
+
+import pytest
+
+from holdfast_grip import LAWS, GripReason
+from holdfast_grip.laws import Stability, Touch, law_named
+from holdfast_grip.laws.costanzo import LARGEST_DYNAMIC_FORCE, STATIC_MARGIN, Costanzo
+from holdfast_grip.laws.friction_margin import FORCE_MARGIN, FrictionMargin
+from holdfast_grip.laws.pr2 import Pr2
+from holdfast_grip.laws.relaxation import RELAXATION_MARGIN, RELAXATION_SETTLE_TIME
+from holdfast_grip.laws.wong_zhu import WongZhu
+
+DT = 1 / 150
+
+
+def touch(normal=2.0, tangential=0.6, probability=0.95, instability=0.001, name="index"):
+    made = Touch(name)
+    made.known = made.touching = True
+    made.probability, made.instability = probability, instability
+    made.force, made.normal, made.tangential = (normal, tangential, 0.0), normal, tangential
+    made.start_normal = 2.0
+    return made
+
+
+def started(name, touches, thumb=-1):
+    law = law_named(name)
+    law.start(touches, thumb)
+    return law
+
+
+class Wanted(NamedTuple):
+    scale: float
+    reason: GripReason
+
+
+def wanted(law, touches, time, dt):
+    return [Wanted(*wish) for wish in law.wishes(touches, time, dt)]
+
+
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_a_quiet_grip_wants_no_rise(name):
+    touches = [touch()]
+    if name == "friction-margin":
+        touches[0].scale = 2.0  # its margin for a friction of 0.3 is more than this grip has
+    law = started(name, touches)
+    for k in range(300):
+        (wish,) = wanted(law, touches, k * DT, DT)
+        assert wish.scale <= touches[0].scale
+
+
+def shake(touches):
+    """Shake the first finger once."""
+    x, y, z = touches[0].force
+    touches[0].force, touches[0].tangential = (x, y + 1.0, z), touches[0].tangential + 1.0
+
+
+def slide(touches):
+    """Let all fingers slide."""
+    for one in touches:
+        one.slides, one.slip_probability = True, 0.9
+
+
+RELAXING = [
+    (Pr2(fall=0.2), shake),
+    (WongZhu(fall=0.2), shake),
+    (WongZhu(fall=0.2, together=True), shake),
+    (Costanzo(fall=0.2), slide),
+]
+
+
+class TestRelaxation:
+    def after_a_slip(self, law, slip, scale=2.0):
+        """Return fingers of a grip that slipped at a scale, and calmed down at once."""
+        touches = [touch(), touch(name="thumb")]
+        for one in touches:
+            one.scale, one.normal, one.tangential = scale, 2.0 * scale, 0.6 * scale
+        law.start(touches, -1)
+        before = [(one.force, one.tangential) for one in touches]
+        slip(touches)
+        assert any(wish.scale > scale for wish in wanted(law, touches, 0.0, DT))
+        for one, (force, tangential) in zip(touches, before, strict=True):
+            one.force, one.tangential = force, tangential
+            one.slides, one.slip_probability = False, 0.0
+        return touches
+
+    def calm(self, law, touches, seconds, start=0.0):
+        for k in range(1, round(seconds / DT) + 1):
+            wishes = wanted(law, touches, start + k * DT, DT)
+            for one, wish in zip(touches, wishes, strict=True):
+                one.scale = min(wish.scale, one.scale)
+        return [one.scale for one in touches]
+
+    @pytest.mark.parametrize(("law", "slip"), RELAXING)
+    def test_the_force_falls_in_calm_after_the_settle_time(self, law, slip):
+        touches = self.after_a_slip(law, slip, scale=2.0)
+        for one in touches:
+            one.scale = 3.0
+        assert self.calm(law, touches, RELAXATION_SETTLE_TIME / 2)[0] == 3.0
+        (scale, _) = self.calm(law, touches, 0.75, start=RELAXATION_SETTLE_TIME / 2)
+        assert 2.5 < scale < 3.0
+
+    @pytest.mark.parametrize(("law", "slip"), RELAXING)
+    def test_it_stays_above_the_force_of_the_last_slip(self, law, slip):
+        touches = self.after_a_slip(law, slip, scale=1.4)
+        touches[0].scale = 3.0
+        assert self.calm(law, touches, 20.0)[0] == pytest.approx(RELAXATION_MARGIN * 1.4)
+
+    @pytest.mark.parametrize("law", [Pr2(fall=0.0), WongZhu(fall=0.0)])
+    def test_without_a_fall_the_force_stays(self, law):
+        touches = self.after_a_slip(law, shake)
+        assert self.calm(law, touches, 5.0) == [2.0, 2.0]
+
+    @pytest.mark.parametrize("law", [Pr2(fall=0.2), WongZhu(fall=0.2)])
+    def test_a_new_grip_forgets_the_slip(self, law):
+        self.after_a_slip(law, shake)
+        touches = [touch(), touch(name="thumb")]
+        law.start(touches, -1)
+        for one in touches:
+            one.scale = 2.0
+        assert self.calm(law, touches, 20.0) == [1.0, 1.0]
+
+
+class TestPr2:
+    def shaken(self, amplitude, slow=0.0):
+        touches = [touch(), touch(name="thumb")]
+        law, wishes = Pr2(gain=1.3, threshold_factor=1.0), []
+        law.start(touches, -1)
+        for k in range(60):
+            normal = 2.0 + slow * k * DT
+            touches[0].force = (normal, 0.6 + amplitude * (-1) ** k, 0.0)
+            touches[0].normal = normal
+            wishes.append(wanted(law, touches, k * DT, DT))
+        return wishes
+
+    def test_a_vibration_raises_all_fingers(self):
+        last = self.shaken(0.1)[-1]
+        assert [tuple(wish) for wish in last] == [(1.3, GripReason.SLIP)] * 2
+
+    def test_a_vibration_below_the_threshold_does_not(self):
+        assert all(one.scale == 1.0 for wishes in self.shaken(0.01) for one in wishes)
+
+    def test_the_factor_raises_the_threshold(self):
+        def rises(factor):
+            touches = [touch()]
+            law = Pr2(threshold_factor=factor)
+            law.start(touches, -1)
+            touches[0].force = (2.0, 0.7, 0.0)
+            return wanted(law, touches, DT, DT)[0].scale > 1.0
+
+        assert rises(1.0) and not rises(3.0)
+
+    def test_a_force_that_changes_slowly_is_no_slip(self):
+        assert self.shaken(0.1, slow=5.0)[-1][0].reason is GripReason.NONE
+
+
+class TestWongZhu:
+    def test_a_jump_of_the_tangential_force_raises_that_finger(self):
+        touches = [touch(), touch(name="thumb")]
+        law = WongZhu(threshold=0.05, gain=1.3, together=False)
+        law.start(touches, -1)
+        touches[0].tangential = 0.67
+        one, other = wanted(law, touches, DT, DT)
+        assert one == (1.3, GripReason.SLIP)
+        assert other == (1.0, GripReason.NONE)
+
+    def test_all_fingers_may_react_together(self):
+        touches = [touch(), touch(name="thumb")]
+        law = WongZhu(threshold=0.05, gain=1.3, together=True)
+        law.start(touches, -1)
+        touches[0].tangential = 0.67
+        assert wanted(law, touches, DT, DT) == [(1.3, GripReason.SLIP)] * 2
+
+    def test_a_small_change_does_not(self):
+        touches = [touch()]
+        law = started("wong-zhu", touches)
+        touches[0].tangential = 0.62
+        assert wanted(law, touches, DT, DT)[0].reason is GripReason.NONE
+
+
+class TestFrictionMargin:
+    def test_the_target_is_the_margin_times_the_least_force(self):
+        touches = [touch(normal=2.0, tangential=1.2)]
+        (wish,) = wanted(started("friction-margin", touches), touches, DT, DT)
+        assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / 0.6 / 2.0)  # 0.6 holds: it is known
+        assert wish.reason is GripReason.MARGIN
+
+    def test_a_slip_lowers_the_friction(self):
+        touches = [touch(normal=2.0, tangential=1.4)]
+        law = started("friction-margin", touches)
+        wanted(law, touches, DT, DT)
+        touches[0].probability, touches[0].tangential = 0.1, 1.2
+        (wish,) = wanted(law, touches, 2 * DT, DT)
+        assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
+
+    def wish(self, law, tangential):
+        touches = [touch(tangential=tangential)]
+        law.start(touches, -1)
+        return wanted(law, touches, DT, DT)[0]
+
+    def test_it_falls_by_5_percent_at_most(self):
+        assert self.wish(FrictionMargin(fall=100.0), 0.01) == (0.95, GripReason.RELAX)
+        assert self.wish(FrictionMargin(fall=0.2), 0.01).scale == pytest.approx(1 - 0.2 * DT)
+
+    def test_it_acts_below_a_margin_of_its_own(self):
+        """The friction is 0.5: 2 N are 1.12 times what 0.893 N need."""
+        always = FrictionMargin(first_friction=0.5, margin=1.15, acts_at=1.15)
+        assert self.wish(always, 0.893).reason is GripReason.MARGIN
+        later = FrictionMargin(first_friction=0.5, margin=1.15, acts_at=1.1)
+        assert self.wish(later, 0.893) == (1.0, GripReason.NONE)
+        assert self.wish(later, 0.95).scale == pytest.approx(1.15 * 0.95 / 0.5 / 2.0)
+
+
+FIRST = {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1, "slip_level": 0.1}
+
+
+class TestCostanzo:
+    def begun(self, n=2, **arguments):
+        touches = [touch(name=name) for name in ("thumb", "index", "middle")[:n]]
+        law = Costanzo(**FIRST | arguments)
+        law.start(touches, 0)
+        return law, touches
+
+    def scales(self, law, touches, n):
+        return [wanted(law, touches, k * DT, DT)[0].scale for k in range(n)]
+
+    def test_a_slip_of_one_finger_raises_all(self):
+        law, touches = self.begun()
+        slide(touches[:1])
+        first, second = wanted(law, touches, 0.0, DT)
+        assert first == second and first.scale > 1.0 and first.reason is GripReason.SLIP
+
+    def test_a_more_probable_slip_presses_more(self):
+        def pressed(probability):
+            law, touches = self.begun()
+            touches[0].slides, touches[0].slip_probability = True, probability
+            return self.scales(law, touches, 1)[0]
+
+        assert pressed(0.3) < pressed(0.6) < pressed(1.0)
+
+    def test_a_probability_below_the_level_is_no_slip(self):
+        law, touches = self.begun(slip_level=0.3)
+        touches[0].slip_probability = 0.29
+        assert self.scales(law, touches, 30)[-1] == 1.0
+        touches[0].slip_probability = 0.5
+        assert self.scales(law, touches, 1)[0] > 1.0
+
+    def test_a_longer_slip_presses_more_up_to_the_largest_dynamic_force(self):
+        law, touches = self.begun(gain=0.1)
+        slide(touches)
+        scales = self.scales(law, touches, 600)
+        static = STATIC_MARGIN * 1.2 / 0.3
+        assert scales[0] < scales[5] <= scales[-1]
+        assert scales[-1] == pytest.approx((static + LARGEST_DYNAMIC_FORCE) / 4.0)
+
+    def test_a_load_that_grows_is_followed_without_a_slip(self):
+        law, touches = self.begun()
+        for one in touches:
+            one.tangential = 1.2
+        scale = self.scales(law, touches, 60)[-1]
+        assert scale == pytest.approx(STATIC_MARGIN * 2.4 / 0.5 / 4.0, rel=0.01)
+        assert wanted(law, touches, 1.0, DT)[0].reason is GripReason.MARGIN
+
+    def test_a_slip_shows_the_friction(self):
+        """T/N is 0.3: as the load doubles, the force follows for 0.3 and no more for 0.5."""
+        law, touches = self.begun(gain=0.0)
+        slide(touches)
+        wanted(law, touches, 0.0, DT)
+        for one in touches:
+            one.slip_probability, one.tangential = 0.0, 1.2
+        assert self.scales(law, touches, 60)[-1] == pytest.approx(
+            STATIC_MARGIN * 2.4 / 0.3 / 4.0, rel=0.01
+        )
+
+    def test_a_finger_without_an_estimate_changes_nothing(self):
+        law, touches = self.begun()
+        slide(touches)
+        touches[1].known = False
+        assert wanted(law, touches, 0.0, DT) == [(1.0, GripReason.NONE)] * 2
+
+
+class TestStability:
+    def scale_after(self, law, touches, seconds, start=0.0):
+        """Return the scale after a time in which the hand follows each wish at once."""
+        for k in range(1, round(seconds / DT) + 1):
+            (wish, *others) = wanted(law, touches, start + k * DT, DT)
+            assert all(other == wish for other in others), "one scale for the hand"
+            for one in touches:
+                one.normal *= wish.scale / one.scale
+                one.scale = wish.scale
+        return touches[0].scale
+
+    def test_a_load_that_grows_is_followed_before_anything_slips(self):
+        one = touch()
+        law = started("holdfast", [one])
+        self.scale_after(law, [one], 0.5)
+        one.tangential, one.probability = 0.9, 0.83
+        (wish,) = [wanted(law, [one], 0.5 + k * DT, DT)[0] for k in range(1, 9)][-1:]
+        assert wish.scale > 1.2
+        assert wish.reason is GripReason.LOAD
+
+    def test_a_load_that_someone_else_carries_at_first_is_no_reaction(self):
+        """The calm grip is followed while the object is handed over."""
+        one = touch(tangential=0.05)
+        law = started("holdfast", [one])
+        for k in range(300):
+            one.tangential = min(0.05 + 0.01 * k, 0.6)
+            (wish,) = wanted(law, [one], k * DT, DT)
+            assert wish.scale == 1.0
+
+    def test_the_step_grows_with_the_doubt(self):
+        def step(probability):
+            touches = [touch(probability=probability)]
+            return wanted(started("holdfast", touches), touches, DT, DT)[0].scale
+
+        assert 1.0 < step(0.1) < step(0.05) < step(0.0)
+
+    def test_no_second_step_in_the_refractory_time(self):
+        one = touch(probability=0.0)
+        law = started("holdfast", [one])
+        (first,) = wanted(law, [one], 0.0, DT)
+        one.scale = first.scale
+        times = [k * DT for k in range(1, 60)]
+        second = next(time for time in times if wanted(law, [one], time, DT)[0].scale > one.scale)
+        assert second > law.refractory
+
+    def test_after_a_step_a_doubt_as_it_leaves_starts_no_second_one(self):
+        one = touch(probability=0.0)
+        law = started("holdfast", [one])
+        (first,) = wanted(law, [one], 0.0, DT)
+        one.scale, one.probability = first.scale, 0.2
+        times = [k * DT for k in range(1, round(law.episode / DT))]
+        assert {wanted(law, [one], time, DT)[0].scale for time in times} == {first.scale}
+
+    @pytest.mark.parametrize(("fingers", "slowest"), [(1, 0.1), (4, 0.02)])
+    def test_a_reaction_comes_the_sooner_the_more_of_the_load_slides(self, fingers, slowest):
+        touches = [touch(name=name) for name in ("thumb", "index", "middle", "ring")]
+        law = started("holdfast", touches)
+        for one in touches[:fingers]:
+            one.probability = 0.4
+        scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(30)]
+        first = next(k for k, scale in enumerate(scales) if scale > 1.0)
+        assert slowest / 4 < first * DT + DT <= slowest
+
+    def test_a_slip_starts_a_reaction_whatever_the_stability(self):
+        one = touch(probability=0.95)
+        one.slides, one.slip_probability = True, 0.2
+        law = started("holdfast", [one])
+        wish = [wanted(law, [one], k * DT, DT)[0] for k in range(2)][-1]
+        assert wish.scale > 1.0 and wish.reason is GripReason.UNSTABLE
+        one.slides = False
+        law = started("holdfast", [one])
+        assert wanted(law, [one], 0.0, DT)[0].scale == 1.0
+
+    def test_a_more_probable_slip_gives_a_larger_step(self):
+        def step(probability):
+            one = touch(probability=0.9)
+            one.slides, one.slip_probability = True, probability
+            law = started("holdfast", [one])
+            return [wanted(law, [one], k * DT, DT)[0].scale for k in range(2)][-1]
+
+        assert step(0.2) < step(0.6) < step(1.0)
+
+    def test_a_hand_that_carries_less_reacts_sooner_and_more(self):
+        """Where friction falls, all contacts slide smoothly, and no finger is surely unstable."""
+
+        def reaction(tangential):
+            touches = [touch(name=name) for name in ("thumb", "index", "middle")]
+            law = started("holdfast", touches)
+            for one in touches:
+                one.tangential, one.probability = tangential, 0.8
+            scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(30)]
+            first = next(k for k, scale in enumerate(scales) if scale > 1.0)
+            return first, scales[first]
+
+        (late, small), (soon, large) = reaction(0.6), reaction(0.4)
+        assert soon < late and large > small
+
+    @pytest.mark.parametrize(("press", "rises"), [(0.7, False), (1.0, True)])
+    def test_a_load_that_falls_with_the_force_is_not_missing(self, press, rises):
+        one = touch()
+        law = started("holdfast", [one])
+        one.scale, one.normal = 2.0, 4.0
+        self.scale_after(law, [one], 1.1)
+        assert 1.0 < one.scale < 1.5, "the force falls"
+        one.probability, one.tangential, one.normal = 0.7, 0.7 * one.tangential, press * one.normal
+        scales = [wanted(law, [one], 1.1 + k * DT, DT)[0].scale for k in range(1, 16)]
+        assert (max(scales) > one.scale) is rises
+
+    def test_after_a_slip_the_floor_follows_the_load(self):
+        """At the friction that the slip has shown, half of the load needs half of the force."""
+        one = touch(normal=2.0, tangential=1.0, probability=0.0)
+        one.slides, one.slip_probability = True, 0.9
+        law = started("holdfast", [one])
+        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.slides, one.slip_probability, one.probability = False, 0.0, 0.95
+        one.normal = 2.0 * one.scale
+        assert self.scale_after(law, [one], 4.0) == pytest.approx(law.margin, rel=0.2)
+        one.tangential = 0.3
+        assert self.scale_after(law, [one], 4.0, 4.0) == 1.0
+
+    def test_a_floor_without_a_slip_rule_is_the_force_of_the_slip_and_the_margin(self):
+        one = touch(probability=0.0)
+        law = started("holdfast", [one])
+        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.probability = 0.95
+        assert 1.0 < self.scale_after(law, [one], 4.0) <= law.margin
+
+    def test_a_hand_that_presses_more_takes_smaller_steps(self):
+        def step(scale):
+            one = touch(probability=0.0)
+            law = started("holdfast", [one])
+            one.scale = scale
+            return wanted(law, [one], DT, DT)[0].scale - scale
+
+        assert step(1.0) == pytest.approx(2.0 * step(2.0))
+
+    def test_after_a_shake_the_force_falls_to_that_of_the_calm_grip(self):
+        """A reaction at a high force shows no low friction: the calm grip held at its T/N."""
+        one = touch()
+        law = started("holdfast", [one])
+        self.scale_after(law, [one], 0.5)
+        one.scale, one.normal, one.probability = 2.4, 4.8, 0.0
+        one.scale = wanted(law, [one], 0.51, DT)[0].scale
+        one.probability = 0.95
+        assert self.scale_after(law, [one], 6.0, 0.51) < 1.5
+
+    def test_a_doubt_that_a_step_leaves_starts_no_other_one_after_the_episode(self):
+        one = touch(probability=0.0)
+        law = started("holdfast", [one])
+        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.probability = 0.8
+        self.scale_after(law, [one], 2.0)
+        assert one.scale < 2.5
+        one.probability = 0.95
+        self.scale_after(law, [one], 5.0, 2.0)
+        one.probability = 0.8
+        before = one.scale
+        assert max(self.scale_after(law, [one], DT, 7.0 + k * DT) for k in range(30)) > before
+
+    def test_a_calm_hand_may_hold_lighter_than_at_first(self):
+        one = touch()
+        law = Stability(lowest=0.9)
+        law.start([one], -1)
+        assert self.scale_after(law, [one], 2.0) == pytest.approx(0.9)
+
+    def test_a_hand_that_relaxes_raises_nothing(self):
+        """Scales of single fingers needed a new balance again and again: 46 rises a minute."""
+        touches = [touch(name=name, normal=n) for name, n in (("thumb", 3.0), ("index", 2.0))]
+        law = started("holdfast", touches)
+        for one in touches:
+            one.scale = 2.0
+        before = 2.0
+        for k in range(450):
+            scale = self.scale_after(law, touches, DT, k * DT)
+            assert scale <= before
+            before = scale
+        assert before < 1.7
+
+    def test_a_finger_that_carries_nothing_starts_no_reaction(self):
+        one, idle = touch(), touch(name="middle", normal=0.01, probability=0.0)
+        idle.start_normal = 0.01
+        law = started("holdfast", [one, idle])
+        assert self.scale_after(law, [one, idle], 1.0) == 1.0
+
+    def test_a_finger_without_contact_is_pressed(self):
+        one = touch()
+        one.touching = False
+        (wish,) = wanted(started("holdfast", [one]), [one], DT, DT)
+        assert wish.reason is GripReason.UNSTABLE

@@ -1,0 +1,406 @@
+import math
+
+import pytest
+
+from grip.build import FINGERS, RATE, hand, holding, scales
+from holdfast.contact import ContactState, HandEstimate
+from holdfast_grip import (
+    FingerCommand,
+    GripCommand,
+    GripController,
+    GripReason,
+    Limits,
+    LoopState,
+)
+from holdfast_grip.errors import HandError
+from holdfast_grip.hands.base import HandDevice
+from holdfast_grip.loop.grip_loop import GripLoop
+
+SLIPPING = {"probability": 0.0, "state": ContactState.UNSTABLE}
+
+
+class Tape(HandDevice):
+    """Hand that keeps its commands, and may fail. It asks for every command."""
+
+    name = "tape:"
+    heartbeat, needs_idle = 0.0, True
+
+    def __init__(self):
+        self.commands, self.fails = [], False
+
+    def open(self):
+        pass
+
+    def _send(self, command):
+        if self.fails:
+            raise HandError("no")
+        self.commands.append(command)
+
+    def close(self):
+        pass
+
+
+class Beats:
+    def __init__(self):
+        self.commands = []
+
+    def beat(self, command):
+        self.commands.append(command)
+
+    def check(self):
+        pass
+
+
+@pytest.fixture
+def tape():
+    return Tape()
+
+
+def stepped(loop, time, n=10, **changes):
+    for _ in range(n):
+        time += 1 / RATE
+        loop.step(hand(time, **changes), time)
+    return time
+
+
+def test_a_dry_run_sends_nothing_and_logs_everything(tape):
+    controller, time = holding()
+    texts = []
+    with GripLoop(controller, tape, log=lambda text, _: texts.append(text)) as loop:
+        stepped(loop, time, index=SLIPPING)
+    assert tape.commands == []
+    assert loop.n_sent == 0
+    assert "grip REACT: index rises from 1.000 (unstable)" in texts
+    assert "grip REACT" in texts
+
+
+def test_the_controller_gets_the_joints_of_the_hand_before_the_estimate(tape):
+    controller, time = holding()
+    reports, seen = [[0.0, 1.0], [0.5, 1.0]], []
+    tape.joint_reports = lambda: [reports.pop(0)] if reports else []
+    controller.observe = lambda angles: seen.append((angles, controller._time))
+    with GripLoop(controller, tape) as loop:
+        end = stepped(loop, time, n=3)
+    assert [angles for angles, _ in seen] == [[0.0, 1.0], [0.5, 1.0]]
+    assert [at for _, at in seen] == pytest.approx([time, time + 1 / RATE])
+    assert end > time
+
+
+def test_armed_it_sends_what_the_controller_says(tape):
+    controller, time = holding()
+    beats = Beats()
+    with GripLoop(controller, tape, armed=True, watchdog=beats) as loop:
+        time = stepped(loop, time)
+        stepped(loop, time, index=SLIPPING)
+        assert scales(tape.commands[-1])["index"] > 1.1
+        assert beats.commands == tape.commands
+    assert scales(tape.commands[-1]) == scales(tape.commands[-2])
+
+
+@pytest.mark.parametrize("on_fault", ["hold", "open"])
+def test_an_exception_leaves_the_hand_in_the_safe_state(tape, on_fault):
+    controller, time = holding(on_fault=on_fault)
+    with pytest.raises(RuntimeError), GripLoop(controller, tape, armed=True) as loop:
+        stepped(loop, time)
+        raise RuntimeError
+    assert tape.commands[-1].state is LoopState.FAULT
+    assert tape.commands[-1].release is (on_fault == "open")
+
+
+def test_a_hand_that_fails_ends_the_loop_with_its_own_error(tape):
+    controller, time = holding()
+    with pytest.raises(HandError, match="no"), GripLoop(controller, tape, armed=True) as loop:
+        time = stepped(loop, time)
+        tape.fails = True
+        stepped(loop, time)
+
+
+def test_heartbeats_continue_between_commands(tape):
+    controller, time = holding(max_rate=30.0)
+    beats = Beats()
+    with GripLoop(controller, tape, armed=True, watchdog=beats) as loop:
+        stepped(loop, time, n=100)
+        assert len(beats.commands) == 100
+        assert len(tape.commands) == pytest.approx(20, abs=1)
+
+
+def test_a_controller_beyond_its_limits_is_stopped_by_the_guard(tape):
+    controller, time = holding()
+    broken = GripCommand(time, LoopState.HOLD, {name: FingerCommand(99.0) for name in FINGERS})
+    controller.update = lambda estimate, time: broken
+    texts = []
+    with GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text)) as loop:
+        loop.step(hand(time), time)
+    assert {one.scale for one in tape.commands[0].fingers.values()} == {1.0}
+    assert tape.commands[0].state is LoopState.FAULT
+    assert texts == ["grip FAULT (limit): thumb: a scale of 99 given, 0.8 to 3 expected"]
+
+
+class TestStop:
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_the_next_step_sends_the_safe_command(self, tape, on_fault):
+        controller, time = holding(on_fault=on_fault)
+        texts = []
+        loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
+        held = scales(tape.commands[-1])
+        assert held["index"] > 1.1
+        loop.stop()
+        loop.step(hand(time, index=SLIPPING), time + 1e-4)  # sooner than the highest rate allows
+        sent = tape.commands[-1]
+        assert (sent.state, sent.reason) == (LoopState.FAULT, GripReason.STOPPED)
+        assert sent.release is (on_fault == "open")
+        assert scales(sent) == held
+        assert controller.state is LoopState.FAULT
+        assert texts[-1] == "grip FAULT (stopped)"
+
+    def test_it_lasts_whatever_the_estimates_are(self, tape):
+        controller, time = holding(recovery=0.0)
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        loop.stop()
+        stepped(loop, time, n=300, index=SLIPPING)
+        assert {command.reason for command in tape.commands[10:]} == {GripReason.STOPPED}
+        assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
+
+    def test_it_needs_no_data(self, tape):
+        beats = Beats()
+        loop = GripLoop(GripController(Limits(on_fault="open")), tape, armed=True, watchdog=beats)
+        loop.stop()
+        loop.step(HandEstimate(0.0, ContactState.UNKNOWN, {}), 0.0)
+        assert [command.release for command in tape.commands] == [True]
+        loop.step(HandEstimate(0.0, ContactState.UNKNOWN, {}), 0.0)
+        assert len(beats.commands) == 2
+
+    def test_a_grip_that_still_holds_goes_on_with_its_scales(self, tape):
+        controller, time = holding()
+        texts = []
+        loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
+        held = scales(tape.commands[-1])
+        assert held["index"] > 1.1
+        loop.stop()
+        time = stepped(loop, time)
+        loop.resume()
+        assert not loop.stopped
+        time = stepped(loop, time, n=1)
+        assert loop.last.state is LoopState.HOLD
+        assert scales(loop.last) == held
+        assert texts[-1] == "grip HOLD"
+        # Past the episode of the first step. The thumb carries half of all normal forces.
+        stepped(loop, time, n=120, thumb=SLIPPING)
+        assert scales(loop.last)["index"] > held["index"]
+
+    def test_without_contact_it_begins_from_idle(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        loop.stop()
+        gone = {name: {"state": ContactState.NO_CONTACT} for name in FINGERS}
+        time = stepped(loop, time, n=20, **gone)
+        loop.resume()
+        stepped(loop, time, n=20, **gone)
+        assert loop.last.state is LoopState.IDLE
+
+    def test_a_hand_that_opened_gets_no_command_until_it_holds_again(self, tape):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True)
+        with loop:
+            loop.stop()
+            time = stepped(loop, time)
+            loop.resume()
+            n = len(tape.commands)
+            time = stepped(loop, time, n=20)
+            assert loop.last.state is LoopState.IDLE
+            (last,) = tape.commands[n:]  # ends the grip of the hand
+            assert (last.state, last.release) == (LoopState.IDLE, True)
+        assert tape.commands[-1].release
+        stepped(loop, time, n=40)
+        assert tape.commands[-1].state is LoopState.HOLD
+        assert not tape.commands[-1].release
+
+    def test_resuming_what_was_not_stopped_changes_nothing(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
+        before = scales(loop.last)
+        loop.resume()
+        stepped(loop, time, n=1)
+        assert loop.last.state is not LoopState.IDLE
+        assert scales(loop.last) == pytest.approx(before, rel=0.05)
+
+
+def test_an_orderly_end_leaves_an_open_hand_open(tape):
+    controller, time = holding(on_fault="open")
+    with GripLoop(controller, tape, armed=True) as loop:
+        loop.stop()
+        stepped(loop, time)
+    assert tape.commands[-1].release
+
+
+def test_a_sample_that_is_late_by_more_than_an_update_is_no_fault(tape):
+    controller, time = holding()
+    loop = GripLoop(controller, tape)
+    loop.step(hand(time), time + 0.012)  # an update while nothing arrived
+    assert loop.step(hand(time + 1 / RATE), time + 1 / RATE).state is LoopState.HOLD
+
+
+def test_a_clock_that_jumps_back_is_a_fault(tape):
+    controller, time = holding()
+    loop = GripLoop(controller, tape)
+    loop.step(hand(time), time)
+    command = loop.step(hand(time - 1.0), time - 1.0)
+    assert (command.state, command.reason) == (LoopState.FAULT, GripReason.STALE)
+
+
+@pytest.mark.parametrize("given", [float("nan"), float("inf")])
+def test_a_time_that_is_no_time_is_a_fault_and_is_forgotten(tape, given):
+    controller, time = holding(recovery=0.0)
+    loop = GripLoop(controller, tape)
+    loop.step(hand(time), time)
+    assert loop.step(hand(time), given).reason is GripReason.CLOCK
+    assert loop.step(hand(time + 1 / RATE), time + 1 / RATE).state is LoopState.HOLD
+
+
+class TestClock:
+    """A clock of the source that jumps ahead, and comes back or does not."""
+
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_one_stamp_from_the_future_is_a_fault_that_a_reset_ends(self, tape, on_fault):
+        controller, time = holding(on_fault=on_fault)
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        loop.step(hand(time + 100.0), time + 100.0)
+        assert (loop.last.state, loop.last.reason) == (LoopState.FAULT, GripReason.CLOCK)
+        time = stepped(loop, time, n=1)
+        loop.resume()
+        stepped(loop, time, n=60)
+        assert loop.last.state is LoopState.HOLD
+
+    def test_with_hold_the_loop_recovers_from_it_by_itself(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        loop.step(hand(time + 100.0), time + 100.0)
+        stepped(loop, time, n=100)
+        assert loop.last.state is LoopState.HOLD
+
+    def test_a_clock_that_stays_ahead_is_accepted_after_a_fault(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        time = stepped(loop, time + 100.0, n=1)
+        assert loop.last.reason is GripReason.CLOCK
+        stepped(loop, time, n=100)
+        assert loop.last.state is LoopState.HOLD
+
+    def test_a_clock_that_jumped_back_is_accepted_by_a_reset(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
+        held = scales(loop.last)
+        time = stepped(loop, time - 100.0)
+        assert loop.last.state is LoopState.FAULT
+        loop.resume()
+        time = stepped(loop, time)
+        assert loop.last.state in (LoopState.HOLD, LoopState.RELAX)
+        # Past the episode of the first step. The thumb carries half of all normal forces.
+        stepped(loop, time, n=120, thumb=SLIPPING)
+        assert scales(loop.last)["index"] > held["index"]
+
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_every_command_has_a_time(self, tape, on_fault):
+        controller, time = holding(on_fault=on_fault)
+        beats, times = Beats(), []
+        loop = GripLoop(
+            controller, tape, armed=True, watchdog=beats, log=lambda _, at: times.append(at)
+        )
+        for bad in (math.nan, time, math.inf, -math.inf, math.nan):
+            loop.step(hand(bad), bad)
+        assert tape.commands[-1].reason is GripReason.CLOCK
+        assert tape.commands[-1].release is (on_fault == "open")
+        assert all(math.isfinite(command.time) for command in (*tape.commands, *beats.commands))
+        assert all(map(math.isfinite, times))
+
+
+class LateBeats(Beats):
+    """Watchdog that has taken over, as the loop finds out before or after a command."""
+
+    def __init__(self, before=math.inf, after=math.inf):
+        super().__init__()
+        self._before, self._after = before, after
+
+    def beat(self, command):
+        super().beat(command)
+        if len(self.commands) > self._before:
+            raise HandError("taken over")
+
+    def check(self):
+        if len(self.commands) > self._after:
+            raise HandError("taken over")
+
+
+class TestTakenOver:
+    @pytest.mark.parametrize("beats", [LateBeats(before=3), LateBeats(after=3)])
+    def test_the_last_command_is_the_safe_one(self, tape, beats):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True, watchdog=beats)
+        with pytest.raises(HandError, match="taken over"), loop:
+            stepped(loop, time)
+        assert len(tape.commands) <= 5
+        assert tape.commands[-1].release
+
+    def test_the_safe_command_holds_what_was_sent_last(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True, watchdog=LateBeats(before=3))
+        with pytest.raises(HandError, match="taken over"), loop:
+            time = stepped(loop, time, n=3)
+            stepped(loop, time, **dict.fromkeys(FINGERS, SLIPPING))
+        assert scales(loop.last)["index"] > 1.0
+        assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
+
+    def test_an_orderly_end_after_it_does_not_close_the_hand(self, tape):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True, watchdog=LateBeats(before=10))
+        with pytest.raises(HandError, match="taken over"), loop:
+            stepped(loop, time, n=10)
+        assert tape.commands[-1].release
+
+
+class TestFollow:
+    def test_it_sends_nothing_and_the_next_step_has_its_force(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time, n=1)
+        for _ in range(5):
+            time += 1 / RATE
+            loop.follow(hand(time, **dict.fromkeys(FINGERS, SLIPPING)), time)
+        assert len(tape.commands) == 1
+        stepped(loop, time, n=1)
+        assert len(tape.commands) == 2
+        assert scales(loop.last)["index"] > 1.2
+        assert loop.guard.violation == ""
+
+    def test_the_guard_checks_it(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time, n=1)
+        good, controller.update = controller.update, lambda estimate, time: GripCommand(
+            time, LoopState.HOLD, {name: FingerCommand(99.0) for name in FINGERS}
+        )  # fmt: skip
+        loop.follow(hand(time + 1 / RATE), time + 1 / RATE)
+        controller.update = good
+        stepped(loop, time + 1 / RATE, n=1)
+        assert tape.commands[-1].reason is GripReason.LIMIT
+
+
+def test_a_silent_hand_is_a_fault_in_which_no_force_changes(tape, monkeypatch):
+    controller, time = holding()
+    loop = GripLoop(controller, tape, armed=True)
+    time = stepped(loop, time)
+    monkeypatch.setattr(Tape, "silent", True)
+    time = stepped(loop, time, index=SLIPPING)
+    assert (loop.last.state, loop.last.reason) == (LoopState.FAULT, GripReason.HAND)
+    assert scales(loop.last) == dict.fromkeys(FINGERS, 1.0)
+    monkeypatch.setattr(Tape, "silent", False)
+    stepped(loop, time, n=100)
+    assert loop.last.state is LoopState.HOLD

@@ -1,0 +1,254 @@
+"""The watchdog, with real processes. No time is asserted: each test waits as long as it takes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import msgspec
+import pytest
+
+from holdfast_grip import FingerCommand, GripCommand, GripReason, LoopState
+from holdfast_grip.errors import HandError
+from holdfast_grip.loop import watchdog
+from holdfast_grip.loop.watchdog import N_SAFE_COMMANDS, Watchdog
+
+PATIENCE = 120.0
+TESTS = str(Path(__file__).parents[2])
+COMMAND = GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(1.3, GripReason.SLIP)})
+
+LOOP = """
+import sys, time
+from holdfast_grip import FingerCommand, GripCommand, LoopState
+from holdfast_grip.loop.watchdog import Watchdog
+watchdog = Watchdog("log:" + sys.argv[1], sys.argv[2], timeout=float(sys.argv[3]))
+watchdog.start()
+command = GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(1.3)})
+watchdog.beat(command)
+print("started", flush=True)
+while True:
+    watchdog.beat(command)
+    time.sleep(0.005)
+"""
+
+GRIP_LOOP = """
+import sys, time
+from contextlib import ExitStack
+from grip.build import RATE, hand, holding
+from holdfast_grip.hands import open_hand
+from holdfast_grip.loop.grip_loop import GripLoop
+from holdfast_grip.loop.watchdog import Watchdog
+uri = "log:" + sys.argv[1]
+controller, at = holding(on_fault="open")
+with ExitStack() as stack:
+    commanded = stack.enter_context(open_hand(uri))
+    watchdog = stack.enter_context(Watchdog(uri, "open", timeout=float(sys.argv[2])))
+    loop = stack.enter_context(GripLoop(controller, commanded, armed=True, watchdog=watchdog))
+    print("started", flush=True)
+    while True:
+        at += 1 / RATE
+        loop.step(hand(at), at)
+        time.sleep(1 / RATE)
+"""
+
+
+def commands(path):
+    lines = path.read_bytes().splitlines() if path.exists() else []
+    return [msgspec.json.decode(line, type=GripCommand) for line in lines]
+
+
+def wait_for(path, n):
+    end = time.monotonic() + PATIENCE
+    while len(commands(path)) < n and time.monotonic() < end:
+        time.sleep(0.01)
+    found = commands(path)
+    assert len(found) >= n, f"{n} commands expected, {found} came"
+    return found
+
+
+@pytest.fixture
+def loop(tmp_path):
+    """A control loop in another process, which was stopped by a signal."""
+    processes = []
+
+    def stopped(number, on_fault, timeout):
+        process = subprocess.Popen(
+            [sys.executable, "-c", LOOP, str(tmp_path / "hand"), on_fault, str(timeout)],
+            stdout=subprocess.PIPE,
+        )
+        processes.append(process)
+        assert process.stdout.readline() == b"started\n"
+        os.kill(process.pid, number)
+        return tmp_path / "hand"
+
+    yield stopped
+    for process in processes:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+@pytest.mark.parametrize("on_fault", ["hold", "open"])
+def test_it_takes_over_when_the_loop_is_killed(loop, on_fault):
+    """The closed pipe is enough: the time-out of the heartbeats is an hour here."""
+    found = wait_for(loop(signal.SIGKILL, on_fault, 3600.0), N_SAFE_COMMANDS)
+    assert len(found) == N_SAFE_COMMANDS
+    for command in found:
+        assert (command.state, command.reason) == (LoopState.FAULT, GripReason.WATCHDOG)
+        assert command.release is (on_fault == "open")
+        assert command.fingers["thumb"].scale == 1.3
+
+
+def test_it_takes_over_when_the_loop_hangs(loop):
+    found = wait_for(loop(signal.SIGSTOP, "hold", 0.1), N_SAFE_COMMANDS)
+    assert found[0].reason is GripReason.WATCHDOG
+
+
+def test_a_loop_that_was_paused_sends_no_old_command(tmp_path):
+    """It is stopped until the watchdog opens the hand, and then goes on."""
+    path = tmp_path / "hand"
+    process = subprocess.Popen(
+        [sys.executable, "-c", GRIP_LOOP, str(path), "0.3"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([TESTS, *sys.path])},
+    )  # fmt: skip
+    try:
+        assert process.stdout.readline() == b"started\n"
+        assert wait_for(path, 1)  # the others are equal, so that the hand gets one
+        os.kill(process.pid, signal.SIGSTOP)
+        while not any(command.reason is GripReason.WATCHDOG for command in commands(path)):
+            time.sleep(0.001)
+        os.kill(process.pid, signal.SIGCONT)
+        _, error = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+        process.wait()
+    assert b"has taken over or ended" in error
+    found = commands(path)
+    first = [command.reason for command in found].index(GripReason.WATCHDOG)
+    assert len(found) >= first + N_SAFE_COMMANDS
+    assert all(command.release for command in found[first:])
+
+
+class TestInOneProcess:
+    @pytest.fixture
+    def clock(self, monkeypatch):
+        """The time of the loop's side, which a test sets."""
+        now = [0.0]
+        monkeypatch.setattr(watchdog, "time", SimpleNamespace(monotonic=lambda: now[0]))
+        return now
+
+    @pytest.fixture
+    def started(self, tmp_path):
+        """A watchdog that has started; at the end of the test it is killed."""
+        started = Watchdog(f"log:{tmp_path / 'hand'}", "open", timeout=PATIENCE)
+        started.start()
+        yield started
+        started.kill()
+
+    def test_a_heartbeat_that_is_too_late_is_refused_and_the_watchdog_takes_over(
+        self, tmp_path, started, clock
+    ):
+        started.beat(COMMAND)
+        clock[0] = PATIENCE
+        started.check()
+        clock[0] = PATIENCE + 0.001
+        with pytest.raises(HandError, match=r"at most 120 s between two heartbeats expected, 120"):
+            started.beat(COMMAND)
+        assert wait_for(tmp_path / "hand", N_SAFE_COMMANDS)[0].release
+
+    def test_a_heartbeat_whose_write_waited_for_too_long_is_refused(self, started, clock):
+        started.beat(COMMAND)
+        write = started._write
+
+        def delayed(data):
+            clock[0] += PATIENCE + 1.0
+            write(data)
+
+        started._write = delayed
+        with pytest.raises(HandError, match="has taken over or ended"):
+            started.beat(COMMAND)
+
+    def test_a_clock_that_is_no_number_is_refused(self, started, clock):
+        started.beat(COMMAND)
+        clock[0] = float("nan")
+        with pytest.raises(HandError, match="has taken over or ended"):
+            started.beat(COMMAND)
+
+    def test_a_watchdog_that_is_stopped_is_a_fault_and_ends(self, started, clock, monkeypatch):
+        monkeypatch.setattr(watchdog, "WATCHDOG_END_TIMEOUT", 0.1, raising=False)
+        started.beat(COMMAND)
+        os.kill(started._process.pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, started._process.pid, os.WSTOPPED | os.WNOWAIT)
+        with pytest.raises(HandError, match="does not read its heartbeats any more"):
+            for _ in range(1000):
+                clock[0] += watchdog.UNREAD_TIMEOUT / 10
+                started.beat(COMMAND)
+        assert clock[0] <= 2 * watchdog.UNREAD_TIMEOUT
+        started.abandon()
+
+    def test_a_full_pipe_blocks_no_heartbeat(self, started, clock, monkeypatch):
+        monkeypatch.setattr(watchdog, "WATCHDOG_END_TIMEOUT", 0.1, raising=False)
+        os.kill(started._process.pid, signal.SIGSTOP)
+        with pytest.raises(HandError, match="does not read its heartbeats any more"):
+            for _ in range(100_000):  # no time passes
+                started.beat(COMMAND)
+        started.stop()
+
+    def test_a_line_that_is_no_command_makes_it_take_over(self, tmp_path, started):
+        started.beat(COMMAND)
+        started._write(b'{"time": null}\n')
+        assert wait_for(tmp_path / "hand", N_SAFE_COMMANDS)[0].release
+
+    def test_a_farewell_ends_it_without_a_command(self, tmp_path):
+        with Watchdog(f"log:{tmp_path / 'hand'}", "open", timeout=PATIENCE) as watchdog:
+            watchdog.beat(COMMAND)
+        assert commands(tmp_path / "hand") == []
+
+    def test_it_takes_over_after_an_exception(self, tmp_path):
+        with (
+            pytest.raises(RuntimeError),
+            Watchdog(f"log:{tmp_path / 'hand'}", "open", timeout=PATIENCE) as watchdog,
+        ):
+            watchdog.beat(COMMAND)
+            raise RuntimeError
+        assert commands(tmp_path / "hand")[-1].release
+
+    def test_a_loop_that_was_taken_over_may_not_continue(self, tmp_path):
+        watchdog = Watchdog(f"log:{tmp_path / 'hand'}", "hold", timeout=0.05)
+        watchdog.start()
+        watchdog.beat(COMMAND)
+        wait_for(tmp_path / "hand", N_SAFE_COMMANDS)
+        with pytest.raises(HandError, match="has taken over or ended"):
+            for _ in range(10_000):
+                watchdog.beat(COMMAND)
+                time.sleep(0.01)
+        watchdog.kill()
+
+    def test_before_the_first_heartbeat_it_commands_nothing(self, tmp_path):
+        watchdog = Watchdog(f"log:{tmp_path / 'hand'}", "open", timeout=0.05)
+        watchdog.start()
+        watchdog.abandon()
+        assert commands(tmp_path / "hand") == []
+
+    def test_a_hand_that_it_cannot_reach_is_an_error(self, tmp_path):
+        watchdog = Watchdog(f"log:{tmp_path}/no/hand", "hold")
+        with pytest.raises(HandError, match=r"cannot command log:.*: cannot write .*No such file"):
+            watchdog.start()
+
+    def test_without_a_start_there_is_no_heartbeat(self):
+        with pytest.raises(HandError, match="has taken over or ended"):
+            Watchdog("log:x", "hold").beat(COMMAND)
+
+
+@pytest.mark.parametrize(("on_fault", "n"), [("hold", 0), ("open", N_SAFE_COMMANDS)])
+def test_before_the_grip_it_can_open_the_hand_only(tmp_path, on_fault, n):
+    path = tmp_path / "hand"
+    watchdog = Watchdog(f"log:{path}", on_fault, timeout=3600.0)
+    watchdog.start()
+    watchdog.beat(msgspec.structs.replace(COMMAND, state=LoopState.IDLE))
+    watchdog.abandon()
+    assert [one.release for one in commands(path)] == [True] * n
