@@ -6,9 +6,11 @@ import pytest
 
 from holdfast.devices.sources import SCHEMES, open_source
 from holdfast.devices.sources.replay import ReplaySource
-from holdfast.devices.uri import is_uri, parse
+from holdfast.devices.uri import SOURCE_PLUGINS, is_uri, parse
 
-KNOWN = "there are xela:, twin:, serial:"
+KNOWN = "there are " + ", ".join(
+    f"{name}:" for name in ("xela", "twin", "serial", *SOURCE_PLUGINS.names())
+)
 
 
 def test_the_parts_of_a_uri():
