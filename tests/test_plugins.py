@@ -325,14 +325,18 @@ def test_what_adds_options_needs_them_and_its_function(group, function, tmp_path
             assert wanted in group.error(name)
 
 
-def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog):
+def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog, capsys):
     """`install` writes version 1.2."""
     points = {"holdfast.verbs": {"trial": "nothing:trial"}}
     install(tmp_path / "site", "holdfast-lab", {}, points)
     with on_the_path(tmp_path / "site", monkeypatch):
         assert main(["trial", "--help"]) == 2
     version = metadata.version("holdfast")
-    assert f"holdfast-lab 1.2 given, {version} expected as of holdfast itself: clone" in caplog.text
+    assert caplog.text == ""
+    assert capsys.readouterr().err == (
+        f"holdfast: the verb trial cannot be used: holdfast-lab 1.2 given, {version} expected as of "
+        "holdfast itself: clone the repository of holdfast, and run `uv run holdfast` there\n"
+    )
 
 
 @pytest.fixture(scope="module")

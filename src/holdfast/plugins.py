@@ -55,9 +55,15 @@ class PluginGroup(Generic[T]):
         self._built_in, self._convert = built_in, convert
         self._reported: set[str] = set()
 
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the plug-ins, in order; no code of theirs is imported."""
-        return tuple(self._usable_points())
+    def names(self, *, report: bool = True) -> tuple[str, ...]:
+        """Return the names of the plug-ins, in order; no code of theirs is imported.
+
+        Args:
+            report: name those whose name is taken.
+        """
+        if report:
+            return tuple(self._usable_points())
+        return tuple(point.name for point, refusal in self._points() if not refusal)
 
     def text(self) -> str:
         """Return the names for the end of a message; empty if there are none."""
@@ -89,7 +95,10 @@ class PluginGroup(Generic[T]):
             HoldfastError: it is skipped, or its package is not installed.
             ValueError: neither holdfast nor a plug-in has the name.
         """
-        if name in self.names():
+        refusals = [refusal for point, refusal in self._points() if point.name == name]
+        if refusals and all(refusals):
+            raise HoldfastError(f"{what} cannot be used: {refusals[0]}")
+        if refusals:
             if (plugin := self.load(name)) is not None:
                 return plugin
             raise HoldfastError(
