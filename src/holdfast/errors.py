@@ -199,6 +199,7 @@ def install_command(extra: str) -> str:
     """
     import json
     from importlib.metadata import distributions
+    from pathlib import Path
 
     # setuptools leaves metadata in `src` as well, which no installer has made.
     found = (one for one in distributions(name="holdfast") if one.read_text("INSTALLER"))
@@ -208,7 +209,9 @@ def install_command(extra: str) -> str:
     origin = json.loads(installed.read_text("direct_url.json") or "{}")
     if origin.get("dir_info", {}).get("editable"):
         folder = origin["url"].removeprefix("file://")
-        pip = f'pip install -e "{folder}[{extra}]"'
+        beside = Path(folder, "packages", f"holdfast-{extra}")
+        with_extra = f"{folder}[{extra}]"
+        pip = f'pip install -e "{beside if beside.is_dir() else with_extra}"'
         options = "".join(f" --extra {name}" for name in extra.split(","))
         return f"uv sync --inexact{options}" if with_uv else pip
     package = f"holdfast[{extra}] @ {origin['url']}" if origin else f"holdfast[{extra}]"
