@@ -151,6 +151,6 @@ def test_nothing_is_imported_for_other_schemes():
     assert done.stdout == "[]\n"
 
 
-@pytest.mark.parametrize("module", ["uri", "sources", "live_twin"])
+@pytest.mark.parametrize("module", ["uri", "sources"])
 def test_a_module_can_be_imported_first(module):
     subprocess.run([sys.executable, "-c", f"import holdfast.devices.{module}"], check=True)

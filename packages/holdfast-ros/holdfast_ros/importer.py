@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
+from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import xela_models
 from holdfast.sensors.types import Array
@@ -27,10 +28,7 @@ from holdfast_ros.sensor_messages import (
     sensors_of,
 )
 
-HINT = (
-    "if the hand already holds the object at the first sample, give --in-contact; bias a "
-    "PapillArray before, without load"
-)
+HINT = f"{IF_IN_CONTACT}; bias a PapillArray before, without load"
 """Option that helps with the recordings, for the person who imports them."""
 CLOCKS = ("device", "header", "bag")
 """Clocks that the times of a recording can come from, best first."""

@@ -23,6 +23,8 @@ from holdfast_ros.topic_messages import (
 )
 from live.estimates import estimate
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).parents[5] / "examples" / "ros2"
 FINGERS = ("thumb", "index", "middle", "ring")
 

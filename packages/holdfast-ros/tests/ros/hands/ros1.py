@@ -8,7 +8,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from holdfast import errors
+from holdfast_grip.errors import HandError
 from holdfast_grip.hands import open_hand
 from ros.ros1_master import Master, needs_ros1
 
@@ -147,5 +147,5 @@ class DistantHand:
         self._process.stdin.flush()
         kind, answer = json.loads(self._process.stdout.readline())
         if kind:
-            raise (ValueError if kind == "ValueError" else getattr(errors, kind))(answer)
+            raise (ValueError if kind == "ValueError" else HandError)(answer)
         return answer
