@@ -50,7 +50,6 @@ CORE = [
     ["calibrate", "normalised.json", "grasp.mcap", "-o", "mine.json", "--force"],
     ["detect", "mine.json", "grasp.mcap"],
     ["hold", "builtin:any", "grasp.mcap", "--hand", "log:commands.jsonl", "--speed", "0"],
-    ["bench", "--samples", "1000", "--updates", "1000"],
     ["simulate", "--help"],
     ["label", "--help"],
     ["train", "--help"],

@@ -31,8 +31,6 @@ EXTRA_MODULES = {
     "hdf5": ("h5py",),
     "onnx": ("onnx", "onnxruntime"),
     "deep": ("torch",),
-    "grip": ("holdfast_grip",),
-    "interop": ("holdfast_interop", "pooch", "requests"),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
 

@@ -10,16 +10,16 @@ from holdfast_grip.hands import HAND_SCHEMES
 from . import blocks
 
 DOCS = blocks.ROOT / "docs"
-MAX_WORDS = 500
+MAX_WORDS = {"support": 500, "datasets": 500, "plugins": 850}
 
 
 def text(page):
     return (DOCS / f"{page}.md").read_text("utf-8")
 
 
-@pytest.mark.parametrize("page", ["support", "plugins", "datasets"])
+@pytest.mark.parametrize("page", MAX_WORDS)
 def test_the_page_is_short(page):
-    assert len(text(page).split()) < MAX_WORDS
+    assert len(text(page).split()) < MAX_WORDS[page]
 
 
 def test_every_device_is_in_the_table_of_support():
