@@ -224,9 +224,11 @@ VERB_OF_KIND = {
     "players": "play",
 }  # fmt: skip
 """The verb that gets the options of a kind of plug-ins."""
+PACKAGES = ["holdfast-lab", *sorted(path.name for path in TEMPLATE.parents[1].glob("packages/*"))]
+"""Distributions beside the core."""
 
 
-@pytest.mark.parametrize("package", PACKAGE_PARTS)
+@pytest.mark.parametrize("package", PACKAGES)
 def test_the_table_of_packages_has_their_entry_points(package):
     parts, options = {}, []
     for point in metadata.distribution(package).entry_points:

@@ -27,6 +27,10 @@ CRASHES = {
         "numpy.ones(10**9)",
         r"needs more memory than the 200\S* MB that a file of \S* MB may take; cut it",
     ),
+    "file": (
+        "__import__('tempfile').TemporaryFile().truncate(10**9)",
+        r"needs more memory than the 200\S* MB that a file of \S* MB may take; cut it",
+    ),
     "error": ("[][1]", r"log\.csv is damaged: list index out of range"),
     "print": ("print('{}') or [][1]", r"log\.csv is damaged: list index out of range"),
     "interrupt": ("os.kill(os.getpid(), 2) or [][1]", r"is damaged: list index out of range"),
