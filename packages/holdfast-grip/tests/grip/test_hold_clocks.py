@@ -9,8 +9,8 @@ import pytest
 from holdfast.cli import main
 from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.assembler import Assembler, Device
-from holdfast.grip import GripCommand
-from holdfast.live.loop import watchdog
+from holdfast_grip import GripCommand
+from holdfast_grip.loop import watchdog
 from live.build import Script, grasp
 
 pytestmark = pytest.mark.slow

@@ -8,8 +8,8 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording, save_recording
-from holdfast.live.loop.watchdog import N_SAFE_COMMANDS
 from holdfast.synthetic import synthetic_recording
+from holdfast_grip.loop.watchdog import N_SAFE_COMMANDS
 
 GRIPPER = """
 import os, signal
@@ -23,9 +23,9 @@ def move(scale):
 PROGRAM = """
 import os, signal, sys, time
 from holdfast.cli import main
-from holdfast.devices.hands.local import ScalarGripper
-from holdfast.live.loop.grip_loop import GripLoop
-from holdfast.live.loop.watchdog import Watchdog
+from holdfast_grip.hands.local import ScalarGripper
+from holdfast_grip.loop.grip_loop import GripLoop
+from holdfast_grip.loop.watchdog import Watchdog
 from holdfast.live.recorder import Recorder
 
 def kill(target, name, at, n=1, wait=0.0):
