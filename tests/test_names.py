@@ -24,7 +24,7 @@ PLUGIN_FOLDERS = (
     "src/holdfast/cli",
     "packages/holdfast-grip/holdfast_grip/laws",
     "packages/holdfast-interop/holdfast_interop",
-    "packages/holdfast-ros/holdfast_ros/sources",
+    "packages/holdfast-ros/holdfast_ros",
     "lab/holdfast_lab/study",
 )
 """Folders of modules that are loaded by name: each may define the constants of their contract."""
