@@ -62,7 +62,12 @@ class PluginGroup(Generic[T]):
     def text(self) -> str:
         """Return the names for the end of a message; empty if there are none."""
         names = self.names()
-        return f"; of plug-ins: {', '.join(names)}" if names else ""
+        parts = [name for parts in PACKAGE_PARTS.values() for name in parts.get(self.kind, ())]
+        found = {
+            "plug-ins": names,
+            "packages that are not installed": [name for name in parts if name not in names],
+        }
+        return "".join(f"; of {where}: {', '.join(some)}" for where, some in found.items() if some)
 
     def load(self, name: str) -> T | None:
         """Return a plug-in; None if there is none of that name, or it is skipped."""
