@@ -16,17 +16,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from holdfast.devices.hands.ros.kinds import HAND_KINDS
-from holdfast.devices.hands.ros.parameters import Parameters
-from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.uri import parse
-from holdfast.ros.topic_messages import JointStates
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS
 from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD
 from holdfast_grip import FingerCommand, GripCommand, LoopState
 from holdfast_lab.trial.trials import Trial, draw_trial
+from holdfast_ros.hands.kinds import HAND_KINDS
+from holdfast_ros.hands.parameters import Parameters
+from holdfast_ros.link import Link, Publisher, TakeStates
+from holdfast_ros.topic_messages import JointStates
 
 STIFFNESS = ",".join(map(str, PROPORTIONAL.tolist()))
 URI = f"ros1:positions?stiffness={STIFFNESS}&max_effort=9&shared=true"

@@ -23,17 +23,17 @@ from threading import Event, Thread
 import numpy as np
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
-from holdfast.devices.hands.ros.driven_twin import DrivenTwin
-from holdfast.devices.ros import dds
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
 from holdfast.live.publishers.xela_server import XelaServer
-from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.topic_messages import FLOAT_ARRAY, JOINT_STATE, joint_message, topic_definition
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast_lab.trial.run import RISE
 from holdfast_lab.trial.trials import LOAD_KINDS, Trial, draw_trials
+from holdfast_ros import dds
+from holdfast_ros.hands.driven_twin import DrivenTwin
+from holdfast_ros.topic_messages import FLOAT_ARRAY, JOINT_STATE, joint_message, topic_definition
 
 EFFORT = 0.1
 PLEXUS = f"ros2:plexus?effort={EFFORT}&max_effort=1"

@@ -81,12 +81,10 @@ MISSING = {
         ["import", "log.csv", "others", "--sensor", "anyskin", "--suffix", "parquet"],
     ],
     "plot": [["info", "grasp.mcap", "--plot", "a.png"], ["sensors", "anyskin", "--plot", "a.png"]],
-    "bags": [["import", "run.bag", "others", "--format", "rosbag"]],
     "hdf5": [
         ["import", "a.h5", "others", "--format", "arq-crisp"],
         ["datasets", "get", "arq-slip-2021"],
     ],
-    "ros2": [["detect", "builtin:any", "ros2:///xServTopic"]],
     "serial": [["detect", "builtin:any", "serial:///dev/ttyACM0?sensor=anyskin"]],
     "cluster": [
         ["import", "log.csv", "others", "--sensor", "anyskin", "--engine", "dask:tcp://a:1"]
@@ -106,7 +104,6 @@ def outcomes(tmp_path_factory):
     normalised_model().save(folder / "normalised.json")
     (folder / "other").mkdir()
     (folder / "other" / "grasp.parquet").write_bytes(b"PAR1")
-    (folder / "run.bag").write_bytes(b"#ROSBAG V2.0\n")
     (folder / "a.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
     columns = ["t", *(f"{axis}{taxel}" for taxel in range(1, 6) for axis in "xyz")]
     numbers = np.column_stack(

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from devices.sources import ros_build
+import ros_messages
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -55,14 +55,14 @@ def run_in(folder, program, *arguments):
 
 def write_bag(path):
     rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
-    types = ros_build.store("xela_server_ros2", ros_build.XELA, ros2=True)
+    types = ros_messages.store("xela_server_ros2", ros_messages.XELA, ros2=True)
     name = "xela_server_ros2/msg/SensStream"
     plugin = rosbag2.StoragePlugin.MCAP
     with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
         topic = writer.add_connection("/xServTopic", name, typestore=types)
         for k in range(30):
-            sample = (1, "uSPa44", k, k / 100, ros_build.counts(16, k), [])
-            message = ros_build.sens_stream(types, "xela_server_ros2", sample)
+            sample = (1, "uSPa44", k, k / 100, ros_messages.counts(16, k), [])
+            message = ros_messages.sens_stream(types, "xela_server_ros2", sample)
             writer.write(topic, k * 10_000_000, types.serialize_cdr(message, name))
 
 

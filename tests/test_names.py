@@ -18,16 +18,17 @@ PACKAGES = (
     "lab/holdfast_lab",
 )
 PLUGIN_FOLDERS = (
-    "packages/holdfast-grip/holdfast_grip/laws",
+    "src/holdfast/devices/sources",
     "src/holdfast/io/importers",
-    "src/holdfast/io/bag_storage",
     "src/holdfast/labelling/rules",
     "src/holdfast/cli",
+    "packages/holdfast-grip/holdfast_grip/laws",
     "packages/holdfast-interop/holdfast_interop",
+    "packages/holdfast-ros/holdfast_ros/sources",
     "lab/holdfast_lab/study",
 )
 """Folders of modules that are loaded by name: each may define the constants of their contract."""
-CONTRACT = {"AUTHOR", "EXTRA", "HINT", "SOURCE", "TASK", "TITLE"}
+CONTRACT = {"AUTHOR", "EXTRA", "HINT", "PARAMETERS", "SOURCE", "TASK", "TITLE"}
 """Constants that every module of such a folder may have, as the contract of its kind."""
 TYPE_VARIABLE = "TypeVar("
 """Begin of the value of a type variable, whose name means nothing outside of its function."""
@@ -73,8 +74,7 @@ def values_of(node, n):
 
 def is_contract(name, paths):
     """Return whether a constant belongs to the contract of modules in one folder of plugins."""
-    in_one_folder = any(all(path.startswith(f) for path in paths) for f in PLUGIN_FOLDERS)
-    return name in CONTRACT and in_one_folder
+    return name in CONTRACT and all(path.startswith(PLUGIN_FOLDERS) for path in paths)
 
 
 def repeated(found):

@@ -12,12 +12,12 @@ from attack.recordings import make_recording
 from attack.result import CpuResult
 from holdfast.errors import ModelError, RecordingError
 from holdfast.io import labels_from_csv, labels_to_csv, load_labels, save_labels
+from holdfast.io.cdr import MessageDecoder
+from holdfast.io.definitions import field_paths, parse_definition
 from holdfast.model import Model
-from holdfast.ros.cdr import MessageDecoder
-from holdfast.ros.definitions import field_paths, parse_definition
-from holdfast.ros.sensor_messages import SENS_STREAM
 from holdfast.sensors import Sensor, sensor
 from holdfast.twin.objects import BUILT_IN_OBJECTS, load_objects
+from holdfast_ros.sensor_messages import SENS_STREAM
 
 Read = Callable[[Path], object]
 Refusals = tuple[type[BaseException], ...]

@@ -12,9 +12,9 @@ from attack.mutations import cut, damaged
 from attack.result import CpuResult
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
-from holdfast.ros.cdr import MessageEncoder
-from holdfast.ros.definitions import parse_definition
-from holdfast.ros.sensor_messages import SENS_STREAM
+from holdfast.io.cdr import MessageEncoder
+from holdfast.io.definitions import parse_definition
+from holdfast_ros.sensor_messages import SENS_STREAM
 
 KIND = "xela_server_ros2/msg/SensStream"
 

@@ -25,8 +25,6 @@ EXTRA_MODULES = {
     "plot": ("matplotlib",),
     "label": ("scipy",),
     "cluster": ("dask", "distributed", "threadpoolctl"),
-    "ros2": ("cyclonedds",),
-    "bags": ("rosbags",),
     "serial": ("serial",),
     "hdf5": ("h5py",),
     "onnx": ("onnx", "onnxruntime"),
@@ -53,8 +51,10 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         ),
     },
     "holdfast-ros": {
-        "publishers": ("ros2", "ros1"),
-        "hands": ("ros2", "ros1"),
+        "sources": ("ros1", "ros2"),
+        "importers": ("rosbag",),
+        "publishers": ("ros1", "ros2"),
+        "hands": ("ros1", "ros2"),
         "players": ("driven",),
         "options": ("serve --ros2", "serve --ros1", "play --hand"),
     },
@@ -199,6 +199,7 @@ def install_command(extra: str) -> str:
     """
     import json
     from importlib.metadata import distributions
+    from pathlib import Path
 
     # setuptools leaves metadata in `src` as well, which no installer has made.
     found = (one for one in distributions(name="holdfast") if one.read_text("INSTALLER"))
@@ -208,7 +209,9 @@ def install_command(extra: str) -> str:
     origin = json.loads(installed.read_text("direct_url.json") or "{}")
     if origin.get("dir_info", {}).get("editable"):
         folder = origin["url"].removeprefix("file://")
-        pip = f'pip install -e "{folder}[{extra}]"'
+        beside = Path(folder, "packages", f"holdfast-{extra}")
+        with_extra = f"{folder}[{extra}]"
+        pip = f'pip install -e "{beside if beside.is_dir() else with_extra}"'
         options = "".join(f" --extra {name}" for name in extra.split(","))
         return f"uv sync --inexact{options}" if with_uv else pip
     package = f"holdfast[{extra}] @ {origin['url']}" if origin else f"holdfast[{extra}]"

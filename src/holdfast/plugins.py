@@ -55,19 +55,28 @@ class PluginGroup(Generic[T]):
         self._built_in, self._convert = built_in, convert
         self._reported: set[str] = set()
 
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the plug-ins, in order; no code of theirs is imported."""
-        return tuple(self._usable_points())
+    def names(self, *, report: bool = True) -> tuple[str, ...]:
+        """Return the names of the plug-ins, in order; no code of theirs is imported.
+
+        Args:
+            report: name those whose name is taken.
+        """
+        if report:
+            return tuple(self._usable_points())
+        return tuple(point.name for point, refusal in self._points() if not refusal)
 
     def text(self) -> str:
-        """Return the names for the end of a message; empty if there are none."""
+        """Return the names for the end of a message, and those of packages that are missing."""
         names = self.names()
-        parts = [name for parts in PACKAGE_PARTS.values() for name in parts.get(self.kind, ())]
-        found = {
-            "plug-ins": names,
-            "packages that are not installed": [name for name in parts if name not in names],
-        }
-        return "".join(f"; of {where}: {', '.join(some)}" for where, some in found.items() if some)
+        missing = [
+            f"{name} ({package})"
+            for package, parts in PACKAGE_PARTS.items()
+            for name in parts.get(self.kind, ())
+            if name not in names
+        ]
+        return (f"; of plug-ins: {', '.join(names)}" if names else "") + (
+            f"; not installed: {', '.join(missing)}" if missing else ""
+        )
 
     def load(self, name: str) -> T | None:
         """Return a plug-in; None if there is none of that name, or it is skipped."""
@@ -94,7 +103,10 @@ class PluginGroup(Generic[T]):
             HoldfastError: it is skipped, or its package is not installed.
             ValueError: neither holdfast nor a plug-in has the name.
         """
-        if name in self.names():
+        refusals = [refusal for point, refusal in self._points() if point.name == name]
+        if refusals and all(refusals):
+            raise HoldfastError(f"{what} cannot be used: {refusals[0]}")
+        if refusals:
             if (plugin := self.load(name)) is not None:
                 return plugin
             raise HoldfastError(

@@ -107,8 +107,9 @@ def test_a_recording_may_be_named_hand(folder, seen):
     ("config", "uri"),
     [
         (Config(), "xela://auto"),
-        (Config(source="ros2:///xServTopic", fingers={"1": "thumb"}),
-         "ros2:///xServTopic?fingers=1:thumb"),
+        (Config(source="xela://h:1?values=counts", fingers={"1": "thumb"}, values="calibrated"),
+         "xela://h:1?values=counts&fingers=1:thumb"),
+        (Config(source="twin:?object=can", fingers={"1": "thumb"}), "twin:?object=can"),
         (Config(source="serial:///dev/ttyACM0?sensor=anyskin", sensor="gtac", values="counts"),
          "serial:///dev/ttyACM0?sensor=anyskin"),
     ],

@@ -100,10 +100,10 @@ def test_the_configuration_of_the_hand(capsys, monkeypatch, tmp_path):
 def test_what_can_be_reached(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.devices.sources.xela.places.own_address", lambda: None)
     found = report(capsys)["sources"]
-    assert set(found) == {"xela", "ros1", "ros2", "serial"}
+    assert {"xela", "serial"} <= set(found)
     assert "127.0.0.1:5000" in found["xela"]
     assert main(["doctor"]) == 0
-    assert found["ros2"] in capsys.readouterr().out
+    assert found["serial"] in capsys.readouterr().out
 
 
 def test_a_listening_server_is_reported(monkeypatch):
@@ -115,13 +115,4 @@ def test_a_listening_server_is_reported(monkeypatch):
 def test_missing_extras_are_reported(monkeypatch):
     monkeypatch.setattr(verb, "is_installed", lambda name: False)
     found = verb.check_sources()
-    assert found["ros2"] == f"not installed: {install_command('ros2')}"
     assert found["serial"] == f"not installed: {install_command('serial')}"
-
-
-def test_a_bad_master_is_reported(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.devices.ros.rospy_node.rospy_module", lambda: None)
-    monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
-    assert report(capsys)["sources"]["ros1"] == (
-        "a ROS master like http://localhost:11311 expected, 'nonsense' given"
-    )

@@ -254,11 +254,3 @@ class TestRefusals:
 )
 def test_what_a_command_waits_for(source, text):
     assert awaited(source) == text
-
-
-def test_only_the_twin_takes_commands(capsys, path):
-    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
-    text = refusal(capsys, path, "--hand", "ros2:plexus?effort=0.1&max_effort=0.3")
-    assert text == f"--hand needs the source twin:..., {path} given"
-    text = refusal(capsys, "twin:", "--hand", "log:x")
-    assert text == "ros2:plexus?effort=0.1&max_effort=0.3 expected, log:x given"

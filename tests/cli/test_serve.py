@@ -184,27 +184,6 @@ def test_no_text_browser_is_opened(monkeypatch):
     assert open_browser("http://127.0.0.1:1/") is False
 
 
-def test_estimates_that_ros_refuses_are_reported(capsys, monkeypatch, grasp):
-    class Refuser:
-        n_failed, n_dropped = 7, 2
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
-        def put(self, said):
-            pass
-
-    monkeypatch.setattr(verb, "_create_publishers", lambda stream, **_: [Refuser()])
-    code, _, err = run(capsys, MODEL, grasp, "--once", "--speed", 50, "--port", 0, "--ros2")
-    assert code == 0
-    assert err.endswith(
-        "Refuser: ROS refused 7 estimates, 2 were dropped because it was too slow\n"
-    )
-
-
 class Slow(Source):
     """Source that has no packet while it is opened, and then fails."""
 

@@ -1,6 +1,6 @@
 """The templates of hands beyond the contract: ceilings, deadband and rate, width, actions.
 
-The contract runs over the first two in `tests/devices/hands/test_contract.py`.
+The contract runs over the first two in `packages/holdfast-grip/tests/grip/hands/test_contract.py`.
 """
 
 import math

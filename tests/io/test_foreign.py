@@ -104,13 +104,16 @@ def test_an_iterator_that_is_left_ends_its_child(tables, file):
 def test_a_child_ends_with_its_parent(tmp_path, kind):
     """Also while it waits for a pipe that nobody writes to."""
     os.mkfifo(tmp_path / "pipe")
-    hanging = "from holdfast.io import bags; bags.poses_of = lambda *_: open('pipe'); "
+    hanging = (
+        "from holdfast.io.importers import xela_log; xela_log.poses = lambda *_: open('pipe'); "
+    )
     program = (
         "from pathlib import Path; from holdfast.io import foreign\n"
         f"foreign._PROGRAM = {hanging!r} + foreign._PROGRAM\n"
         "child = foreign._Child(); foreign._idle.append(child)\n"
         "print(child._process.pid, child._folder, flush=True)\n"
-        "foreign.read_foreign_arrays('poses', Path('.'), {})\n"
+        "options = {'format': 'xela-log', 'bodies': {}}\n"
+        "foreign.read_foreign_arrays('poses', Path('.'), options)\n"
     )
     parent = subprocess.Popen(
         python_command(program), cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL

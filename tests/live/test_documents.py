@@ -15,7 +15,6 @@ import holdfast
 from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactEstimate
 from holdfast.live.documents import FingerDocument, document_type, finger_document
-from holdfast.live.publishers.ros_publisher import NOT_IN_DIAGNOSTICS, diagnostics_of
 from live import estimates
 
 PACKAGE = Path(holdfast.__file__).parent
@@ -27,7 +26,6 @@ import holdfast
 from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.live.documents import finger_document
-from holdfast.live.publishers.ros_publisher import diagnostics_of
 from holdfast.live.web.schema import EstimateDocument
 from live import estimates
 import msgspec
@@ -44,7 +42,6 @@ json.dump(
         "line": json.loads(line),
         "socket": msgspec.to_builtins(socket)["fingers"]["thumb"],
         "schema": msgspec.json.schema(EstimateDocument)["$defs"]["FingerDocument"],
-        "ros": dict(diagnostics_of((hand, 1.0), 1.0)[1].values),
     },
     sys.stdout,
 )
@@ -80,7 +77,6 @@ def test_a_new_field_of_the_estimate_is_in_every_document(wider):
     assert list(wider["socket"])[-3:] == ["slip_distance", "humidity", "taxels"]
     assert wider["line"]["humidity"] == wider["socket"]["humidity"] == 0.25
     assert wider["socket"]["taxels"] == [[1.0, 2.0, 3.0]]
-    assert wider["ros"]["humidity"] == "0.25"
     assert {"type": "null"} in wider["schema"]["properties"]["humidity"]["anyOf"]
     assert "humidity" in wider["schema"]["required"]
 
@@ -89,12 +85,9 @@ def test_all_documents_have_the_fields_of_the_estimate():
     estimate = estimates.estimate()
     (lines,) = json_lines(EstimateChunk("made", {"thumb": [estimate.fingers["thumb"]]}, []))
     socket = msgspec.to_builtins(finger_document(estimate.fingers["thumb"]))
-    diagnostic = dict(diagnostics_of((estimate, 1.0), 1.0)[1].values)
     names = list(ContactEstimate.__struct_fields__)
     assert list(json.loads(lines)) == [names[0], "finger", *names[1:]]
     assert list(socket) == [*names, "taxels"]
-    assert list(diagnostic) == [name for name in names if name not in NOT_IN_DIAGNOSTICS]
-    assert set(names) >= NOT_IN_DIAGNOSTICS
 
 
 def test_numbers_may_be_null_where_a_value_may_have_none():

@@ -119,7 +119,11 @@ def _app(words: list[str]) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_root)
-    others = {name: "A verb of a plug-in." for name in VERB_PLUGINS.names() if name not in VERBS}
+    others = {
+        name: "A verb of a plug-in."
+        for name in VERB_PLUGINS.names(report=False)
+        if name not in VERBS
+    }
     for name, summary in {**VERBS, **others}.items():
         if name in words:
             verb = load_verb(name)

@@ -40,17 +40,19 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Args:
             source: path or URI from the command line, or `hand`.
         """
-        from holdfast.devices.uri import DEVICE_MODULES, is_uri, parse
+        from holdfast.devices.uri import is_uri, parse, source_module
 
         if source == HAND and not Path(HAND).exists():
             source = self.source or f"xela://{self.host or 'auto'}"
         if not is_uri(source):
             return source
         scheme, address = parse(source)
-        if scheme not in DEVICE_MODULES:
-            return source
-        more = {key: v for key, v in self._parameters(scheme).items() if v is not None}
-        missing = {key: value for key, value in more.items() if key not in address.parameters}
+        known = getattr(source_module(scheme), "PARAMETERS", ())
+        missing = {
+            key: value
+            for key, value in self._parameters().items()
+            if key in known and key not in address.parameters and value is not None
+        }
         if not missing:
             return source
         return f"{source}{'&' if '?' in source else '?'}{urlencode(missing, safe=':,/')}"
@@ -65,10 +67,9 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             defaults["ignore"] = ",".join(taxels)
         return defaults
 
-    def _parameters(self, scheme: str) -> dict[str, str | None]:
+    def _parameters(self) -> dict[str, str | None]:
         fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items()) or None
-        shared = {"fingers": fingers, "sensor": self.sensor}
-        return shared if scheme == "serial" else {**shared, "values": self.values}
+        return {"fingers": fingers, "sensor": self.sensor, "values": self.values}
 
 
 def find_config(option: Path | None = None) -> Path | None:

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import time
 from contextlib import suppress
+from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,10 +33,9 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "onnx": "classifiers as ONNX files",
-    "bags": "import of ROS 1 and ROS 2 bags",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
-    "ros2": "ROS 2 topics without a ROS installation",
+    "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "grip": "holdfast hold: control of the grip force of a hand",
@@ -63,10 +63,10 @@ have kinds of their own, see `GROUP_PLUGINS`."""
 PLUGIN_TIMEOUT = 60.0
 """Time in which a plug-in must be imported [s]."""
 
-_ANSWER = "error of the plug-in: "
-_LOAD_PLUGIN = (
-    "from holdfast.cli.doctor import plugin_group\n"
-    f"print({_ANSWER!r} + plugin_group(sys.argv[1]).error(sys.argv[2]), end='')"
+_ANSWER = "answer of the plug-in: "
+_CHILD = (
+    "from holdfast.cli.doctor import plugin_error, source_state\n"
+    f"print({_ANSWER!r} + %s(*sys.argv[1:]), end='')"
 )
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
@@ -113,20 +113,33 @@ def _report(context: typer.Context) -> dict[str, Any]:
 def _plugins() -> "list[Plugin]":
     """Return the plug-ins of other packages, and why some of them are skipped."""
     kinds = (*PLUGIN_GROUPS, *GROUP_PLUGINS.load_all())
-    return [plugin for kind in kinds for plugin in plugin_group(kind).states(_plugin_error)]
+    ask = partial(_ask_child, "plugin_error")
+    return [plugin for kind in kinds for plugin in plugin_group(kind).states(ask)]
 
 
-def _plugin_error(kind: str, name: str) -> str:
-    """Return why a plug-in is skipped; a child process loads it, which it may end or block."""
+def plugin_error(kind: str, name: str) -> str:
+    """Return why a plug-in is skipped; empty if it can be used."""
+    return plugin_group(kind).error(name)
+
+
+def source_state(name: str) -> str:
+    """Return what a source of a plug-in finds, or why it is skipped; empty without a state."""
+    from holdfast.devices.uri import source_module
+
+    return plugin_error("sources", name) or getattr(source_module(name), "state", str)()
+
+
+def _ask_child(function: str, *words: str) -> str:
+    """Return what a function gives in a child process, which a plug-in may end or block."""
     try:
         done = subprocess.run(
-            python_command(_LOAD_PLUGIN, kind, name), stdin=subprocess.DEVNULL,
+            python_command(_CHILD % function, *words), stdin=subprocess.DEVNULL,
             capture_output=True, text=True, errors="replace", timeout=PLUGIN_TIMEOUT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return f"its import takes longer than {PLUGIN_TIMEOUT:.0f} s"
-    _, answered, error = done.stdout.rpartition(_ANSWER)
-    return error if answered else f"its import ends the process (exit code {done.returncode})"
+    _, answered, answer = done.stdout.rpartition(_ANSWER)
+    return answer if answered else f"its import ends the process (exit code {done.returncode})"
 
 
 def plugin_group(kind: str) -> "PluginGroup[Any]":
@@ -271,7 +284,11 @@ def _extra_text(extra: dict[str, Any]) -> str:
 
 def check_sources() -> dict[str, str]:
     """Return a short description of the state of each kind of live source."""
-    return {"xela": _xela(), "ros1": _ros1(), "ros2": _ros2(), "serial": _serial()}
+    from holdfast.devices.uri import SOURCE_PLUGINS
+
+    others = {name: _ask_child("source_state", name) for name in SOURCE_PLUGINS.names()}
+    known = {name: state for name, state in others.items() if state}
+    return {"xela": _xela(), **known, "serial": _serial()}
 
 
 def _xela() -> str:
@@ -283,24 +300,6 @@ def _xela() -> str:
         with suppress(OSError), socket.create_connection(address, PROBE_TIMEOUT):
             return f"a server listens at {address}"
     return f"no server listens at {' or '.join(map(str, addresses))}"
-
-
-def _ros1() -> str:
-    from holdfast.devices.ros.rospy_node import check_master, master_uri, rospy_module
-    from holdfast.errors import HoldfastError
-
-    try:
-        rospy_module()
-        check_master(master := master_uri(None))
-    except (HoldfastError, ValueError) as error:  # ValueError: ROS_MASTER_URI is invalid
-        return str(error)
-    return f"rospy is installed; ROS master at {master}"
-
-
-def _ros2() -> str:
-    if not is_installed("cyclonedds"):
-        return f"not installed: {install_command('ros2')}"
-    return f"cyclonedds, domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
 
 
 def _serial() -> str:

@@ -1,14 +1,16 @@
 """Sources by name: the path of a recording, or a URI, also of a plug-in."""
 
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast.errors import require_extras
+from holdfast.errors import missing_part, require_extras
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import Sensor, sensor, sensor_names
 
@@ -18,13 +20,12 @@ if TYPE_CHECKING:
 SCHEMES = {
     "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
     "twin": "the twin: twin:?object=can&seed=1&case=2&profile=reference",
-    "ros2": "a ROS 2 topic: ros2:///xServTopic",
-    "ros1": "a ROS 1 topic: ros1:///xServTopic",
     "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
 }
 """URI schemes of the sources, with a description and an example of each."""
-DEVICE_MODULES = {"xela": "xela", "ros2": "ros.ros2", "ros1": "ros.ros1", "serial": "serial"}
-"""Modules of `holdfast.devices.sources` whose function `source(address)` makes a source."""
+DEVICE_SCHEMES = ("xela", "serial")
+"""Those of devices: the module `holdfast.devices.sources.<scheme>` has a function `source(address)`
+that makes a source, and the names of the parameters of its URI in `PARAMETERS`."""
 VALUES = ("counts", "calibrated")
 """Readings to take from a packet: uint16 counts, or newtons if the device sends them."""
 
@@ -115,6 +116,7 @@ def parse(text: str) -> tuple[str, Address]:
 
     Raises:
         ValueError: the scheme is not known, or a parameter occurs twice or has no value.
+        HoldfastError: the scheme is of a package that is not installed.
 
     Example:
         >>> parse("twin:?object=can")[1].parameters
@@ -123,7 +125,7 @@ def parse(text: str) -> tuple[str, Address]:
     match = _SCHEME.match(text)
     scheme = match["scheme"] if match else ""
     if scheme not in SCHEMES and scheme not in (others := SOURCE_PLUGINS.names()):
-        raise ValueError(
+        raise missing_part("sources", scheme, f"the source {scheme}:") or ValueError(
             f"{text!r} is neither the path of a recording nor the URI of a source; there are "
             + ", ".join(f"{name}:" for name in (*SCHEMES, *others))
         )
@@ -182,14 +184,26 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
     return _source_maker(scheme)(address)
 
 
+def source_module(scheme: str) -> ModuleType | None:
+    """Return the module of the sources of a scheme, None of the twin.
+
+    It may have `PARAMETERS`, names of parameters of the URI, and a function `state()`, which
+    returns in a few words whether such a source can be reached.
+
+    Raises:
+        ValueError: the plug-in of the scheme cannot be used.
+    """
+    return None if scheme == "twin" else sys.modules.get(_source_maker(scheme).__module__)
+
+
 def _source_maker(scheme: str) -> "Callable[[Address], Source]":
     """Return the function that makes the sources of a scheme.
 
     Raises:
         ValueError: the plug-in of the scheme cannot be used.
     """
-    if scheme in DEVICE_MODULES:
-        module = import_module(f"holdfast.devices.sources.{DEVICE_MODULES[scheme]}")
+    if scheme in DEVICE_SCHEMES:
+        module = import_module(f"holdfast.devices.sources.{scheme}")
         make: Callable[[Address], Source] = module.source
         return make
     plugin = SOURCE_PLUGINS.load(scheme)

@@ -366,10 +366,11 @@ def _texts(lines: list[str]) -> Iterator[tuple[bytes, Arrays]]:
 
 
 def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    from holdfast.io.bags import poses_of
+    from holdfast.io.importers import importer
 
+    source = importer(str(request.options["format"]))
     _limit_memory(request)
-    poses = poses_of(path, request.options)
+    poses = source.poses(path, request.options["bodies"])
     yield msgspec.json.encode(list(poses)), list(poses.values())
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.definitions import Definition, parse_definition
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
+from holdfast.io.definitions import Definition, parse_definition
 from holdfast.sensors.types import Array
 
 TEXT_TYPE = "holdfast_msgs/msg/Text"

@@ -18,7 +18,7 @@ from .helpers import run
         ),
         (
             ("--auto", "tracking", "F", "--poses", "a.bag", "--track", "object=/pose"),
-            "one bag of ROS expected at a.bag, 0 found",
+            "a.bag does not exist; a file or folder to import expected",
         ),
         (
             ("--auto", "tracking", "F", "--track", "object=/pose"),

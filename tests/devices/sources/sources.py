@@ -1,16 +1,13 @@
 """Every source, ready to be opened, for the contract in `test_contract.py`."""
 
-import os
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from importlib.util import find_spec
 from socket import create_server
-from threading import Event, Thread
+from threading import Event
 
 import numpy as np
-import pytest
 
 import holdfast.devices.sources.serial
 import holdfast.devices.sources.twin
@@ -19,8 +16,6 @@ from holdfast.devices.sources import Source, open_source
 from holdfast.io import save_recording
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.recordings import Recording, Tactile
-from holdfast.ros.cdr import MessageEncoder
-from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.twin.simulation import simulate
 
@@ -163,59 +158,13 @@ class _Pads(Source):
         return arrival._replace(samples=samples)
 
 
-@contextmanager
-def ros1(folder, monkeypatch):
-    pytest.skip("rospy comes with ROS 1 alone, and needs its master")
-    yield
-
-
-@contextmanager
-def ros2(folder, monkeypatch):
-    if find_spec("cyclonedds") is None:
-        pytest.skip("cyclonedds is not installed")
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    from holdfast.devices.ros import dds
-
-    domain = 201 + os.getpid() % 30  # tests of ROS 2 itself take those below
-    definition = known_definition("xela_server_ros2/SensStream", ros2=True)
-    node = dds.Node(domain)
-    write, encode = node.writer("/xServTopic", definition), MessageEncoder(definition)
-    quiet = Event()
-
-    def publish():
-        for k in range(10_000):
-            write(encode({"sensors": [_sensor_full(k, number) for number in (1, 2)]}))
-            if quiet.wait(0.01):
-                return
-
-    thread = Thread(target=publish)
-    thread.start()
-    try:
-        yield Ready(open_source(f"ros2:///xServTopic?domain={domain}&fingers=1:thumb"), quiet.set)
-    finally:
-        quiet.set()
-        thread.join()
-
-
-def _sensor_full(k, number):
-    """Sample `k` of a 4 x 4 patch, as XELA's server sends it in ROS 2."""
-    return {
-        "message": k,
-        "time": 1000.0 + k / 100,
-        "model": "uSPa44",
-        "sensor_pos": number,
-        "taxels": [{"x": k % 65536, "y": taxel, "z": 7} for taxel in range(16)],
-        "forces": [],
-    }
-
-
 EVERY = {
     make.__name__: make
     for make in (parquet, mcap, parquet_at_once, mcap_at_once, twin, twin_at_once, serial, xela)
-} | {"ros1": ros1, "ros2": ros2}
+}
 ENDING = {make.__name__: make for make in (parquet_at_once, mcap_at_once, twin_at_once)}
 """Sources that end."""
-LASTING = {make.__name__: make for make in (parquet, mcap, twin_slow, serial, xela, ros1, ros2)}
+LASTING = {make.__name__: make for make in (parquet, mcap, twin_slow, serial, xela)}
 """Sources that become silent, and do not end."""
 
 

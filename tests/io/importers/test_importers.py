@@ -4,7 +4,7 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import FORMATS, import_recordings
-from holdfast.io.importers import IMPORTER_PLUGINS
+from holdfast.io.importers import IMPORTER_PLUGINS, read_poses
 
 NAMES = (*FORMATS, *IMPORTER_PLUGINS.names())
 """Formats of holdfast, and of the packages that are installed."""
@@ -51,3 +51,11 @@ def test_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "a.csv")
     with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
         import_recordings(tmp_path / "a.csv")
+
+
+def test_a_format_without_poses(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,finger1:1:x,finger1:1:y,finger1:1:z\n0,1,2,3\n")
+    with pytest.raises(RecordingError) as refusal:
+        read_poses(path, {"object": "object"})
+    assert str(refusal.value) == f"{path} is of the format csv, from which no poses can be read"

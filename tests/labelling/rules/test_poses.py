@@ -5,7 +5,6 @@ from holdfast.errors import RecordingError
 from holdfast.labelling.rules.poses import (
     PoseTrack,
     in_sight,
-    poses_from_bag,
     poses_from_csv,
     poses_from_truth,
     poses_of,
@@ -13,7 +12,6 @@ from holdfast.labelling.rules.poses import (
 )
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
-from ros.pose_bags import PoseBagWriter
 
 HEADER = "time,x,y,z,qw,qx,qy,qz"
 ROW = "{t},{x},0,0.5,1,0,0,0"
@@ -129,17 +127,3 @@ def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():
     turns = np.tile([1.0, 0, 0, 0], (60, 1))
     seen = in_sight(PoseTrack(times, place, turns)).seen
     assert seen.tolist() == [True] * 20 + [False] * 20 + [True] * 10 + [False] * 10
-
-
-def test_poses_from_a_bag(tmp_path):
-    bag = PoseBagWriter(tmp_path / "bag", ros1=False)
-    path = bag.write(
-        [("/marker", bag.pose(1e9 + k / 4, float(k))) for k in range(4)]
-        + [("/tf", bag.frames(1e9 + k / 4, k / 2, "thumb_tip", "camera")) for k in range(4)]
-    )
-    poses = poses_from_bag(path, "/marker", {"thumb": "thumb_tip"})
-    assert (poses.object_track.times - 1e9).tolist() == [0, 0.25, 0.5, 0.75]
-    assert poses.object_track.positions[:, 0].tolist() == [0, 1, 2, 3]
-    assert poses.tip_tracks["thumb"].positions[:, 0].tolist() == [0, 0.5, 1, 1.5]
-    assert poses.tip_tracks["thumb"].quaternions[0].tolist() == [1, 0, 0, 0]
-    assert not poses.same_clock

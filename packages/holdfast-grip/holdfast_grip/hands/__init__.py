@@ -1,7 +1,6 @@
 """Hands that take commands, by URI, also of a plug-in."""
 
 from collections.abc import Callable
-from inspect import signature
 from typing import Any
 
 from holdfast.errors import missing_part
@@ -44,21 +43,21 @@ def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
             f"{uri!r} is no hand; there are twin:, log:PATH, call:MODULE:FUNCTION"
             f"{HAND_PLUGINS.text()}"
         )
-    has_standby = "standby" in signature(make).parameters
-    hand: Any = make(uri, standby=standby) if has_standby else make(uri)
+    hand: Any = make(uri)
     if not isinstance(hand, HandDevice):
         raise ValueError(
             f"{uri}: the plug-in {scheme} must return a subclass of HandDevice, as the contract "
             f"of hands says; {type(hand).__name__} returned"
         )
+    hand.standby = standby
     return hand
 
 
-def _plugin_hand(name: str, loaded: Any) -> Callable[..., HandDevice]:  # noqa: ANN401
+def _plugin_hand(name: str, loaded: Any) -> Callable[[str], HandDevice]:  # noqa: ANN401
     """Return the function of a plug-in that makes the hand of a URI."""
     if not callable(loaded):
         raise TypeError(f"a function hand(uri) expected for {name}:, {loaded!r} given")
-    make: Callable[..., HandDevice] = loaded
+    make: Callable[[str], HandDevice] = loaded
     return make
 
 

@@ -27,6 +27,8 @@ class HandDevice(Openable):
         heartbeat: time after which it needs its command again, although nothing changed [s]; None
             if it keeps its last command, and gets each command once.
         needs_idle: whether it needs commands while the loop is IDLE, before the grip begins.
+        standby: whether a watchdog opens it, beside the controller of the hand, to release the hand
+            if that one dies.
         n_refused: number of messages of the hand that were refused, because they cannot be right.
     """
 
@@ -34,6 +36,7 @@ class HandDevice(Openable):
     fingers: tuple[str, ...] | None = None
     heartbeat: float | None = None
     needs_idle: bool = False
+    standby: bool = False
     n_refused: int = 0
 
     _begun = False

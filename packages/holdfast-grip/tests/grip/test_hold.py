@@ -9,7 +9,6 @@ import pytest
 from holdfast.cli import main
 from holdfast.cli.app import spread_groups
 from holdfast.cli.serve import serve
-from holdfast.devices.hands.ros import ros_hand
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast_grip import GripCommand, Limits
@@ -22,8 +21,6 @@ pytestmark = pytest.mark.slow
 
 DOCS = Path(__file__).parents[4] / "docs"
 TWIN = "twin:?object=ball&case=1&profile=finger-vigorous"
-WIDTH = "ros2:width-gripper?topic=/g&joint=f&open=0.08&effort=4&stiffness=2000"
-PLEXUS = "ros2:plexus?effort=0.06&max_effort=0.1"
 
 
 @pytest.fixture(scope="module")
@@ -84,53 +81,11 @@ def test_the_published_trials_have_these_limits():
 
 
 @pytest.mark.parametrize(
-    ("hand", "message"),
-    [
-        ("ros2:plexus?effort=1", "max_effort: a number or 16 numbers"),
-        (PLEXUS, "at most 0.1 N m expected, 0.18 N m given at max_scale 3: lower"),
-        (f"{WIDTH}&max_effort=9", "at most 9 N expected, 12 N given at max_scale 3: lower one of"),
-        (
-            f"{WIDTH.replace('2000', '2')}&max_effort=12",
-            "0.08 m expected, 4 m given at max_scale 3",
-        ),
-        (
-            f"{WIDTH.replace('0.08', '80')}&max_effort=12",
-            "a stroke of at most 1 m expected, 80 giv",
-        ),
-        (f"ros2:v4?effort={','.join(['0.3'] * 16)}", "0.9 N m given at max_scale 3: lower one of"),
-        (
-            f"ros2:v4?home={','.join(['45'] * 16)}",
-            "home: index joint 0: -0.47 to 0.47 rad expected",
-        ),
-        ("ros2:v4?order=thumb,ring,index", "order=thumb,index,middle,ring expected, in any order"),
-    ],
-)
-def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, message):
-    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
-    assert main(["hold", "builtin:twin", str(grasp), "--hand", hand, "--speed", "0"]) == 2
-    assert message in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_a_hand_that_does_not_answer_is_one_line(grasp, capsys, monkeypatch):
-    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.1)
-    hand = "ros2:v4?domain=229"
-    words = ["hold", "builtin:twin", str(grasp), "--hand", hand, "--armed", "--confirm", hand]
-    assert main(words) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "nothing listens on /allegro_hand_position_controller/commands in ROS domain 229" in line
-
-
-@pytest.mark.parametrize(
     ("words", "message"),
     [
         (["--hand", "log:h", "--armed"], "--armed moves the hand: confirm it with --confirm log:h"),
         (["--hand", "log:h", "--armed", "--confirm", "log:x"], "confirm it with --confirm log:h"),
         (["--hand", "magic:"], "'magic:' is no hand; there are twin:"),
-        (["--hand", "ros2:magic"], "there are the hands ros2:plexus, ros2:v4"),
-        (["--hand", "ros2:v4-envelop"], "as a goal, by services, which plain DDS does not have"),
-        (["--hand", "ros1:efforts", "--armed", "--confirm", "x"], "confirm it with --confirm ros1"),
         (["--hand", "twin:"], "--hand twin: needs the source twin:..."),
         (["--hand", "log:h", "--max-scale", "0.5"], "min_scale <= 1 <= max_scale expected"),
         (["--hand", "log:h", "--law", "magic"], "unknown law 'magic'"),

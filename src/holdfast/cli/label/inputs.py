@@ -45,7 +45,6 @@ class RuleOptions:
         Raises:
             ValueError: tracks are given without a bag, or a bag without the track of the object.
             RecordingError: the file cannot be read.
-            MissingExtra: the file is a bag, and rosbags is not installed.
         """
         from holdfast.labelling.rules.poses import OBJECT, poses_from_bag, poses_from_csv
 

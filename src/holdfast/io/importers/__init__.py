@@ -15,23 +15,21 @@ from typing import Any
 
 from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
-from holdfast.io.foreign import read_foreign
+from holdfast.io.foreign import read_foreign, read_foreign_arrays
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, name_prefixes
 from holdfast.io.safe_reading import recording_errors
 from holdfast.plugins import PluginGroup
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
 
 FORMATS = {
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
-    "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order, those of
 plug-ins before the last."""
-EXTRAS = {"rosbag": "bags"}
-"""Extras that formats need."""
 IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
     "read this, give --in-contact"
@@ -39,7 +37,6 @@ IN_CONTACT = (
 IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
 HINTS = {
     "xela-log": IF_IN_CONTACT,
-    "rosbag": f"{IF_IN_CONTACT}; bias a PapillArray before, without load",
     "csv": f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
 }
 """Option that helps with the recordings of a format, for the person who imports them."""
@@ -120,6 +117,25 @@ def import_parts(
     return name, parts
 
 
+def read_poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
+    """Read the poses of bodies from a file or folder, in a child process.
+
+    Args:
+        path: path of the file or folder.
+        bodies: name in the file of each body.
+
+    Returns:
+        For each body (n, 8): time [s], position [m], quaternion w x y z.
+
+    Raises:
+        RecordingError: no format fits, its importer has no poses, or a body is missing.
+    """
+    name = _format_of(path, None, None, None)
+    if not hasattr(importer(name), "poses"):
+        raise RecordingError(f"{path} is of the format {name}, from which no poses can be read")
+    return read_foreign_arrays("poses", path, {"format": name, "bodies": dict(bodies)})
+
+
 def _named_apart(
     parts: Sequence[Path], read: Callable[[Path], Iterator[Recording]]
 ) -> Iterator[Recording]:
@@ -189,7 +205,7 @@ def import_hint(name: str) -> str | None:
 
 def extra_of(name: str) -> str | None:
     """Return the extra that a format needs; None without one."""
-    extra: str | None = EXTRAS.get(name) or getattr(importer(name), "EXTRA", None)
+    extra: str | None = getattr(importer(name), "EXTRA", None)
     return extra
 
 
@@ -204,7 +220,7 @@ def importer(name: str) -> ModuleType:
         if plugin is None:
             raise ValueError(f"the plug-in of {name} cannot be used; holdfast doctor says why")
         return plugin
-    module = {"csv": "generic_csv", "rosbag": "ros_bag"}.get(name, name.replace("-", "_"))
+    module = "generic_csv" if name == "csv" else name.replace("-", "_")
     return import_module(f"holdfast.io.importers.{module}")
 
 

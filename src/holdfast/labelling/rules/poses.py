@@ -138,21 +138,17 @@ def poses_from_csv(path: str | Path) -> Poses:
 def poses_from_bag(
     path: str | Path, object_name: str, tip_names: Mapping[str, str] | None = None
 ) -> Poses:
-    """Read poses from a bag of ROS 1 or ROS 2: topics of PoseStamped, or frames of TFMessage.
-
-    A name that begins with a slash is a topic of `geometry_msgs/PoseStamped`. Any other name is a
-    child frame of `tf2_msgs/TFMessage`. All must have the same parent frame.
+    """Read poses from a bag, or a file of any other format whose importer has poses.
 
     Args:
         path: of the bag.
-        object_name: topic or frame of the object.
-        tip_names: topic or frame of each fingertip, by finger.
+        object_name: name of the object in the bag: its topic or frame.
+        tip_names: the same of each fingertip, by finger.
 
     Raises:
-        RecordingError: the bag cannot be read, a topic or frame is missing, or parents differ.
-        MissingExtra: rosbags is not installed.
+        RecordingError: the bag cannot be read, or has no such pose.
     """
-    from holdfast.io.bags import read_poses
+    from holdfast.io.importers import read_poses
 
     names = {OBJECT: object_name, **(tip_names or {})}
     return _measured(read_poses(Path(path), names), Path(path))

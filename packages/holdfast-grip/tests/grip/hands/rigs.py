@@ -4,28 +4,18 @@ import json
 import runpy
 import socket
 import sys
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
-import pytest
 
-from devices.hands.ros.drivers import ROS1, ROS2, Ros2Driver
 from holdfast_grip import GripCommand
 from holdfast_grip.hands import open_hand
 from holdfast_grip.hands.live_twin import LiveTwin
-from ros.domains import new_domain
 
 taken = []
 EXAMPLES = Path(__file__).parents[5] / "examples"
-LOCAL = ["twin", "log", "call", "newtons", "width"]
-WITH_STATES = [
-    f"{scheme}:{name}"
-    for scheme, drivers in (("ros2", ROS2), ("ros1", ROS1))
-    for name, driver in drivers.items()
-    if driver.states is not None
-]
-NAMES = [*LOCAL, *(f"ros2:{name}" for name in ROS2), *(f"ros1:{name}" for name in ROS1)]
+NAMES = ["twin", "log", "call", "newtons", "width"]
 
 
 class TwinRig:
@@ -171,60 +161,12 @@ class WidthRig:
         self.hand.close()
 
 
-class RosRig:
-    """A hand on topics, with a driver on the other side."""
-
-    def __init__(self, hand, driver):
-        self.hand, self.peer, self.driver = hand, driver, driver.driver
-        self.per_finger = self.driver.effort is None
-        self.fingers = self.driver.order or None
-
-    def start(self):
-        self.peer.messages.clear()
-        self.hand.heartbeat = None
-
-    @contextmanager
-    def spoiled(self, position):
-        """Every third reading of the first joint is wrong."""
-        self.peer.spoil(position)
-        yield
-        self.peer.spoil(None)
-
-    @contextmanager
-    def other_hand(self, *, standby=False):
-        """A second hand of the same URI, not yet open."""
-        hand = open_hand(self.hand.name, standby=standby)
-        yield hand
-        hand.close()
-
-    def forces(self, n):
-        messages = self.peer.wait(n)
-        assert len(messages) == n, messages
-        return self.driver.meaning(messages)
-
-    def close(self):
-        self.hand.close()
-        self.peer.close()
-
-
-def ros2_rig(name):
-    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
-    domain = new_domain()
-    driver = ROS2[name]
-    uri = with_parameter(driver.uri, f"domain={domain}")
-    return RosRig(open_hand(uri), Ros2Driver(driver, domain))
-
-
-def with_parameter(uri, text):
-    return f"{uri}{'&' if '?' in uri else '?'}{text}"
-
-
 class Rigs:
     """Rigs by name; each is made when it is needed, and reused."""
 
     def __init__(self, new_folder):
         self._new_folder = new_folder
-        self._made, self._world = {}, None
+        self._made = {}
 
     def __call__(self, name):
         if name not in self._made:
@@ -233,19 +175,9 @@ class Rigs:
         return self._made[name]
 
     def _new(self, name):
-        scheme, _, kind = name.partition(":")
-        if scheme == "ros2":
-            return ros2_rig(kind)
-        if scheme == "ros1":
-            from .ros.ros1 import Ros1Rig, Ros1World
-
-            self._world = self._world or Ros1World(self._new_folder())
-            return Ros1Rig(self._world, kind)
         kinds = {"twin": TwinRig, "log": LogRig, "call": CallRig, "newtons": NewtonRig}
         return {**kinds, "width": WidthRig}[name](self._new_folder())
 
     def close(self):
         for rig in self._made.values():
             rig.close()
-        if self._world is not None:
-            self._world.close()

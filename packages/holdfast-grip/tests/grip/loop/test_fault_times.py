@@ -7,7 +7,6 @@ import pytest
 
 from grip.build import RATE, hand, holding
 from holdfast.contact import ContactState
-from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.sources.timeline import MIN_LATE_DELAY
 from holdfast_grip import Limits, LoopState, repeats
 from holdfast_grip.controller import OVERLOAD
@@ -37,8 +36,8 @@ TIMES = [
     ("`not_finite`, `overload`", "the same sample"),
     ("`clock`", "the same sample"),
     ("`behind`", f"{ms(runner.MAX_PAUSE)}, at the next step"),
-    ("`hand`", f"{ms(ros_hand.SILENCE_TIME)}, or {ros_hand.SILENCE_PERIODS:g} of their periods"),
-    ("the loop ends", ms(ros_hand.STATE_TIMEOUT)),
+    ("`hand`", "100 ms, or 3 of their periods"),  # of hands that report joints, as those of ROS
+    ("the loop ends", "500 ms"),
     ("the loop ends", "the next command"),
     ("`limit`", "the same command"),
     ("`stopped`", TICK),

@@ -3,6 +3,9 @@
 from holdfast.devices.sources.base import Source
 from holdfast.devices.uri import Address
 
+PARAMETERS = ("values", "fingers", "sensor")
+"""Names of the parameters of the URI."""
+
 
 def source(address: Address) -> Source:
     """Return the source of a URI; entering it connects.
@@ -18,7 +21,7 @@ def source(address: Address) -> Source:
     from holdfast.devices.sources.xela.client import XelaSource
     from holdfast.devices.sources.xela.places import places
 
-    address.only("values", "fingers", "sensor")
+    address.only(*PARAMETERS)
     return XelaSource(
         address.text,
         places(address),

@@ -1,0 +1,198 @@
+"""Bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap): their topics and messages, and poses in them.
+
+`holdfast_ros.bag_storage` reads the containers only. Messages stay bytes until the core's
+codec decodes them by the definitions in the bag, which are data: nothing from a bag is executed.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.io.definitions import Definition, parse_definition, short_name
+from holdfast.io.importers.table import natural_order
+from holdfast.io.safe_reading import ReadBudget, one_line
+from holdfast.sensors.types import Array
+from holdfast_ros.bag_storage import BagConnection, BagStorage
+from holdfast_ros.bag_storage.folder import METADATA, open_folder
+from holdfast_ros.bag_storage.mcap import open_mcap
+from holdfast_ros.bag_storage.ros1 import open_ros1
+from holdfast_ros.bag_storage.sqlite import open_sqlite
+from holdfast_ros.pose_messages import PoseDecoder, has_poses, known_pose_definition
+from holdfast_ros.sensor_messages import known_definition
+
+MAGICS = {
+    ".bag": re.compile(rb"#ROSBAG V"),
+    ".db3": re.compile(rb"SQLite format 3\x00"),
+    ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
+}
+"""First bytes of the files of bags, by suffix. MCAP has the profile of ROS 2."""
+MAX_BAG_MESSAGE_SIZE = 1 << 22
+"""Maximum size of a message that is decoded [bytes]; one of 368 taxels has some 10 kB."""
+
+
+class BagTopic(NamedTuple):
+    """A topic of a bag.
+
+    Attributes:
+        name: name of the topic.
+        kind: type of its messages, as ROS 1 writes it: `package/Type`.
+        definition: definition of its messages; None if it is missing or cannot be parsed.
+        n_messages: number of messages that the bag lists.
+        number: number of its connection; a topic has one for each of its publishers.
+    """
+
+    name: str
+    kind: str
+    definition: Definition | None
+    n_messages: int
+    number: int
+
+
+class Bag:
+    """An open bag; see `open_bag`.
+
+    Attributes:
+        ros2: whether it is a bag of ROS 2.
+        topics: its topics, in the order of their names.
+    """
+
+    def __init__(self, storage: BagStorage, budget: ReadBudget, *, ros2: bool) -> None:
+        self._storage = storage
+        self._budget = budget
+        self._definitions: dict[tuple[str, str], Definition | None] = {}
+        self.ros2 = ros2
+        connections = sorted(storage.connections, key=lambda one: one.topic)
+        self.topics = [self._topic(connection) for connection in connections]
+
+    def messages(self, topics: Iterable[BagTopic]) -> Iterator[tuple[BagTopic, float, bytes]]:
+        """Yield topic, time of recording [s] and bytes of each message, in the order of time.
+
+        Raises:
+            RecordingError: a message is too large, or there are too many.
+        """
+        by_number = {topic.number: topic for topic in topics}
+        if not by_number:
+            return
+        for number, nanoseconds, data in self._storage.messages(list(by_number)):
+            if len(data) > MAX_BAG_MESSAGE_SIZE:
+                raise ValueError(
+                    f"a message of {len(data)} bytes on {by_number[number].name}; at most "
+                    f"{MAX_BAG_MESSAGE_SIZE} expected"
+                )
+            self._budget.step()
+            self._budget.unpack(len(data))
+            yield by_number[number], nanoseconds * 1e-9, data
+
+    def keep(self, n_bytes: int) -> None:
+        """Count the size of a value that is kept of a message [bytes].
+
+        Raises:
+            RecordingError: the values take more memory than the bag may have.
+        """
+        self._budget.keep(n_bytes, 1)
+
+    def _topic(self, one: BagConnection) -> BagTopic:
+        return BagTopic(
+            one.topic, short_name(one.kind), self._definition(one), one.n_messages, one.number
+        )
+
+    def _definition(self, one: BagConnection) -> Definition | None:
+        """Return the definition in the bag; if there is none, the one of a known type."""
+        key = (one.kind, one.definition)
+        if key not in self._definitions:
+            self._definitions[key] = self._parsed(*key)
+        return self._definitions[key]
+
+    def _parsed(self, kind: str, text: str) -> Definition | None:
+        if text.strip():
+            try:
+                return parse_definition(kind, text)
+            except ValueError:
+                return None
+        return known_definition(kind, ros2=self.ros2) or known_pose_definition(kind, ros2=self.ros2)
+
+
+def find_bags(path: Path) -> list[Path]:
+    """Return the bag at `path`, or the bags in that folder in natural order."""
+    if _is_bag(path):
+        return [path]
+    return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural_order)
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Bag]:
+    """Open a bag for reading; errors of libraries inside the block become `RecordingError`.
+
+    Raises:
+        RecordingError: the bag cannot be read, is cut or damaged.
+    """
+    ros2 = path.suffix != ".bag" or path.is_dir()
+    try:
+        budget = ReadBudget(path)
+        with _storage(path, budget) as storage:
+            yield Bag(storage, budget, ros2=ros2)
+    except RecordingError:
+        raise
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
+    except MemoryError as cause:
+        raise RecordingError(f"{path} does not fit into memory: {one_line(cause)}") from cause
+    except Exception as cause:  # libraries raise errors of any type for a damaged bag
+        raise RecordingError(f"{path} is cut or damaged: {one_line(cause)}") from cause
+
+
+def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
+    """Return the poses of bodies in a bag; see `importer.poses`."""
+    rows: dict[str, list[tuple[float, ...]]] = {}
+    frames: dict[str, str] = {}
+    for name, frame, row in _poses(path):
+        rows.setdefault(name, []).append(row)
+        frames[name] = frame
+    if missing := [name for name in wanted.values() if name not in rows]:
+        found = ", ".join(sorted(rows)) or "none"
+        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {found}")
+    parents = sorted({frames[name] for name in wanted.values()})
+    if len(parents) > 1:
+        raise RecordingError(f"{path}: poses in one frame expected, {' and '.join(parents)} given")
+    return {body: np.array(rows[name]) for body, name in wanted.items()}
+
+
+def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
+    """Yield topic or child frame, parent frame, and time and pose, of each pose in a bag."""
+    with open_bag(path) as bag:
+        decoders = {
+            topic.number: PoseDecoder(topic.definition, ros2=bag.ros2)
+            for topic in bag.topics
+            if topic.definition is not None and has_poses(topic.definition)
+        }
+        topics = [topic for topic in bag.topics if topic.number in decoders]
+        for topic, _, data in bag.messages(topics):
+            for pose in decoders[topic.number](data):
+                row = (pose.time, *pose.position, *pose.quaternion)
+                bag.keep(0)
+                yield pose.body or topic.name, pose.frame, row
+
+
+def _is_bag(path: Path) -> bool:
+    if path.is_dir():
+        return (path / METADATA).is_file()
+    if path.suffix not in MAGICS or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return MAGICS[path.suffix].match(file.read(64)) is not None
+
+
+def _storage(path: Path, budget: ReadBudget) -> AbstractContextManager[BagStorage]:
+    if path.is_dir():
+        return open_folder(path, budget)
+    openers: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
+        ".bag": open_ros1,
+        ".db3": open_sqlite,
+        ".mcap": open_mcap,
+    }
+    return openers[path.suffix](path, budget)

@@ -1,0 +1,357 @@
+"""Topics of ROS 2 without an installation of ROS: over DDS, by Cyclone DDS."""
+
+import os
+from collections.abc import Mapping
+from functools import cache, partial
+from typing import Any, Self
+
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import (
+    DDSException,
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import make_idl_struct
+from cyclonedds.idl import types as idl
+from cyclonedds.internal import InvalidSample
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from holdfast.errors import SourceError
+from holdfast.io.cdr import MessageDecoder, MessageEncoder
+from holdfast.io.definitions import NUMBER_CODES, Definition, MessageField
+from holdfast_ros.link import Link, Publisher, TakeStates
+from holdfast_ros.topic_messages import JOINT_STATE, JointStates, topic_definition
+
+READER_QUEUE_SIZE = 256
+"""Maximum number of messages that wait for a busy reader."""
+WRITER_QUEUE_SIZE = 10
+"""Maximum number of messages that wait for a busy subscriber."""
+MAX_MESSAGES_PER_READ = 32
+"""Maximum number of messages that are read at a time."""
+MAX_ENDPOINTS = 1000
+"""Maximum number of publishers, or of subscribers, that are listed."""
+MAX_DOMAIN = 232
+"""Largest number of a ROS domain; larger ones have no ports."""
+TOPIC_PREFIX, TYPE_SEPARATOR = "rt/", "::msg::dds_::"
+"""Parts that ROS 2 adds to the names of topics and of types in DDS."""
+
+LOCALHOST_CONFIGURATION = (
+    "<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast><Interfaces>"
+    '<NetworkInterface address="127.0.0.1"/></Interfaces></General><Discovery>'
+    "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
+)
+"""Configuration for `ROS_LOCALHOST_ONLY=1`."""
+
+_PRIMITIVES = {
+    "bool": bool,
+    "string": str,
+    "byte": idl.uint8,
+    "char": idl.uint8,
+    **{
+        name: getattr(idl, name)
+        for name in NUMBER_CODES
+        if hasattr(idl, name) and name[-1].isdigit()
+    },
+}
+_domains: dict[int, Domain] = {}
+
+
+class Node:
+    """Participant in a ROS domain; on this machine only, if `ROS_LOCALHOST_ONLY` is 1.
+
+    Args:
+        domain: number of the ROS domain.
+
+    Raises:
+        SourceError: DDS reports an error, for example if `CYCLONEDDS_URI` is not valid.
+    """
+
+    def __init__(self, domain: int) -> None:
+        try:
+            if _is_local() and domain not in _domains:
+                _domains[domain] = Domain(domain, LOCALHOST_CONFIGURATION)
+            self._participant = DomainParticipant(domain)
+            self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+            self._subscriptions = BuiltinDataReader(self._participant, BuiltinTopicDcpsSubscription)
+        except DDSException as cause:
+            raise SourceError(f"ROS domain {domain} cannot be joined: {cause.msg}") from cause
+
+    def published_topics(self) -> dict[str, str]:
+        """Return the types of all published topics by name, both as in ROS."""
+        return {
+            _ros_topic(endpoint): ros_type(endpoint.type_name)
+            for endpoint in _endpoints(self._publications)
+        }
+
+    def subscribed_topics(self) -> dict[str, str]:
+        """Return the types of all topics with a subscriber by name, both as in ROS."""
+        return {
+            _ros_topic(endpoint): ros_type(endpoint.type_name)
+            for endpoint in _endpoints(self._subscriptions)
+        }
+
+    def n_other_writers(self, topic: str) -> int:
+        """Return the number of publishers on a topic that do not belong to this node.
+
+        Those of a program that was killed count until DDS notices, 10 s by default.
+        """
+        mine = self._participant.guid
+        found = [endpoint.participant_key for endpoint in _endpoints(self._publications)
+                 if _ros_topic(endpoint) == topic]  # fmt: skip
+        return sum(key != mine for key in found)
+
+    def reader(self, topic: str, definition: Definition) -> "TopicReader":
+        """Subscribe to a topic."""
+        qos = _qos(
+            Policy.Reliability.BestEffort, READER_QUEUE_SIZE
+        )  # also matches reliable publishers
+        reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
+        return TopicReader(reader, WaitSet(self._participant))
+
+    def writer(self, topic: str, definition: Definition) -> "TopicWriter":
+        """Return a function that publishes messages on a topic, with the defaults of ROS 2."""
+        reliable = Policy.Reliability.Reliable(duration(milliseconds=0))  # never blocks
+        qos = _qos(reliable, WRITER_QUEUE_SIZE)
+        writer = DataWriter(self._participant, self._topic(topic, definition, qos), qos=qos)
+        return TopicWriter(writer, _raw(definition))
+
+    def _topic(self, name: str, definition: Definition, qos: Qos) -> Topic[Any]:
+        full = TOPIC_PREFIX + name.removeprefix("/")
+        return Topic(self._participant, full, _raw(definition), qos=qos)
+
+
+class TopicReader:
+    """Subscription to one topic."""
+
+    def __init__(self, reader: DataReader[Any], wait: WaitSet) -> None:
+        self._reader = reader
+        new = ViewState.Any | SampleState.NotRead | InstanceState.Any
+        self._new = ReadCondition(reader, new)
+        self._wait = wait
+        self._wait.attach(self._new)
+
+    def take(self, timeout: float) -> list[bytes]:
+        """Return the waiting messages; if there are none, wait up to `timeout` [s] for some."""
+        found = self._reader.take(MAX_MESSAGES_PER_READ)
+        if not found and self._wait.wait(duration(seconds=timeout)) > 0:
+            found = self._reader.take(MAX_MESSAGES_PER_READ)
+        return [one.data for one in found if not isinstance(one, InvalidSample)]
+
+    def n_writers(self) -> int:
+        """Return the number of publishers on the topic."""
+        return len(self._reader.get_matched_publications())
+
+
+class TopicWriter:
+    """Function that publishes messages on one topic, given as their bytes."""
+
+    def __init__(self, writer: DataWriter[Any], raw: type[Any]) -> None:
+        self._writer = writer
+        self._raw = raw
+
+    def __call__(self, data: bytes) -> None:
+        """Publish a message.
+
+        Raises:
+            SourceError: DDS refuses it.
+        """
+        try:
+            self._writer.write(self._raw(data))
+        except DDSException as cause:
+            topic = self._writer.topic.name
+            raise SourceError(f"DDS refuses a message on {topic}: {cause.msg}") from cause
+
+    def n_readers(self) -> int:
+        """Return the number of subscribers of the topic."""
+        return len(self._writer.get_matched_subscriptions())
+
+
+def _endpoints(reader: BuiltinDataReader) -> list[Any]:
+    """Return the publishers or subscribers of all topics of ROS."""
+    alive = InstanceState.Alive | ViewState.Any | SampleState.Any
+    found = reader.read(MAX_ENDPOINTS, ReadCondition(reader, alive))
+    return [
+        one
+        for one in found
+        if not isinstance(one, InvalidSample) and one.topic_name.startswith(TOPIC_PREFIX)
+    ]
+
+
+def _ros_topic(endpoint: Any) -> str:  # noqa: ANN401 (cyclonedds has no types)
+    name: str = endpoint.topic_name
+    return name.removeprefix(TOPIC_PREFIX[:-1])
+
+
+def _qos(reliability: object, depth: int) -> Qos:
+    return Qos(
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        reliability,
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth),
+    )
+
+
+def _is_local() -> bool:
+    """Return whether ROS is limited to this machine and no other configuration is set."""
+    return os.environ.get("ROS_LOCALHOST_ONLY") == "1" and not os.environ.get("CYCLONEDDS_URI")
+
+
+def domain_number(given: str | None) -> int:
+    """Return the given ROS domain; by default that of `ROS_DOMAIN_ID`, otherwise 0.
+
+    Raises:
+        ValueError: the domain is not a number from 0 to 232.
+    """
+    text = given if given is not None else os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not (text.isdecimal() and int(text) <= MAX_DOMAIN):
+        raise ValueError(f"a ROS domain from 0 to {MAX_DOMAIN} expected, {text!r} given")
+    return int(text)
+
+
+def dds_type(name: str) -> str:
+    """Return the name in DDS of a type of ROS.
+
+    Example:
+        >>> dds_type("std_msgs/String")
+        'std_msgs::msg::dds_::String_'
+    """
+    package, kind = name.split("/")
+    return f"{package}{TYPE_SEPARATOR}{kind}_"
+
+
+def ros_type(name: str) -> str:
+    """Return the name in ROS of a type of DDS; a type that is not of ROS keeps its name.
+
+    Example:
+        >>> ros_type("std_msgs::msg::dds_::String_")
+        'std_msgs/String'
+    """
+    package, separator, kind = name.partition(TYPE_SEPARATOR)
+    return f"{package}/{kind.removesuffix('_')}" if separator else name
+
+
+def _raw(definition: Definition) -> type[Any]:
+    """Return the DDS type of a message; its samples keep their bytes in `data`."""
+    return _raw_type(definition.name, tuple(definition.types.items()))
+
+
+class _Raw:
+    """Methods of a DDS type that keep its messages as bytes."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+
+    def serialize(self, *_: object, **__: object) -> bytes:
+        return self.data
+
+    @classmethod
+    def deserialize(cls, data: bytes, *_: object, **__: object) -> Self:
+        return cls(bytes(data))
+
+    deserialize_key = deserialize
+
+
+@cache
+def _raw_type(name: str, types: tuple[tuple[str, tuple[MessageField, ...]], ...]) -> type[Any]:
+    made = _struct(name, dict(types))
+    for method in ("__init__", "serialize", "deserialize", "deserialize_key"):
+        setattr(made, method, vars(_Raw)[method])
+    return made
+
+
+def _struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type[Any]:
+    fields = {field.name: _member(field, types) for field in types[name]}
+    _, kind = name.split("/")
+    return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
+
+
+def _member(field: MessageField, types: Mapping[str, tuple[MessageField, ...]]) -> Any:  # noqa: ANN401
+    one = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
+    if field.size is None:
+        return one
+    return idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]
+
+
+class Ros2Link(Link):
+    """Connection to a ROS domain.
+
+    Args:
+        domain: number of the domain as text; by default that of `ROS_DOMAIN_ID`.
+
+    Raises:
+        ValueError: there is no such domain.
+    """
+
+    def __init__(self, domain: str | None = None) -> None:
+        self._domain = domain_number(domain)
+        self.where = f"in ROS domain {self._domain}"
+        self._joined: Node | None = None
+
+    def open(self) -> None:
+        """Join the domain.
+
+        Raises:
+            SourceError: DDS reports an error.
+        """
+        self._joined = Node(self._domain)
+
+    def publisher(self, topic: str, kind: str) -> Publisher:
+        """Return a publisher of messages of a type on a topic."""
+        definition = topic_definition(kind)
+        write, encode = self._node.writer(topic, definition), MessageEncoder(definition)
+        return Publisher(lambda message: write(encode(message)), write.n_readers)
+
+    def joint_states(self, topic: str) -> TakeStates:
+        """Subscribe to the joint states of a topic."""
+        definition = topic_definition(JOINT_STATE)
+        decode = MessageDecoder(definition, ros2=True)
+        return partial(_take, topic, self._node.reader(topic, definition), decode)
+
+    def n_other_publishers(self, topic: str) -> int:
+        """Return the number of publishers on a topic, other than those of this link."""
+        return self._node.n_other_writers(topic)
+
+    def subscribed_topics(self) -> list[str]:
+        """Return the names of all topics with a subscriber."""
+        return sorted(self._node.subscribed_topics())
+
+    def published_topics(self) -> list[str]:
+        """Return the names of all topics with a publisher."""
+        return sorted(self._node.published_topics())
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._joined = None
+
+    @property
+    def _node(self) -> Node:
+        if self._joined is None:
+            raise SourceError(f"the link {self.where} is not open")
+        return self._joined
+
+
+def _take(topic: str, reader: TopicReader, decode: MessageDecoder) -> list[JointStates]:
+    waiting: list[bytes] = []
+    while found := reader.take(0.0):
+        waiting += found
+        if len(found) < MAX_MESSAGES_PER_READ:
+            break
+    try:
+        messages = [decode(data) for data in waiting]
+    except ValueError as cause:
+        raise SourceError(f"{topic} sends damaged joint states: {cause}") from cause
+    return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]

@@ -1,0 +1,256 @@
+"""Hands that take a command for each joint: torques, largest torques or set-points."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from holdfast.sensors.types import Array
+from holdfast_grip.command import GripCommand
+from holdfast_grip.errors import HandError
+from holdfast_grip.limits import Limits
+from holdfast_ros.hands.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
+from holdfast_ros.hands.ros_hand import RosHand
+from holdfast_ros.link import Link
+from holdfast_ros.topic_messages import (
+    JOINT_STATE,
+    JOINT_TRAJECTORY,
+    JointStates,
+    array_message,
+    joint_message,
+    trajectory_message,
+)
+
+SLACK = 1e-9
+"""Rounding by which a torque may exceed its ceiling, as a share of it."""
+
+
+class JointOutput(StrEnum):
+    """What a driver takes for each joint.
+
+    TORQUES: the torque. LARGEST: the largest torque of its position control. POSITIONS: the
+    set-point of its position control.
+    """
+
+    TORQUES = "torques"
+    LARGEST = "largest"
+    POSITIONS = "positions"
+
+
+@dataclass(frozen=True, eq=False)
+class JointSetup:
+    """Description of a hand that takes a command for each joint; arrays are (n_joints,).
+
+    Attributes:
+        output: what the driver takes.
+        topic: topic of the commands.
+        message: its message type.
+        order: order and names of the joints in the messages.
+        max_torques: ceiling of the torque of each joint [N m].
+        torques: torques when the grip begins [N m]; None to take those of the joint states.
+        states: topic of the joint states; None if they are not needed.
+        stiffness: torque of the position control for each radian of error [N m/rad].
+        lowest: lower limits of the joints, of readings and of set-points [rad].
+        highest: upper limits of the joints [rad].
+        home: pose of the open hand [rad]; None to open without torque.
+        home_topic: topic for this pose; None if it is the topic of the commands.
+    """
+
+    output: JointOutput
+    topic: str
+    message: str
+    order: JointOrder
+    max_torques: Array
+    torques: Array | None
+    states: str | None
+    stiffness: Array
+    lowest: Array
+    highest: Array
+    home: Array | None
+    home_topic: str | None
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Message type of each topic that is published, that of the commands first."""
+        topics = {self.topic: self.message}
+        if self.home is not None and self.home_topic is not None:
+            topics[self.home_topic] = self.message
+        return topics
+
+
+class JointHand(RosHand):
+    """Hand that takes a command for each joint.
+
+    Force and torque are proportional in a given pose, so the torque of each joint when the grip
+    began is multiplied by the scale of its finger. Set-points follow from torques by the
+    stiffness k of the position control: q = q_begin + scale * torque_begin / k. q_begin and
+    torque_begin are medians over the joint states of the last 0.2 s.
+
+    Args:
+        name: URI of the hand.
+        link: connection to ROS.
+        setup: description of the hand.
+        shared: as of `RosHand`.
+
+    Attributes:
+        setup: description of the hand.
+    """
+
+    def __init__(self, name: str, link: Link, setup: JointSetup, *, shared: bool) -> None:
+        super().__init__(name, link, setup.topics, setup.states, shared=shared)
+        self.fingers = setup.order.fingers
+        self.setup = setup
+        self._max_scale = 1.0
+        self._grip: JointGrip | None = None
+
+    def check(self, limits: Limits, fingers: Iterable[str]) -> None:
+        """Check the fingers, and the given torques at the highest scale.
+
+        Raises:
+            ValueError: the hand lacks a finger, or a torque exceeds its ceiling.
+        """
+        super().check(limits, fingers)
+        self._max_scale = limits.max_scale
+        torques = self.setup.torques
+        if torques is None:
+            return
+        if problem := self._excess(limits.max_scale * torques):
+            raise ValueError(f"{problem} at max_scale {limits.max_scale:g}: lower one of them")
+        if problem := self._reach(limits.max_scale * torques):
+            raise ValueError(problem)
+
+    def _begin(self) -> None:
+        given = self.setup.torques
+        positions, measured = self._measured()
+        torques = measured if given is None else given
+        if not torques.any():
+            raise HandError(
+                f"{self.name}: the joint states of {self.setup.states} have no efforts, so the "
+                "torques at the beginning of the grip are not known: give effort="
+            )
+        if problem := self._excess(self._max_scale * torques):
+            raise HandError(
+                f"{problem} at max_scale {self._max_scale:g}: lower it, or grip more gently"
+            )
+        if problem := self._reach(self._max_scale * torques):
+            raise HandError(problem)
+        self._grip = JointGrip(positions, torques)
+
+    def _checked(self, states: JointStates) -> JointStates:
+        """Return joint states in the order of the hand.
+
+        Raises:
+            ValueError: a joint is missing, a value is not finite, or a joint is beyond its limits.
+        """
+        setup = self.setup
+        ordered = setup.order.sort(states)
+        below, above = setup.lowest - ordered.positions, ordered.positions - setup.highest
+        beyond = np.maximum(below, above)
+        worst = int(np.argmax(beyond))
+        if beyond[worst] > LIMIT_TOLERANCE:
+            raise ValueError(
+                f"{setup.order.describe(worst)} at {ordered.positions[worst]:g} rad, "
+                f"{setup.lowest[worst]:g} to {setup.highest[worst]:g} expected"
+            )
+        return ordered
+
+    def _measured(self) -> tuple[Array, Array]:
+        """Return the median positions and torques (n_joints,) of the last joint states.
+
+        Positions are NaN without joint states, and torques 0 where a state has none.
+        """
+        n = len(self.setup.order.names)
+        states = [one for _, one in self._states]
+        if not states:
+            return np.full(n, np.nan), np.zeros(n)
+        efforts = [state.efforts for state in states if len(state.efforts)]
+        torques = np.zeros(n)
+        if len(efforts) == len(states):
+            torques = np.median(efforts, axis=0)
+        return np.median([state.positions for state in states], axis=0), torques
+
+    def _press(self, command: GripCommand) -> None:
+        if self._grip is None:
+            return
+        torques = self.setup.order.scales(command) * self._grip.torques
+        if problem := self._excess(torques):
+            raise HandError(problem)
+        self._publish(self.setup.topic, self._message(command.time, torques, self._grip))
+
+    def _release(self) -> None:
+        setup = self.setup
+        if setup.home is None:
+            message = self._values(0.0, efforts=np.zeros(len(setup.order.names)))
+            self._publish(setup.topic, message)
+        else:
+            message = self._values(0.0, positions=setup.home)
+            self._publish(setup.home_topic or setup.topic, message)
+
+    def _message(self, time: float, torques: Array, grip: JointGrip) -> Mapping[str, Any]:
+        setup = self.setup
+        if setup.output is JointOutput.TORQUES:
+            return self._values(time, efforts=torques)
+        if setup.output is JointOutput.LARGEST:
+            return self._values(time, efforts=np.abs(torques))
+        targets = grip.positions + torques / setup.stiffness
+        return self._values(time, positions=np.clip(targets, setup.lowest, setup.highest))
+
+    def _values(
+        self, time: float, *, positions: Array | None = None, efforts: Array | None = None
+    ) -> Mapping[str, Any]:
+        names = self.setup.order.names
+        if self.setup.message == JOINT_STATE:
+            return joint_message(time, names, positions=positions, efforts=efforts)
+        if self.setup.message == JOINT_TRAJECTORY and positions is not None:
+            return trajectory_message(names, positions)
+        values = positions if efforts is None else efforts
+        return array_message(np.empty(0) if values is None else values)
+
+    def _excess(self, torques: Array) -> str:
+        """Return a message about the torque that exceeds its ceiling most; empty if none does."""
+        setup = self.setup
+        ratio = np.abs(torques) / setup.max_torques
+        worst = int(np.argmax(ratio))
+        if ratio[worst] <= 1.0 + SLACK:
+            return ""
+        return (
+            f"{self.name}: {setup.order.describe(worst)}: at most {setup.max_torques[worst]:g} N m "
+            f"expected, {abs(torques[worst]):g} N m given"
+        )
+
+    def _reach(self, torques: Array) -> str:
+        """Return a message about a set-point further away than its joint moves; else empty.
+
+        No joint can need it, so the stiffness has another unit, or is that of another hand.
+        """
+        setup = self.setup
+        if setup.output is not JointOutput.POSITIONS:
+            return ""
+        distance, longest = np.abs(torques) / setup.stiffness, setup.highest - setup.lowest
+        worst = int(np.argmax(distance / longest))
+        if distance[worst] <= longest[worst]:
+            return ""
+        return (
+            f"{self.name}: {setup.order.describe(worst)}: a set-point at most {longest[worst]:g} "
+            f"rad from the joint expected, {distance[worst]:.3g} rad given at max_scale "
+            f"{self._max_scale:g}: check stiffness= [N m/rad]"
+        )
+
+
+def check_home(name: str, setup: JointSetup) -> None:
+    """Check that the pose of the open hand is within the limits of the joints.
+
+    Raises:
+        ValueError: it is not, as in degrees, or in another order of the joints.
+    """
+    if setup.home is None:
+        return
+    beyond = np.maximum(setup.lowest - setup.home, setup.home - setup.highest)
+    worst = int(np.argmax(beyond))
+    if beyond[worst] > 0.0:
+        raise ValueError(
+            f"{name}: home: {setup.order.describe(worst)}: {setup.lowest[worst]:g} to "
+            f"{setup.highest[worst]:g} rad expected, {setup.home[worst]:g} given"
+        )

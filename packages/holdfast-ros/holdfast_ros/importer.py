@@ -1,0 +1,308 @@
+"""Import of bags of ROS 1 and ROS 2 with topics of tactile sensors.
+
+The topics are those of XELA's uSkin and of Contactile's PapillArray. Topics of other types are
+ignored.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import RecordingError
+from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import xela_models
+from holdfast.sensors.types import Array
+from holdfast_ros.bag_storage.folder import METADATA
+from holdfast_ros.bags import Bag, BagTopic, find_bags, open_bag, poses_of
+from holdfast_ros.sensor_messages import (
+    DeviceSample,
+    SampleDecoder,
+    module_name,
+    readings_of,
+    sensors_of,
+)
+
+HINT = f"{IF_IN_CONTACT}; bias a PapillArray before, without load"
+"""Option that helps with the recordings, for the person who imports them."""
+CLOCKS = ("device", "header", "bag")
+"""Clocks that the times of a recording can come from, best first."""
+ONE_CLOCK_DIFFERENCE = 1.0
+"""Topics whose clocks differ by more, compared with the bag's clock, have two clocks [s]."""
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is a bag, or a folder with bags."""
+    return bool(find_bags(path))
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the bag, or the bags of a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    bags = find_bags(path)
+    if not bags and path.is_file():
+        problem = "is no bag of ROS" if path.stat().st_size else "is empty"
+        raise RecordingError(f"{path} {problem}; a .bag, .db3 or .mcap file of ROS expected")
+    if not bags:
+        raise RecordingError(f"no bag of ROS in {path}; a folder with {METADATA} or .bag expected")
+    return bags
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recording in a bag.
+
+    Raises:
+        RecordingError: it is damaged or has no known topic.
+    """
+    with open_bag(path) as bag:
+        recording = _BagImport(path, bag).recording()
+    yield recording
+
+
+def poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
+    """Return the poses of bodies in a bag.
+
+    Args:
+        path: path of the bag, or of a folder with one bag.
+        bodies: for each body a topic of `geometry_msgs/PoseStamped` (with a slash at its
+            beginning) or a child frame in messages of `tf2_msgs/TFMessage`.
+
+    Returns:
+        For each body (n, 8): time [s], position [m], quaternion w x y z.
+
+    Raises:
+        RecordingError: the bag cannot be read, a topic or frame is missing, or the poses are
+            in different frames.
+    """
+    bags = find_bags(path)
+    if len(bags) != 1:
+        raise RecordingError(
+            f"one bag of ROS expected at {path}, {len(bags)} found; a .bag, .db3 or .mcap file, "
+            f"or a folder with {METADATA}"
+        )
+    return poses_of(bags[0], bodies)
+
+
+class _TactileTopic(NamedTuple):
+    """A topic with samples: how to decode them, and its parts, one for each publisher."""
+
+    name: str
+    kind: str
+    decode: SampleDecoder
+    parts: list[BagTopic]
+
+
+@dataclass
+class _DeviceTrack:
+    """All samples of one device in one topic.
+
+    Attributes:
+        first: the first sample.
+        readings: (n_taxels, 3) of each sample.
+        stamps: times of each sample by each of `CLOCKS` [s]; None if there is none.
+        n_refused: number of samples with another number of taxels.
+        last: the last sample.
+    """
+
+    first: DeviceSample
+    readings: list[npt.NDArray[Any]] = field(default_factory=list)
+    stamps: list[tuple[float | None, float | None, float]] = field(default_factory=list)
+    n_refused: int = 0
+    last: DeviceSample | None = None
+
+    def add(self, sample: DeviceSample, time: float) -> None:
+        """Append a sample that the bag has at `time` [s], unless it repeats the last one."""
+        readings = readings_of(sample, "count")
+        if readings.shape != readings_of(self.first, "count").shape:
+            self.n_refused += 1
+        elif self.last is None or not _is_repeated(self.last, sample):
+            self.readings.append(readings)
+            self.stamps.append((sample.time, sample.stamp, time))
+        self.last = sample
+
+    def drop_undated(self) -> int:
+        """Drop samples without a time of their own by the clock of the device.
+
+        The node of the PapillArray sends what it has, at its own rate: zeros before the first
+        packet, and a sample that changes while it is read, twice with one time. A clock that goes
+        back, or stands still for more than half of the samples, is no clock, and all are kept.
+
+        Returns:
+            The number of samples that were dropped.
+        """
+        times = [time for time, _, _ in self.stamps]
+        first = next((k for k, time in enumerate(times) if time is not None), len(times))
+        dated = np.array(times[first:], dtype=np.float64)  # NaN for None
+        steps = np.diff(dated)
+        n_kept = 1 + int(np.count_nonzero(steps > 0))
+        if not (steps >= 0).all() or not len(dated) or 2 * n_kept < len(times):
+            return 0
+        places = first + np.flatnonzero(np.append(True, steps > 0))
+        self.readings = [self.readings[place] for place in places]
+        self.stamps = [self.stamps[place] for place in places]
+        return len(times) - n_kept
+
+    def times(self, clock: str) -> Array | None:
+        """Return the times by a clock [s]; None if one is missing or they do not increase."""
+        column = [stamps[CLOCKS.index(clock)] for stamps in self.stamps]
+        if None in column:
+            return None
+        times = np.array(column, dtype=np.float64)
+        return times if (np.diff(times) > 0).all() else None
+
+    def offset(self, clock: str) -> float:
+        """Return how far the bag's clock is ahead of another clock [s]; NaN if unknown."""
+        times = self.times(clock)
+        bag_times = np.array([stamps[-1] for stamps in self.stamps])
+        return np.nan if times is None else float(np.median(bag_times - times))
+
+
+def _is_repeated(first: DeviceSample, second: DeviceSample) -> bool:
+    """Return whether the second sample is the first one, sent again."""
+    return (
+        second.time is not None
+        and (first.time, first.sequence) == (second.time, second.sequence)
+        and np.array_equal(readings_of(first, "count"), readings_of(second, "count"))
+    )
+
+
+class _BagImport:
+    """Import of one bag, which is read once from its beginning to its end."""
+
+    def __init__(self, path: Path, bag: Bag) -> None:
+        self._path = path
+        self._bag = bag
+        self._tracks: dict[tuple[str, int], _DeviceTrack] = {}
+        self._n_undated = 0
+
+    def recording(self) -> Recording:
+        topics = self._tactile_topics()
+        self._read(topics)
+        self._n_undated = sum(track.drop_undated() for track in self._tracks.values())
+        if not any(track.readings for track in self._tracks.values()):
+            names = ", ".join(topic.name for topic in topics)
+            raise RecordingError(f"{self._path} has no messages on {names}; at least one expected")
+        clock = self._clock()
+        name = self._path.name if self._path.is_dir() else self._path.stem
+        try:
+            return Recording(name, self._modules(clock), self._metadata(topics, clock))
+        except (RecordingError, ValueError) as cause:
+            raise RecordingError(f"{self._path}: {cause}") from cause
+
+    def _tactile_topics(self) -> list[_TactileTopic]:
+        topics: dict[str, _TactileTopic] = {}
+        others: list[str] = []
+        for part in self._bag.topics:
+            decode = self._decoder(part)
+            if decode is None:
+                others.append(f"{part.name} ({part.kind})")
+            else:
+                topic = _TactileTopic(part.name, part.kind, decode, [])
+                topics.setdefault(part.name, topic).parts.append(part)
+        if not topics:
+            raise RecordingError(
+                f"{self._path} has no topic of a supported tactile sensor; it has "
+                f"{', '.join(others) or 'none'}"
+            )
+        return list(topics.values())
+
+    def _decoder(self, part: BagTopic) -> SampleDecoder | None:
+        try:
+            return part.definition and SampleDecoder(part.definition, ros2=self._bag.ros2)
+        except ValueError:  # messages of another kind
+            return None
+
+    def _read(self, topics: list[_TactileTopic]) -> None:
+        """Read the samples of all topics, in the order of time."""
+        decoders = {topic.name: topic.decode for topic in topics}
+        n_read = Counter[str]()
+        for part, time, data in self._bag.messages(part for one in topics for part in one.parts):
+            n_read[part.name] += 1
+            for sample in decoders[part.name](data):
+                self._add(part.name, sample, time)
+        for topic in topics:
+            n_expected = sum(part.n_messages for part in topic.parts)
+            if n_read[topic.name] < n_expected:
+                raise RecordingError(
+                    f"{self._path} is cut or damaged: {n_read[topic.name]} messages on "
+                    f"{topic.name}, {n_expected} expected"
+                )
+
+    def _add(self, topic: str, sample: DeviceSample, time: float) -> None:
+        readings = readings_of(sample, "count")
+        if not len(readings):  # XELA's server sends this for a sensor off
+            return
+        self._bag.keep(readings.nbytes)
+        number = 0 if sample.number is None else sample.number
+        self._tracks.setdefault((topic, number), _DeviceTrack(sample)).add(sample, time)
+
+    def _clock(self) -> str:
+        """Return the best clock that all tracks have, that increases and that is one clock."""
+        tracks = [track for track in self._tracks.values() if track.readings]
+        for clock in CLOCKS[:-1]:
+            offsets = [track.offset(clock) for track in tracks]
+            if np.ptp(offsets) <= ONE_CLOCK_DIFFERENCE:  # False if an offset is NaN
+                return clock
+        return CLOCKS[-1]
+
+    def _modules(self, clock: str) -> dict[str, Tactile]:
+        modules: dict[str, Tactile] = {}
+        for (topic, finger), track in self._tracks_by_finger().items():
+            new = _modules_of(finger, track, clock)
+            prefix = _unused_prefix(modules, new, finger, topic.strip("/"))
+            modules.update({f"{prefix}{name}": module for name, module in new.items()})
+        return modules
+
+    def _tracks_by_finger(self) -> dict[tuple[str, str], _DeviceTrack]:
+        """Return tracks by topic and finger; devices without a number are counted by topic."""
+        tracks: dict[tuple[str, str], _DeviceTrack] = {}
+        n_without = 0
+        for (topic, number), track in sorted(self._tracks.items()):
+            n_without += track.first.number is None
+            finger = n_without if track.first.number is None else number
+            tracks[topic, f"finger{finger}"] = track
+        return tracks
+
+    def _metadata(self, topics: list[_TactileTopic], clock: str) -> dict[str, Any]:
+        hands = [xela_models.whole_hand(track.first.model) for track in self._tracks.values()]
+        names = sorted({hand.name for hand in hands if hand is not None})
+        n_refused = sum(track.n_refused for track in self._tracks.values())
+        return {
+            "source": self._path.name,
+            "topics": {topic.name: topic.kind for topic in topics},
+            "clock": clock,
+            **({"hand": names[0]} if len(names) == 1 else {}),
+            **({"n_refused": n_refused} if n_refused else {}),
+            **({"n_undated": self._n_undated} if self._n_undated else {}),
+        }
+
+
+def _unused_prefix(
+    taken: Mapping[str, Tactile], new: Mapping[str, Tactile], finger: str, topic: str
+) -> str:
+    """Return a prefix for the names of new modules that makes them different from others."""
+    longer = [f"{topic}/"] if finger in new else [f"{finger}/", f"{topic}/", f"{topic}/{finger}/"]
+    return next(
+        (prefix for prefix in ("", *longer) if not any(f"{prefix}{name}" in taken for name in new)),
+        longer[-1],
+    )
+
+
+def _modules_of(finger: str, track: _DeviceTrack, clock: str) -> Mapping[str, Tactile]:
+    times = track.times(clock)
+    if times is None:  # the bag's times do not increase either: Tactile names the place
+        times = np.array([stamps[-1] for stamps in track.stamps])
+    sensors = sensors_of(track.first, "count")
+    parts = xela_models.split(track.first.model, np.array(track.readings))
+    return {
+        module_name(finger, part, named=False): Tactile(sensor, times, parts[part])
+        for part, sensor in sensors.items()
+    }

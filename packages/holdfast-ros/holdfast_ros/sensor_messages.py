@@ -1,0 +1,321 @@
+"""Messages of tactile sensors in ROS: their definitions, and how to get readings from them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.io.cdr import MessageDecoder
+from holdfast.io.definitions import (
+    ROS1_HEADER,
+    ROS2_HEADER,
+    SEPARATOR,
+    Definition,
+    field_paths,
+    parse_definition,
+    short_name,
+)
+from holdfast.sensors import Sensor, sensor
+from holdfast.sensors.types import Array, Unit
+from holdfast.sensors.xela_models import module_sensors
+
+SENS_STREAM = (
+    "SensorFull[] sensors\n"
+    + SEPARATOR
+    + "xela_server_ros/SensorFull\n"
+    + "uint32 message\nfloat64 time\nstring model\nuint8 sensor_pos\n"
+    + "Taxel[] taxels\nForces[] forces\n"
+    + SEPARATOR
+    + "xela_server_ros/Taxel\nuint16 x\nuint16 y\nuint16 z\n"
+    + SEPARATOR
+    + "xela_server_ros/Forces\nfloat32 x\nfloat32 y\nfloat32 z\n"
+)
+"""Definition of XELA's messages since 2021. In ROS 2 the package is xela_server_ros2."""
+
+_SENSOR_STATE = (
+    "std_msgs/Header header\nint64 tus\nPillarState[] pillars\n"
+    "float32 gfX\nfloat32 gfY\nfloat32 gfZ\nfloat32 gtX\nfloat32 gtY\nfloat32 gtZ\n"
+    "float32 friction_est\nfloat32 target_grip_force\n"
+    "bool is_sd_active\nbool is_ref_loaded\nbool is_contact\n"
+    + SEPARATOR
+    + "PACKAGE/PillarState\nstd_msgs/Header header\nint32 id\n"
+    + "float32 dX\nfloat32 dY\nfloat32 dZ\nfloat32 fX\nfloat32 fY\nfloat32 fZ\n"
+    + "bool in_contact\nint32 slip_state\n"
+)
+
+_SENSOR_STATE_OF_ROS2 = (
+    "int64 tus\nPillarState[] pillars\n"
+    "float32 gfx\nfloat32 gfy\nfloat32 gfz\nfloat32 gtx\nfloat32 gty\nfloat32 gtz\n"
+    "float32 friction_est\nfloat32 target_grip_force\n"
+    "bool is_sd_active\nbool is_ref_loaded\nbool is_contact\n"
+    + SEPARATOR
+    + "PACKAGE/PillarState\nint32 id\n"
+    + "float32 dx\nfloat32 dy\nfloat32 dz\nfloat32 fx\nfloat32 fy\nfloat32 fz\n"
+    + "bool in_contact\nint32 slip_state\n"
+)
+
+_NO_FORCES = np.empty((0, 3))
+_PILLARS = ("papillarray_ros_v2/SensorState", "sensor_interfaces/SensorState")
+
+
+class DeviceSample(NamedTuple):
+    """One sample of one device, from a message.
+
+    Attributes:
+        number: number of the device, from 1; None if it has none.
+        model: model name of the device; empty if it has none.
+        time: time on the clock of the device [s], or None.
+        stamp: time in the header, when ROS received the sample [s], or None.
+        sequence: number of the packet, or None.
+        counts: (n_taxels, 3) [count]; None if the device sends newtons only.
+        forces: (n_taxels, 3) [N]; (0, 3) if the device is not calibrated.
+    """
+
+    number: int | None
+    model: str
+    time: float | None
+    stamp: float | None
+    sequence: int | None
+    counts: npt.NDArray[Any] | None
+    forces: Array
+
+
+MAX_MESSAGE_SIZE = 1 << 20
+"""Maximum size of a message of a device; one of a whole hand with all fields has 20 kB [bytes]."""
+PAPILLARRAY = "papillarray"
+"""Name of Contactile's sensor, which sends no model name."""
+
+
+def known_definition(name: str, *, ros2: bool) -> Definition | None:
+    """Return the definition of a type of tactile messages, or None for any other type.
+
+    Example:
+        >>> known_definition("xela_server_ros2/msg/SensStream", ros2=True).fields[0].name
+        'sensors'
+    """
+    short = short_name(name)
+    package, _, kind = short.partition("/")
+    if kind == "SensStream" and package in ("xela_server_ros", "xela_server_ros2"):
+        return parse_definition(short, SENS_STREAM.replace("xela_server_ros/", f"{package}/"))
+    if short in _PILLARS:
+        text = _SENSOR_STATE.replace("PACKAGE", package)
+        return parse_definition(short, text + (ROS2_HEADER if ros2 else ROS1_HEADER))
+    return None
+
+
+def _other_layout(name: str) -> list[Definition]:
+    """Return at most one other definition of a type of ROS 2, whose bags and topics may have none.
+
+    Packages of one name differ: the maker's messages have no headers.
+    """
+    if short_name(name) not in _PILLARS:
+        return []
+    text = _SENSOR_STATE_OF_ROS2.replace("PACKAGE", short_name(name).partition("/")[0])
+    return [parse_definition(short_name(name), text)]
+
+
+class SampleDecoder:
+    """Decoder of messages of one type into the samples in them.
+
+    Args:
+        definition: definition of the messages.
+        ros2: whether messages are encoded as in ROS 2; otherwise as in ROS 1.
+
+    Raises:
+        ValueError: the messages are not of a supported type.
+    """
+
+    def __init__(self, definition: Definition, *, ros2: bool) -> None:
+        layouts = [definition, *(_other_layout(definition.name) if ros2 else ())]
+        self._layouts = [(_converter(text), MessageDecoder(text, ros2=ros2)) for text in layouts]
+
+    def __call__(self, data: bytes) -> list[DeviceSample]:
+        """Return the sample of each device in a message.
+
+        Raises:
+            ValueError: the bytes are not a message of this type, or too many.
+        """
+        if len(data) > MAX_MESSAGE_SIZE:
+            raise ValueError(
+                f"a message of at most {MAX_MESSAGE_SIZE} bytes expected, {len(data)} given"
+            )
+        problems: list[ValueError] = []
+        for layout in self._layouts:
+            convert, decode = layout
+            try:
+                samples = convert(decode(data))
+            except ValueError as problem:
+                problems.append(problem)
+            else:
+                if layout is not self._layouts[0]:  # the first from now on
+                    self._layouts.reverse()
+                return samples
+        raise problems[0]
+
+
+SUPPORTED_MESSAGES = (
+    "xela_server_ros/SensStream, xela_server_ros2/SensStream, XStream, xServerMsg, "
+    "XelaServerMsg, SensorState"
+)
+"""Supported message types, for error messages."""
+
+
+def _converter(definition: Definition) -> Callable[[Mapping[str, Any]], list[DeviceSample]]:
+    """Choose by the fields of the messages: packages differ in the names of types."""
+    paths = field_paths(definition)
+    for needed, convert in _CONVERTERS:
+        if needed <= paths:
+            return convert
+    raise ValueError(f"{definition.name} is not supported; supported are {SUPPORTED_MESSAGES}")
+
+
+def _axis_paths(prefix: str, kind: str, axes: str = "xyz") -> set[str]:
+    return {f"{prefix}{axis} {kind}" for axis in axes}
+
+
+def _from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+    return [
+        DeviceSample(
+            one["sensor_pos"],
+            one["model"],
+            one["time"] if np.isfinite(one["time"]) and one["time"] > 0 else None,
+            None,
+            one["message"],
+            _counts(_points(one["taxels"])),
+            _points(one["forces"]).astype(np.float64),
+        )
+        for one in message["sensors"]
+    ]
+
+
+def _from_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+    return [
+        DeviceSample(one["sensor"], "", None, None, None, _counts(_points(one["xyz"])), _NO_FORCES)
+        for one in message["data"]
+    ]
+
+
+def _from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
+    counts = _counts(_points([one["point"] for one in message["points"]]))
+    number, model = message["sensor"], message["model"]
+    stamp = _seconds(message["header"]["stamp"])
+    return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
+
+
+def _from_sensor_state(message: Mapping[str, Any]) -> list[DeviceSample]:
+    return _pillar_sample(message, ("fX", "fY", "fZ"))
+
+
+def _from_sensor_state_of_ros2(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the sample of a PapillArray in ROS 2, which allows small letters only."""
+    return _pillar_sample(message, ("fx", "fy", "fz"))
+
+
+def _pillar_sample(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
+    forces = _points(message["pillars"], names)
+    time = message["tus"] * 1e-6 if message["tus"] > 0 else None
+    header = message.get("header")  # the maker's messages of ROS 2 have none
+    stamp = _seconds(header["stamp"]) if header else None
+    return [DeviceSample(None, PAPILLARRAY, time, stamp, None, None, forces)]
+
+
+_CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]], ...] = (
+    (
+        {
+            "sensors[].message uint32",
+            "sensors[].time float64",
+            "sensors[].model string",
+            "sensors[].sensor_pos uint8",
+        }
+        | _axis_paths("sensors[].taxels[].", "uint16")
+        | _axis_paths("sensors[].forces[].", "float32"),
+        _from_sens_stream,
+    ),
+    ({"data[].sensor int16"} | _axis_paths("data[].xyz[].", "uint32"), _from_x_stream),
+    (
+        {"sensor int16", "model string", "header.frame_id string"}
+        | _axis_paths("points[].point.", "float64"),
+        _from_x_server,
+    ),
+    ({"tus int64"} | _axis_paths("pillars[].f", "float32", "XYZ"), _from_sensor_state),
+    ({"tus int64"} | _axis_paths("pillars[].f", "float32"), _from_sensor_state_of_ros2),
+)
+
+
+def _points(
+    given: npt.NDArray[Any] | list[dict[str, Any]], names: Sequence[str] = "xyz"
+) -> npt.NDArray[Any]:
+    """Return (n, 3) of points that are an array or dictionaries."""
+    if isinstance(given, np.ndarray):
+        return given
+    rows = [[one[name] for name in names] for one in given]
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def _counts(values: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
+    """Convert counts of a wider number type.
+
+    Raises:
+        ValueError: one is not a whole number of 16 bits.
+    """
+    if values.dtype == np.uint16:
+        return values
+    with np.errstate(invalid="ignore"):
+        counts = values.astype(np.uint16)
+    if (counts != values).any():
+        raise ValueError("a reading is not a whole number from 0 to 65535")
+    return counts
+
+
+def _seconds(stamp: Mapping[str, int]) -> float | None:
+    """Return a stamp of ROS 1 or ROS 2 [s]; None if it was not set."""
+    seconds, nanoseconds = stamp.values()
+    return seconds + nanoseconds * 1e-9 if seconds or nanoseconds else None
+
+
+def sensors_of(sample: DeviceSample, unit: Unit) -> dict[str, Sensor]:
+    """Return the sensors of a device by module, as `module_sensors` does.
+
+    Args:
+        sample: any sample of the device.
+        unit: unit of the readings.
+
+    Raises:
+        ValueError: the device has another number of taxels than its model.
+    """
+    readings = readings_of(sample, unit)
+    if sample.counts is None:
+        pillars = sensor(PAPILLARRAY)
+        if len(readings) != pillars.n_taxels:
+            raise ValueError(
+                f"{len(readings)} taxels given, {pillars.n_taxels} expected ({PAPILLARRAY})"
+            )
+        return {"": pillars}
+    sensors = module_sensors(sample.model, len(readings))
+    if unit == "count":
+        return sensors
+    return {name: replace(one, unit=unit, range=None) for name, one in sensors.items()}
+
+
+def readings_of(sample: DeviceSample, unit: Unit) -> npt.NDArray[Any]:
+    """Return (n_taxels, 3) in a unit; newtons if the device sends nothing else."""
+    return sample.forces if unit == "N" or sample.counts is None else sample.counts
+
+
+def module_name(finger: str, part: str, *, named: bool) -> str:
+    """Return the name of a module: the part of a hand, otherwise the finger.
+
+    Args:
+        finger: finger that the device is on.
+        part: part of the hand; empty if the device is not a hand.
+        named: whether a user gave the name of the finger; it then precedes the part.
+
+    Example:
+        >>> [module_name("left", "thumb", named=True), module_name("finger1", "", named=False)]
+        ['left/thumb', 'finger1']
+    """
+    if not part:
+        return finger
+    return f"{finger}/{part}" if named else part

@@ -1,0 +1,54 @@
+import csv
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from holdfast_ros.hands.joints import (
+    THUMB_FIRST,
+    THUMB_LAST,
+    V4_HIGHEST,
+    V4_LOWEST,
+    allegro_order,
+)
+from holdfast_ros.topic_messages import JointStates
+
+
+def test_limits_are_those_of_the_twins_hand():
+    text = resources.files("holdfast.twin.tables").joinpath("allegro_right.csv").read_text()
+    rows = list(csv.DictReader(line for line in text.splitlines() if line[0] != "#"))
+    order = allegro_order(THUMB_LAST, "joint_")
+    assert [row["joint"] for row in rows] == list(order.names)
+    np.testing.assert_allclose(order.values(V4_LOWEST), [float(row["lower"]) for row in rows])
+    np.testing.assert_allclose(order.values(V4_HIGHEST), [float(row["upper"]) for row in rows])
+
+
+def test_states_are_sorted_by_name():
+    order = allegro_order(THUMB_FIRST, "ah_joint")
+    names = ("arm", *reversed(order.names))
+    values = np.arange(17.0)
+    found = order.sort(JointStates(names, values, 10 * values))
+    np.testing.assert_array_equal(found.positions, np.arange(16, 0, -1))
+    np.testing.assert_array_equal(found.efforts, 10 * found.positions)
+
+
+@pytest.mark.parametrize(
+    ("states", "message"),
+    [
+        (JointStates((), np.zeros(15), np.zeros(15)), r"no joint ah_joint00 \(there are no na"),
+        (
+            JointStates(("a", "b"), np.zeros(2), np.zeros(2)),
+            r"ah_joint00 \(there are a, b",
+        ),
+        (JointStates((), np.full(16, np.nan), np.zeros(16)), "a value is not finite"),
+    ],
+)
+def test_states_of_another_hand_are_refused(states, message):
+    with pytest.raises(ValueError, match=message):
+        allegro_order(THUMB_FIRST, "ah_joint").sort(states)
+
+
+def test_a_short_list_of_names_is_no_crash():
+    order = allegro_order(THUMB_FIRST, "ah_joint")
+    with pytest.raises(ValueError, match="no joint"):
+        order.sort(JointStates(order.names, np.zeros(3), np.zeros(3)))

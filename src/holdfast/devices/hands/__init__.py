@@ -1,1 +1,0 @@
-"""Hands of other rooms."""
