@@ -22,7 +22,7 @@ from holdfast.cli.extensions import (
     flags_of,
 )
 from holdfast.devices.uri import open_source, parse
-from holdfast.errors import PACKAGE_PARTS, RecordingError
+from holdfast.errors import PACKAGE_PARTS, HoldfastError, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.importers import IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
@@ -200,6 +200,15 @@ def test_a_broken_importer_does_not_hinder_the_others(parts, caplog, capsys):
     assert half.startswith("plug-in half (importers of acme 1.2) is skipped: TypeError: a module ")
     with pytest.raises(ValueError, match="the plug-in of half cannot be used; holdfast doctor"):
         import_recordings(parts / "a.txt", "half")
+
+
+def test_formats_of_packages_that_are_not_installed_are_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(PACKAGE_PARTS, "holdfast-far", {"importers": ("far",)})
+    with pytest.raises(ValueError, match=r"; not installed: far \(holdfast-far\)"):
+        import_recordings(tmp_path, "near")
+    text = r"the format far is part of holdfast-far, which is not installed: .*\[far\]|extra far"
+    with pytest.raises(HoldfastError, match=text):
+        import_recordings(tmp_path, "far")
 
 
 def test_labels_of_a_plug_in(parts, capsys, caplog):
