@@ -188,10 +188,14 @@ def _tactile(data: ModuleData, sensor: Sensor, samples: TimedArray | None) -> Ta
     if samples is None:
         samples = (np.empty(0), np.empty((0, sensor.n_taxels, 3), data.number or "float64"))
     module = Tactile(sensor, *samples, unit=data.unit)
-    labels = tuple(label_of(label) for label in data.labels)
-    has_all_samples = data.n_samples in (None, module.n_samples)
-    keep_labels = has_all_samples and module.n_samples > 0
-    return replace(module, labels=labels if keep_labels else cut_labels(labels, module))
+    if module.n_samples and data.n_samples in (None, module.n_samples):
+        return replace(module, labels=tuple(map(label_of, data.labels)))
+    if not module.n_samples:
+        return module
+    # Of a part: the others are not made, which would take longer than to read its samples.
+    first, last = float(module.times[0]), float(module.times[-1]) + module.period
+    near = [label for label in data.labels if label.start < last and label.end > first]
+    return replace(module, labels=cut_labels(tuple(map(label_of, near)), module))
 
 
 def _truth(header: Header, arrays: TimedArrays) -> Truth | None:
