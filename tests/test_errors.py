@@ -12,7 +12,6 @@ FAMILIES = (
     errors.TrainingError,
     errors.StreamError,
     errors.SourceError,
-    errors.HandError,
     errors.EngineError,
     errors.OutputError,
     errors.MissingExtra,

@@ -135,9 +135,9 @@ def _document(recording: "Recording | None", tare: "Tare", path: Path) -> dict[s
     """Return the content of the recording; None if it is read from its path, in parts."""
     from holdfast.io import read_chunks
     from holdfast.labelling.review.findings import findings_of_scan, hidden_labels
-    from holdfast.labelling.review.scan import RecordingScan
+    from holdfast.labelling.review.scan import FindingsScan
 
-    scan, faults = RecordingScan(), _Faults(tare)
+    scan, faults = FindingsScan(), _FaultCounts(tare)
     for part in [recording] if recording else read_chunks(path, SAMPLES_OF_PART):
         scan.add(part)
         faults.add(part)
@@ -193,7 +193,7 @@ def _module(module: "ModuleScan", faults: Mapping["Fault", int]) -> dict[str, An
     }
 
 
-class _Faults:
+class _FaultCounts:
     """Number of samples of each module with each fault that a detector finds."""
 
     def __init__(self, tare: "Tare") -> None:

@@ -147,7 +147,7 @@ class Chunk(NamedTuple):
     hand: Array
 
 
-COLUMNS = (
+TRACE_COLUMNS = (
     ("state", np.int8), ("reason", np.int8), ("probability", np.float64), ("sigma", np.float64),
     ("force", np.float64), ("faults", np.int16), ("taxels", np.int64), ("cause", np.int8),
     ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
@@ -185,7 +185,7 @@ def detection_of(
                 continue
             part = slice(ends[finger], ends[finger] + len(rows))
             ends[finger] = part.stop
-            for column, (field, _) in zip(found[finger][1:], COLUMNS, strict=True):
+            for column, (field, _) in zip(found[finger][1:], TRACE_COLUMNS, strict=True):
                 if column is not None:
                     column[part] = rows[field]
     return Detection(recording.name, found, np.concatenate(times), np.concatenate(hand))
@@ -193,7 +193,9 @@ def detection_of(
 
 def _empty_trace(times: Array, n_slips: int) -> FingerTrace:
     """Return a trace to be filled, with 0, 1 or 2 heads of slips; see `_slip_heads`."""
-    n_columns = len(COLUMNS) - (3, 2, 0)[n_slips]
-    shapes = [(len(times), 3) if field == "force" else len(times) for field, _ in COLUMNS]
-    columns = [np.empty(shape, number) for shape, (_, number) in zip(shapes, COLUMNS, strict=True)]
+    n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
+    shapes = [(len(times), 3) if field == "force" else len(times) for field, _ in TRACE_COLUMNS]
+    columns = [
+        np.empty(shape, number) for shape, (_, number) in zip(shapes, TRACE_COLUMNS, strict=True)
+    ]
     return FingerTrace(times, *columns[:n_columns])

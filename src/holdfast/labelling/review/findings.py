@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
-from holdfast.labelling.review.scan import ModuleScan, RecordingScan
+from holdfast.labelling.review.scan import ModuleScan, FindingsScan
 from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
@@ -54,12 +54,12 @@ def findings_of(recording: Recording) -> list[Finding]:
         >>> findings_of(synthetic_recording("made", seed=0))
         []
     """
-    scan = RecordingScan()
+    scan = FindingsScan()
     scan.add(recording)
     return findings_of_scan(scan)
 
 
-def findings_of_scan(scan: RecordingScan) -> list[Finding]:
+def findings_of_scan(scan: FindingsScan) -> list[Finding]:
     """Return the findings of a recording that came in parts, as `findings_of`."""
     found = [
         Finding(name, kind, text)

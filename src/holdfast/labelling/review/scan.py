@@ -12,7 +12,7 @@ from holdfast.labelling.server.long_recordings import force_sensor
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array, Flags
 
-BLOCK_SAMPLES = 4096
+SCAN_BLOCK_SAMPLES = 4096
 """Samples that are compared and summed at a time: bounds the memory."""
 
 
@@ -47,8 +47,8 @@ class ModuleScan:
         if module.n_samples:
             self._times.append(module.times)
             self._end = float(module.times[-1])
-        for first in range(0, module.n_samples, BLOCK_SAMPLES):
-            self._add_readings(module.readings[first : first + BLOCK_SAMPLES])
+        for first in range(0, module.n_samples, SCAN_BLOCK_SAMPLES):
+            self._add_readings(module.readings[first : first + SCAN_BLOCK_SAMPLES])
 
     @cached_property
     def repeats(self) -> Flags:
@@ -90,7 +90,7 @@ class ModuleScan:
         self.labels += labels
 
 
-class RecordingScan:
+class FindingsScan:
     """What is kept of a recording.
 
     Attributes:
