@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
-from holdfast.labelling.review.scan import ModuleScan, FindingsScan
+from holdfast.labelling.review.scan import FindingsScan, ModuleScan
 from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
