@@ -190,5 +190,8 @@ def test_all_missing_extras_are_named(monkeypatch):
 def test_an_import_that_fails_names_its_extra():
     found = missing_extra(ModuleNotFoundError("no", name="pyarrow.parquet"))
     assert found.args == ("pyarrow", "parquet")
+    found = missing_extra(ModuleNotFoundError("no", name="holdfast_grip.hands"))
+    assert found.args == ("holdfast_grip", "grip")
+    assert missing_extra(ModuleNotFoundError("no", name="holdfast_lab")) is None
     assert missing_extra(ModuleNotFoundError("no", name="numpy")) is None
     assert missing_extra(ModuleNotFoundError("no")) is None

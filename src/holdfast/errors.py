@@ -151,9 +151,11 @@ def require_extras(*extras: str) -> None:
 def missing_extra(cause: ModuleNotFoundError) -> MissingExtra | None:
     """Return the error of a failed import of an optional package; None for any other module."""
     module = (cause.name or "").partition(".")[0]
-    extras = (extra for extra, modules in EXTRA_MODULES.items() if module in modules)
-    extra = next(extras, None)
-    return None if extra is None else MissingExtra(module, extra)
+    extras = [extra for extra, modules in EXTRA_MODULES.items() if module in modules]
+    package = module.replace("_", "-")  # one beside the core, which another one imports
+    if package in PACKAGE_PARTS and package != LABORATORY:
+        extras.append(package.removeprefix("holdfast-"))
+    return MissingExtra(module, extras[0]) if extras else None
 
 
 def missing_part(kind: str, name: str, what: str) -> HoldfastError | None:

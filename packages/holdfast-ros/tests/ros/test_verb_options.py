@@ -1,6 +1,9 @@
+import sys
+
 import pytest
 
 from holdfast.cli import main
+from holdfast.errors import MissingExtra
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast_ros import verb_options
@@ -40,4 +43,15 @@ def test_only_the_twin_takes_commands(capsys, grasp):
         ("twin:", "log:x", f"{plexus} expected, log:x given"),
     ):
         assert main(["play", source, "--hand", hand]) == 2
-        assert capsys.readouterr().err == f"holdfast: {text}\n"
+        assert capsys.readouterr().err.splitlines()[-1] == f"holdfast: {text}"
+
+
+def test_the_twin_takes_commands_with_grip_control_only(capsys, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("holdfast_ros.hands")]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in [name for name in sys.modules if name.startswith("holdfast_grip")]:
+        monkeypatch.setitem(sys.modules, name, None)
+    assert main(["play", "twin:", "--hand", "ros2:plexus?effort=0.1&max_effort=0.3"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"holdfast: {MissingExtra('holdfast_grip', 'grip')}"
+    )

@@ -1,1 +1,1 @@
-"""Publishers of estimates and samples: ROS 1, ROS 2 and the protocol of XELA."""
+"""Publishers of samples: the protocol of XELA."""
