@@ -23,7 +23,7 @@ PLUGIN_FOLDERS = (
     "src/holdfast/labelling/rules",
     "src/holdfast/cli",
     "packages/holdfast-grip/holdfast_grip/laws",
-    "packages/holdfast-interop/holdfast_interop",
+    "packages",
     "packages/holdfast-ros/holdfast_ros/sources",
     "lab/holdfast_lab/study",
 )

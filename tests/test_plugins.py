@@ -345,8 +345,8 @@ def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog, 
     version = metadata.version("holdfast")
     assert caplog.text == ""
     assert capsys.readouterr().err == (
-        f"holdfast: the verb trial cannot be used: holdfast-lab 1.2 given, {version} expected as of "
-        "holdfast itself: clone the repository of holdfast, and run `uv run holdfast` there\n"
+        f"holdfast: the verb trial cannot be used: holdfast-lab 1.2 given, {version} expected as "
+        "of holdfast itself: clone the repository of holdfast, and run `uv run holdfast` there\n"
     )
 
 
