@@ -6,7 +6,6 @@ once by the logger `holdfast.plugins`, which prints on stderr by default, and is
 packages beside the core (`PACKAGE_PARTS` of `errors.py`) use nothing else.
 """
 
-import logging
 from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
@@ -17,7 +16,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_LOGGER = logging.getLogger("holdfast.plugins")
+LOGGER_NAME = "holdfast.plugins"
+"""Name of the logger that reports plug-ins that are skipped."""
 GROUP_PREFIX = "holdfast."
 """Begin of the names of all groups of entry points: `holdfast.sensors`."""
 
@@ -179,8 +179,10 @@ class PluginGroup(Generic[T]):
         """Report that a plug-in is skipped, each reason once."""
         text = f"plug-in {point.name} ({self.kind} of {_package(point)}) is skipped: {reason}"
         if text not in self._reported:
+            import logging  # not for `--help`
+
             self._reported.add(text)
-            _LOGGER.warning("%s", text)
+            logging.getLogger(LOGGER_NAME).warning("%s", text)
 
 
 def _package(point: "EntryPoint") -> str:

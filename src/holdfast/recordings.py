@@ -14,7 +14,7 @@ import numpy.typing as npt
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array, Unit, rebuilt
+from holdfast.sensors.types import Array, Flags, Unit, rebuilt
 
 GAP_PERIODS = 3.0
 """A step in time of more sample periods is a gap."""
@@ -23,7 +23,7 @@ STARTS_LOADED = "starts_loaded"
 BASELINES = "baselines"
 """Field of the metadata: readings without contact by module, for each taxel and axis."""
 HASHED_SAMPLES = 4096
-"""Number of samples that are converted at a time for a hash: bounds the memory."""
+"""Number of samples that are hashed or compared at a time: bounds the memory."""
 MAX_SHOWN_CLOCK = 1e5
 """If a recording starts later than this, times are shown since its start [s]."""
 
@@ -156,8 +156,15 @@ class Tactile:
     @property
     def n_repeats(self) -> int:
         """Number of samples that repeat the readings of the sample before."""
-        same = (self.readings[1:] == self.readings[:-1]).all(axis=(1, 2))
-        return int(same.sum())
+        return int(self.repeats().sum())
+
+    def repeats(self) -> Flags:
+        """Return (n - 1,) whether each sample after the first repeats the one before."""
+        same = np.ones(max(self.n_samples - 1, 0), dtype=np.bool_)
+        for first in range(0, len(same), HASHED_SAMPLES):
+            part = self.readings[first : first + HASHED_SAMPLES + 1]
+            same[first : first + HASHED_SAMPLES] = (part[1:] == part[:-1]).all(axis=(1, 2))
+        return same
 
     @property
     def label_states(self) -> npt.NDArray[np.int8]:
@@ -332,7 +339,7 @@ class Recording:
         names: dict[str, str] = {}
         for name, module in self.modules.items():
             first = names.setdefault(module.readings_digest, name)
-            if first != name and (module.readings[1:] != module.readings[:-1]).any():
+            if first != name and not module.repeats().all():
                 raise RecordingError(
                     f"recording {self.name!r}: {first} and {name} have the same readings; those "
                     "of different sensors expected"

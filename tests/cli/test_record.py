@@ -22,6 +22,7 @@ from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
+from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -415,3 +416,13 @@ def test_on_a_full_disk_the_recorded_part_stays(grasp, tmp_path):
     np.testing.assert_array_equal(
         recording.modules["thumb"].readings, want.modules["thumb"].readings[:n]
     )
+
+
+@pytest.mark.parametrize("words", [(), ("--force",)])
+def test_a_file_that_another_program_writes_is_refused(capsys, grasp, tmp_path, words):
+    out = tmp_path / "a.mcap"
+    with RecordingWriter(out, {"thumb": sensor("anyskin")}) as writer:
+        writer.append("thumb", [0.0, 0.01], np.zeros((2, 5, 3)))
+        text = refusal(capsys, grasp, out, "--speed", "0", *words)
+    assert text.startswith(f"{out} ")
+    assert load_recording(out).modules["thumb"].n_samples == 2

@@ -14,7 +14,8 @@ from holdfast.io import load_recording, read_chunks, safe_reading, save_labels, 
 from holdfast.io.header import encode_header
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.labelling.server.workspace import summary_of
-from holdfast.recordings import Label
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors import sensor
 
 
 @pytest.mark.parametrize("read", [load_recording, read_chunks])
@@ -268,3 +269,16 @@ def test_a_limit_that_is_no_number_is_refused(make_recording, tmp_path, monkeypa
     monkeypatch.setenv("HOLDFAST_MAX_BYTES", given)
     with pytest.raises(RecordingError, match="HOLDFAST_MAX_BYTES: a whole number of bytes expect"):
         load_recording(tmp_path / "a.parquet")
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_what_verbs_compute_counts_as_memory(tmp_path, monkeypatch, suffix):
+    n, path = 20_000, tmp_path / f"a.{suffix}"
+    module = Tactile(sensor("anyskin"), np.arange(n) / 100, np.zeros((n, 5, 3), np.int16))
+    save_recording(Recording("a", {"finger1": module}), path)
+    size = n * (8 + 5 * 3 * 2)
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", str(3 * size))
+    with pytest.raises(RecordingError, match="`holdfast info` and `detect` read it in parts"):
+        load_recording(path)
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", str(6 * size))
+    assert load_recording(path).modules["finger1"].n_samples == n

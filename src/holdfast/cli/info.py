@@ -27,13 +27,16 @@ from holdfast.cli.terminal.progress import progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from holdfast.contact import Fault
+    from holdfast.detector import Detector
     from holdfast.features import Tare
-    from holdfast.recordings import Label, Recording, Tactile
+    from holdfast.labelling.review.scan import ModuleScan
+    from holdfast.recordings import Label, Recording
 
 MAX_VALUE_LENGTH = 90
 """Maximum number of characters of a metadata value in the table."""
-SAMPLES_OF_PART = 20_000
-"""Samples that a detector gets at a time: it keeps a multiple of their memory."""
+SAMPLES_OF_PART = 4096
+"""Samples that are read at a time; it bounds the memory."""
 
 
 def info(
@@ -93,10 +96,11 @@ def _print_file(
         from holdfast.plots.recording import plot_recording
 
         loaded = None if model is None else Model.load(model)
-        return plot_recording(recording, tare, model=loaded)
+        return plot_recording(recording or load_recording(path), tare, model=loaded)
 
     figure.check()
-    recording = load_recording(path)
+    whole = figure.plot is not None or tare.kind == "interval"
+    recording = load_recording(path) if whole else None
     document = _document(recording, tare, path)
     figure.save(draw)
     if as_json:
@@ -107,13 +111,13 @@ def _print_file(
 
 def _print_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
     from holdfast.errors import RecordingError
-    from holdfast.io import load_dataset, load_recording
+    from holdfast.io import load_dataset
 
     paths = load_dataset(folder).paths
     documents: list[dict[str, Any]] = []
     for path in progress(paths, "reading"):
         try:
-            documents.append(_document(load_recording(path), tare, path))
+            documents.append(_document(None, tare, path))
         except RecordingError as cause:
             documents.append({"name": path.stem, "error": str(cause)})
     if as_json:
@@ -127,46 +131,95 @@ def _print_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
         raise RecordingError(failures[-1])
 
 
-def _document(recording: "Recording", tare: "Tare", path: Path) -> dict[str, Any]:
-    from holdfast.labelling.review.findings import findings_of, hidden_labels
+def _document(recording: "Recording | None", tare: "Tare", path: Path) -> dict[str, Any]:
+    """Return the content of the recording; None if it is read from its path, in parts."""
+    from holdfast.io import read_chunks
+    from holdfast.labelling.review.findings import findings_of_scan, hidden_labels
+    from holdfast.labelling.review.scan import RecordingScan
 
-    truth, hidden = recording.truth, hidden_labels(path)
-    findings = findings_of(recording) + ([] if hidden is None else [hidden])
+    scan, faults = RecordingScan(), _Faults(tare)
+    for part in [recording] if recording else read_chunks(path, SAMPLES_OF_PART):
+        scan.add(part)
+        faults.add(part)
+        truth = part.truth
+    found, hidden = scan.recording, hidden_labels(path)
+    findings = findings_of_scan(scan) + ([] if hidden is None else [hidden])
     return {
-        "name": recording.name,
+        "name": found.name,
         "modules": {
-            name: _module(recording, name, module, tare)
-            for name, module in recording.modules.items()
+            name: _module(module, faults.counts.get(name, {}))
+            for name, module in scan.modules.items()
         },
-        "start": recording.start,
-        "duration": recording.duration,
-        "complete": recording.complete,
-        "metadata": recording.metadata,
-        "markers": [{"time": time, "text": text} for time, text in recording.markers],
-        "media": [{"path": path, "offset": offset} for path, offset in recording.media],
+        "start": found.start,
+        "duration": found.duration,
+        "complete": found.complete,
+        "metadata": found.metadata,
+        "markers": [{"time": time, "text": text} for time, text in found.markers],
+        "media": [{"path": path, "offset": offset} for path, offset in found.media],
         "truth": truth
         and {
-            "n_samples": len(truth.times),
+            "n_samples": scan.n_truth,
             "hand": list(truth.hand),
             "fingers": {finger: list(arrays) for finger, arrays in truth.fingers.items()},
         },
-        "digest": recording.digest,
+        "digest": recording.digest if recording else _digest(path),
         "findings": [finding._asdict() for finding in findings],
     }
 
 
-def _module(recording: "Recording", name: str, module: "Tactile", tare: "Tare") -> dict[str, Any]:
+def _digest(path: Path) -> str | None:
+    """Return the digest of a recording; None if its file has none and it is too large to load."""
+    from holdfast.errors import RecordingError
+    from holdfast.labelling.server.workspace import summary_of
+
+    try:
+        return summary_of(path).digest
+    except RecordingError:  # its parts were read without an error
+        return None
+
+
+def _module(module: "ModuleScan", faults: Mapping["Fault", int]) -> dict[str, Any]:
+    force = module.force
     return {
         "sensor": module.sensor.name,
         "n_taxels": module.sensor.n_taxels,
-        "unit": module.unit,
-        "n_samples": module.n_samples,
-        "rate": module.rate,
-        "gaps": module.n_gaps,
-        "repeats": module.n_repeats,
+        "unit": module.sensor.unit,
+        "n_samples": force.n_samples,
+        "rate": force.rate,
+        "gaps": force.n_gaps,
+        "repeats": int(module.repeats.sum()),
         "labels": label_seconds(module.labels),
-        "faults": _faults(recording, name, module, tare) if module.n_samples else {},
+        "faults": {fault.value: n for fault, n in faults.items() if n},
     }
+
+
+class _Faults:
+    """Number of samples of each module with each fault that a detector finds."""
+
+    def __init__(self, tare: "Tare") -> None:
+        import msgspec
+
+        from holdfast.model import Model
+
+        self.counts: dict[str, dict[Fault, int]] = {}
+        self._model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
+        self._detectors: dict[str, Detector] = {}
+
+    def add(self, part: "Recording") -> None:
+        """Add a recording, or its next part."""
+        from holdfast.contact import Fault
+        from holdfast.detector import Detector
+
+        for name, module in part.modules.items():
+            if not module.n_samples:
+                continue
+            alone = replace(part, modules={name: module}, truth=None)
+            if name not in self._detectors:
+                self._detectors[name] = Detector.for_recording(self._model, alone)
+                self.counts[name] = dict.fromkeys(Fault, 0)
+            masks = self._detectors[name].run(alone).fingers[name].faults
+            for bit, fault in enumerate(Fault):
+                self.counts[name][fault] += int((masks >> bit & 1).sum())
 
 
 def label_seconds(labels: "Iterable[Label]") -> dict[str, float]:
@@ -183,33 +236,12 @@ def _label_states() -> list[str]:
     return [state.value.lower() for state in LABEL_STATES]
 
 
-def _faults(
-    recording: "Recording", name: str, module: "Tactile", tare: "Tare"
-) -> Mapping[str, int]:
-    """Return the number of samples with each fault that a detector finds."""
-    import msgspec
-
-    from holdfast.contact import Fault
-    from holdfast.detector import Detector
-    from holdfast.model import Model
-
-    model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
-    alone = replace(recording, modules={name: module}, truth=None)
-    detector, counts = Detector.for_recording(model, alone), dict.fromkeys(Fault, 0)
-    for start in range(0, module.n_samples, SAMPLES_OF_PART):
-        part = replace(alone, modules={name: module.slice(start, start + SAMPLES_OF_PART)})
-        masks = detector.run(part).fingers[name].faults
-        for bit, fault in enumerate(Fault):
-            counts[fault] += int((masks >> bit & 1).sum())
-    return {fault.value: n for fault, n in counts.items() if n}
-
-
 def _print_one(document: Mapping[str, Any]) -> None:
     complete = "yes" if document["complete"] else "no: the end of the file is cut off"
     rows = [
         ("duration", f"{document['duration']:.3f} s from {document['start']:.3f} s"),
         ("complete", complete),
-        ("digest", document["digest"]),
+        ("digest", document["digest"] or "not known: loading the recording takes too much memory"),
         *((key, _shorten(value)) for key, value in document["metadata"].items()),
         *((f"media at {x['offset']:g} s", x["path"]) for x in document["media"]),
     ]

@@ -1,6 +1,6 @@
 """Estimates of a whole recording, as arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from typing import NamedTuple
@@ -20,6 +20,7 @@ from holdfast.contact import (
 )
 from holdfast.kernel import _extension
 from holdfast.model import FingerModel
+from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Flags, Integers
 
 STATE_BY_CODE = tuple(ContactState)
@@ -146,42 +147,53 @@ class Chunk(NamedTuple):
     hand: Array
 
 
+COLUMNS = (
+    ("state", np.int8), ("reason", np.int8), ("probability", np.float64), ("sigma", np.float64),
+    ("force", np.float64), ("faults", np.int16), ("taxels", np.int64), ("cause", np.int8),
+    ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
+)  # fmt: skip
+"""Fields of `ESTIMATE` in the order of `FingerTrace` after its times, and their types there."""
+
+
 def detection_of(
-    name: str, fingers: Sequence[str], parts: Sequence[FingerModel], chunks: Sequence[Chunk]
+    recording: Recording,
+    fingers: Sequence[str],
+    parts: Sequence[FingerModel],
+    chunks: Iterable[Chunk],
 ) -> Detection:
-    """Join the chunks of a recording.
+    """Join the chunks of a recording, each of which is needed only until the next.
 
     Args:
-        name: of the recording.
+        recording: of which all samples are in the chunks.
         fingers: in the order of the columns.
         parts: models of the fingers.
         chunks: at least one, in order of time.
     """
-    times, present, estimates, hand = (
-        np.concatenate(arrays) for arrays in zip(*chunks, strict=True)
-    )
-    found = {}
-    for place, (finger, n_slips) in enumerate(zip(fingers, _slip_heads(parts), strict=True)):
-        own = present[:, place]
-        if own.any():
-            found[finger] = _trace_of(times[own], estimates[own, place], n_slips)
-    return Detection(name, found, times, hand.astype(np.int8))
+    times, hand = list[Array](), list[npt.NDArray[np.int8]]()
+    found = {
+        finger: _empty_trace(recording.modules[finger].times, n_slips)
+        for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True)
+        if finger in recording.modules and recording.modules[finger].n_samples
+    }
+    ends = dict.fromkeys(found, 0)
+    for chunk in chunks:
+        times.append(chunk.times)
+        hand.append(chunk.hand.astype(np.int8))
+        for place, finger in enumerate(fingers):
+            rows = chunk.estimates[chunk.present[:, place], place]
+            if not len(rows):
+                continue
+            part = slice(ends[finger], ends[finger] + len(rows))
+            ends[finger] = part.stop
+            for column, (field, _) in zip(found[finger][1:], COLUMNS, strict=True):
+                if column is not None:
+                    column[part] = rows[field]
+    return Detection(recording.name, found, np.concatenate(times), np.concatenate(hand))
 
 
-def _trace_of(times: Array, rows: npt.NDArray[np.void], n_slips: int) -> FingerTrace:
-    """Return the trace of a finger with 0, 1 or 2 heads of slips; see `_slip_heads`."""
-    columns = {name: rows[name].copy() for name in rows.dtype.names or ()}
-    return FingerTrace(
-        times,
-        columns["state"].astype(np.int8),
-        columns["reason"].astype(np.int8),
-        columns["probability"],
-        columns["sigma"],
-        columns["force"],
-        columns["faults"].astype(np.int16),
-        columns["taxels"],
-        columns["cause"].astype(np.int8),
-        columns["slip"] if n_slips > 0 else None,
-        columns["speed"] if n_slips > 1 else None,
-        columns["distance"] if n_slips > 1 else None,
-    )
+def _empty_trace(times: Array, n_slips: int) -> FingerTrace:
+    """Return a trace to be filled, with 0, 1 or 2 heads of slips; see `_slip_heads`."""
+    n_columns = len(COLUMNS) - (3, 2, 0)[n_slips]
+    shapes = [(len(times), 3) if field == "force" else len(times) for field, _ in COLUMNS]
+    columns = [np.empty(shape, number) for shape, (_, number) in zip(shapes, COLUMNS, strict=True)]
+    return FingerTrace(times, *columns[:n_columns])

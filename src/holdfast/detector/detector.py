@@ -5,7 +5,7 @@ a sample, see `kernel/detector.h`.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from typing import Self
@@ -291,8 +291,12 @@ class Detector:
         """
         self._check_recording(recording)
         self._settle_transitions()
-        stream, chunks = self._stream, []
-        for times, present, readings in stream.samples_of(recording):
+        fingers, chunks = self._stream.plan.fingers, self._estimates(recording)
+        return detection_of(recording, fingers, self._parts, chunks)
+
+    def _estimates(self, recording: Recording) -> Iterator[Chunk]:
+        """Yield the estimates of all samples of a recording, in chunks."""
+        for times, present, readings in self._stream.samples_of(recording):
             estimates, numbers = tables.estimate_rows(*present.shape)
             hand = np.empty(len(times))
             if self._feeder is None:
@@ -306,8 +310,7 @@ class Detector:
                     )
             codes = np.column_stack([estimates["state"], hand.astype(np.int64)])
             self._events += self._changes.update_chunk(times, codes)
-            chunks.append(Chunk(times, present, estimates, hand))
-        return detection_of(recording.name, stream.plan.fingers, self._parts, chunks)
+            yield Chunk(times, present, estimates, hand)
 
     def _check_time(self, time: float) -> None:
         last = self._kernel.last_time()

@@ -26,8 +26,15 @@ from holdfast.io.mcap_writer import (
     MESSAGE_SECONDS,
     MessageLog,
 )
-from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget, one_line
+from holdfast.io.safe_reading import (
+    JSON_EXPANSION,
+    PARTS_WAY_OUT,
+    WORK_PER_SAMPLE,
+    ReadBudget,
+    one_line,
+)
 from holdfast.io.timed_arrays import (
+    TACTILE,
     TRUTH,
     ArraySpec,
     TimedArray,
@@ -82,7 +89,7 @@ def load(path: Path) -> Recording:
     Raises:
         RecordingError: the file is damaged or not a recording, or nothing can be recovered.
     """
-    budget = ReadBudget(path)
+    budget = ReadBudget(path, PARTS_WAY_OUT)
     complete = _is_complete(path)
     messages = _messages(path, complete, budget)
     header = _header(path, messages, complete, budget)
@@ -240,7 +247,8 @@ class _Channels:
 class _JoinedSize:
     """Size in memory of arrays that are read in parts; texts are as long as the longest.
 
-    All count twice: the parts, and the arrays that are joined of them.
+    All count twice: the parts, and the arrays that are joined of them. After that, the memory of
+    the parts is free for what verbs compute, which may need more of it.
     """
 
     def __init__(self, budget: ReadBudget) -> None:
@@ -260,7 +268,8 @@ class _JoinedSize:
             widest = max(width, values.itemsize)
             self._texts[topic] = n + values.size, widest
             n_bytes += (n + values.size) * widest - n * width - values.nbytes
-        self._budget.keep(2 * n_bytes, 1)
+        work = WORK_PER_SAMPLE * len(times) if topic.startswith(TACTILE) else 0
+        self._budget.keep(n_bytes + max(n_bytes, work), 1)
 
 
 def _decoded(path: Path, message: _McapMessage, spec: ArraySpec | None) -> TimedArray:

@@ -24,7 +24,14 @@ from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.arrow_arrays import arrow_column, arrow_type, component_rows
 from holdfast.io.header import Header, decode_header, encode_header, header_of
-from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget, check_size, one_line
+from holdfast.io.safe_reading import (
+    JSON_EXPANSION,
+    PARTS_WAY_OUT,
+    WORK_PER_SAMPLE,
+    ReadBudget,
+    check_size,
+    one_line,
+)
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -95,7 +102,7 @@ def load(path: Path) -> Recording:
     """
     header, file = _open(path)
     n_rows = file.metadata.num_rows
-    check_size(path, sum(_size(spec) for spec in array_specs(header)))
+    check_size(path, sum(_size(spec) for spec in array_specs(header)), PARTS_WAY_OUT)
     buffers = {spec.topic: _ArrayBuffer(spec, n_rows, path) for spec in array_specs(header)}
     for arrays in _groups(header, file, path):
         for topic, (times, values) in arrays.items():
@@ -313,7 +320,6 @@ def _modules_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator
         while waiting:
             waiting.extend(islice(ahead, 1))
             yield waiting.popleft().result()
-    pa.default_memory_pool().release_unused()
 
 
 def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
@@ -363,16 +369,19 @@ class _GroupReader:
             RecordingError: it is damaged.
         """
         try:
-            return _columns(specs, self._file.read_row_group(group, columns=names), self._order)
+            arrays = _columns(specs, self._file.read_row_group(group, columns=names), self._order)
         except (pa.ArrowException, OSError, ValueError) as cause:
             raise RecordingError(
                 f"{self._path} is damaged in row group {group}: {one_line(cause)}"
             ) from cause
+        pa.default_memory_pool().release_unused()  # 50 MB, which Arrow would keep
+        return arrays
 
 
 def _size(spec: ArraySpec) -> int:
-    """Return the size of an array and its times in memory [bytes]."""
-    return (spec.n or 0) * _value_size(spec)
+    """Return the memory of an array, its times, and what verbs compute of them [bytes]."""
+    work = 0 if spec.track == "truth" else WORK_PER_SAMPLE
+    return (spec.n or 0) * (_value_size(spec) + work)
 
 
 def _value_size(spec: ArraySpec) -> int:

@@ -24,8 +24,14 @@ STEP_WORK = 2048
 """Work that a record counts, however short it is [bytes that are unpacked]."""
 JSON_EXPANSION = 32
 """Size in memory of a decoded JSON text, as a multiple of its length; an empty list has 21."""
+WORK_PER_SAMPLE = 128
+"""Memory that verbs need of each sample of a module beside its readings, as for estimates [bytes].
+
+Measured: `evaluate` 75, `label --auto` 70."""
 WAY_OUT = f"cut it into shorter files, or set {LIMIT_VARIABLE} to read it anyway"
 """End of the message about a file that needs too much memory."""
+PARTS_WAY_OUT = f"{WAY_OUT}; `holdfast info` and `detect` read it in parts"
+"""The same of a recording of holdfast."""
 MAX_CAUSE_LENGTH = 200
 """Number of characters of a foreign error that are shown."""
 
@@ -94,8 +100,13 @@ def given_limit() -> int | None:
     return int(given)
 
 
-def check_size(path: Path, n_bytes: int) -> None:
+def check_size(path: Path, n_bytes: int, way_out: str = WAY_OUT) -> None:
     """Check that the content of a file may have a size in memory.
+
+    Args:
+        path: of the file.
+        n_bytes: size of the content [bytes].
+        way_out: what the user may do.
 
     Raises:
         RecordingError: it is larger than `size_limit`.
@@ -103,7 +114,7 @@ def check_size(path: Path, n_bytes: int) -> None:
     if n_bytes > (limit := size_limit(path)):
         raise RecordingError(
             f"{path} takes {megabytes(n_bytes)} in memory, {megabytes(limit)} are allowed for a "
-            f"file of {megabytes(stored_size(path))}; {WAY_OUT}"
+            f"file of {megabytes(stored_size(path))}; {way_out}"
         )
 
 
@@ -115,13 +126,15 @@ class ReadBudget:
 
     Args:
         path: path of the file or folder.
+        way_out: what the user may do if it needs too much memory.
 
     Raises:
         RecordingError: it is a sparse file that is larger than what may be read from it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, way_out: str = WAY_OUT) -> None:
         self._path = path
+        self._way_out = way_out
         self._limit = size_limit(path)
         self._kept = 0
         self._work = 0
@@ -157,7 +170,7 @@ class ReadBudget:
         """
         self._kept += n_bytes + n_items * ITEM_SIZE
         if self._kept > self._limit:
-            check_size(self._path, self._kept)
+            check_size(self._path, self._kept, self._way_out)
 
     def unpack(self, n_bytes: int) -> None:
         """Count bytes that are in memory only until the next bytes are unpacked.
@@ -166,7 +179,7 @@ class ReadBudget:
             RecordingError: the memory or the work is used up.
         """
         if self._kept + n_bytes > self._limit:
-            check_size(self._path, self._kept + n_bytes)
+            check_size(self._path, self._kept + n_bytes, self._way_out)
         self._add_work(n_bytes)
 
     def step(self, n_steps: int = 1) -> None:

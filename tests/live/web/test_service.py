@@ -1,6 +1,6 @@
 import asyncio
 import time
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 
 import msgspec
 import numpy as np
@@ -16,7 +16,11 @@ from holdfast.live.session import Session
 from holdfast.live.status import operating_points
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.web import schema
-from holdfast.live.web.service import LiveService
+from holdfast.live.web.service import (
+    MAX_WEBSOCKETS_PER_ADDRESS,
+    LiveService,
+    WebSocketClient,
+)
 from holdfast.metrics.masks import runs
 from holdfast.model import Choice, Head, ThresholdPoint
 from holdfast.web.guard import Guard
@@ -229,22 +233,32 @@ def test_every_estimate_is_sent():
         assert set(one["fingers"]) == set(build.FINGERS)
 
 
-def test_a_client_that_does_not_read_delays_no_other():
+def test_clients_that_do_not_read_delay_no_other():
     recording = build.grasp()
+    n = 900  # fewer than a queue has, so that the last client gets all
 
     async def work():
-        source = build.Script.of(recording, patient=True)
-        async with (
-            served(source, start=False) as (client, session),
-            client.ws_connect("/api/v1/estimates"),  # and never reads
-        ):
+        source = patient(n, recording)
+        async with served(source, start=False) as (client, session), AsyncExitStack() as stack:
+            for _ in range(MAX_WEBSOCKETS_PER_ADDRESS - 1):  # and never read
+                await stack.enter_async_context(client.ws_connect("/api/v1/estimates"))
+            good = await stack.enter_async_context(client.ws_connect("/api/v1/estimates"))
+            await good.receive_json()
             session.start()
-            await wait_for(lambda: session.n_packets == len(build.arrivals_of(recording)))
+            times = [(await good.receive_json())["time"] for _ in range(n)]
             session.stop()
-            return session.latency()
+            return times, session.latency()
 
-    latency = run(work())
+    times, latency = run(work())
+    assert times == recording.modules["thumb"].times[:n].tolist()
     assert latency.p50 < 1.0  # an estimate does not wait for a socket
+
+
+def test_the_queue_of_a_client_keeps_the_newest_documents():
+    client = WebSocketClient(None, 3)
+    for k in range(10):
+        client.put(str(k))
+    assert [client._queue.get_nowait() for _ in range(client._queue.qsize())] == ["7", "8", "9"]
 
 
 def test_the_tare(tmp_path):

@@ -1,5 +1,6 @@
 """Step a grip loop with every estimate of a source, and while nothing arrives."""
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -17,6 +18,9 @@ TICK = 0.01
 """Time without samples after which the loop is stepped, so that it detects silence [s]."""
 MAX_PAUSE = 0.1
 """Longest time between two steps of the loop; a longer one is the fault `behind` [s]."""
+MIN_TIME_STEP = 1e-6
+"""Step of the source's time below which its clock stands still [s]. Samples that come with the same
+stamp are one unit in the last place apart, and would never be old."""
 MAX_PENDING = 512
 """Number of newest updates that wait for the next step: more than come in `MAX_PAUSE`."""
 NO_DATA = HandEstimate(0.0, ContactState.UNKNOWN, {})
@@ -61,6 +65,7 @@ class LoopRunner:
         self._requests = RequestQueue()
         self._estimate: HandEstimate | None = None
         self._received = 0.0
+        self._received_time = math.nan  # of the estimate whose samples came then
         self._stepped_at: float | None = None
 
     def put(self, update: StreamUpdate) -> None:
@@ -110,7 +115,8 @@ class LoopRunner:
             self.loop.follow(estimate, estimate.time)
         if estimates:
             newest = estimates[-1]
-            if self._estimate is None or newest.time != self._estimate.time:
+            if not abs(newest.time - self._received_time) < MIN_TIME_STEP:
+                self._received_time = newest.time
                 self._received = max(received for update, received in arrived if update.estimates)
             self._estimate = newest
         if self._estimate is None:

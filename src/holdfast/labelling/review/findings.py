@@ -4,23 +4,20 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-import numpy as np
-
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
+from holdfast.labelling.review.scan import ModuleScan, RecordingScan
 from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
 from holdfast.model import RELATIVE_RATES
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Recording
 
 CONSTANT_SECONDS = 0.5
 """Shortest stretch without any change of the readings that is reported [s]."""
 AXES = "xyz"
 MAX_TAXEL_FORCE = 100.0
 """Force on one taxel above which the unit of the readings is in doubt [N]."""
-MAX_UNIT_SAMPLES = 10_000
-"""Number of samples from which the unit is judged."""
 
 FindingKind = Literal[
     "constant",
@@ -57,17 +54,24 @@ def findings_of(recording: Recording) -> list[Finding]:
         >>> findings_of(synthetic_recording("made", seed=0))
         []
     """
+    scan = RecordingScan()
+    scan.add(recording)
+    return findings_of_scan(scan)
+
+
+def findings_of_scan(scan: RecordingScan) -> list[Finding]:
+    """Return the findings of a recording that came in parts, as `findings_of`."""
     found = [
         Finding(name, kind, text)
-        for name, module in recording.modules.items()
-        if module.n_samples > 1
+        for name, module in scan.modules.items()
+        if module.force.n_samples > 1
         for kind, text in _of_module(module)
     ]
-    if reason := evidence_of_contact(recording):
+    if reason := evidence_of_contact(scan.recording):
         text = f"begins in contact ({reason}): the first samples are load (give --in-contact); or "
         text += "z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
-    if _without_contact(recording):
+    if _without_contact(scan.recording):
         found.append(Finding("", "no_contact", "no finger is in contact in the whole recording"))
     return found
 
@@ -118,13 +122,14 @@ def _hides(path: Path) -> bool:
         return False
 
 
-def _of_module(module: Tactile) -> Iterator[tuple[FindingKind, str]]:
+def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
     low, high = RELATIVE_RATES
-    if not low <= module.rate <= high:
-        yield "rate", f"{module.rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
+    rate = module.force.rate
+    if not low <= rate <= high:
+        yield "rate", f"{rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
     if module.sensor.n_taxels == 1:
         yield "one_taxel", "one taxel: taxels cannot be compared, only its force is judged"
-    still = _still_axes(module)
+    still = [axis for axis, is_still in zip(AXES, module.still, strict=True) if is_still]
     if len(still) == len(AXES):
         yield "dead", "the readings never change: the sensor is dead or disconnected"
         return
@@ -136,19 +141,10 @@ def _of_module(module: Tactile) -> Iterator[tuple[FindingKind, str]]:
         yield "unit", text
 
 
-def _still_axes(module: Tactile) -> list[str]:
-    """Return the axes that no taxel changes."""
-    readings = module.readings
-    finite = np.isfinite(readings)
-    changed = (readings[1:] != readings[:-1]) & finite[1:] & finite[:-1]
-    return [axis for k, axis in enumerate(AXES) if not changed[:, :, k].any()]
-
-
-def _constant(module: Tactile) -> str:
+def _constant(module: ModuleScan) -> str:
     """Return a text about stretches in which no reading changes; empty without any."""
-    times = module.times
-    same = (module.readings[1:] == module.readings[:-1]).all(axis=(1, 2))
-    stretches = [(times[first], times[last]) for first, last in runs(same)]
+    times = module.force.times
+    stretches = [(times[first], times[last]) for first, last in runs(module.repeats)]
     long = [(start, end) for start, end in stretches if end - start >= CONSTANT_SECONDS]
     if not long:
         return ""
@@ -160,16 +156,15 @@ def _constant(module: Tactile) -> str:
     return f"{text}: the tare shows no noise; give train a --contact-threshold"
 
 
-def _odd_unit(module: Tactile) -> str:
+def _odd_unit(module: ModuleScan) -> str:
     """Return a text about readings that cannot be counts, or hardly newtons; empty otherwise."""
-    readings = module.readings[:: max(1, module.n_samples // MAX_UNIT_SAMPLES)]
-    low, high = np.nanmin(readings), np.nanmax(readings)
-    if module.unit == "count" and high - low < 1:
+    low, high, unit = module.lowest, module.highest, module.sensor.unit
+    if unit == "count" and high - low < 1:
         return (
             f"readings between {low:.4g} and {high:.4g} are less than one count apart, and so "
             "taken for noise: is their unit N? (--unit N of holdfast sensors --template)"
         )
-    if module.unit == "N" and max(abs(low), abs(high)) > MAX_TAXEL_FORCE:
+    if unit == "N" and max(abs(low), abs(high)) > MAX_TAXEL_FORCE:
         return f"readings up to {max(abs(low), abs(high)):.4g} N on a taxel: is their unit count?"
     return ""
 

@@ -15,7 +15,7 @@ from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.force import tared_force
-from holdfast.features.tare import TareArgument, baseline_of, offline_tare
+from holdfast.features.tare import TareArgument, baseline_of, first_finite, offline_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors.types import Array
@@ -156,10 +156,10 @@ def hand_force(recording: Recording, tare: TareArgument | Tare | None = None) ->
 def _has_tare(module: Tactile, tare: Tare) -> bool:
     if module.n_samples < 2:
         return False
-    finite = np.isfinite(module.readings).all(axis=(1, 2))
+    readings = module.readings
     if tare.kind == "interval":
-        finite &= (module.times >= tare.interval[0]) & (module.times < tare.interval[1])
-    return bool(finite.any())
+        readings = readings[slice(*np.searchsorted(module.times, tare.interval))]
+    return len(readings) > 0 and bool(np.isfinite(readings[first_finite(readings)]).all())
 
 
 def _finger(module: Tactile, tare: Tare, grid: Array, period: float) -> FingerForce:

@@ -86,14 +86,14 @@ def _header_of_forces(header: Header) -> Header:
     """Return the header of the recording with one taxel in each module, without truth."""
     modules = {
         name: msgspec.structs.replace(
-            header.modules[name], sensor=_force_sensor(sensor).to_dict(), number="float64"
+            header.modules[name], sensor=force_sensor(sensor).to_dict(), number="float64"
         )
         for name, sensor in header_sensors(header).items()
     }
     return msgspec.structs.replace(header, modules=modules, truth=None)
 
 
-def _force_sensor(sensor: Sensor) -> Sensor:
+def force_sensor(sensor: Sensor) -> Sensor:
     """Return a sensor with one taxel in the fingertip frame, whose reading is the force."""
     return Sensor(
         f"force of {sensor.name}",

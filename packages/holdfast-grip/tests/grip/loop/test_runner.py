@@ -48,6 +48,18 @@ def test_silence_is_a_fault(held, monkeypatch):
     assert tape.commands[-1].reason is GripReason.STALE
 
 
+def test_a_clock_of_the_source_that_stands_still_is_a_fault(held, monkeypatch):
+    # The samples are new, but by their times they are not: an assembler makes them just increase.
+    runner, tape, time = held
+    now = runner._received
+    monkeypatch.setattr("holdfast.live.loop.runner.time.monotonic", lambda: now)
+    for _ in range(20):
+        now += 0.01
+        time = math.nextafter(time, math.inf)
+        runner.process(update(hand(time)))
+    assert tape.commands[-1].reason is GripReason.STALE
+
+
 def test_silence_counts_by_the_clock_of_a_slow_source(held, monkeypatch):
     runner, tape, _ = held
     runner._speed = 0.1

@@ -1,0 +1,127 @@
+"""What findings need of a recording, which may come in parts: all but its readings."""
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.features.tare import first_finite
+from holdfast.kernel.batch import fill_fingertip_force
+from holdfast.labelling.server.long_recordings import force_sensor
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors.types import Array, Flags
+
+BLOCK_SAMPLES = 4096
+"""Samples that are compared and summed at a time: bounds the memory."""
+
+
+class ModuleScan:
+    """What is kept of the samples of a module: 33 bytes of each.
+
+    Args:
+        module: a part of it, which is not added.
+
+    Attributes:
+        sensor: of the module.
+        labels: as in the recording; those that the parts divide are joined.
+        still: (3,) whether no taxel changed along an axis.
+        lowest: of all readings [unit of the readings].
+        highest: of all readings [unit of the readings].
+    """
+
+    def __init__(self, module: Tactile) -> None:
+        self.sensor = module.sensor
+        self.labels: list[Label] = []
+        self.still: Flags = np.ones(3, dtype=np.bool_)
+        self.lowest, self.highest = np.inf, -np.inf
+        self._times, self._end = [np.empty(0)], -np.inf
+        self._forces = [np.empty((0, 3))]
+        self._repeats = [np.empty(0, dtype=np.bool_)]
+        self._last = module.readings[:0]
+        self._zero: Array | None = None
+
+    def add(self, module: Tactile) -> None:
+        """Add the next samples."""
+        self._add_labels(module)
+        if module.n_samples:
+            self._times.append(module.times)
+            self._end = float(module.times[-1])
+        for first in range(0, module.n_samples, BLOCK_SAMPLES):
+            self._add_readings(module.readings[first : first + BLOCK_SAMPLES])
+
+    @cached_property
+    def repeats(self) -> Flags:
+        """(n - 1,) whether each sample after the first repeats the one before."""
+        return np.concatenate(self._repeats)
+
+    @cached_property
+    def force(self) -> Tactile:
+        """The module as one taxel with the fingertip force since the first sample.
+
+        A tare is linear: it gives the same force as of all taxels.
+        """
+        forces = np.concatenate(self._forces)[:, None]
+        return Tactile(force_sensor(self.sensor), np.concatenate(self._times), forces)
+
+    def _add_readings(self, readings: npt.NDArray[np.generic]) -> None:
+        joined = np.concatenate([self._last, readings])
+        self._last = readings[-1:].copy()
+        differs, finite = joined[1:] != joined[:-1], np.isfinite(joined)
+        self._repeats.append(~differs.any(axis=(1, 2)))
+        self.still &= ~(differs & finite[1:] & finite[:-1]).any(axis=(0, 1))
+        self.lowest = float(np.fmin(self.lowest, np.fmin.reduce(readings, axis=None)))
+        self.highest = float(np.fmax(self.highest, np.fmax.reduce(readings, axis=None)))
+        values = np.ascontiguousarray(readings, dtype=np.float64)
+        if self._zero is None:  # so that readings that never change have no rounding errors
+            self._zero = np.nan_to_num(values[first_finite(values)], posinf=0.0, neginf=0.0)
+        force = np.empty((len(values), 3))
+        fill_fingertip_force(values, self._zero, self.sensor.rotations, force)
+        self._forces.append(force)
+
+    def _add_labels(self, module: Tactile) -> None:
+        labels = list(module.labels)
+        if labels and self.labels and self._end < self.labels[-1].end:
+            before, after = self.labels[-1], labels[0]
+            is_cut = after.start <= float(module.times[0])
+            if is_cut and replace(after, start=before.start, end=before.end) == before:
+                self.labels[-1] = replace(before, end=after.end)
+                del labels[0]
+        self.labels += labels
+
+
+class RecordingScan:
+    """What is kept of a recording.
+
+    Attributes:
+        modules: by name.
+        n_truth: number of samples of the truth.
+    """
+
+    def __init__(self) -> None:
+        self.modules: dict[str, ModuleScan] = {}
+        self.n_truth = 0
+        self._markers: list[tuple[float, str]] = []
+        self._last: Recording | None = None
+
+    def add(self, part: Recording) -> None:
+        """Add a recording, or its next part."""
+        for name, module in part.modules.items():
+            if name not in self.modules:
+                self.modules[name] = ModuleScan(module)
+            self.modules[name].add(module)
+        self.n_truth += 0 if part.truth is None else len(part.truth.times)
+        self._markers += part.markers
+        self._last = replace(part, modules={n: m.slice(0, 1) for n, m in part.modules.items()})
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The recording with forces in place of readings.
+
+        Raises:
+            RecordingError: nothing was added.
+        """
+        modules = {name: scan.force for name, scan in self.modules.items()}
+        if self._last is None:
+            return Recording("", modules)
+        return replace(self._last, modules=modules, markers=tuple(self._markers), truth=None)
