@@ -22,9 +22,7 @@ PLUGIN_FOLDERS = (
     "src/holdfast/io/importers",
     "src/holdfast/labelling/rules",
     "src/holdfast/cli",
-    "packages/holdfast-grip/holdfast_grip/laws",
-    "packages/holdfast-interop/holdfast_interop",
-    "packages/holdfast-ros/holdfast_ros",
+    "packages",
     "lab/holdfast_lab/study",
 )
 """Folders of modules that are loaded by name: each may define the constants of their contract."""

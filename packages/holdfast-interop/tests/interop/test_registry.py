@@ -89,7 +89,7 @@ def test_a_wrong_registry_is_refused():
 
 
 def test_the_page_of_data_sets_has_those_that_can_be_downloaded():
-    page = Path(__file__).parents[3].joinpath("docs/datasets.md").read_text("utf-8")
+    page = Path(__file__).parents[4].joinpath("docs/datasets.md").read_text("utf-8")
     for name, public in public_sets().items():
         if public.files:
             assert f"| `{name}` |" in page
