@@ -1,3 +1,5 @@
+import functools
+
 import numpy as np
 import pytest
 
@@ -19,9 +21,14 @@ from holdfast_lab.randomized.simulation import RandomHold, simulate_random
 pytestmark = pytest.mark.slow
 
 
+@functools.cache
+def plain_hand(number):
+    return simulate_random(RandomHold(number, seed=3))
+
+
 @pytest.fixture(scope="module")
 def hands():
-    return [simulate_random(RandomHold(number, seed=3)) for number in range(4)]
+    return [plain_hand(number) for number in range(4)]
 
 
 def test_the_same_number_and_seed_give_the_same_bytes(hands):
@@ -167,7 +174,7 @@ def test_updates_and_gaps_leave_the_rest_of_a_hand_as_it_is():
     """Rows are repeated or lost; those that remain are those of the hand without."""
     measured = ("updates", "stamps")
     number = hand_with(lambda s, _: s.rows_per_update > 1 and s.jitter > 0, measured)
-    plain = simulate_random(RandomHold(number, seed=3))
+    plain = plain_hand(number)
     changed = simulate_random(RandomHold(number, seed=3, measured=measured))
     assert plain.metadata.get("starts_loaded") == changed.metadata.get("starts_loaded")
     for name, array in plain.truth.hand.items():
@@ -186,7 +193,7 @@ def test_updates_and_gaps_leave_the_rest_of_a_hand_as_it_is():
 @pytest.mark.parametrize("carrier", ["carry", "person"])
 def test_a_carried_hand_moves_all_the_time(carrier):
     number = hand_with(lambda _, drawn: drawn == carrier, (carrier,))
-    plain = simulate_random(RandomHold(number, seed=3))
+    plain = plain_hand(number)
     carried = simulate_random(RandomHold(number, seed=3, measured=(carrier,)))
     assert carried.metadata["carrier"] == carrier
     assert "carrier" not in plain.metadata
