@@ -252,13 +252,13 @@ class TestCluster:
 
         def arguments():
             nonlocal n_read
-            for n_read in range(1, 3001):
+            for n_read in range(1, 301):
                 yield n_read, 1
 
         results = engine_of(cluster).map_ordered(power, arguments())
         next(results)
-        assert n_read < 3000
-        assert len(list(results)) == 2999
+        assert n_read < 300
+        assert len(list(results)) == 299
 
     @pytest.mark.parametrize(
         ("preload", "message"),
