@@ -39,7 +39,7 @@ VERB_GROUPS = {
         "calibrate": "Fit a model to a hand by a minute of handling, without labels.",
     },
     "More": {
-        "demo": "Detect on real and simulated recordings, train, and replay live.",
+        "demo": "Detect on real and simulated recordings; train; replay live.",
         "simulate": "Simulate recordings of grasps with the physical twin.",
         "hold": "Control the grip force of a hand by the estimates of a source.",
         "export": "Export a model as C or ONNX, or recordings to other tools.",
