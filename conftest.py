@@ -1,12 +1,21 @@
 import functools
+import gc
 import os
 import re
 import shutil
 import signal
+import sys
 from pathlib import Path
 
 import hypothesis
 import pytest
+
+# Where the environment forbids bytecode, each of the many child processes would compile NumPy and
+# all others again, which takes most of the time of the suite; so would pytest with the tests.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# The workers of pytest-xdist use the processors already; threads of OpenBLAS that wait take time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 for _signal, _handler in (
     (signal.SIGINT, signal.default_int_handler),
@@ -143,6 +152,17 @@ def pytest_collection_modifyitems(config, items):
     config.stash[COLLECTED] = [
         (item.nodeid.partition("::")[0], "quick" in item.keywords) for item in items
     ]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect without searches for garbage: there is little, and each goes through all tests."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @functools.cache

@@ -1,8 +1,7 @@
 """Plug-ins of other packages: found by name, loaded late, and named if they are skipped."""
 
+import functools
 import json
-import os
-import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -24,6 +23,7 @@ from holdfast.cli.extensions import (
 from holdfast.devices.uri import open_source, parse
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, RecordingError
 from holdfast.io import import_recordings
+from holdfast.io.foreign import end_children
 from holdfast.io.importers import IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import SENSOR_PLUGINS, sensor, sensor_names
@@ -33,7 +33,6 @@ from holdfast_grip.laws import law_named
 from installed import install, install_project, on_the_path
 
 TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
-PROGRAM = "import sys; from holdfast.cli import main; sys.exit(main())"
 
 PARTS = '''
 import os, time
@@ -264,7 +263,8 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
 
 
-def test_doctor_lists_them(parts, capsys):
+def test_doctor_lists_them(parts, capsys, monkeypatch):
+    monkeypatch.setattr(doctor, "_ask_child", functools.cache(doctor._ask_child))
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
@@ -284,12 +284,12 @@ def test_doctor_lists_them(parts, capsys):
         ("odd", "GeneratorExit"),
     ],
 )
-def test_doctor_outlives_a_plug_in(parts, monkeypatch, name, error):
+def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     if name == "hang":
         monkeypatch.setattr(doctor, "PLUGIN_TIMEOUT", 3.0, raising=False)
     points = {"holdfast.laws": {name: f"parts:{name}"}}
-    install(parts / "more", "bad", {}, points)
-    with on_the_path(parts / "more", monkeypatch):
+    install(tmp_path / "more", "bad", {"parts.py": PARTS}, points)
+    with on_the_path(tmp_path / "more", monkeypatch):
         found = {plugin.name: plugin.error for plugin in doctor._plugins()}
     assert error in found[name]
 
@@ -350,42 +350,38 @@ def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog, 
     )
 
 
-@pytest.fixture(scope="module")
-def run_with_template(tmp_path_factory):
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
     """A function that runs a verb with the template package of `examples/plugin` installed."""
-    site, folder = tmp_path_factory.mktemp("site"), tmp_path_factory.mktemp("work")
-    install_project(site, TEMPLATE)
+    install_project(tmp_path / "site", TEMPLATE)
+    monkeypatch.chdir(tmp_path)
+    end_children()  # those of other tests have another path
 
     def run(*words, code=0):
-        done = subprocess.run(
-            [sys.executable, "-c", PROGRAM, *words], capture_output=True, text=True, check=False,
-            cwd=folder, env={**os.environ, "PYTHONPATH": str(site)}, timeout=120,
-        )  # fmt: skip
-        assert done.returncode == code, done.stderr
-        return done.stdout if code == 0 else done.stderr
+        assert main([*words]) == code
+        out, err = capsys.readouterr()
+        return err if code else out
 
-    return run, folder
+    with on_the_path(tmp_path / "site", monkeypatch):
+        yield run
 
 
-def test_the_template_is_listed_by_doctor(run_with_template):
-    run, _ = run_with_template
+def test_the_template_is_listed_by_doctor(run):
     plugins = json.loads(run("doctor", "--json"))["plugins"]
     assert [(plugin["kind"], plugin["name"], plugin["error"]) for plugin in plugins] == [
         ("sensors", "pin-skin", ""), ("sources", "pins", ""), ("importers", "pins-log", ""),
     ]  # fmt: skip
 
 
-def test_the_sensor_of_the_template(run_with_template):
-    run, _ = run_with_template
+def test_the_sensor_of_the_template(run):
     listed = json.loads(run("sensors", "--json"))["sensors"]
     assert listed[-1]["name"] == "pin-skin"
     assert json.loads(run("sensors", "pin-skin", "--json"))["n_taxels"] == 6
 
 
-def test_the_source_of_the_template(run_with_template):
-    run, folder = run_with_template
+def test_the_source_of_the_template(run, tmp_path):
     run("record", "pins:?seconds=2", "press.mcap")
-    recording = holdfast.load_recording(folder / "press.mcap")
+    recording = holdfast.load_recording(tmp_path / "press.mcap")
     assert recording.modules["finger1"].n_samples == 200
     lines = run("detect", "builtin:any", "pins:?seconds=2", "--json").splitlines()
     states = [json.loads(line)["state"] for line in lines]
@@ -395,17 +391,16 @@ def test_the_source_of_the_template(run_with_template):
     assert refused == "holdfast: pins:?secs=2: unknown parameter secs; there are seconds\n"
 
 
-def test_the_format_of_the_template(run_with_template):
-    run, folder = run_with_template
+def test_the_format_of_the_template(run, tmp_path):
     times = np.arange(200) / 100
     rows = np.column_stack([times, np.random.default_rng(0).normal(size=(200, 18)).round(6)])
-    np.savetxt(folder / "press.pins", rows, "%.6f")
+    np.savetxt(tmp_path / "press.pins", rows, "%.6f")
     imported = json.loads(run("import", "press.pins", "out", "--json"))
     assert imported["n_samples"] == 200
     assert imported["hint"].endswith("give --in-contact")
-    loaded = holdfast.load_recording(folder / imported["recordings"][0]["path"])
+    loaded = holdfast.load_recording(tmp_path / imported["recordings"][0]["path"])
     np.testing.assert_allclose(loaded.modules["finger1"].readings.reshape(200, 18), rows[:, 1:])
-    (folder / "bad.pins").write_text("0.0 1 2\n")
+    (tmp_path / "bad.pins").write_text("0.0 1 2\n")
     text = run("import", "bad.pins", "bad", "--format", "pins-log", code=2)
     assert text == "holdfast: bad.pins, line 1: 3 values, 19 expected\n"
 

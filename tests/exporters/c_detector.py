@@ -1,9 +1,12 @@
 """The exported header as a library, and streams of samples on which it equals `Detector`."""
 
 import ctypes
+import functools
 import math
 import shutil
 import subprocess
+import tempfile
+from pathlib import Path
 
 import numpy as np
 
@@ -40,17 +43,23 @@ def estimate_type(n_fingers, real=ctypes.c_double):
     return HandEstimate
 
 
-class CDetector:
-    """Detector of a header, compiled and loaded."""
-
-    def __init__(self, header, folder, sensors, *, single=False, options=()):
-        path = folder / "model.h"
-        path.write_text(header.text)
-        library = folder / "model.so"
+@functools.cache  # a second of compiler; all state of a detector is in its own memory
+def library_of(text, options):
+    """Compile and load a header."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, library = Path(folder) / "model.h", Path(folder) / "model.so"
+        path.write_text(text)
         command = [shutil.which("cc"), "-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *options]
         words = ["-shared", "-fPIC", "-DHOLDFAST_API=extern", "-x", "c", path, "-o", library, "-lm"]
         subprocess.run([*command, *words], check=True, capture_output=True, text=True)
-        self.library = ctypes.CDLL(str(library))
+        return ctypes.CDLL(str(library))
+
+
+class CDetector:
+    """Detector of a header, compiled and loaded."""
+
+    def __init__(self, header, sensors, *, single=False, options=()):
+        self.library = library_of(header.text, options)
         self.real = ctypes.c_float if single else ctypes.c_double
         self.dtype = np.float32 if single else np.float64
         self.names = list(sensors)
@@ -73,10 +82,10 @@ class CDetector:
         return code, self.estimate
 
 
-def both(model, sensors, rate, folder, *, single=False, options=(), **stream):
+def both(model, sensors, rate, *, single=False, options=(), **stream):
     """Return the detector of Python and that of C of a model."""
     header = header_of(model, sensors, rate, single=single, **stream)
-    c = CDetector(header, folder, sensors, single=single, options=options)
+    c = CDetector(header, sensors, single=single, options=options)
     return Detector(model, sensors, rate, **stream), c
 
 

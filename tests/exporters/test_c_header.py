@@ -72,8 +72,12 @@ def driven(program, samples, names, n_taxels, dtype=np.float64):
     return [line.split() for line in done.stdout.decode().splitlines()]
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("name", ["paper", "twin", "any-newton", "rich"])
+# The rich model uses every part of the kernel. The others meet gcc in the tests below.
+@pytest.mark.parametrize(
+    ("name", "compiler"),
+    [*(("rich", each) for each in COMPILERS), ("paper", "clang++"), ("twin", "clang"),
+     ("any-newton", "g++")],
+)  # fmt: skip
 def test_every_compiler_accepts_it_and_gives_the_same(name, compiler, tmp_path):
     model, sensors, rate = made(name)
     program = compiled(compiler, tmp_path, header_of(model, sensors, rate))
@@ -96,8 +100,9 @@ def test_every_compiler_accepts_it_and_gives_the_same(name, compiler, tmp_path):
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang", "g++", "clang++"])
 def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
-    model, sensors, rate = made("twin")
-    compiled(compiler, tmp_path, header_of(model, sensors, rate))  # writes model.h
+    if shutil.which(COMPILERS[compiler][0]) is None:
+        pytest.skip(f"{COMPILERS[compiler][0]} is not installed")
+    (tmp_path / "model.h").write_text(header_of(*made("twin")).text)
     for name, body in (
         ("main", "int other(holdfast_detector *d);\nint main(void)\n{\n"
                  "    static holdfast_detector d;\n    holdfast_init(&d);\n"
@@ -114,17 +119,21 @@ def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("name", MODELS)
-def test_single_precision_compiles(name, compiler, tmp_path):
-    model, sensors, rate = made(name)
-    compiled(compiler, tmp_path, header_of(model, sensors, rate, single=True))
+def test_single_precision_compiles(compiler, tmp_path):
+    compiled(compiler, tmp_path, header_of(*made("rich"), single=True))
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "rich"])
+def test_single_precision_has_no_hidden_conversion(name, compiler, tmp_path):
+    compiled(compiler, tmp_path, header_of(*made(name), single=True), "-O0")
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_random_samples_give_the_same(name, tmp_path):
+def test_random_samples_give_the_same(name):
     model, sensors, rate = made(name)
     counts = next(iter(sensors.values())).unit == "count"
-    python, c = both(model, sensors, rate, tmp_path)
+    python, c = both(model, sensors, rate)
     seen = Counter()
     for samples, time in random_samples(np.random.default_rng(2), sensors, rate, 2500, counts):
         hand = compare(python, c, samples, time)
@@ -137,19 +146,19 @@ def test_random_samples_give_the_same(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["paper", "twin", "any"])
 @pytest.mark.parametrize("in_contact", [False, True])
-def test_a_grasp_gives_the_same(name, in_contact, tmp_path):
+def test_a_grasp_gives_the_same(name, in_contact):
     model, sensors, rate = made(name)
     recording = synthetic_recording("made", 3, tuple(sensors))
-    python, c = both(model, sensors, rate, tmp_path, in_contact=in_contact)
+    python, c = both(model, sensors, rate, in_contact=in_contact)
     seen = run_recording(python, c, recording)
     assert seen > {ContactState.UNKNOWN}
 
 
-def test_readings_without_contact_and_ignored_taxels_give_the_same(tmp_path):
+def test_readings_without_contact_and_ignored_taxels_give_the_same():
     recording = synthetic_recording("made", 3, tuple(HAND))
     zero = {name: m.readings[:20].mean(axis=0) for name, m in recording.modules.items()}
     options = {"in_contact": True, "baselines": zero, "ignore": {"index": [0, 7]}}
-    python, c = both(built_in("any"), HAND, 150.0, tmp_path, **options)
+    python, c = both(built_in("any"), HAND, 150.0, **options)
     assert run_recording(python, c, recording) > {ContactState.UNKNOWN}
 
 
@@ -166,25 +175,25 @@ def run_recording(python, c, recording):
     return seen
 
 
-def test_a_calibrated_model_gives_the_same(tmp_path):
+def test_a_calibrated_model_gives_the_same():
     recordings = [synthetic_recording(f"made-{k}", k, tuple(HAND)) for k in range(2)]
     model = calibrate(built_in("any"), recordings)
     model = getattr(model, "model", model)
-    python, c = both(model, HAND, 150.0, tmp_path)
+    python, c = both(model, HAND, 150.0)
     run_recording(python, c, recordings[0])
 
 
 @pytest.mark.parametrize("tare", ["0.5", "first", "none"])
-def test_every_tare_gives_the_same(tare, tmp_path):
+def test_every_tare_gives_the_same(tare):
     model = paper(tare=tare)
-    python, c = both(model, HAND, 150.0, tmp_path)
+    python, c = both(model, HAND, 150.0)
     for samples, time in random_samples(np.random.default_rng(4), HAND, 150.0, 700):
         compare(python, c, samples, time)
 
 
-def test_a_long_stream_of_large_times_gives_the_same(tmp_path):
+def test_a_long_stream_of_large_times_gives_the_same():
     model, sensors, rate = made("any-newton")
-    python, c = both(model, sensors, rate, tmp_path)
+    python, c = both(model, sensors, rate)
     for k, (samples, _) in enumerate(
         random_samples(np.random.default_rng(6), sensors, rate, 4000, counts=False)
     ):
@@ -192,7 +201,7 @@ def test_a_long_stream_of_large_times_gives_the_same(tmp_path):
 
 
 @pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac", "gtac_v2"])
-def test_real_recordings_give_the_same(format_, data_folder, tmp_path):
+def test_real_recordings_give_the_same(format_, data_folder):
     folder = data_folder / format_
     if not folder.is_dir():
         pytest.skip(f"{folder} is not there")
@@ -200,15 +209,15 @@ def test_real_recordings_give_the_same(format_, data_folder, tmp_path):
     recording = recording.recording if hasattr(recording, "recording") else recording
     model = built_in("any")
     sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-    python, c = both(model, sensors, recording.rate, tmp_path)
+    python, c = both(model, sensors, recording.rate)
     modules = {name: m.slice(0, 2500) for name, m in
                recording.modules.items() if name in sensors}  # fmt: skip
     run_recording(python, c, type(recording)(recording.name, modules))
 
 
-def test_single_precision_is_within_its_tolerance(tmp_path):
+def test_single_precision_is_within_its_tolerance():
     recording = synthetic_recording("made", 3, tuple(HAND))
-    python, c = both(built_in("twin"), HAND, 150.0, tmp_path, single=True)
+    python, c = both(built_in("twin"), HAND, 150.0, single=True)
     n_other = 0
     for k, time in enumerate(recording.modules["index"].times.tolist()):
         samples = {name: m.readings[k] for name, m in recording.modules.items()}
@@ -248,8 +257,8 @@ def test_no_multiplication_is_joined_with_an_addition(compiler, tmp_path):
     assert "vfmadd" not in (tmp_path / "model.s").read_text()
 
 
-def test_a_detector_without_header_or_of_another_is_refused(tmp_path):
-    _, c = both(paper(), HAND, 150.0, tmp_path)
+def test_a_detector_without_header_or_of_another_is_refused():
+    _, c = both(paper(), HAND, 150.0)
     samples = {"thumb": np.zeros((30, 3))}
     c.memory.raw = bytes(len(c.memory.raw))
     code, estimate = c.update(samples, 0.0)
@@ -304,12 +313,10 @@ def test_the_header_says_what_it_was_made_of():
     assert header_of(model, HAND, 150.0).text == text
 
 
-def test_the_size_of_the_state_is_that_of_the_struct(tmp_path):
+def test_the_size_of_the_state_is_that_of_the_struct():
     for single in (False, True):
         header = header_of(paper(), HAND, 150.0, single=single)
-        folder = tmp_path / f"single-{single}"  # a library is loaded once from a path
-        folder.mkdir()
-        c = CDetector(header, folder, HAND, single=single)
+        c = CDetector(header, HAND, single=single)
         assert len(c.memory.raw) == header.state_size
 
 
