@@ -41,7 +41,7 @@ _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 """Characters with which Python reads numbers that no other program writes, such as `1_000`."""
 
 
-class Head(NamedTuple):
+class TableHead(NamedTuple):
     """What is before the first row of a file.
 
     Attributes:
@@ -324,7 +324,7 @@ def natural_order(path: Path) -> list[str | int]:
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
-def read_head(path: Path) -> Head:
+def read_head(path: Path) -> TableHead:
     """Return what is before the first row of a file, and how its cells are separated.
 
     The header of `numpy.savetxt` begins with `#`: it is the last comment, with as many cells as
@@ -349,7 +349,7 @@ def read_head(path: Path) -> Head:
                     names, separator = _names(line.rstrip("\r\n"), following, separators)
                     if not _is_sample(names, separator):
                         row = _cells(following, separator)
-                        return Head(
+                        return TableHead(
                             tuple(comments), names, number + 1, separator, encoding, True, row
                         )
                     numbered = tuple(f"column{k + 1}" for k in range(len(names)))
@@ -358,7 +358,9 @@ def read_head(path: Path) -> Head:
                     if named:
                         comments.pop()
                     shown = title if named else numbered
-                    return Head(tuple(comments), shown, number, separator, encoding, named, names)
+                    return TableHead(
+                        tuple(comments), shown, number, separator, encoding, named, names
+                    )
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
@@ -436,7 +438,7 @@ def _first_lines(file: TextIO) -> Iterator[str]:
         yield line
 
 
-def _lines(path: Path, head: Head) -> Iterator[str]:
+def _lines(path: Path, head: TableHead) -> Iterator[str]:
     """Yield the lines of a file from its first row on; blanks between cells as one.
 
     Raises:

@@ -17,7 +17,7 @@ from holdfast.errors import RecordingError, SourceError
 from holdfast.io.importers.table import natural_order
 from holdfast.recordings import Recording, Tactile
 
-SUFFIXES = (".jsonl", ".json", ".log", ".txt")
+LOG_SUFFIXES = (".jsonl", ".json", ".log", ".txt")
 HINT = "if the hand already holds the object at the first sample, give --in-contact"
 MAX_MESSAGE_LENGTH = 1 << 20
 """Longest line that is read [characters]; a whole hand sends 20,000."""
@@ -82,8 +82,10 @@ def read(path: Path) -> Iterator[Recording]:
 
 def _files(path: Path) -> list[Path]:
     if path.is_file():
-        return [path] if path.suffix.lower() in SUFFIXES else []
-    files = (file for file in path.glob("*") if file.suffix.lower() in SUFFIXES and file.is_file())
+        return [path] if path.suffix.lower() in LOG_SUFFIXES else []
+    files = (
+        file for file in path.glob("*") if file.suffix.lower() in LOG_SUFFIXES and file.is_file()
+    )
     return sorted(files, key=natural_order)
 
 
