@@ -54,8 +54,8 @@ MIN_EPISODE = 10
 MAX_MODULES = 20
 """Maximum number of modules that rows are divided among without being asked to."""
 
-TableRows = npt.NDArray[np.intp] | slice
-"""TableRows of a table."""
+RowIndices = npt.NDArray[np.intp] | slice
+"""RowIndices of a table."""
 Settings = Mapping[tuple[str, str | None], str]
 """Value by key (sensor or unit) and module; None for all modules."""
 Report = Callable[[str], None]
@@ -288,7 +288,9 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _episodes(times: Array, first: TableRows, values: list[str]) -> dict[str, npt.NDArray[np.intp]]:
+def _episodes(
+    times: Array, first: RowIndices, values: list[str]
+) -> dict[str, npt.NDArray[np.intp]]:
     """Return the rows of each episode: where a column of episodes changes, or the times restart."""
     rows = np.arange(len(times))
     of_module = rows[first]
@@ -336,7 +338,7 @@ def _with_signs(recording: Recording, factors: Array) -> Recording:
     return replace(recording, modules=modules)
 
 
-def _times(table: Table, columns: Columns, first: TableRows) -> tuple[Array, str]:
+def _times(table: Table, columns: Columns, first: RowIndices) -> tuple[Array, str]:
     """Return the times of all rows, and their unit by the rows of the first module."""
     if columns.rate is not None:
         return np.arange(len(table.values)) / columns.rate, "s"
