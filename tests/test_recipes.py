@@ -1,4 +1,4 @@
-"""The recipes of CONTRIBUTING, followed in a temporary copy: only the files that they name."""
+"""The recipes of docs/recipes.md, followed in a temporary copy: only the files that they name."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from holdfast.synthetic import synthetic_recording
 
 PACKAGE = Path(holdfast.__file__).parent
 ROOT = Path(__file__).parents[1]
-CONTRIBUTING = ROOT / "CONTRIBUTING.md"
+RECIPES = ROOT / "docs" / "recipes.md"
 
 
 VERB = ("-c", "import sys; from holdfast.cli import main; sys.exit(main())")
@@ -29,14 +29,14 @@ class Copy:
 
     Args:
         folder: for the copy.
-        title: of the recipe in CONTRIBUTING.
+        title: of the recipe.
     """
 
     def __init__(self, folder, title):
         ignored = shutil.ignore_patterns("static", "page")
         for package in (PACKAGE, *ROOT.glob("packages/*/holdfast_*")):
             shutil.copytree(package, folder / package.name, ignore=ignored)
-        section = CONTRIBUTING.read_text().split(f"### {title}\n")[1].split("\n### ")[0]
+        section = RECIPES.read_text("utf-8").split(f"## {title}\n")[1].split("\n## ")[0]
         prefixes = r"(?:src/|packages/[\w-]+/)?"
         named = re.findall(rf"`{prefixes}(holdfast\w*/[\w/<>.]+)`", section)
         self.folder, self._named = folder, set(named)
@@ -61,7 +61,7 @@ class Copy:
         root = self.folder / "clone"
         root.mkdir()
         for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
-            shutil.copy(CONTRIBUTING.with_name(name), root)
+            shutil.copy(ROOT / name, root)
         (root / "src").mkdir()
         (root / "src" / "holdfast").symlink_to(self.folder / "holdfast")
         command = (sys.executable, "-c", "import setup; setup.build_editable('.')")

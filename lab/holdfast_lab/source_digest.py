@@ -7,7 +7,7 @@ from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("holdfast", "holdfast_lab")
+PACKAGES = ("holdfast", "holdfast_grip", "holdfast_interop", "holdfast_lab")
 """Packages whose files count; other packages are pinned by the lock file."""
 WITHOUT_RESULTS = (
     *("holdfast.cli", "holdfast.plots", "holdfast.web"),

@@ -1,4 +1,4 @@
-"""The paths that CONTRIBUTING.md names exist, so that its tour and its recipes can be followed."""
+"""CONTRIBUTING.md is short; the paths that it, the tour and the recipes name exist."""
 
 import re
 from pathlib import Path
@@ -7,15 +7,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "holdfast"
-TEXT = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+PAGES = ("CONTRIBUTING.md", "docs/tour.md", "docs/recipes.md")
+RECIPES = (ROOT / "docs/recipes.md").read_text("utf-8")
+TEXT = "".join((ROOT / page).read_text("utf-8") for page in PAGES)
 NO_FILES = {"utils.py"}
 """Names of files that must not exist."""
 PATHS = sorted(set(re.findall(r"`([\w.<>-]*(?:/[\w.<>-]*)+|[\w.<>-]+\.(?:py|md|toml))`", TEXT)))
-
-
-def section(title):
-    """Return the text from a heading to the next one of its level."""
-    return re.split(r"\n## ", TEXT.partition(f"\n## {title}\n")[2])[0]
 
 
 def exists(path):
@@ -31,6 +28,15 @@ def test_a_path_exists(path):
 
 
 def test_a_recipe_names_paths_from_the_root():
-    paths = [path for path in PATHS if f"`{path}`" in section("Recipes")]
+    paths = [path for path in PATHS if f"`{path}`" in RECIPES]
     assert len(paths) > 30
     assert [path for path in paths if not exists(ROOT / path)] == []
+
+
+def test_the_page_is_short():
+    assert len((ROOT / "CONTRIBUTING.md").read_text("utf-8").split()) <= 700
+
+
+def test_a_version_in_the_changelog_is_short():
+    versions = (ROOT / "CHANGELOG.md").read_text("utf-8").split("\n## ")[1:]
+    assert max(len(version.split()) for version in versions) <= 900

@@ -133,6 +133,7 @@ PAGES = [
     *DOCS.rglob("*.md"),
     blocks.ROOT / "README.md",
     blocks.ROOT / "CONTRIBUTING.md",
+    blocks.ROOT / "CHANGELOG.md",
     blocks.ROOT / "examples" / "README.md",
 ]
 

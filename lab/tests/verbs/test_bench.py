@@ -3,10 +3,10 @@ import json
 import numpy as np
 import pytest
 
-from holdfast.cli import bench as verb
 from holdfast.cli import main
 from holdfast.cli.terminal.console import print_json
 from holdfast.features import DEFAULT_WINDOW, haar_features
+from holdfast_lab.verbs import bench as verb
 from holdfast_lab.verbs.bench import _pywt_loop, _scipy, _tsflex, benchmark
 
 pytestmark = pytest.mark.slow

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 from typer.main import get_command
 
 from holdfast.cli.extensions import PluginOptions
@@ -23,31 +24,39 @@ from holdfast.cli.terminal.console import print_error, print_line
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
 from holdfast.plugins import PluginGroup
 
-VERBS = {
-    "demo": "Detect on a real recording and on simulated grasps, train, and replay one grasp.",
-    "simulate": "Simulate recordings of grasps with the physical twin.",
-    "record": "Record a source; a crash loses at most the last half second.",
-    "import": "Import recordings from other formats.",
-    "datasets": "List public recordings, download them and import them.",
-    "info": "Show the content of a recording, a folder of them, or a model.",
-    "label": "Label recordings on a page or by a rule, and check labels.",
-    "train": "Train a model from labelled recordings.",
-    "evaluate": "Evaluate a model on labelled recordings.",
-    "calibrate": "Fit a model to a hand by a minute of its ordinary handling, without labels.",
-    "tune": "Choose the threshold for a wanted rate of false alarms.",
-    "export": "Export a model as C or ONNX, or recordings to other tools.",
-    "detect": "Detect the contact state of every finger at every sample.",
-    "serve": "Show the estimates of a source on a web page, and publish them.",
-    "hold": "Control the grip force of a hand by the estimates of a source.",
-    "play": "Send a recording or the twin as a XELA server does.",
-    "trial": "Compare laws of grip force on the twin, all on the same trials.",
-    "study": "Repeat the experiments of the paper, and run further ones.",
-    "bench": "Measure the speed of the features and of the detector.",
-    "sensors": "List the known sensors and hands, or show one of them.",
-    "doctor": "Check the installation and the reachable sources.",
+VERB_GROUPS = {
+    "Your hand and your recordings": {
+        "detect": "Detect the contact state of every finger at every sample.",
+        "serve": "Show the estimates of a source on a web page, and publish them.",
+        "record": "Record a source; a crash loses at most the last half second.",
+        "play": "Send a recording or the twin as a XELA server does.",
+        "import": "Import recordings from other formats.",
+        "info": "Show the content of a recording, a folder of them, or a model.",
+        "label": "Label recordings on a page or by a rule, and check labels.",
+        "train": "Train a model from labelled recordings.",
+        "evaluate": "Evaluate a model on labelled recordings.",
+        "tune": "Choose the threshold for a wanted rate of false alarms.",
+        "calibrate": "Fit a model to a hand by a minute of handling, without labels.",
+    },
+    "More": {
+        "demo": "Detect on real and simulated recordings; train; replay live.",
+        "simulate": "Simulate recordings of grasps with the physical twin.",
+        "hold": "Control the grip force of a hand by the estimates of a source.",
+        "export": "Export a model as C or ONNX, or recordings to other tools.",
+        "datasets": "List public recordings, download them and import them.",
+        "sensors": "List the known sensors and hands, or show one of them.",
+        "doctor": "Check the installation and the reachable sources.",
+    },
+    "Laboratory": {
+        "trial": "Compare laws of grip force on the twin, all on the same trials.",
+        "study": "Repeat the experiments of the paper, and run further ones.",
+        "bench": "Measure the speed of the features and of the detector.",
+    },
 }
 """Verbs in the order of the help, with the first line of their docstrings. Those that are plug-ins
 of the packages beside the core are listed as well; verbs of other plug-ins follow them."""
+VERBS = {name: summary for verbs in VERB_GROUPS.values() for name, summary in verbs.items()}
+"""Verbs with the first line of their docstrings."""
 
 HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or
 disturbed, from its tactile sensors, at every sample.
@@ -113,6 +122,7 @@ def _run(words: list[str]) -> int:
 def _app(words: list[str]) -> typer.Typer:
     """Create the app with all verbs; import only those among `words`."""
     app = typer.Typer(
+        cls=_GroupedVerbs,
         help=HELP,
         epilog=EPILOG,
         rich_markup_mode=None,
@@ -131,6 +141,23 @@ def _app(words: list[str]) -> typer.Typer:
         else:
             app.command(name, help=summary)(_placeholder)
     return app
+
+
+class _GroupedVerbs(TyperGroup):
+    """Verbs that the help lists by group."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 (of click)
+        """Write a section for each group, and one for verbs of plug-ins."""
+        others = {name: "" for name in self.commands if name not in VERBS}
+        width = max(map(len, self.commands))
+        limit = formatter.width - 6 - width
+        for title, verbs in {**VERB_GROUPS, "Plug-ins": others}.items():
+            rows = [
+                (name.ljust(width), self.commands[name].get_short_help_str(limit)) for name in verbs
+            ]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
 
 def _complete() -> int:

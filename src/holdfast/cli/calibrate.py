@@ -81,7 +81,7 @@ def calibrate(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to a hand by a minute of its ordinary handling, without labels.
+    """Fit a model to a hand by a minute of handling, without labels.
 
     Write a copy of the model in which every feature is normalised by what it is on this sensor
     while it is used as usual: grasp, carry, turn, put down, without slip. The thresholds are set

@@ -30,8 +30,8 @@ ColumnsOption = Annotated[
     str | None,
     typer.Option(
         "--columns",
-        help="Columns of a CSV file: time=COLUMN[:ms],taxels=PATTERN[,label=COLUMN], where "
-        "PATTERN is like F{axis}{taxel}.",
+        help="Columns of a CSV file, by names or numbers: time=COLUMN[:ms] or time=100Hz, "
+        "taxels=PATTERN, as F{axis}{taxel} or 2..16; also label=, module=, episode=.",
         show_default="guessed from the header",
     ),
 ]

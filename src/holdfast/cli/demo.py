@@ -81,7 +81,7 @@ def demo(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Detect on a real recording and on simulated grasps, train, and replay one grasp.
+    """Detect on real and simulated recordings; train; replay live.
 
     Run the detector on a recording of a real robot that loses a box, with one sentence for
     each event. Simulate grasps of a mug and a carton with the physical twin. Evaluate the model

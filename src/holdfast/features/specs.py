@@ -157,7 +157,7 @@ HOLDFAST_FEATURES = (
     *_rich("finger"),
     *_rich("hand"),
 )
-"""The project's own features, named `holdfast`: see `holdfast_lab.study.methods.holdfast`."""
+"""The project's own features, named `holdfast` in the study."""
 
 
 ANY_LAGS = (0.017, 0.067, 0.133, 0.267, 0.533)

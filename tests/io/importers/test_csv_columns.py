@@ -99,7 +99,8 @@ def test_times_without_steps_are_seconds(values):
 @pytest.mark.parametrize("text", ["", "time", "time=", "when=t", "time=a,time=b", "x=y=z"])
 def test_a_text_of_another_form(text):
     expected = (
-        "--columns: time=COLUMN, taxels=COLUMN, signs=COLUMN, label=COLUMN, cause=COLUMN expected"
+        "--columns: time=COLUMN, taxels=COLUMN, signs=COLUMN, label=COLUMN, cause=COLUMN, "
+        "module=COLUMN, episode=COLUMN expected"
     )
     with pytest.raises(ValueError, match=re.escape(expected)):
         Columns.parse(text)

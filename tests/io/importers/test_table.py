@@ -150,6 +150,6 @@ def test_forms_of_numbers_that_only_python_reads(tmp_path, cell):
 
 
 def test_text_that_is_not_utf8(tmp_path):
-    (tmp_path / "a.csv").write_bytes(b"a,b\n1,\xff\n")
+    (tmp_path / "a.csv").write_bytes(b"a,b\n1,\xff\x00\n")
     with pytest.raises(RecordingError, match=r"a\.csv is not CSV text: .* byte 0xff"):
         read_table(tmp_path / "a.csv", ["b"])

@@ -6,6 +6,7 @@ They are written as in `--columns`: `time=stamp:ms,taxels=F{axis}{taxel},label=s
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from itertools import product, takewhile
 
 import numpy as np
@@ -32,11 +33,26 @@ MAX_PATTERNS = 1 << 18
 """Maximum number of patterns that a guess compares; 368 taxels have some thousand."""
 MAX_GUESSED_NAME = 200
 """Maximum length of the name of a column that a guess considers [characters]."""
+DAY = 86_400.0
+"""Length of a day [s]."""
+MAX_EQUAL_SHARE = 90.0
+"""Share of equal times from which they were written with too few digits [%]."""
 RUN = ".."
 """Between the first and the last of consecutive columns."""
 
-_FIELDS = ("time", "taxels", "signs", "label", "cause")
-_TIME_NAMES = ("time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis")
+_RUN_HINT = ", and taxels=2..16 (numbers of columns) for x, y, z of taxel after taxel"
+_FIELDS = ("time", "taxels", "signs", "label", "cause", "module", "episode")
+_OF_ROWS = {
+    "module": re.compile(r"(?:sensor|module|finger)(?:[_ ]?id)?", re.IGNORECASE),
+    "episode": re.compile(r"(?:episode|trial)(?:[_ ]?(?:id|index))?", re.IGNORECASE),
+}
+"""Names of columns that say to which module or episode a row belongs."""
+_UNIT = re.compile(r"(?:^|[\W_])(?P<unit>mm|um|µm|m|N|mN|counts?)\W*$")
+_TIME_NAMES = (
+    "time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis",
+    "zeit", "temps", "tiempo", "tempo", "tijd", "czas",
+)  # fmt: skip
+_CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:\.\d*)?)")
 _RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s*hz", re.IGNORECASE)
 _UNIT_WORDS = {
     **dict.fromkeys(("s", "sec", "secs", "seconds"), "s"),
@@ -63,11 +79,14 @@ class Columns:
         time: column of the times, or a rate such as `100Hz` if there is none.
         time_unit: key of `TIME_UNITS`; None if it follows from the times.
         taxels: names of the taxel columns with `{taxel}`, `{axis}` and `{module}` in place of
-            what differs; or FIRST..LAST, consecutive columns x, y, z of taxel after taxel.
+            what differs; or FIRST..LAST, consecutive columns x, y, z of taxel after taxel, of
+            module after module. A column can also be given by its number, from 1.
         signs: of the axes x, y and z, such as `+--` for a sensor whose z falls when it is pressed;
             None for `+++`.
         label: column of the states; None without.
         cause: column of the causes; None without.
+        module: column that says of which module a row is; None without.
+        episode: column that says of which recording a row is; None without.
     """
 
     time: str | None = None
@@ -76,6 +95,8 @@ class Columns:
     signs: str | None = None
     label: str | None = None
     cause: str | None = None
+    module: str | None = None
+    episode: str | None = None
 
     @classmethod
     def parse(cls, text: str) -> "Columns":
@@ -107,7 +128,8 @@ class Columns:
     def __str__(self) -> str:
         unit = f":{self.time_unit}" if self.time_unit else ""
         time = self.time and self.time + unit
-        values = (time, self.taxels, self.signs, self.label, self.cause)
+        others = (self.signs, self.label, self.cause, self.module, self.episode)
+        values = (time, self.taxels, *others)
         found = zip(_FIELDS, values, strict=True)
         return ",".join(f"{field}={value}" for field, value in found if value)
 
@@ -122,26 +144,31 @@ class Columns:
         match = _RATE.fullmatch(self.time or "")
         return float(match["rate"]) if match else None
 
-    def completed(self, names: Sequence[str], n_taxels: Collection[int]) -> "Columns":
+    def completed(
+        self, names: Sequence[str], n_taxels: Collection[int], units: Collection[str] = ()
+    ) -> "Columns":
         """Return the same columns, with a guess for the time and the taxels if not given.
 
         Args:
             names: names of the columns of the file.
             n_taxels: numbers of taxels that the sensors of the file have, if known.
+            units: units of the sensors, if known.
 
         Raises:
             RecordingError: nothing in the header looks like times or taxels.
         """
-        time = self.time or _guessed_time(names) or _first_of_run(names, n_taxels)
+        given = None if self.rate is not None else self.time
+        time = named_column(names, given) if given else self.time
+        time = time or _guessed_time(names) or _first_of_run(names, n_taxels)
         others = [name for name in names if name != time]
-        taxels = self.taxels or _guessed_taxels(others, n_taxels)
-        taxels = taxels or _guessed_run(others, n_taxels) or _guessed_taxels(others, ())
+        taxels = self.taxels or _guessed_taxels(others, n_taxels, units)
+        taxels = taxels or _guessed_run(others, n_taxels) or _guessed_taxels(others, (), units)
         label = self.label or ("label" if "label" in names else None)
         cause = self.cause or ("cause" if "cause" in names else None)
         if time is None:
             raise RecordingError(
                 f"no column of times among {some_names(names)}: give --columns time=COLUMN, or "
-                "time=100Hz if there is none"
+                "time=100Hz if there is none" + (_RUN_HINT if names[:1] == ("column1",) else "")
             )
         if taxels is None:
             raise RecordingError(
@@ -152,17 +179,44 @@ class Columns:
             )
         return replace(self, time=time, taxels=taxels, label=label, cause=cause)
 
-    def layout(self, names: Sequence[str]) -> Layout:
+    def layout(self, names: Sequence[str], n_taxels: Collection[int] = ()) -> Layout:
         """Return the column of each taxel and axis, by module.
+
+        Args:
+            names: names of the columns of the file.
+            n_taxels: numbers of taxels that the sensors of the file have; if it is one, a longer
+                run of columns has several modules.
 
         Raises:
             RecordingError: no column has a name of this form, or the file lacks one.
         """
         pattern = self.taxels or ""
-        layout = _run_layout(pattern, names) if RUN in pattern else pattern_layout(pattern, names)
+        is_run = RUN in pattern
+        layout = _run_layout(pattern, names, n_taxels) if is_run else pattern_layout(pattern, names)
         if not layout:
             raise RecordingError(f"no column is named as {pattern!r}; it has {some_names(names)}")
         return layout
+
+
+def column_of_rows(kind: str, names: Sequence[str]) -> str | None:
+    """Return the column that says of which module or episode a row is; None without one.
+
+    Example:
+        >>> column_of_rows("module", ("t_us", "sensor_id", "x1"))
+        'sensor_id'
+    """
+    return next((name for name in names if _OF_ROWS[kind].fullmatch(name.strip())), None)
+
+
+def named_column(names: Sequence[str], text: str) -> str:
+    """Return the column of a name, or of a number from 1; the text itself without such a column.
+
+    Example:
+        >>> named_column(("t", "x1"), "2")
+        'x1'
+    """
+    is_number = text not in names and text.isdecimal() and 1 <= int(text) <= len(names)
+    return names[int(text) - 1] if is_number else text
 
 
 def stated_unit(name: str) -> str | None:
@@ -202,6 +256,81 @@ def unit_of_column(name: str, values: Array, where: str) -> str:
             f"time={name}:{likely}, or the unit that is true"
         )
     return unit
+
+
+def clock_seconds(cells: Sequence[str]) -> Array | None:
+    """Return wall-clock times in seconds, past midnight too; None if the first cell has none.
+
+    Args:
+        cells: dates with times (ISO 8601), or times such as 23:59:59.999.
+
+    Raises:
+        RecordingError: another cell has no such time.
+
+    Example:
+        >>> clock_seconds(["23:59:59.5", "00:00:00,5"]).tolist()
+        [86399.5, 86400.5]
+    """
+    times = []
+    for row, cell in enumerate(cells):
+        time = _clock_time(cell)
+        if time is None and row == 0:
+            return None
+        if time is None:
+            raise RecordingError(f"time {cell[:40]!r} given after {cells[0][:40]!r}")
+        times.append(time)
+    values = np.array(times)
+    if "-" in cells[0]:  # with a date
+        return values
+    days: Array = np.cumsum(np.diff(values, prepend=values[0]) < -DAY / 2)
+    return values + DAY * days
+
+
+def _clock_time(cell: str) -> float | None:
+    """Return the seconds of a date with a time, or since midnight; None if it is neither."""
+    text = cell.strip().replace(",", ".")
+    if match := _CLOCK.fullmatch(text):
+        return 3600 * int(match["h"]) + 60 * int(match["m"]) + float(match["s"])
+    try:
+        date = datetime.fromisoformat(text) if "-" in text[1:] else None
+    except ValueError:
+        return None
+    if date is None:
+        return None
+    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+
+
+def check_steps(name: str, times: Array) -> None:
+    """Check that times increase; name the option that works if they do not.
+
+    Args:
+        name: of their column.
+        times: (n,) in the unit of the file.
+
+    Raises:
+        RecordingError: a time is not later than the one before.
+    """
+    steps = np.diff(times)
+    wrong = np.flatnonzero(~(steps > 0))
+    if not len(wrong):
+        return
+    first, share = int(wrong[0]), 100 * len(wrong) / len(steps)
+    option = "give --columns time=100Hz with the true rate"
+    before, after = times[first], times[first + 1]
+    if not np.isfinite(after) or not np.isfinite(before):
+        raise RecordingError(f"column {name!r} has no time in row {first + 2} of the samples")
+    if after < before:
+        raise RecordingError(
+            f"column {name!r}: times go back at sample {first + 1}: {after:.12g} after "
+            f"{before:.12g}; strictly increasing times expected: {option} if the samples are "
+            "evenly spaced, or cut the file there"
+        )
+    lost = ": their last digits are lost" if share > MAX_EQUAL_SHARE else ""
+    raise RecordingError(
+        f"column {name!r}: times stand still at sample {first + 1}: {after:.12g} after "
+        f"{before:.12g}, in {share:.0f} % of the samples{lost}; strictly increasing times "
+        f"expected: {option} if the samples are evenly spaced"
+    )
 
 
 def _check_clear(name: str, step: float, where: str) -> None:
@@ -284,19 +413,37 @@ def _from_one(columns: Mapping[tuple[int, str], str]) -> dict[tuple[int, str], s
     return {(taxel_number(taxel - first), axis): name for (taxel, axis), name in columns.items()}
 
 
-def _run_layout(text: str, names: Sequence[str]) -> Layout:
-    """Return consecutive columns, three for each taxel."""
-    ends = [word.strip() for word in text.split(RUN, 1)]
+def _run_layout(text: str, names: Sequence[str], n_taxels: Collection[int]) -> Layout:
+    """Return consecutive columns, three for each taxel; of several modules if they are many."""
+    ends = [named_column(names, word.strip()) for word in text.split(RUN, 1)]
     if missing := [name for name in ends if name not in names]:
         raise RecordingError(f"taxels={text}: no column {missing[0]!r}; it has {some_names(names)}")
     run = names[names.index(ends[0]) : names.index(ends[1]) + 1]
     if not run or len(run) % 3:
         raise RecordingError(f"taxels={text}: {len(run)} columns given; 3 for each taxel expected")
-    return {"": {(taxel_number(k // 3), "xyz"[k % 3]): name for k, name in enumerate(run)}}
+    size = 3 * next(iter(n_taxels)) if len(set(n_taxels)) == 1 else len(run)
+    if len(run) % size:
+        size = len(run)
+    starts = range(0, len(run), size)
+    return {
+        f"finger{k + 1}" if len(starts) > 1 else "": {
+            (taxel_number(n // 3), "xyz"[n % 3]): name
+            for n, name in enumerate(run[start : start + size])
+        }
+        for k, start in enumerate(starts)
+    }
 
 
-def _guessed_taxels(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
-    """Return the pattern of the taxel columns: the one that most columns fit completely."""
+def _guessed_taxels(
+    names: Sequence[str], n_taxels: Collection[int], units: Collection[str]
+) -> str | None:
+    """Return the pattern of the taxel columns: the one that most columns fit completely.
+
+    Of several with other units, as displacements and forces, it is that of the sensors' unit.
+
+    Raises:
+        RecordingError: the names have too many numbers, or several units that no sensor decides.
+    """
     found: dict[str, dict[tuple[int, str], str]] = {}
     pairs = ((name, *one) for name in names for one in _patterns(name))
     for n, (name, pattern, key) in enumerate(pairs):
@@ -314,7 +461,20 @@ def _guessed_taxels(names: Sequence[str], n_taxels: Collection[int]) -> str | No
     if not sizes:
         return None
     most = max(sizes.values())
-    return _with_module([pattern for pattern, size in sizes.items() if size == most])
+    return _with_module(_of_one_unit([p for p, size in sizes.items() if size == most], units))
+
+
+def _of_one_unit(patterns: list[str], units: Collection[str]) -> list[str]:
+    """Return the patterns of one unit: that of the sensors if there are several."""
+    stated = [match and match["unit"] for match in map(_UNIT.search, patterns)]
+    if len(set(stated)) < 2 or None in stated:
+        return patterns
+    if not (fitting := [p for p, unit in zip(patterns, stated, strict=True) if unit in units]):
+        raise RecordingError(
+            f"columns in {' and '.join(sorted(map(str, set(stated))))} fit: give --columns "
+            f"'taxels={patterns[0]}' or 'taxels={patterns[-1]}'"
+        )
+    return fitting
 
 
 def _guessed_run(names: Sequence[str], n_taxels: Collection[int]) -> str | None:

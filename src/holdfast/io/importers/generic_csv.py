@@ -4,12 +4,15 @@ In the generic CSV the names of the columns are fixed. The columns of any other 
 (`Columns`), or guessed from its header; what was guessed is reported.
 """
 
+import itertools
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
@@ -17,6 +20,9 @@ from holdfast.io.importers.csv_columns import (
     TIME_UNITS,
     Columns,
     Layout,
+    check_steps,
+    clock_seconds,
+    column_of_rows,
     seconds_of,
     unit_of_column,
 )
@@ -26,6 +32,8 @@ from holdfast.io.importers.table import (
     errors_named,
     header_line,
     name_prefixes,
+    natural_order,
+    read_head,
     read_table,
     with_integer_type,
 )
@@ -39,6 +47,15 @@ DEFAULT_MODULE = "finger1"
 ANY_MODULE = "*"
 """Key of the sensor of all modules that have none of their own."""
 
+MAX_SHOWN = 6
+"""Maximum number of unused columns that a text lists."""
+MIN_EPISODE = 10
+"""Minimum number of samples from a restart of the times to the next."""
+MAX_MODULES = 20
+"""Maximum number of modules that rows are divided among without being asked to."""
+
+RowIndices = npt.NDArray[np.intp] | slice
+"""RowIndices of a table."""
 Settings = Mapping[tuple[str, str | None], str]
 """Value by key (sensor or unit) and module; None for all modules."""
 Report = Callable[[str], None]
@@ -87,7 +104,7 @@ def read(
     return (
         replace(recording, name=f"{prefix}{recording.name}")
         for file, prefix in name_prefixes(parts(path, columns, sensors)).items()
-        for recording in [_recording(file, sensors or {}, columns, report_once)]
+        for recording in _recordings(file, sensors or {}, columns, report_once)
     )
 
 
@@ -133,15 +150,15 @@ def _is_guessable(names: tuple[str, ...], n_taxels: Collection[int]) -> bool:
     return True
 
 
-def _recording(
+def _recordings(
     path: Path,
     sensors: Mapping[str, Sensor],
     columns: Columns | None,
     report: Callable[[str, tuple[str, ...]], None],
-) -> Recording:
+) -> list[Recording]:
     with errors_named(path):
         if columns is None and _is_header(header_line(path)):
-            return _generic(path, sensors, report)
+            return [_generic(path, sensors, report)]
         return _of_any_logger(path, sensors, columns or Columns(), report)
 
 
@@ -166,21 +183,150 @@ def _of_any_logger(
     sensors: Mapping[str, Sensor],
     columns: Columns,
     report: Callable[[str, tuple[str, ...]], None],
-) -> Recording:
-    """Return the recording in a file with any names of the columns; report a guess."""
+) -> list[Recording]:
+    """Return the recordings in a file with any names of the columns; report a guess."""
     names = header_line(path) or read_table(path)[0].names  # which reports what is wrong
-    chosen = columns.completed(names, _numbers_of_taxels(sensors))
-    layout = {module or DEFAULT_MODULE: own for module, own in chosen.layout(names).items()}
+    n_taxels = _numbers_of_taxels(sensors)
+    units = {one.unit for one in sensors.values()}
+    chosen = columns.completed(names, n_taxels, units)
+    layout = chosen.layout(names, n_taxels)
+    layout = {module or DEFAULT_MODULE: own for module, own in layout.items()}
     used = {name for own in layout.values() for name in own.values()}
     text = {"label": chosen.label, "cause": chosen.cause}
-    table, found = read_table(path, [n for n in names if n not in used | {chosen.time}])
+    of_rows = {
+        kind: getattr(chosen, kind) or column_of_rows(kind, [n for n in names if n not in used])
+        for kind in ("module", "episode")
+    }
+    numbers = used if _has_clock(path, chosen) else used | {chosen.time}
+    table, found = read_table(path, [n for n in names if n not in numbers])
     cells = {name: found[column] for name, column in text.items() if column in found}
-    times, unit = _times(table, chosen)
-    known = chosen if chosen.rate else replace(chosen, time_unit=unit)
+    clock = clock_seconds(found[chosen.time]) if chosen.time in found else None
+    modules = _modules_of_rows(found.get(of_rows["module"] or "", []), layout, bool(chosen.module))
+    first = next(iter(modules.values()), slice(None))
+    times, unit = _times(table, chosen, first) if clock is None else (clock, None)
+    episodes = _episodes(times, first, found.get(of_rows["episode"] or "", []))
+    known = replace(
+        chosen,
+        time_unit=None if chosen.rate else unit,
+        module=of_rows["module"] if modules else None,
+        episode=of_rows["episode"] if len(episodes) > 1 else None,
+    )
     if known != columns:
-        report(str(known), _guess_text(path, known, times, layout, names))
-    recording = _assembled(table, cells, times, layout, _settings(table), sensors)
-    return recording if chosen.signs is None else _with_signs(recording, chosen.factors)
+        report(str(known), _guess_text(path, known, times[first], layout, names))
+    recordings = []
+    for episode, rows in episodes.items():
+        part = _Part(table, cells, times, rows)
+        recording = part.recording(chosen, layout, modules, sensors)
+        name = f"{path.stem}-{episode}" if len(episodes) > 1 else path.stem
+        recordings.append(replace(recording, name=name))
+    if chosen.signs is None:
+        return recordings
+    return [_with_signs(recording, chosen.factors) for recording in recordings]
+
+
+class _Part(NamedTuple):
+    """The rows of a file that belong to a recording."""
+
+    table: Table
+    cells: Mapping[str, list[str]]
+    times: Array
+    rows: npt.NDArray[np.intp]
+
+    def recording(
+        self,
+        columns: Columns,
+        layout: Layout,
+        modules: Mapping[str, npt.NDArray[np.intp]],
+        sensors: Mapping[str, Sensor],
+    ) -> Recording:
+        """Return the recording; with `modules`, each has the rows of its own."""
+        found: dict[str, Tactile] = {}
+        of_modules = modules or {"": np.arange(len(self.times))}
+        for name, own in of_modules.items():
+            rows = np.intersect1d(self.rows, own)
+            if not columns.rate:
+                check_steps(columns.time or TIME, self.times[rows])
+            table = self.table._replace(
+                values=self.table.values[rows], first_line=self.table.first_line + int(rows[0])
+            )
+            cells = {key: [column[row] for row in rows] for key, column in self.cells.items()}
+            named = {name: next(iter(layout.values()))} if modules else layout
+            settings = _settings(table)
+            found |= _assembled(table, cells, self.times[rows], named, settings, sensors).modules
+        return Recording(self.table.path.stem, found, {"source": self.table.path.name})
+
+
+def _modules_of_rows(
+    values: list[str], layout: Layout, is_given: bool
+) -> dict[str, npt.NDArray[np.intp]]:
+    """Return the rows of each module, if a column names it and the modules take turns.
+
+    Raises:
+        RecordingError: a module has both columns and rows of its own.
+    """
+    kinds = sorted(set(values), key=lambda text: natural_order(Path(text)))
+    n_changes = sum(a != b for a, b in itertools.pairwise(values))
+    takes_turns = 1 < len(kinds) <= MAX_MODULES and n_changes > len(values) / 4
+    if not takes_turns and not is_given:
+        return {}
+    if len(layout) > 1:
+        raise RecordingError(
+            f"{len(layout)} modules by columns and {len(kinds)} by rows given; one of both expected"
+        )
+    cells = np.array(values)
+    return {
+        kind if _number(kind) is None else f"finger{k + 1}": np.flatnonzero(cells == kind)
+        for k, kind in enumerate(kinds)
+    }
+
+
+def _number(text: str) -> float | None:
+    """Return the number of a text; None if it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _episodes(
+    times: Array, first: RowIndices, values: list[str]
+) -> dict[str, npt.NDArray[np.intp]]:
+    """Return the rows of each episode: where a column of episodes changes, or the times restart."""
+    rows = np.arange(len(times))
+    of_module = rows[first]
+    own = times[of_module]
+    back = np.flatnonzero(np.diff(own) < 0) + 1
+    if not len(back):
+        return {"1": rows}
+    if values:
+        starts = [0, *(k for k in range(1, len(values)) if values[k] != values[k - 1])]
+        numbers = [_number(values[start]) for start in starts]
+        names = [
+            values[start] if number is None else f"{number:g}"
+            for start, number in zip(starts, numbers, strict=True)
+        ]
+    else:
+        steps = np.diff(own)
+        latest = own[0] + 2 * (float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0)
+        lengths = np.diff([0, *back, len(own)])
+        if (own[back] > latest).any() or lengths.min() < MIN_EPISODE:
+            return {"1": rows}  # a clock that was set back, or no times at all
+        starts = [0, *(int(of_module[k]) for k in back)]
+        names = [str(k + 1) for k in range(len(starts))]
+    if len(set(names)) < len(names):
+        return {"1": rows}
+    ends = [*starts[1:], len(rows)]
+    return {name: rows[start:end] for name, start, end in zip(names, starts, ends, strict=True)}
+
+
+def _has_clock(path: Path, columns: Columns) -> bool:
+    """Return whether the column of times has wall-clock times."""
+    head = read_head(path)
+    if columns.time not in head.names or columns.time_unit is not None:
+        return False
+    cells = head.first_row
+    place = head.names.index(columns.time)
+    return place < len(cells) and clock_seconds(cells[place : place + 1]) is not None
 
 
 def _with_signs(recording: Recording, factors: Array) -> Recording:
@@ -192,12 +338,13 @@ def _with_signs(recording: Recording, factors: Array) -> Recording:
     return replace(recording, modules=modules)
 
 
-def _times(table: Table, columns: Columns) -> tuple[Array, str]:
+def _times(table: Table, columns: Columns, first: RowIndices) -> tuple[Array, str]:
+    """Return the times of all rows, and their unit by the rows of the first module."""
     if columns.rate is not None:
         return np.arange(len(table.values)) / columns.rate, "s"
     name = columns.time or TIME
     values = table.columns([name])[:, 0]
-    unit = columns.time_unit or unit_of_column(name, values, str(table.path))
+    unit = columns.time_unit or unit_of_column(name, values[first], str(table.path))
     return seconds_of(values, unit)
 
 
@@ -208,9 +355,11 @@ def _guess_text(
     steps = np.diff(times)
     rate = 1 / float(np.median(steps)) if len(steps) and np.median(steps) > 0 else 0.0
     modules = [f"{name} {len(own) // 3} taxels" for name, own in layout.items()]
-    used = {columns.time, columns.label, columns.cause}
+    used = {columns.time, columns.label, columns.cause, columns.module, columns.episode}
     used |= {name for own in layout.values() for name in own.values()}
-    unused = ", ".join(name for name in names if name not in used) or "none"
+    others = [name for name in names if name not in used]
+    more = f" and {len(others) - MAX_SHOWN} more" if len(others) > MAX_SHOWN else ""
+    unused = (", ".join(others[:MAX_SHOWN]) or "none") + more
     return (
         f"{path.name}: the columns are a guess: {rate:.4g} Hz, {', '.join(modules)}; "
         f"columns that are not used: {unused}",

@@ -1,5 +1,6 @@
 """Tables of numbers in CSV files; errors name the place of a wrong cell."""
 
+import codecs
 import csv
 import re
 from array import array
@@ -24,15 +25,42 @@ MAX_HEAD_SIZE = 1 << 20
 """Maximum size of all lines before the first row [characters]."""
 COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
-SEPARATORS = ",;"
-"""Characters between the cells of a row, of which a file has one."""
+SEPARATORS = ",;\t "
+"""Characters between the cells of a row, of which a file has one; any number of blanks is one."""
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
 
 _ANY_CASE = "*.[cC][sS][vV]"
+_SEPARATOR_LINE = re.compile(r'"?sep=(?P<separator>.)"?', re.IGNORECASE)
+"""First line of a file of a spreadsheet: its separator."""
+_ENCODING_SIZE = 1 << 16
+"""Size of the start of a file that decides its encoding [bytes]."""
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
 _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 """Characters with which Python reads numbers that no other program writes, such as `1_000`."""
+
+
+class TableHead(NamedTuple):
+    """What is before the first row of a file.
+
+    Attributes:
+        comments: lines that begin with `#`, without the `#`.
+        names: of the columns; `column1` and so on without a header.
+        first_line: line of the first row in the file, counted from 1.
+        separator: between the cells.
+        encoding: of the text.
+        named: whether the names are those of a header.
+        first_row: cells of the first row.
+    """
+
+    comments: tuple[str, ...]
+    names: tuple[str, ...]
+    first_line: int
+    separator: str
+    encoding: str
+    named: bool
+    first_row: tuple[str, ...]
 
 
 class Table(NamedTuple):
@@ -74,7 +102,7 @@ def header_line(path: Path) -> tuple[str, ...]:
     None if it is not text.
     """
     try:
-        return _head(path)[1]
+        return read_head(path).names
     except (RecordingError, UnicodeError):
         return ()
 
@@ -82,7 +110,8 @@ def header_line(path: Path) -> tuple[str, ...]:
 def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, list[str]]]:
     """Read the numbers of a CSV file, and the cells of its columns of text.
 
-    Cells are separated by commas, or by semicolons; with these a number may have a decimal comma.
+    Cells are separated by commas, semicolons, tabs or blanks. A number may have a decimal comma if
+    cells are not separated by commas.
 
     Args:
         path: path of the file.
@@ -92,14 +121,15 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
         RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
             that is not a number, both decimal commas and points, or a row that is too long.
     """
-    comments, names, first_line, separator = _head(path)
+    head = read_head(path)
+    names, first_line, separator = head.names, head.first_line, head.separator
     ReadBudget(path).keep(len(names) * COLUMN_SIZE)
     cells: dict[int, list[str]] = {names.index(name): [] for name in text if name in names}
     numbers = array("d")
     points = _DecimalPoints(path, separator)
     try:
         with _long_cells():
-            rows = csv.reader(_lines(path, first_line), delimiter=separator)
+            rows = csv.reader(_lines(path, head), delimiter=separator)
             for number, row in enumerate(rows, start=first_line):
                 if row:
                     numbers.extend(_numbers(path, number, names, row, cells, points))
@@ -111,7 +141,7 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
         raise RecordingError(f"{path} has a header but no samples; at least one expected")
     values = np.frombuffer(numbers).reshape(-1, len(names))
     return (
-        Table(path, names, values, first_line, comments),
+        Table(path, names, values, first_line, head.comments),
         {names[place]: column for place, column in cells.items()},
     )
 
@@ -294,21 +324,43 @@ def natural_order(path: Path) -> list[str | int]:
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
-def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int, str]:
-    """Return comments, names of the columns, the line of the first row, and the separator."""
+def read_head(path: Path) -> TableHead:
+    """Return what is before the first row of a file, and how its cells are separated.
+
+    The header of `numpy.savetxt` begins with `#`: it is the last comment, with as many cells as
+    the first row.
+
+    Raises:
+        RecordingError: the file cannot be read, is empty or is not text.
+    """
     try:
         check_regular(path)
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        encoding = _encoding(path)
+        with path.open(encoding=encoding, newline="") as file:
             comments: list[str] = []
+            separators = SEPARATORS
             for number, line in enumerate(_first_lines(file), start=1):
                 if line.startswith("#"):
                     comments.append(line[1:].strip())
+                elif number == 1 and (given := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))):
+                    separators = given["separator"]
                 elif line.strip():
-                    names, separator = _names(line.rstrip("\r\n"))
-                    if not _is_sample(names):
-                        return tuple(comments), names, number + 1, separator
-                    names = tuple(f"column{k + 1}" for k in range(len(names)))
-                    return tuple(comments), names, number, separator
+                    following = file.readline(MAX_HEAD_SIZE)
+                    names, separator = _names(line.rstrip("\r\n"), following, separators)
+                    if not _is_sample(names, separator):
+                        row = _cells(following, separator)
+                        return TableHead(
+                            tuple(comments), names, number + 1, separator, encoding, True, row
+                        )
+                    numbered = tuple(f"column{k + 1}" for k in range(len(names)))
+                    title = _cells(comments[-1], separator) if comments else ()
+                    named = len(title) == len(names)
+                    if named:
+                        comments.pop()
+                    shown = title if named else numbered
+                    return TableHead(
+                        tuple(comments), shown, number, separator, encoding, named, names
+                    )
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
@@ -316,19 +368,54 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int, str]:
     raise RecordingError(f"{path} is empty; a header line and samples expected")
 
 
-def _names(header: str) -> tuple[tuple[str, ...], str]:
-    """Return the names in a header line, and the separator that gives more than one."""
-    names: list[str] = []
+def _encoding(path: Path) -> str:
+    """Return the encoding of a file: UTF-16 by its first bytes, UTF-8, or else cp1252.
+
+    Raises:
+        UnicodeError: it begins with bytes that no text has.
+    """
+    with path.open("rb") as file:
+        start = file.read(_ENCODING_SIZE)
+    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(start)
+    except UnicodeError:
+        text = start.decode("cp1252", errors="ignore")
+        if _CONTROL.search(text) or len(text) < len(start):
+            raise
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def _names(header: str, following: str, separators: str) -> tuple[tuple[str, ...], str]:
+    """Return the names in a header line, and the separator.
+
+    It is the first that gives several names, and as many cells in the following line; else the
+    first that gives several.
+    """
+    found: tuple[tuple[str, ...], str] | None = None
+    for separator in separators:
+        names = _cells(header, separator)
+        if len(names) > 1:
+            found = found or (names, separator)
+            if len(_cells(following, separator)) == len(names):
+                return names, separator
+    return found or ((header.strip().strip('"'),), separators[0])
+
+
+def _cells(line: str, separator: str) -> tuple[str, ...]:
+    """Return the cells of a line, without blanks around them."""
+    if separator == " ":
+        line = " ".join(line.split())
     with _long_cells():
-        for separator in SEPARATORS:
-            names = next(csv.reader([header], delimiter=separator))
-            if len(names) > 1:
-                return tuple(name.strip() for name in names), separator
-    return (header.strip().strip('"'),), SEPARATORS[0]
+        return tuple(name.strip() for name in next(csv.reader([line], delimiter=separator), []))
 
 
-def _is_sample(names: Sequence[str]) -> bool:
+def _is_sample(names: Sequence[str], separator: str) -> bool:
     """Return whether the first line has numbers, other than those with which columns are named."""
+    if separator != ",":
+        names = [name.replace(",", ".", 1) for name in names]
     named = [str(k) for k in range(len(names) + 1)]
     return (
         len(names) > 3
@@ -351,20 +438,20 @@ def _first_lines(file: TextIO) -> Iterator[str]:
         yield line
 
 
-def _lines(path: Path, first_line: int) -> Iterator[str]:
-    """Yield the lines of a file from a line on.
+def _lines(path: Path, head: TableHead) -> Iterator[str]:
+    """Yield the lines of a file from its first row on; blanks between cells as one.
 
     Raises:
         csv.Error: a line is too long.
     """
-    with path.open(encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
+    with path.open(encoding=head.encoding, errors="surrogateescape", newline="") as file:
         number = 0
         while line := file.readline(MAX_ROW_SIZE + 1):
             if len(line) > MAX_ROW_SIZE:
                 raise csv.Error(f"a row of more than {MAX_ROW_SIZE} bytes")
             number += 1
-            if number >= first_line:
-                yield line
+            if number >= head.first_line:
+                yield " ".join(line.split()) + "\n" if head.separator == " " else line
 
 
 def _start(cell: str) -> str:
@@ -380,6 +467,6 @@ def _text(problem: Exception) -> str:
 
 
 def some_names(names: Sequence[str]) -> str:
-    """Return the first names of columns, for a message."""
-    shown = ", ".join(map(repr, names[:6]))
+    """Return the first names of columns, and the starts of long ones, for a message."""
+    shown = ", ".join(map(_start, names[:6]))
     return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown
