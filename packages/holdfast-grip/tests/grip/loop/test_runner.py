@@ -52,7 +52,7 @@ def test_a_clock_of_the_source_that_stands_still_is_a_fault(held, monkeypatch):
     # The samples are new, but by their times they are not: an assembler makes them just increase.
     runner, tape, time = held
     now = runner._received
-    monkeypatch.setattr("holdfast.live.loop.runner.time.monotonic", lambda: now)
+    monkeypatch.setattr("holdfast_grip.loop.runner.time.monotonic", lambda: now)
     for _ in range(20):
         now += 0.01
         time = math.nextafter(time, math.inf)
