@@ -17,11 +17,9 @@ class PluginOptions:
 
     Attributes:
         group: the plug-ins.
-        built_in: plug-ins that holdfast itself has, by name.
     """
 
     group: ClassVar[PluginGroup[Any]]
-    built_in: ClassVar[Mapping[str, Any]] = {}
 
     def __init__(self, values: Mapping[str, object]) -> None:
         self._values = values
@@ -29,7 +27,7 @@ class PluginOptions:
     @classmethod
     def plugins(cls) -> dict[str, Any]:
         """Return the plug-ins by name; the code of all is imported."""
-        return {**cls.built_in, **cls.group.load_all()}
+        return cls.group.load_all()
 
     def chosen(self) -> "list[tuple[str, Any, Any]]":
         """Return name, plug-in and options of those whose options are given."""
@@ -49,17 +47,15 @@ def flags_of(options: object) -> list[str]:
     return [f"--{field.name.replace('_', '-')}" for field in fields(options)]  # type: ignore[arg-type]
 
 
-def _extension(*functions: str) -> Any:  # noqa: ANN401 (the function that converts a plug-in)
+def _extension(function: str) -> Any:  # noqa: ANN401 (the function that converts a plug-in)
     def convert(name: str, loaded: Any) -> Any:  # noqa: ANN401
         """Return a plug-in that adds options to a verb."""
         options = getattr(loaded, "OPTIONS", None)
-        lacking = [
-            function for function in functions if not callable(getattr(loaded, function, None))
-        ]
-        if not is_dataclass(options) or isinstance(options, type) or lacking:
+        is_lacking = not callable(getattr(loaded, function, None))
+        if not is_dataclass(options) or isinstance(options, type) or is_lacking:
             raise TypeError(
-                f"OPTIONS, a dataclass with its defaults, and {', '.join(functions)} expected for "
-                f"{name}, {loaded!r} given"
+                f"OPTIONS, a dataclass with its defaults, and {function} expected for {name}, "
+                f"{loaded!r} given"
             )
         return loaded
 

@@ -1,6 +1,6 @@
 """Panels: what plug-ins add to the live page and its service."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -55,7 +55,3 @@ class PanelOpener(Protocol):
 
     def open(self, session: "Session") -> AbstractContextManager[Panel]:
         """Run the panel beside a session."""
-
-
-Panels = Mapping[str, Panel]
-"""Panels by name."""
