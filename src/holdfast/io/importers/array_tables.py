@@ -24,6 +24,7 @@ from holdfast.io.importers.csv_columns import (
     THREE_AXES,
     Columns,
     column_of_rows,
+    guessed_taxels,
     guessed_time,
 )
 from holdfast.io.importers.generic_csv import (
@@ -33,13 +34,11 @@ from holdfast.io.importers.generic_csv import (
     ReportOnce,
     recordings_of_table,
 )
-from holdfast.io.importers.table import Table, errors_named, natural_order
+from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
-MAX_LISTED_LENGTH = 110
-"""Length from which on arrays are left out of a message [characters]."""
 RATE_NAMES = (
     "fs", "rate", "fps", "hz", "frequency", "samplerate", "samplingrate", "samplingfrequency"
 )  # fmt: skip
@@ -129,9 +128,10 @@ def recordings_of_arrays(
     if single := choice.single_columns(sensors):
         n = prod(next(iter(single.values())).shape)
         table = _table(choice, (), np.empty((n, 0)), single)
+        of_all = dict.fromkeys([ANY_MODULE], next(iter(sensors.values())))
         with errors_named(path):
             yield from recordings_of_table(
-                table[0].names, lambda *_: table, path.name, sensors, columns, report_once
+                table[0].names, lambda *_: table, path.name, of_all, columns, report_once
             )
         return
     for group, wanted in choice.by_group(sensors).items():
@@ -155,16 +155,11 @@ def recordings_of_arrays(
 
 def listed(arrays: StoredArrays) -> str:
     """Return the paths and shapes of arrays for a message: larger ones first, one of a kind."""
-    kinds = {_DIGITS.sub("0", name): name for name in reversed(arrays)}
+    kinds = {_DIGITS.sub("0", name): name for name in reversed([*arrays])}
     order = sorted(
         kinds.values(), key=lambda name: (-len(arrays[name].shape), -prod(arrays[name].shape))
     )
-    shown = [f"{name[-60:]} {arrays[name].shape}" for name in order]
-    n_shown = len(shown)
-    while n_shown > 1 and sum(map(len, shown[:n_shown])) > MAX_LISTED_LENGTH:
-        n_shown -= 1
-    more = f" and {len(shown) - n_shown} more" if n_shown < len(shown) else ""
-    return (", ".join(shown[:n_shown]) or "no array of numbers") + more
+    return first_texts([f"{name[-60:]} {arrays[name].shape}" for name in order])
 
 
 class _Choice:
@@ -201,17 +196,16 @@ class _Choice:
 
     def single_columns(self, sensors: Mapping[str, Sensor]) -> StoredArrays:
         """Return the arrays that are the columns of a table, if no array fits a sensor for all."""
-        one = sensors.get(ANY_MODULE)
-        if one is None or any(self.layout(name, one) for name in self.arrays):
+        if len(sensors) != 1:
             return {}
-        lengths = Counter(max(array.shape, default=1) for array in self.arrays.values())
-        n_rows, n_columns = max(lengths.items(), key=lambda pair: (pair[0] > 1) * pair[1])
-        found = {
-            name: array
-            for name, array in self.arrays.items()
-            if n_rows == prod(array.shape) and array.kind in "biufU"
-        }
-        return found if min(n_rows - 1, n_columns - 3) > 0 and len(found) > 3 else {}
+        ((key, one),) = sensors.items()
+        named = self._named(key.strip("/"))
+        if key in self.arrays or not named or any(self.layout(name, one) for name in named):
+            return {}
+        lengths = Counter(prod(self.arrays[name].shape) for name in named)
+        n_rows = max(lengths, key=lambda n: (n > 1, lengths[n]))
+        places = [name for name in named if self.arrays[name].shape == (n_rows,)]
+        return {name: self.arrays[name] for name in places} if len(places) > 3 else {}
 
     def _size(self, name: str) -> tuple[int, int]:
         return len(self.arrays[name].shape), prod(self.arrays[name].shape)
@@ -220,14 +214,7 @@ class _Choice:
         """Return the paths of the arrays that a key means."""
         if key in self.arrays:
             return [key]
-        named = [
-            name
-            for name in self.arrays
-            if key == ANY_MODULE
-            or fnmatchcase(name, key)
-            or f"/{name}".endswith(f"/{key}")
-            or name.startswith(f"{key}/")
-        ]
+        named = self._named(key)
         fitting = [name for name in named if self.layout(name, one) is not None]
         if not named:
             raise RecordingError(f"{self.path} has no array {key!r}; it has {self.listed}")
@@ -236,20 +223,31 @@ class _Choice:
         if not fitting:
             raise RecordingError(
                 f"{self.path} has {self.listed}; none has {one.n_taxels} taxels x 3 axes a sample "
-                f"({one.name}): give another sensor, or {self._option} ARRAY={one.name}; "
-                f"{THREE_AXES}"
+                f"({one.name}): give another sensor; {THREE_AXES}"
             )
         alike = {_DIGITS.sub("0", name) for name in fitting}
         parents = {name.rpartition("/")[0] for name in fitting}
         if len(fitting) > 1 and (
             len(alike) > 1 or len(parents) < len(fitting) or _PART_OF_HAND.search(min(parents))
         ):
-            options = " ".join(f"{self._option} {name}={one.name}" for name in fitting[:2])
+            slash = "/" if self._option == "--topic" else ""
+            options = " ".join(f"{self._option} {slash}{name}={one.name}" for name in fitting[:2])
             raise RecordingError(
                 f"{self.path}: {len(fitting)} arrays fit {one.name}: give the one, or several for "
                 f"one hand, as {options}"
             )
         return fitting
+
+    def _named(self, key: str) -> list[str]:
+        """Return the paths of the arrays that a key may mean: also those in a group of its name."""
+        return [
+            name
+            for name in self.arrays
+            if key == ANY_MODULE
+            or fnmatchcase(name, key)
+            or f"/{name}".endswith(f"/{key}")
+            or name.startswith(f"{key}/")
+        ]
 
     def layout(self, name: str, one: Sensor) -> _Layout | None:
         """Return how the axes of an array are understood; None if it does not fit a sensor.
@@ -279,7 +277,7 @@ class _Choice:
             elif n_values % size == 0 and (len(inner) == 1 or size in products):
                 n_modules = n_values // size
                 is_episodes = n_modules > 1 and len(shape) > 2 and axis == 1
-                if n_modules <= MAX_MODULES or is_episodes:
+                if 0 < n_modules <= MAX_MODULES or is_episodes:
                     found.append(_Layout(axis, tuple(inner), n_modules, is_episodes))
         beside = self.beside(name)
         time = beside.get(self.columns.time or guessed_time(list(beside)) or "")
@@ -368,7 +366,8 @@ def _of_rows(
     names = stored.columns if len(stored.columns) == width else numbered
     time = given.time or guessed_time(list(beside)) or choice.rate(place)
     taxels = given.taxels
-    if taxels is None and names is numbered and width % (3 * one.n_taxels) == 0:
+    is_named = guessed_taxels(names, {one.n_taxels}, {one.unit}) is not None
+    if taxels is None and not is_named and width % (3 * one.n_taxels) == 0:
         taxels = f"{names[0]}{RUN}{names[-1]}"
     if time is None and width == 3 * one.n_taxels + 1:  # the first is the time
         beside = {}
