@@ -288,7 +288,7 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
 )
 def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     if name == "hang":
-        monkeypatch.setattr(children, "ANSWER_TIMEOUT", 3.0)
+        monkeypatch.setattr(children, "CHILD_TIMEOUT", 3.0)
     points = {"holdfast.laws": {name: f"parts:{name}"}}
     install(tmp_path / "more", "bad", {"parts.py": PARTS}, points)
     with on_the_path(tmp_path / "more", monkeypatch):

@@ -11,7 +11,7 @@ from types import TracebackType
 
 SAFE_PATH_VARIABLE = "PYTHONSAFEPATH"
 """Environment variable that keeps the working folder from the path of Python, as `python -P`."""
-ANSWER_TIMEOUT = 60.0
+CHILD_TIMEOUT = 60.0
 """Time in which a child must answer; enough to import a plug-in [s]."""
 ANSWER_PREFIX = "answer of the plug-in: "
 """Text before an answer: a plug-in may print as well."""
@@ -50,10 +50,10 @@ def answer_of_child(module: str, function: str, *words: str) -> str:
     try:
         done = subprocess.run(
             python_command(program, *words), stdin=subprocess.DEVNULL,
-            capture_output=True, text=True, errors="replace", timeout=ANSWER_TIMEOUT, check=False,
+            capture_output=True, text=True, errors="replace", timeout=CHILD_TIMEOUT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return f"its import takes longer than {ANSWER_TIMEOUT:.0f} s"
+        return f"its import takes longer than {CHILD_TIMEOUT:.0f} s"
     _, answered, answer = done.stdout.rpartition(ANSWER_PREFIX)
     return answer if answered else f"its import ends the process (exit code {done.returncode})"
 
