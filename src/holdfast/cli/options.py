@@ -32,6 +32,9 @@ TOKEN_VARIABLE = "HOLDFAST_TOKEN"
 MAX_TOKEN_LENGTH = 1024
 """Longest token that is read from a file [characters]."""
 LOCALHOST = "127.0.0.1"
+RARE = "rare"
+"""Mark of an option, or of a group of options, that few users need: `Annotated[JobsOption, RARE]`.
+The help of a verb shows it with `--help-all` only."""
 PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
