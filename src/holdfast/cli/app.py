@@ -184,9 +184,14 @@ class _Verb(TyperCommand):
             with formatter.section("Commands"):
                 formatter.write_dl([(n.removeprefix(prefix), t) for n, t in commands.items()])
         options = inspect.signature(self.callback or _placeholder, eval_str=True).parameters
+        rare = {
+            name
+            for name, option in options.items()
+            if RARE in getattr(option.annotation, "__metadata__", ())
+        }
+        hidden = () if ctx.meta.get(SHOWS_ALL) else rare or {"help_all"}
         for option in self.params:
-            marks = getattr(options[option.name or ""].annotation, "__metadata__", ())
-            option.hidden = RARE in marks and not ctx.meta.get(SHOWS_ALL)  # type: ignore[attr-defined]
+            option.hidden = option.name in hidden  # type: ignore[attr-defined]
         super().format_options(ctx, formatter)
 
 

@@ -66,8 +66,8 @@ def test_commands_do_what_the_options_did(capsys, folder, tmp_path, before, now)
     places = {"F": folder, "O": tmp_path / "out"}
     if "import" in now:
         run(capsys, "export", "csv", places["O"], folder)
-    results = []
-    for text in (before, now):
-        results.append(run(capsys, *(places.get(word, word) for word in text.split())))
-    assert results[0] == results[1]
-    assert results[0][0] == (2 if "gone" in now or "magic" in now else 0)
+    first, second = (
+        run(capsys, *(places.get(word, word) for word in text.split())) for text in (before, now)
+    )
+    assert first == second
+    assert first[0] == (2 if "gone" in now or "magic" in now else 0)

@@ -39,7 +39,7 @@ def import_(
 
     Example:
       holdfast label import export.json recordings/
-      holdfast label import export.json recordings/ --annotator ann --dry-run --json
+      holdfast label import export.json recordings/ --annotator ann --json
     """
     require_extras("label")
     from holdfast.errors import RecordingError
