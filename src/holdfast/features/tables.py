@@ -9,13 +9,8 @@ import numpy as np
 from holdfast.features.haar import n_levels
 from holdfast.features.loaded_start import loaded_tare
 from holdfast.features.specs import (
-    FEATURE_KINDS,
-    LAG_KINDS,
-    MEAN_SECOND_KINDS,
-    OF_COMPONENTS,
-    RATIO_KINDS,
+    KINDS,
     SCOPES,
-    SECOND_KINDS,
     TRANSFORMS,
     FeatureSpec,
 )
@@ -152,7 +147,7 @@ def _hand(
         "n_features": plan.width,
         "n_lags": len(lags),
         "n_history": n_history,
-        "n_channels": N_COMPONENTS if any(spec.kind in OF_COMPONENTS for spec in specs) else 1,
+        "n_channels": N_COMPONENTS if any(KINDS[spec.kind].of_components for spec in specs) else 1,
         "n_levels": n_levels(n_history),
         "n_track": RING_SPARE * reach + 1,
         "period": 1.0 / plan.rate,
@@ -205,7 +200,7 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
     }  # fmt: skip
     return [
         {
-            "kind": FEATURE_KINDS.index(spec.kind),
+            "kind": list(KINDS).index(spec.kind),
             "transform": 0 if spec.seconds else TRANSFORMS.index(spec.transform),
             "of_hand": spec.scope == SCOPES[1],
             "window": spec.window,
@@ -218,14 +213,14 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
 
 
 def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Struct:
-    kinds = {spec.kind for spec in specs if spec.seconds == seconds}
+    families = {KINDS[spec.kind].family for spec in specs if spec.seconds == seconds}
     return {
         "samples": max(1, round(seconds * rate)),
         "seconds": seconds,
-        "has_changes": not kinds.isdisjoint(LAG_KINDS),
-        "has_seconds": not kinds.isdisjoint((*SECOND_KINDS, *MEAN_SECOND_KINDS)),
-        "has_means": not kinds.isdisjoint(MEAN_SECOND_KINDS),
-        "has_ratios": not kinds.isdisjoint(RATIO_KINDS),
+        "has_changes": not families.isdisjoint(("change", "load")),
+        "has_seconds": not families.isdisjoint(("second", "mean_second")),
+        "has_means": "mean_second" in families,
+        "has_ratios": "ratio" in families,
     }
 
 
