@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from holdfast.classifiers import Linear
 from holdfast.contact import Cause
 from holdfast.features import FeatureSpec, parse_features
-from holdfast.features.specs import MEAN_SECOND_KINDS, RATIO_KINDS, SECOND_KINDS
+from holdfast.features.specs import kinds_of
 from holdfast.model import FingerModel, Head, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
@@ -76,7 +76,7 @@ SLIP_OWN = (
 """Features of a head of slips; the second is one of the head of stability, too."""
 TAXELS = tuple(
     FeatureSpec(kind, transform="relative", seconds=0.02)
-    for kind in (*SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
+    for kind in kinds_of("second", "mean_second", "ratio")
 )
 """Features of a head of slips that need the taxels."""
 

@@ -281,7 +281,7 @@ def _document(path: Path, recording: "Recording", labels: "ModuleLabels") -> dic
 
 def _label_seconds(labels: "ModuleLabels") -> dict[str, float]:
     """Return the duration of each state over all fingers [s], rounded to microseconds."""
-    from holdfast.cli.info import label_seconds
+    from holdfast.labelling.review.content import label_seconds
 
     total = label_seconds(chain.from_iterable(labels.values()))
     return {state: round(seconds, 6) for state, seconds in total.items()}

@@ -16,13 +16,11 @@ import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.io.importers.csv_columns import (
+from holdfast.io.importers.csv_columns import Columns, Layout, column_of_rows
+from holdfast.io.importers.csv_times import (
     TIME_UNITS,
-    Columns,
-    Layout,
     check_steps,
     clock_seconds,
-    column_of_rows,
     seconds_of,
     unit_of_column,
 )
