@@ -36,6 +36,8 @@ from holdfast_ros.topic_arrays import arrays_of_topics
 TAKES_SENSORS = True
 HINT = f"{IF_IN_CONTACT}; bias a PapillArray before, without load"
 """Option that helps with the recordings, for the person who imports them."""
+MIN_DRIFT = 1e-3
+"""Smallest relative difference of the clocks of a device and a bag that is noted."""
 CLOCKS = ("device", "header", "bag")
 """Clocks that the times of a recording can come from, best first."""
 ONE_CLOCK_DIFFERENCE = 1.0
@@ -285,6 +287,14 @@ class _BagImport:
             modules.update({f"{prefix}{name}": module for name, module in new.items()})
         return modules
 
+    def _drift(self, clock: str) -> float:
+        """Return how much faster the bag's clock runs than that of the longest track."""
+        track = max(self._tracks.values(), key=lambda track: len(track.stamps))
+        place = CLOCKS.index(clock)
+        times = np.array([(stamps[place], stamps[-1]) for stamps in track.stamps], dtype=np.float64)
+        device, bag = (times - times[0]).T
+        return round(float(np.polyfit(device, bag - device, 1)[0]), 6) if len(times) > 2 else 0.0
+
     def _tracks_by_finger(self) -> dict[tuple[str, str], _DeviceTrack]:
         """Return tracks by topic and finger; devices without a number are counted by topic."""
         tracks: dict[tuple[str, str], _DeviceTrack] = {}
@@ -306,6 +316,7 @@ class _BagImport:
             **({"hand": names[0]} if len(names) == 1 else {}),
             **({"n_refused": n_refused} if n_refused else {}),
             **({"n_undated": self._n_undated} if self._n_undated else {}),
+            **({"clock_drift": drift} if abs(drift := self._drift(clock)) >= MIN_DRIFT else {}),
         }
 
 

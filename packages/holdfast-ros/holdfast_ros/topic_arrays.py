@@ -10,7 +10,6 @@ import numpy as np
 
 from holdfast.errors import RecordingError
 from holdfast.io.cdr import MessageDecoder
-from holdfast.io.definitions import Definition, parse_definition
 from holdfast.io.importers.array_tables import (
     StoredArray,
     arrays_of_records,
@@ -45,11 +44,10 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
     if not topics:
         shown = first_texts(list(dict.fromkeys(topic.name for topic in bag.topics)))
         raise RecordingError(f"{path} has no topic {', '.join(names)}; it has {shown}")
-    definitions = {n: topic.definition or _standard(topic.kind) for n, topic in topics.items()}
     decoders = {
-        n: MessageDecoder(definition, ros2=bag.ros2)
-        for n, definition in definitions.items()
-        if definition is not None
+        n: MessageDecoder(topic.definition, ros2=bag.ros2)
+        for n, topic in topics.items()
+        if topic.definition is not None
     }
     if not decoders:
         first = next(iter(topics.values()))
@@ -81,19 +79,6 @@ def _is_wanted(topic: BagTopic, names: Collection[str]) -> bool:
         return IMAGE_KINDS.fullmatch(topic.kind) is None
     name = topic.name.strip("/")
     return any(f"{one.strip('/')}/".startswith(f"{name}/") for one in names)
-
-
-def _standard(kind: str) -> Definition | None:
-    """Return the definition of a type of ROS 2 itself; None of others.
-
-    Databases before ROS 2 Jazzy have no definitions.
-    """
-    from rosbags.typesys import Stores, get_typestore
-
-    store, name = get_typestore(Stores.ROS2_HUMBLE), kind.replace("/", "/msg/")
-    if name not in store.fielddefs:
-        return None
-    return parse_definition(kind, store.generate_msgdef(name, ros_version=2)[0])
 
 
 def _fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -186,7 +186,7 @@ def test_only_arrays_in_the_file_itself_are_read(tmp_path, store, name):
     write(tmp_path / "a.h5", [4, 5, 4, 4], **{name: None})
     with h5py.File(tmp_path / "a.h5", "a") as file:
         store(file[GROUP], name, other)
-    with pytest.raises(RecordingError, match=f"/{GROUP}/{name} is no array stored in this file"):
+    with pytest.raises(RecordingError, match=f"{GROUP}/{name} is no array stored in this file"):
         list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
 
 
@@ -200,7 +200,7 @@ def test_a_group_in_another_file_is_not_found(tmp_path):
 
 def test_texts_and_huge_arrays_are_refused(tmp_path):
     write(tmp_path / "a.h5", [4, 5, 4, 4], tactile_timestamps=["a", "b", "c", "d"])
-    with pytest.raises(RecordingError, match="numbers expected in tactile_timestamps, object giv"):
+    with pytest.raises(RecordingError, match="numbers expected in tactile_timestamps, <U1 given"):
         list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
     write(tmp_path / "b.h5", [4, 5, 4, 4], tactile_data_raw=None)
     with h5py.File(tmp_path / "b.h5", "a") as file:

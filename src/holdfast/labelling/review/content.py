@@ -13,6 +13,7 @@ from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.io import read_chunks
 from holdfast.labelling.review.findings import findings_of_scan, hidden_labels
+from holdfast.labelling.review.oddities import with_oddities
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.model import Model
@@ -41,6 +42,7 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
         truth = part.truth
     found, hidden = scan.recording, hidden_labels(path)
     findings = findings_of_scan(scan) + ([] if hidden is None else [hidden])
+    findings = with_oddities(findings, scan, path)
     return {
         "name": found.name,
         "modules": {

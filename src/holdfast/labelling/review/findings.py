@@ -30,6 +30,10 @@ FindingKind = Literal[
     "starts_loaded",
     "no_contact",
     "hidden_labels",
+    "unlikely_rate",
+    "gaps",
+    "drift",
+    "no_labels",
 ]
 
 
