@@ -82,13 +82,19 @@ def read(
         RecordingError: it is damaged or has no known topic.
     """
     with open_bag(path) as bag:
-        if not sensors and not columns:
-            recordings = [_BagImport(path, bag).recording()]
-        else:
-            wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
-            arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
-            found = recordings_of_arrays(path, arrays, wanted, columns, report, "--topic")
-            recordings = [replace(recording, complete=bag.complete) for recording in found]
+        try:
+            if not sensors and not columns:
+                recordings = [_BagImport(path, bag).recording()]
+            else:
+                wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
+                arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
+                found = recordings_of_arrays(path, arrays, wanted, columns, report, "--topic")
+                recordings = [replace(recording, complete=bag.complete) for recording in found]
+        except RecordingError as cause:
+            if bag.complete:
+                raise
+            text = str(cause).removeprefix(f"{path} ")
+            raise RecordingError(f"{path} is cut or damaged: up to the cut it {text}") from cause
     yield from recordings
 
 

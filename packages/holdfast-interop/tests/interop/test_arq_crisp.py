@@ -206,7 +206,7 @@ def test_texts_and_huge_arrays_are_refused(tmp_path):
     with h5py.File(tmp_path / "b.h5", "a") as file:
         shape = (18, 3, 10**8)
         file[GROUP].create_dataset("tactile_data_raw", shape, "f8", chunks=(18, 3, 100))
-    with pytest.raises(RecordingError, match="needs more memory than the"):
+    with pytest.raises(RecordingError, match=r"in memory, .* are allowed for a file of"):
         list(import_recordings(tmp_path / "b.h5", "arq-crisp"))
 
 

@@ -77,13 +77,11 @@ class _Layout(NamedTuple):
     Attributes:
         axis: of the samples.
         inner: order of the other axes.
-        n_modules: number of sensors side by side.
         is_episodes: whether the axis before that of the samples counts recordings.
     """
 
     axis: int
     inner: tuple[int, ...]
-    n_modules: int
     is_episodes: bool = False
 
 
@@ -155,11 +153,14 @@ def recordings_of_arrays(
 
 def listed(arrays: StoredArrays) -> str:
     """Return the paths and shapes of arrays for a message: larger ones first, one of a kind."""
+    return first_texts([f"{name[-60:]} {arrays[name].shape}" for name in _by_size(arrays)])
+
+
+def _by_size(arrays: StoredArrays) -> list[str]:
+    """Return the first path of each kind of paths, those of larger arrays first."""
     kinds = {_DIGITS.sub("0", name): name for name in reversed([*arrays])}
-    order = sorted(
-        kinds.values(), key=lambda name: (-len(arrays[name].shape), -prod(arrays[name].shape))
-    )
-    return first_texts([f"{name[-60:]} {arrays[name].shape}" for name in order])
+    shapes = {name: arrays[name].shape for name in kinds.values()}
+    return sorted(shapes, key=lambda name: (-len(shapes[name]), -prod(shapes[name])))
 
 
 class _Choice:
@@ -181,7 +182,7 @@ class _Choice:
             RecordingError: no array fits, or several that are no recordings of one kind.
         """
         if not sensors:
-            first = next(iter(sorted(self.arrays, key=self._size, reverse=True)), "PATH")
+            first, *_ = [*_by_size(self.arrays), "PATH"]
             raise RecordingError(
                 f"{self.path} has {self.listed}: give the array and its sensor, as "
                 f"{self._option} {first}=SENSOR"
@@ -207,15 +208,16 @@ class _Choice:
         places = [name for name in named if self.arrays[name].shape == (n_rows,)]
         return {name: self.arrays[name] for name in places} if len(places) > 3 else {}
 
-    def _size(self, name: str) -> tuple[int, int]:
-        return len(self.arrays[name].shape), prod(self.arrays[name].shape)
-
     def _places(self, key: str, one: Sensor) -> list[str]:
         """Return the paths of the arrays that a key means."""
         if key in self.arrays:
             return [key]
         named = self._named(key)
-        fitting = [name for name in named if self.layout(name, one) is not None]
+        fitting = [
+            name
+            for name in named
+            if self.layout(name, one) and not guessed_time([name.rpartition("/")[2]])
+        ]
         if not named:
             raise RecordingError(f"{self.path} has no array {key!r}; it has {self.listed}")
         if not fitting and len(named) == 1:
@@ -252,15 +254,18 @@ class _Choice:
     def layout(self, name: str, one: Sensor) -> _Layout | None:
         """Return how the axes of an array are understood; None if it does not fit a sensor.
 
-        Of several axes that could be that of the samples, it is the one with as many values as the
-        times, or else the longest.
+        The axis of the samples is the one with as many values as the times. Where there are no
+        such times, it is the longest, or else the first.
         """
         array = self.arrays[name]
         shape, size = array.shape, 3 * one.n_taxels
         if array.kind not in "biuf" or len(shape) < 2:
             return None
-        found: list[_Layout] = []
-        for axis in range(len(shape)):
+        beside = self.beside(name)
+        time = beside.get(self.columns.time or guessed_time(list(beside)) or "")
+        n_times = 0 if time is None else prod(self.arrays[time].shape)
+        timed = [axis for axis, n in enumerate(shape) if n == n_times]
+        for axis in timed or [int(np.argmax(shape)), *([0] if shape[0] > 1 else [])]:
             inner = [other for other in range(len(shape)) if other != axis]
             threes = [other for other in inner if shape[other] == 3]
             is_flat = len(inner) == 1 or shape[inner[-1]] == size
@@ -273,18 +278,12 @@ class _Choice:
             n_values = prod(shape[other] for other in inner)
             is_table = self.columns.taxels or n_values == size + 1  # the first is the time
             if is_table and len(shape) == 2:
-                found.append(_Layout(axis, tuple(inner), 1))
-            elif n_values % size == 0 and (len(inner) == 1 or size in products):
-                n_modules = n_values // size
-                is_episodes = n_modules > 1 and len(shape) > 2 and axis == 1
-                if 0 < n_modules <= MAX_MODULES or is_episodes:
-                    found.append(_Layout(axis, tuple(inner), n_modules, is_episodes))
-        beside = self.beside(name)
-        time = beside.get(self.columns.time or guessed_time(list(beside)) or "")
-        n_times = 0 if time is None else prod(self.arrays[time].shape)
-        return max(
-            found, key=lambda one: (shape[one.axis] == n_times, shape[one.axis]), default=None
-        )
+                return _Layout(axis, tuple(inner))
+            if n_values % size == 0 and (len(inner) == 1 or size in products):
+                is_episodes = n_values > size and len(shape) > 2 and axis == 1
+                if size <= n_values <= MAX_MODULES * size or is_episodes:
+                    return _Layout(axis, tuple(inner), is_episodes)
+        return None
 
     def beside(self, name: str) -> dict[str, str]:
         """Return the paths of the single columns beside an array, by their last names.
@@ -331,6 +330,8 @@ def _recordings(
     """Return the recordings in an array, with the columns beside it."""
     array, layout = choice.arrays[place], choice.layout(place, one)
     if layout is None:
+        if array.kind == "O":
+            array.read()  # which gives the reason
         few = array.shape[-1:] in ((1,), (2,), (one.n_taxels,), (2 * one.n_taxels,))
         raise RecordingError(
             f"{place!r} has shape {array.shape}; (samples, {one.n_taxels}, 3) or (samples, "
