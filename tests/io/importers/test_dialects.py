@@ -45,6 +45,7 @@ DIALECTS = {
     "semicolon": [";".join(HEAD), *rows(";", ",")],
     "sep line": ["sep=;", ";".join(HEAD), *rows(";", ",")],
     "tab": ["\t".join(HEAD), *rows("\t")],
+    "bar": ["|".join(HEAD), *rows("|")],
     "blanks": ["  ".join(["t", *(name.split()[0] for name in NAMES)]), *rows("   ")],
     "header of numpy": ["# " + ",".join(HEAD), *rows(",")],
     "comma within a name": [";".join([*HEAD[:-1], "Bz4, [uT]"]), *rows(";", ",")],
@@ -87,6 +88,7 @@ CLOCKS = {
     "clock": [f"23:59:59.{n:03d}" for n in range(700, 1000, 10)]
     + [f"00:00:00.{n:03d}" for n in range(0, 300, 10)],
     "iso": [f"2026-11-21T10:00:00.{n:03d}" for n in range(0, 600, 10)],
+    "day": [f"21.11.2026 10:00:00.{n:03d}" for n in range(0, 600, 10)],
     "date": [f"2026-11-21 10:00:00.{n:03d}+01:00" for n in range(0, 600, 10)],
 }
 

@@ -48,7 +48,7 @@ CASES = {
     "a unit": (
         timed(lambda times: times * 1e3),
         [
-            *((name, "unlikely_rate", "0.15 Hz where the sensor has 100: if the times have another")
+            *((name, "unlikely_rate", "0.15 Hz where the sensor has 150: if the times have another")
               for name in UNLABELLED.modules),
             *((name, "rate", "0.15 Hz; builtin:any needs") for name in UNLABELLED.modules),
             ("", "no_labels", "no labels"),

@@ -27,7 +27,7 @@ COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
 MAX_SHOWN_LENGTH = 80
 """Length from which on names of columns are left out of a message [characters]."""
-SEPARATORS = ",;\t "
+SEPARATORS = ",;\t| "
 """Characters between the cells of a row, of which a file has one; any number of blanks is one."""
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
