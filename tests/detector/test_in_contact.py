@@ -131,10 +131,8 @@ def test_a_reset_keeps_the_declaration_unless_told():
 @pytest.mark.parametrize("name", MODELS)
 def test_live_equals_offline(name, by_metadata):
     model, recording = Model.load(name), held(released(2.0))
-    metadata = {"starts_loaded": True} if by_metadata else {}
-    live = ArrivalDetector(
-        model, {"a": sensor("uskin-4x4")}, in_contact=not by_metadata, metadata=metadata
-    )
+    metadata = {"starts_loaded": True}
+    live = ArrivalDetector(model, {"a": sensor("uskin-4x4")}, metadata=metadata)
     module, found = recording.modules["a"], []
     for k, time in enumerate(module.times.tolist()):
         found += live.update(Arrival(time, {"a": module.readings[k]}, time))

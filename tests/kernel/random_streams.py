@@ -11,6 +11,7 @@ from holdfast.features.specs import (
     WINDOWED,
     FeatureSpec,
 )
+from holdfast.features.start import Start
 from holdfast.features.tables import StreamPlan
 from holdfast.sensors import Sensor
 
@@ -81,7 +82,7 @@ def random_plan(rng):
         tare=Tare.parse(str(tare)),
         rate=float(rng.choice(RATES)),
         ignore=ignore,
-        in_contact=bool(rng.random() < 0.2),
+        start=Start(bool(rng.random() < 0.2)),
     )
 
 

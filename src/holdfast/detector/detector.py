@@ -30,7 +30,7 @@ from holdfast.detector.detection import (
 )
 from holdfast.detector.onnx_feeder import OnnxFeeder
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.loaded_start import declared_baselines
+from holdfast.features.start import Start, declared_baselines
 from holdfast.features.stream import FeatureStream
 from holdfast.features.tables import StreamPlan
 from holdfast.kernel import _extension
@@ -88,7 +88,7 @@ class Detector:
         first = next(iter(sensors.values()))
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
         known = declared_baselines({BASELINES: baselines}, sensors)
-        plan = replace(plan, in_contact=in_contact, baselines=known)
+        plan = replace(plan, start=Start(in_contact, known))
         if plan.tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
@@ -103,7 +103,6 @@ class Detector:
         recording: Recording,
         *,
         ignore: IgnoredTaxels | None = None,
-        in_contact: bool | None = None,
     ) -> Self:
         """Return a detector for a recording, whose tare may be an interval of it.
 
@@ -112,7 +111,6 @@ class Detector:
             recording: the recording; or its first part, if `run` receives it in parts. A tare by
                 interval then needs that interval in the first part.
             ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
-            in_contact: the first samples are load; None if the metadata say it (`starts_loaded`).
 
         Raises:
             ModelError: the recording has none of the model's fingers, or another sensor.
@@ -122,7 +120,6 @@ class Detector:
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
         plan = _ignoring(model.plan(sensors, recording.rate), ignore)
-        plan = replace(plan, in_contact=in_contact)
         detector._start(model, FeatureStream.for_recording(plan, recording))
         return detector
 
@@ -177,8 +174,8 @@ class Detector:
             in_contact: whether the next samples are load; None for as before.
         """
         plan = self._stream.plan
-        loaded = plan.in_contact if in_contact is None else in_contact
-        self._use(FeatureStream(replace(plan, in_contact=loaded)))
+        loaded = plan.start.loaded if in_contact is None else in_contact
+        self._use(FeatureStream(replace(plan, start=replace(plan.start, loaded=loaded))))
 
     def set_thresholds(self, thresholds: Mapping[str, float]) -> None:
         """Change the probability from which a contact is stable, from the next sample on.
@@ -390,10 +387,10 @@ def detect(model: Model, recording: Recording, *, in_contact: bool | None = None
         >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
         (['index', 'middle', 'thumb'], 1725, (1725,))
     """
-    recording = true_updates(recording)
+    recording = true_updates(recording.with_start(loaded=in_contact))
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
-    return Detector.for_recording(model, recording, in_contact=in_contact).run(recording)
+    return Detector.for_recording(model, recording).run(recording)
 
 
 def check_thresholds(thresholds: Mapping[str, float]) -> None:

@@ -23,7 +23,7 @@ from holdfast.detector.detector import check_thresholds
 from holdfast.devices.sources.base import Arrival, ModuleSamples
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
-from holdfast.features.loaded_start import begins_in_contact, declared_baselines
+from holdfast.features.start import Start
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
 from holdfast.recordings import BASELINES, GAP_PERIODS, STARTS_LOADED
@@ -167,8 +167,7 @@ class ArrivalDetector:
         strict: refuse a rate that is not the model's instead of resampling.
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
         watch_rate: report the fault RATE while a finger has another rate than at the start.
-        in_contact: the first samples are load, and not an open hand.
-        metadata: of the source; they may say that it begins in contact.
+        metadata: of the source, which declare how it begins.
 
     Attributes:
         fingers: sensor of each finger that the model uses.
@@ -189,7 +188,6 @@ class ArrivalDetector:
         strict: bool = False,
         ignore: Mapping[str, tuple[int, ...]] | None = None,
         watch_rate: bool = False,
-        in_contact: bool = False,
         metadata: Mapping[str, Any] | None = None,
     ) -> None:
         tare = Tare.parse(model.tare)
@@ -205,10 +203,8 @@ class ArrivalDetector:
         self.notices: list[str] = []
         self._watch_rate = watch_rate
         self._monitor: RateMonitor | None = None
-        metadata = metadata or {}
-        self._loaded = begins_in_contact(metadata, in_contact or None)
-        self._baselines = declared_baselines(metadata, self.fingers) if self._loaded else {}
-        self._finds_pull = tare.kind != "seconds" and not self._loaded
+        self._begin = Start.of(metadata or {}, self.fingers)
+        self._finds_pull = tare.kind != "seconds" and not self._begin.loaded
         self._readings = ReadingsMonitor(self.fingers, finds_pull=self._finds_pull)
         self._strict = strict
         self._ignore = ignore
@@ -320,7 +316,7 @@ class ArrivalDetector:
         Without it, the tare of the recording would be what the hand holds now.
         """
         if self._detector is None:
-            return self._declared(self._baselines) if self._loaded else {}
+            return self._declared(self._begin.baselines) if self._begin.loaded else {}
         if self._detector.knows_zero:
             baselines = self._detector.baselines()
             return self._declared(baselines) if baselines else {}
@@ -397,7 +393,7 @@ class ArrivalDetector:
     def _new_detector(self, rate: float) -> Detector:
         return Detector(
             self.model, self.fingers, rate,
-            ignore=self._ignore, in_contact=self._loaded, baselines=self._baselines,
+            ignore=self._ignore, in_contact=self._begin.loaded, baselines=self._begin.baselines,
         )  # fmt: skip
 
     def _detect(self, detector: Detector, arrival: Arrival) -> Iterator[StreamEstimate]:

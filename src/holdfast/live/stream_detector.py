@@ -20,6 +20,7 @@ from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.base import DeviceSource, ModuleSamples
 from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
 from holdfast.model import Model
+from holdfast.recordings import STARTS_LOADED
 
 
 class StreamUpdate(NamedTuple):
@@ -103,7 +104,7 @@ class StreamDetector:
         self._detector = ArrivalDetector(
             model, source.sensors, strict=strict, ignore=ignore,
             watch_rate=isinstance(source, DeviceSource),
-            in_contact=in_contact, metadata=source.metadata,
+            metadata={**source.metadata, STARTS_LOADED: True} if in_contact else source.metadata,
         )  # fmt: skip
         self.fingers = self._detector.fingers
         self._changes = StateChanges((*self.fingers, HAND))

@@ -13,7 +13,6 @@ import numpy as np
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import TrainingError
-from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import extract
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs
@@ -129,7 +128,7 @@ class OwnHandling:
         traces = detect(raw, recording).fingers
         sensors = {name: recording.modules[name].sensor for name in traces}
         rows = extract(self.model.plan(sensors, recording.rate), recording)
-        loaded = begins_in_contact(recording.metadata) and BASELINES not in recording.metadata
+        loaded = recording.starts_loaded and BASELINES not in recording.metadata
         for name, trace in traces.items():
             self._count_faults(name, trace)
             self._add_finger(name, sensors[name], trace, rows[name].features, loaded=loaded)

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from holdfast.contact import NO_CONTACT, UNKNOWN
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.force import rest_amplitude
-from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import extract
 from holdfast.features.tables import StreamPlan
 from holdfast.metrics.slip_truth import slip_truth
@@ -196,7 +195,7 @@ def _samples_of_part(
     with_others = not plan.only_stable
     is_same = plan.slip_features == setting.features
     slip_rows = stable_rows if is_same or not with_others else extracted(plan.slip_features)
-    loaded, fingers = begins_in_contact(recording.metadata), {}
+    fingers = {}
     recording_step = scan.recordings[index].step
     group = int(plan.data_split.group_of[index])
     for finger, rows in stable_rows.items():
@@ -205,7 +204,7 @@ def _samples_of_part(
         units = plan.data_split.units_of(index, module.n_samples)
         usable = usable_rows(rows, states)[::recording_step]
         kept = usable[-n_seen.get(finger, 0) % step :: step]
-        has_rest = tare.without_contact and not scan.relative and not loaded
+        has_rest = tare.without_contact and not scan.relative and not recording.starts_loaded
         stable = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows, states, kept, group),

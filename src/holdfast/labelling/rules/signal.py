@@ -167,9 +167,9 @@ class _GraspLabeller:
         self._rule = rule
         self._inside = np.zeros(len(hand.times), dtype=bool)
         self._inside[span] = True
-        self._begins_in_contact = all(finger.threshold is None for finger in hand.fingers.values())
+        self._starts_loaded = all(finger.threshold is None for finger in hand.fingers.values())
         self._end = span.stop
-        self._locked = span.start if self._begins_in_contact else self._lock()
+        self._locked = span.start if self._starts_loaded else self._lock()
 
     def _lock(self) -> int:
         """Return the sample from which no finger in contact changes for long enough."""
@@ -191,7 +191,7 @@ class _GraspLabeller:
         timeline.set_state(touching & self._changing[name], UNSTABLE, Cause.DISTURBANCE, ratio)
         before = np.arange(len(touching)) < self._locked
         timeline.set_state(touching & before, UNSTABLE, Cause.CLOSING, _contact_ratio(finger))
-        if not self._begins_in_contact:
+        if not self._starts_loaded:
             self._label_end(name, touching, timeline)
 
     def _label_end(self, name: str, touching: Mask, timeline: StateTimeline) -> None:
