@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.detector import detect
-from holdfast.devices.sources import Arrival
-from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.devices.sources import Arrival, Source
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
@@ -77,17 +77,33 @@ def disturbed(seed: int, condition: str) -> Recording:
     return Recording(made.name, modules)
 
 
+class Passed(Source):
+    """Source whose samples are passed to the detector by hand."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.sensors = {name: module.sensor for name, module in recording.modules.items()}
+
+    def open(self) -> None:
+        """Open nothing."""
+
+    def read(self, timeout: float) -> None:
+        """Read nothing."""
+
+    def close(self) -> None:
+        """Close nothing."""
+
+
 def live(model: Model, recording: Recording) -> Estimates:
     """Return the estimates of a live stream."""
-    detector = ArrivalDetector(model, {n: m.sensor for n, m in recording.modules.items()})
+    detector = StreamDetector(model, Passed(recording))
     samples: dict[float, dict[str, npt.NDArray[Any]]] = {}
     for name, module in recording.modules.items():
         for when, readings in zip(module.times.tolist(), module.readings, strict=True):
             samples.setdefault(when, {})[name] = readings
     found = []
     for when in sorted(samples):
-        found += detector.update(Arrival(when, samples[when], time.monotonic()))
-    found += detector.finish()
+        found += detector.update(Arrival(when, samples[when], time.monotonic())).estimates
+    found += detector.finish().estimates
     return {
         (name, round(1e6 * each.estimate.time)): (finger.stable_probability, finger.state.code)
         for each in found

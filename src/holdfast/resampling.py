@@ -16,6 +16,8 @@ TOLERANCE_PERIODS = 1e-3
 """Tolerance of times in periods of the new rate. The rounding of times, 1e-7 s since 1970, then
 moves no sample."""
 
+RATE_TOLERANCE = 0.2
+"""A rate that differs by at most this share from that of a model is taken as it is."""
 MIN_ROWS_PER_UPDATE = 1.5
 """Least number of rows from one change of the readings to the next of a sample-and-hold sensor."""
 EVEN_SHARE = 0.95
@@ -119,6 +121,20 @@ def _update_rows(module: Tactile, n_rows: float) -> Tactile:
     rows = zip(module.times.tolist(), module.readings, strict=True)
     kept = [repeats.is_update(time, reading) for time, reading in rows]
     return replace(module, times=module.times[kept], readings=module.readings[kept])
+
+
+def at_rate(recording: Recording, rate: float | None) -> Recording:
+    """Return the true updates of a recording, resampled unless their rate is near another.
+
+    Args:
+        recording: at any rate.
+        rate: of a model [Hz]; None for one of any rate. Within 20 % of it nothing is resampled.
+    """
+    # The true updates first: the rows of a sensor that holds its samples are no rate of its own.
+    recording = true_updates(recording)
+    if rate is None or abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
+        return recording
+    return resample(recording, rate)
 
 
 def resample(recording: Recording, rate: float) -> Recording:

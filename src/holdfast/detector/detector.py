@@ -36,7 +36,7 @@ from holdfast.features.tables import StreamPlan
 from holdfast.kernel import _extension
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import BASELINES, Recording
-from holdfast.resampling import resample, true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
@@ -387,9 +387,7 @@ def detect(model: Model, recording: Recording, *, in_contact: bool | None = None
         >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
         (['index', 'middle', 'thumb'], 1725, (1725,))
     """
-    recording = true_updates(recording.with_start(loaded=in_contact))
-    if model.rate is not None and not model.rate_fits(recording.rate):
-        recording = resample(recording, model.rate)
+    recording = at_rate(recording.with_start(loaded=in_contact), model.rate)
     return Detector.for_recording(model, recording).run(recording)
 
 

@@ -3,17 +3,16 @@
 import math
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-from holdfast.contact import ContactState
 from holdfast.errors import HoldfastError, SourceError, StreamError
-from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.recorder import output_path
 from holdfast.live.recording_buffer import ModuleBuffer
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamDetector, StreamUpdate
+from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamEstimate, StreamUpdate
 from holdfast.live.web.schema import CalibrationDocument, CalibrationState
 from holdfast.model import Model
 from holdfast.model.files import encode
@@ -38,7 +37,6 @@ LONGEST_STEP = 0.1
 SAFETY_SECONDS = 0.5
 """Held time beyond the least that is wanted before it may end [s]: the calibration leaves out
 samples at the edges of gaps."""
-HELD_STATES = (ContactState.STABLE, ContactState.UNSTABLE)
 
 
 class HandlingBuffer:
@@ -115,7 +113,7 @@ class HandlingBuffer:
         self._end = now
         for name in estimate.updated_fingers:
             step, self._last[name] = now - self._last[name], now
-            holds = estimate.estimate.fingers[name].state in HELD_STATES
+            holds = estimate.estimate.fingers[name].state in TOUCHING
             if holds and step <= LONGEST_STEP:
                 self._held[name] += step
 
@@ -213,7 +211,7 @@ class SessionCalibration:
                 return
             if self._result is None:
                 raise StreamError("there is no calibration to undo")
-            self._session.set_model(self._original)
+            self._set_model(self._original)
             self._result, self.text, self._refused = None, "calibration undone", False
 
     def encoded_model(self) -> bytes:
@@ -245,6 +243,10 @@ class SessionCalibration:
         if self._result is None:
             raise StreamError("there is no calibrated model: calibrate first")
         return self._result
+
+    def _set_model(self, model: Model) -> None:
+        work = partial(self._session.stream.set_model, model)
+        self._session.change(work, "the model was not changed")
 
     def _running(self) -> HandlingBuffer:
         if self._buffer is None:
@@ -291,7 +293,7 @@ class SessionCalibration:
             self._fitting = False
 
     def _use(self, calibrated: CalibratedModel) -> None:
-        self._session.set_model(calibrated.model)
+        self._set_model(calibrated.model)
         self._result, self._refused = calibrated, False
         self.text = " ".join(described(summary) for summary in calibrated.sensors)
 

@@ -16,7 +16,6 @@ import numpy as np
 from holdfast.devices.sources import Arrival
 from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
-from holdfast.model import Model
 
 Work = Callable[[], None]
 MAX_LATENCIES = 8192
@@ -214,48 +213,27 @@ class Session:
     ) -> None:
         self.stop()
 
-    def restart_tare(self) -> None:
-        """Discard the tare, and take a new one from the next samples.
-
-        Raises:
-            StreamError: a finger is in contact, or the session is locked.
-            SourceError: the source has ended or is silent.
-        """
-        self.check_lock()
-        if self.ended:
-            raise SourceError("the source has ended: no tare can be taken")
-        self._request(self._restart_tare, "no tare can be taken")
-
-    def set_threshold(self, threshold: float | None) -> None:
-        """Change the probability from which a contact is stable, for all fingers.
+    def change(self, work: Work, consequence: str) -> None:
+        """Change the tare, the thresholds or the model of the detector, in its thread.
 
         Args:
-            threshold: from 0 to 1; None for the thresholds of the model.
+            work: the change, such as `session.stream.restart_tare`.
+            consequence: what is not done if the source does not answer, for the message.
 
         Raises:
-            StreamError: the session is locked.
+            StreamError: the session is locked, or the detector refuses the change.
             SourceError: the source has ended or is silent.
-            ValueError: the threshold is not from 0 to 1.
+            ValueError, ModelError: the detector refuses the change.
         """
         self.check_lock()
-        consequence = "the threshold was not changed"
         if self.ended:
             raise SourceError(f"the source has ended: {consequence}")
-        self._request(lambda: self.stream.set_threshold(threshold), consequence)
-
-    def set_model(self, model: Model) -> None:
-        """Change the model to one of the same features; states continue.
-
-        Raises:
-            StreamError: the session is locked.
-            SourceError: the source has ended or is silent.
-            ModelError: the model has other features or another debouncing.
-        """
-        self.check_lock()
-        consequence = "the model was not changed"
-        if self.ended:
-            raise SourceError(f"the source has ended: {consequence}")
-        self._request(lambda: self.stream.set_model(model), consequence)
+        request = self._requests.append(work)
+        try:
+            request.result(REQUEST_TIMEOUT)
+        except TimeoutError as cause:
+            request.cancel()
+            raise SourceError(f"the source does not answer: {consequence}") from cause
 
     def check_lock(self) -> None:
         """Check that tare, thresholds and model may be changed.
@@ -302,20 +280,6 @@ class Session:
         self.n_packets = max(self._n_samples.values(), default=0)
         self.n_lost += arrival.n_lost
         self.n_refused += arrival.n_refused
-
-    def _restart_tare(self) -> None:
-        if self.stream.silent:
-            raise SourceError("no samples arrive: no tare can be taken")
-        self.stream.restart_tare()
-
-    def _request(self, work: Callable[[], None], consequence: str) -> None:
-        """Run `work` in the detector's thread, and wait for its end."""
-        request = self._requests.append(work)
-        try:
-            request.result(REQUEST_TIMEOUT)
-        except TimeoutError as cause:
-            request.cancel()
-            raise SourceError(f"the source does not answer: {consequence}") from cause
 
     def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:

@@ -9,14 +9,13 @@ import numpy as np
 from holdfast.contact import ContactState, Fault, HandEstimate
 from holdfast.detector.slips import SlipWatch
 from holdfast.errors import ModelError
-from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch, Problem
 from holdfast.live.handling import SessionCalibration
 from holdfast.live.panels import Panel
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor

@@ -29,6 +29,7 @@ from holdfast.model.parts import (
     check_limit,
 )
 from holdfast.recordings import Recording
+from holdfast.resampling import RATE_TOLERANCE
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE
 
@@ -38,8 +39,6 @@ EXACT_RATE = 0.05
 """Tolerance of a measured rate beside a nominal one, as a share of it."""
 RELATIVE_RATES = (30.0, 1000.0)
 """Rates for which relative features are made [Hz]."""
-RATE_TOLERANCE = 0.2
-"""A source whose rate differs less from the model's, as a share of it, is not resampled."""
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

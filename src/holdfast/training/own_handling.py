@@ -19,10 +19,9 @@ from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import BASELINES, Recording
-from holdfast.resampling import true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.training_samples import resample_if_needed
 
 MIN_HANDLING = 5.0
 """Least held time of own handling [s]."""
@@ -121,9 +120,7 @@ class OwnHandling:
             self.n_left_out += 1
             return
         self.digests[recording.name] = recording.digest
-        recording = true_updates(recording)
-        if self.model.rate is not None:
-            recording = resample_if_needed(recording, self.model.rate)
+        recording = at_rate(recording, self.model.rate)
         raw = msgspec.structs.replace(self.model, debounce=Debounce())
         traces = detect(raw, recording).fingers
         sensors = {name: recording.modules[name].sensor for name in traces}

@@ -14,10 +14,10 @@ from holdfast.features.force import rest_amplitude
 from holdfast.features.stream import extract
 from holdfast.features.tables import StreamPlan
 from holdfast.metrics.slip_truth import slip_truth
-from holdfast.model import ANY_FINGER, RATE_TOLERANCE, HeadName
+from holdfast.model import ANY_FINGER, HeadName
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
-from holdfast.resampling import resample, true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.training.dataset_scan import DatasetScan, OneRecording, Progress, show_nothing
@@ -178,9 +178,7 @@ def _samples_of_part(
         n_seen: usable samples of each finger in all recordings before.
     """
     scan, setting, step = plan.scan, plan.setting, plan.step
-    recording = true_updates(part[0])
-    if not scan.relative:
-        recording = resample_if_needed(recording, scan.rate)
+    recording = at_rate(part[0], None if scan.relative else scan.rate)
     rate, tare = scan.model_rate or recording.rate, setting.used_tare
     sensors = sensors_of(recording, scan)
 
@@ -243,14 +241,6 @@ def _states_to_learn(module: Tactile, relative: bool) -> npt.NDArray[np.int8]:
     """Return (n,) the labels, without those of no contact if the load separates them."""
     states = label_states(module.labels, module.times)
     return np.where(states == NO_CONTACT, UNKNOWN, states).astype(np.int8) if relative else states
-
-
-def resample_if_needed(recording: Recording, rate: float) -> Recording:
-    """Return the true updates of a recording, resampled unless their rate [Hz] is within 20 %."""
-    recording = true_updates(recording)
-    if abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
-        return recording
-    return resample(recording, rate)
 
 
 def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:

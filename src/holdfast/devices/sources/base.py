@@ -79,6 +79,7 @@ class Source(Openable):
             JSON.
         paced: whether samples arrive in the course of time, instead of as fast as they are read.
         speed: ratio of the source's time to real time; 0 is as fast as samples are read.
+        is_device: whether the samples come from a device, whose rate may change.
 
     Example:
         To detect contact states, use `holdfast.StreamDetector`: it also resamples, and handles
@@ -96,6 +97,7 @@ class Source(Openable):
     metadata: Mapping[str, Any] = {}
     paced: bool = True
     speed: float = 1.0
+    is_device: bool = False
 
     @abstractmethod
     def open(self) -> None:
@@ -140,6 +142,7 @@ class DeviceSource(Source):
         silence_timeout: time without a new sample after which a notice reports silence [s].
     """
 
+    is_device = True
     silence_timeout: float = math.inf
 
     def __init__(self) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from http import HTTPStatus
 from importlib import resources
 from pathlib import Path
@@ -261,7 +262,9 @@ class LiveService:
         return web.Response(body=self._newest_document, content_type="application/json")
 
     async def _post_tare(self, _: web.Request) -> web.Response:
-        return await _answer(self._session.restart_tare)
+        session = self._session
+        work = partial(session.change, session.stream.restart_tare, "no tare can be taken")
+        return await _answer(work)
 
     async def _post_threshold(self, request: web.Request) -> web.Response:
         value = (await self._bodies.read(request, _ThresholdRequest)).value
@@ -271,7 +274,9 @@ class LiveService:
         return await self._set_threshold(None, "threshold of the model restored")
 
     async def _set_threshold(self, value: float | None, notice: str) -> web.Response:
-        answer = await _answer(lambda: self._session.set_threshold(value))
+        work = partial(self._session.stream.set_threshold, value)
+        change = partial(self._session.change, work, "the threshold was not changed")
+        answer = await _answer(change)
         if answer.status == HTTPStatus.OK:
             self._status.add_notice(notice)
         return answer
