@@ -12,7 +12,7 @@ from holdfast.errors import HoldfastError, SourceError, StreamError
 from holdfast.live.recorder import output_path
 from holdfast.live.recording_buffer import ModuleBuffer
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamEstimate, StreamUpdate
+from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamUpdate
 from holdfast.live.web.schema import CalibrationDocument, CalibrationState
 from holdfast.model import Model
 from holdfast.model.files import encode
@@ -89,8 +89,14 @@ class HandlingBuffer:
                 if name in arrival.samples:
                     buffer.append(arrival.time, arrival.samples[name])
                     self._n_bytes += arrival.samples[name].nbytes
-        for estimate in update.estimates:
-            self._count(estimate)
+        for estimate, updated in update.estimates:
+            now = estimate.time
+            self._start = now if math.isnan(self._start) else self._start
+            self._end = now
+            for name in updated:
+                step, self._last[name] = now - self._last[name], now
+                if estimate.fingers[name].state in TOUCHING and step <= LONGEST_STEP:
+                    self._held[name] += step
 
     def recording(self) -> Recording:
         """Return the samples as a recording that begins as the stream was then.
@@ -106,16 +112,6 @@ class HandlingBuffer:
                 modules[name] = Tactile(self._stream.fingers[name], times, kept)
         name = time.strftime("handling-%Y%m%d-%H%M%S")
         return Recording(name, modules, metadata=dict(self._metadata or {}))
-
-    def _count(self, estimate: StreamEstimate) -> None:
-        now = estimate.estimate.time
-        self._start = now if math.isnan(self._start) else self._start
-        self._end = now
-        for name in estimate.updated_fingers:
-            step, self._last[name] = now - self._last[name], now
-            holds = estimate.estimate.fingers[name].state in TOUCHING
-            if holds and step <= LONGEST_STEP:
-                self._held[name] += step
 
 
 class SessionCalibration:
@@ -144,7 +140,10 @@ class SessionCalibration:
     def document(self) -> CalibrationDocument:
         """Return the progress and the result as a document."""
         if self._session.ended:
-            self._end_with_source()
+            with self._lock:
+                if self._buffer is not None:
+                    self._end()
+                    self._refuse("the source has ended during the calibration")
         buffer, result = self._buffer, self._result
         state: CalibrationState = "idle" if buffer is None else "recording"
         if self._fitting:
@@ -186,7 +185,9 @@ class SessionCalibration:
         Raises:
             StreamError: no calibration is running, or too little was held so far.
         """
-        buffer = self._running()
+        buffer = self._buffer
+        if buffer is None:
+            raise StreamError("no calibration is running: start one, and hold an object")
         least = MIN_HANDLING + SAFETY_SECONDS
         if buffer.seconds < least:
             raise StreamError(
@@ -248,11 +249,6 @@ class SessionCalibration:
         work = partial(self._session.stream.set_model, model)
         self._session.change(work, "the model was not changed")
 
-    def _running(self) -> HandlingBuffer:
-        if self._buffer is None:
-            raise StreamError("no calibration is running: start one, and hold an object")
-        return self._buffer
-
     def _put(self, update: StreamUpdate) -> None:
         buffer = self._buffer
         if buffer is None:
@@ -264,12 +260,6 @@ class SessionCalibration:
     def _end(self) -> None:
         self._session.remove_listener(self._put)
         self._buffer = None
-
-    def _end_with_source(self) -> None:
-        with self._lock:
-            if self._buffer is not None:
-                self._end()
-                self._refuse("the source has ended during the calibration")
 
     def _refuse(self, reason: str) -> None:
         self.text, self._refused = f"not calibrated: {reason}; nothing has changed", True
@@ -284,35 +274,22 @@ class SessionCalibration:
 
     def _fit(self, buffer: HandlingBuffer) -> None:
         try:
-            self._use(_fitted(self._original, buffer))
+            if buffer.seconds < MIN_HANDLING:
+                raise StreamError(
+                    f"{buffer.seconds:.1f} s held in {MAX_WAITING:.0f} s, at least "
+                    f"{MIN_HANDLING:g} s expected"
+                )
+            calibrated = calibrate_with_report(self._original, [buffer.recording()])
+            calibrated.check()
+            self._set_model(calibrated.model)
+            self._result, self._refused = calibrated, False
+            self.text = " ".join(described(summary) for summary in calibrated.sensors)
         except HoldfastError as refusal:
             self._refuse(str(refusal))
         except Exception as failure:  # the user gets it, and the session goes on
             self._refuse(f"{type(failure).__name__}: {failure}")
         finally:
             self._fitting = False
-
-    def _use(self, calibrated: CalibratedModel) -> None:
-        self._set_model(calibrated.model)
-        self._result, self._refused = calibrated, False
-        self.text = " ".join(described(summary) for summary in calibrated.sensors)
-
-
-def _fitted(model: Model, buffer: HandlingBuffer) -> CalibratedModel:
-    """Return the model with the own handling of a buffer.
-
-    Raises:
-        HoldfastError: nothing is held for long enough, the handling is refused, or the model got
-            worse.
-    """
-    if buffer.seconds < MIN_HANDLING:
-        raise StreamError(
-            f"{buffer.seconds:.1f} s held in {MAX_WAITING:.0f} s, at least {MIN_HANDLING:g} s "
-            "expected"
-        )
-    calibrated = calibrate_with_report(model, [buffer.recording()])
-    calibrated.check()
-    return calibrated
 
 
 def described(summary: HandlingSummary) -> str:

@@ -239,48 +239,30 @@ class Recorder(Closable):
         left = len(self._queue)
         while left:
             n = min(left, _CHUNK_SIZE)
-            self._write_chunk([self._queue.popleft() for _ in range(n)])
             left -= n
-        self._report_dropped()
+            for _ in range(n):
+                item = self._queue.popleft()
+                if isinstance(item, _QueuedMarker):
+                    self._buffer.add_marker(*item)
+                else:
+                    self._buffer.add(item)
+            for name, module in self._buffer.modules.items():
+                times, readings = module.pop_samples()
+                if len(times):
+                    self._writer.append(name, times, readings)
+                    time.sleep(_YIELD_TIME)
+            self._write_markers()
+        n_new = self._n_dropped - self._n_dropped_reported
+        if n_new:
+            self._n_dropped_reported += n_new
+            text = f"note: {n_new} samples dropped: the disk is too slow"
+            self._buffer.add_marker(self._newest_time, text)
         self._write_markers()
         self._writer.flush()
         if self._fsync and time.monotonic() - self._synced_at >= SYNC_INTERVAL:
             self._synced_at = time.monotonic()
             self._writer.sync()
         self._check_file()
-        self._measure_rate()
-
-    def _write_chunk(self, chunk: list[Arrival | _QueuedMarker]) -> None:
-        for one in chunk:
-            if isinstance(one, _QueuedMarker):
-                self._buffer.add_marker(*one)
-            else:
-                self._buffer.add(one)
-        for name, module in self._buffer.modules.items():
-            times, readings = module.pop_samples()
-            if len(times):
-                self._writer.append(name, times, readings)
-                time.sleep(_YIELD_TIME)
-        self._write_markers()
-
-    def _write_markers(self) -> None:
-        for when, text in self._buffer.pop_markers():
-            self._writer.mark(when, text, at_once=False)
-            self._n_markers += 1
-
-    def _report_dropped(self) -> None:
-        """Add a marker where samples were dropped because the disk was too slow."""
-        n = self._n_dropped - self._n_dropped_reported
-        if n:
-            self._n_dropped_reported += n
-            text = f"note: {n} samples dropped: the disk is too slow"
-            self._buffer.add_marker(self._newest_time, text)
-
-    def _check_file(self) -> None:
-        if _file_id(self.path) != self._file_id:
-            raise OutputError(f"cannot write {self.path}: it was removed while it was recorded")
-
-    def _measure_rate(self) -> None:
         self._n_bytes = self._writer.n_bytes
         counts = self._counts
         counts.append((time.monotonic(), self._buffer.n_samples))
@@ -288,6 +270,15 @@ class Recorder(Closable):
             counts.popleft()
         (begin, before), (end, after) = counts[0], counts[-1]
         self._rate = (after - before) / (end - begin) if end > begin else 0.0
+
+    def _write_markers(self) -> None:
+        for when, text in self._buffer.pop_markers():
+            self._writer.mark(when, text, at_once=False)
+            self._n_markers += 1
+
+    def _check_file(self) -> None:
+        if _file_id(self.path) != self._file_id:
+            raise OutputError(f"cannot write {self.path}: it was removed while it was recorded")
 
 
 def output_path(folder: Path | None, stem: str, suffix: str) -> Path:
@@ -340,7 +331,11 @@ class SessionRecorder:
                 valid file name, or the file cannot be written.
         """
         with self._lock:
-            recorder = self._new_recorder(name or time.strftime("%Y%m%d-%H%M%S"))
+            if self.current is not None:
+                raise OutputError(f"{self.current.path} is being recorded already")
+            source = self._session.source
+            path = output_path(self._folder, name or time.strftime("%Y%m%d-%H%M%S"), ".mcap")
+            recorder = Recorder(path, source.sensors, metadata=dict(source.metadata))
             self.current = recorder
             self._session.add_listener(self._put)
             return recorder.path
@@ -379,13 +374,6 @@ class SessionRecorder:
         recorder = self.current
         if recorder is not None and update.arrival is not None:
             recorder.put(update.arrival)
-
-    def _new_recorder(self, name: str) -> Recorder:
-        if self.current is not None:
-            raise OutputError(f"{self.current.path} is being recorded already")
-        source = self._session.source
-        path = output_path(self._folder, name, ".mcap")
-        return Recorder(path, source.sensors, metadata=dict(source.metadata))
 
 
 def _file_id(path: Path) -> tuple[int, int] | None:

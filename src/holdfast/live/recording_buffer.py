@@ -76,16 +76,14 @@ class ModuleBuffer:
         self._times.clear()
         self._readings.clear()
         if len(times):
-            self._count_gaps(np.diff(times, prepend=self._last_popped_time))
+            steps = np.diff(times, prepend=self._last_popped_time)
+            steps = steps[~np.isnan(steps)]  # there is no step before the first sample
+            self._steps = np.concatenate([self._steps, steps])[-_N_STEPS:]
+            known = len(self._steps) >= _MIN_STEPS
+            period = float(np.median(self._steps)) if known else 1 / self._sensor.rate
+            self.n_gaps += int((steps > GAP_PERIODS * period).sum())
             self._last_popped_time = self._last_time
         return times, readings
-
-    def _count_gaps(self, steps: Array) -> None:
-        steps = steps[~np.isnan(steps)]  # there is no step before the first sample
-        self._steps = np.concatenate([self._steps, steps])[-_N_STEPS:]
-        known = len(self._steps) >= _MIN_STEPS
-        period = float(np.median(self._steps)) if known else 1 / self._sensor.rate
-        self.n_gaps += int((steps > GAP_PERIODS * period).sum())
 
 
 class RecordingBuffer:

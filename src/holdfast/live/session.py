@@ -13,7 +13,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.devices.sources import Arrival
 from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
@@ -263,23 +262,21 @@ class Session:
     def _step(self) -> None:
         self._requests.carry_out()
         update = self.stream.read()
-        if update.arrival is not None:
-            self._count(update.arrival, has_estimates=bool(update.estimates))
-        if update.arrival is not None or update.estimates:
+        arrival = update.arrival
+        if arrival is not None:
+            if arrival.samples and update.estimates:
+                latency = time.monotonic() - arrival.received
+                self._latencies[self._n_latencies % MAX_LATENCIES] = latency
+                self._n_latencies += 1
+            if arrival.samples:
+                self.delay = arrival.delay
+            for module in arrival.samples:
+                self._n_samples[module] += 1
+            self.n_packets = max(self._n_samples.values(), default=0)
+            self.n_lost += arrival.n_lost
+            self.n_refused += arrival.n_refused
+        if arrival is not None or update.estimates:
             self._notify(update)
-
-    def _count(self, arrival: Arrival, *, has_estimates: bool) -> None:
-        if arrival.samples and has_estimates:
-            latency = time.monotonic() - arrival.received
-            self._latencies[self._n_latencies % MAX_LATENCIES] = latency
-            self._n_latencies += 1
-        if arrival.samples:
-            self.delay = arrival.delay
-        for module in arrival.samples:
-            self._n_samples[module] += 1
-        self.n_packets = max(self._n_samples.values(), default=0)
-        self.n_lost += arrival.n_lost
-        self.n_refused += arrival.n_refused
 
     def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:

@@ -76,10 +76,15 @@ class StatusPublisher:
 
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
-        self._watch_calibration()
+        text = "" if self._calibration is None else self._calibration.text
+        if text and text != self._told:
+            self.add_notice(text)
+        self._told = text
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
         estimates = [estimate for _, update in updates for estimate in update.estimates]
-        self._watch_faults(estimates)
+        for estimate, _ in estimates:
+            for problem in self._faults.update(estimate):
+                self.add_notice(problem.text)
         own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
         if estimates:
             self._newest = estimates[-1].estimate
@@ -93,9 +98,20 @@ class StatusPublisher:
                 name: finger_document(finger, self._taxels.get(name))
                 for name, finger in fingers.items()
             },
-            series=_hand_series(estimates, list(self._session.stream.fingers)),
+            series=schema.HandSeries(
+                times=[estimate.time for estimate, _ in estimates],
+                fingers={n: _finger_series(estimates, n) for n in self._session.stream.fingers},
+            ),
             events=[schema.EventDocument(*event) for _, one in updates for event in one.events],
-            notices=own + _source_notices(updates),
+            notices=[
+                *own,
+                *(
+                    schema.Notice(when, text)
+                    for when, update in updates
+                    if update.arrival is not None
+                    for text in update.arrival.notices
+                ),
+            ],
             health=self._health(recorder),
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
@@ -115,18 +131,6 @@ class StatusPublisher:
             **{panel.name: panel.document() for panel in self._panels},
         )
 
-    def _watch_calibration(self) -> None:
-        """Add a notice when a calibration has a result."""
-        text = "" if self._calibration is None else self._calibration.text
-        if text and text != self._told:
-            self.add_notice(text)
-        self._told = text
-
-    def _watch_faults(self, estimates: list[StreamEstimate]) -> None:
-        for estimate, _ in estimates:
-            for problem in self._faults.update(estimate):
-                self.add_notice(problem.text)
-
     def _problem_text(self, problem: Problem) -> str:
         if problem.fault is not Fault.LATE:
             return problem.text
@@ -144,8 +148,13 @@ class StatusPublisher:
 
     def _health(self, recorder: Recorder | None) -> schema.Health:
         session, latency = self._session, self._session.latency()
+        counts = self._counts
+        counts.append((time.monotonic(), session.n_packets))
+        while len(counts) > 2 and counts[-1][0] - counts[1][0] >= RATE_PERIOD:
+            counts.popleft()
+        (begin, before), (end, after) = counts[0], counts[-1]
         return schema.Health(
-            rate=self._packet_rate(),
+            rate=(after - before) / (end - begin) if end > begin else np.nan,
             n_packets=session.n_packets,
             n_lost=session.n_lost,
             n_refused=session.n_refused,
@@ -154,14 +163,6 @@ class StatusPublisher:
             latency=schema.LatencyInfo(latency.p50, latency.p99, latency.largest),
             delay=session.delay,
         )
-
-    def _packet_rate(self) -> float:
-        """Return the number of packets per second, over the last second."""
-        self._counts.append((time.monotonic(), self._session.n_packets))
-        while len(self._counts) > 2 and self._counts[-1][0] - self._counts[1][0] >= RATE_PERIOD:
-            self._counts.popleft()
-        (begin, before), (end, after) = self._counts[0], self._counts[-1]
-        return (after - before) / (end - begin) if end > begin else np.nan
 
 
 def hello_document(session: Session, started: float, can_record: bool) -> schema.HelloDocument:
@@ -227,15 +228,6 @@ def recording_info(recorder: Recorder) -> schema.RecordingInfo:
     )
 
 
-def _source_notices(updates: list[tuple[float, StreamUpdate]]) -> list[schema.Notice]:
-    return [
-        schema.Notice(when, text)
-        for when, update in updates
-        if update.arrival is not None
-        for text in update.arrival.notices
-    ]
-
-
 def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
     part = model.finger(name, sensor)
     return schema.FingerInfo(
@@ -248,13 +240,6 @@ def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
         contact_threshold=part.contact_threshold,
         probability_threshold=part.stable.threshold,
         slip_threshold=None if part.slip is None else part.slip.threshold,
-    )
-
-
-def _hand_series(estimates: list[StreamEstimate], fingers: list[str]) -> schema.HandSeries:
-    return schema.HandSeries(
-        times=[estimate.time for estimate, _ in estimates],
-        fingers={name: _finger_series(estimates, name) for name in fingers},
     )
 
 

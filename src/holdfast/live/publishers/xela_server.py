@@ -113,7 +113,9 @@ class XelaServer:
         self._joined = Event()
         self._time_offset = self._sent_time = -math.inf
         self._has_offset = False
-        self._server_thread = Thread(target=self._serve, name="holdfast-play", daemon=True)
+        self._server_thread = Thread(
+            target=lambda: asyncio.run(self._run()), name="holdfast-play", daemon=True
+        )
         self._source_thread = Thread(
             target=self._read_source, name="holdfast-play-source", daemon=True
         )
@@ -167,7 +169,11 @@ class XelaServer:
         """Read the source, and pass its packets to the event loop that sends them."""
         try:
             if self._restarts:
-                self._encode_one()
+                # Encode the first samples now: readings of another kind fail before a client comes.
+                arrival = self._source.read(STOP_CHECK_INTERVAL)
+                if arrival is not None and arrival.samples:
+                    for batch in self._batcher.add(arrival.samples, arrival.time):
+                        self._packet(batch)
             while not self._stopping.is_set() and not self._source.ended:
                 arrival = self._source.read(STOP_CHECK_INTERVAL) if self._may_read() else None
                 if arrival is not None and arrival.samples:
@@ -177,15 +183,8 @@ class XelaServer:
             self.failure = failure
         finally:
             if not self._stopping.is_set() and self.failure is None:
-                self._wait_for_clients()
+                asyncio.run_coroutine_threadsafe(self._drain(), self._loop).result()
             self._ended.set()
-
-    def _encode_one(self) -> None:
-        """Encode the first samples, so that readings of another kind fail before a client comes."""
-        arrival = self._source.read(STOP_CHECK_INTERVAL)
-        if arrival is not None and arrival.samples:
-            for batch in self._batcher.add(arrival.samples, arrival.time):
-                self._packet(batch)
 
     def _may_read(self) -> bool:
         """Return whether to read the source now, after a wait for clients if necessary."""
@@ -193,19 +192,16 @@ class XelaServer:
             return self._client_seen.wait(STOP_CHECK_INTERVAL)
         if self._joined.is_set():
             self._joined.clear()
-            self._restart_source()
+            # Clients that joined receive nothing from before.
+            self._queue_packets(self._batcher.flush())
+            self._batcher = self._new_batcher()
+            self._has_offset = self._has_offset and bool(self._clients)
+            self._source.restart()
+            self._loop.call_soon_threadsafe(self._admit)
         elif not self.n_clients:
             self._joined.wait(STOP_CHECK_INTERVAL)
             return False
         return True
-
-    def _restart_source(self) -> None:
-        """Begin the next recording. Clients that joined receive nothing from before."""
-        self._queue_packets(self._batcher.flush())
-        self._batcher = self._new_batcher()
-        self._has_offset = self._has_offset and bool(self._clients)
-        self._source.restart()
-        self._loop.call_soon_threadsafe(self._admit)
 
     def _new_batcher(self) -> SampleBatcher:
         return SampleBatcher(self._source.sensors, own_stamps=self.encoder.has_own_stamps)
@@ -231,9 +227,6 @@ class XelaServer:
         packet = self.encoder.packet(batch.samples, batch.time + self._time_offset, now, times)
         return packet.decode()
 
-    def _wait_for_clients(self) -> None:
-        asyncio.run_coroutine_threadsafe(self._drain(), self._loop).result()
-
     async def _drain(self) -> None:
         """Wait until the last packet has been sent to all clients."""
         deadline = time.monotonic() + DRAIN_TIMEOUT
@@ -241,9 +234,6 @@ class XelaServer:
             if self._stopping.is_set() or time.monotonic() > deadline:
                 return
             await asyncio.sleep(0.01)
-
-    def _serve(self) -> None:
-        asyncio.run(self._run())
 
     async def _run(self) -> None:
         self._loop = asyncio.get_running_loop()

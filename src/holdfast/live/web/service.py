@@ -142,8 +142,8 @@ class LiveService:
             web.get("/", self._get_page),
             web.static("/page", PAGE_FOLDER),
             web.static("/web", SHARED_FOLDER),
-            web.get("/api/v1/live", self._serve_live),
-            web.get("/api/v1/estimates", self._serve_estimates),
+            web.get("/api/v1/live", partial(self._serve_socket, kind="live")),
+            web.get("/api/v1/estimates", partial(self._serve_socket, kind="estimates")),
             web.get("/api/v1/info", self._get_info),
             web.get("/api/v1/state", self._get_state),
             web.get("/api/v1/schema", self._get_schema),
@@ -189,19 +189,16 @@ class LiveService:
         """Send the live documents; each is encoded once for all clients."""
         while True:
             await asyncio.sleep(1 / LIVE_DOCUMENT_RATE)
-            await self._stop_failed_recording()
+            recorder = self._recorder.current
+            if recorder is not None and recorder.failed:
+                try:
+                    await asyncio.to_thread(self._recorder.stop)
+                except HoldfastError as failure:
+                    self._status.add_notice(f"the recording has ended: {failure}")
             document = self._status.live_document(self._recorder.current)
             self._newest_document = _encode(document)
             for client in self._clients["live"]:
                 client.put(self._newest_document.decode())
-
-    async def _stop_failed_recording(self) -> None:
-        recorder = self._recorder.current
-        if recorder is not None and recorder.failed:
-            try:
-                await asyncio.to_thread(self._recorder.stop)
-            except HoldfastError as failure:
-                self._status.add_notice(f"the recording has ended: {failure}")
 
     def _send_estimates(self, update: StreamUpdate) -> None:
         for estimate, updated in update.estimates:
@@ -212,12 +209,6 @@ class LiveService:
             text = _encode(document).decode()
             for client in self._clients["estimates"]:
                 client.put(text)
-
-    async def _serve_live(self, request: web.Request) -> web.WebSocketResponse:
-        return await self._serve_socket(request, "live")
-
-    async def _serve_estimates(self, request: web.Request) -> web.WebSocketResponse:
-        return await self._serve_socket(request, "estimates")
 
     async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
         if sum(map(len, self._clients.values())) >= MAX_WEBSOCKETS:
