@@ -118,6 +118,7 @@ class FaultWatch:
 
     def __init__(self) -> None:
         self.current: list[Problem] = []
+        # When each fault began, of those that last now; and when each was last seen to last.
         self._since: dict[tuple[Fault, str], float] = {}
         self._reported: dict[tuple[Fault, str], float] = {}
 

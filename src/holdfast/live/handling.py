@@ -49,7 +49,8 @@ class HandlingBuffer:
     def __init__(self, stream: StreamDetector) -> None:
         self._stream = stream
         self._modules = {name: ModuleBuffer(one) for name, one in stream.fingers.items()}
-        self._metadata: Mapping[str, Any] | None = None
+        self._metadata: Mapping[str, Any] | None = None  # of the start: the zero of the stream
+        # Held time of each finger, and the time of its last estimate; `put` changes both.
         self._held = dict.fromkeys(stream.fingers, 0.0)
         self._last = dict.fromkeys(stream.fingers, math.nan)
         self._start = self._end = math.nan
@@ -130,7 +131,9 @@ class SessionCalibration:
 
     def __init__(self, session: Session, folder: Path | None) -> None:
         self._session, self._folder = session, folder
-        self._original = session.stream.model
+        self._original = session.stream.model  # each calibration begins with it, none with another
+        # Requests of several clients, and the end of the handling in the session's thread, change
+        # `_buffer` and `_fitting`: exactly one of them may end it.
         self._lock = Lock()
         self._buffer: HandlingBuffer | None = None
         self._fitting = False
@@ -207,6 +210,7 @@ class SessionCalibration:
         with self._lock:
             if self._fitting:
                 raise StreamError("the model is being fitted: undo it when that is done")
+            # One button for both: what runs is ended first, the result before stays.
             if self._buffer is not None:
                 self._end()
                 return
@@ -266,7 +270,7 @@ class SessionCalibration:
 
     def _fit_soon(self, buffer: HandlingBuffer) -> None:
         with self._lock:
-            if self._buffer is not buffer:
+            if self._buffer is not buffer:  # cancelled, or ended by another thread
                 return
             self._end()
             self._fitting = True
@@ -282,6 +286,7 @@ class SessionCalibration:
             calibrated = calibrate_with_report(self._original, [buffer.recording()])
             calibrated.check()
             self._set_model(calibrated.model)
+            # Only now: if the session refuses the model, nothing has changed.
             self._result, self._refused = calibrated, False
             self.text = " ".join(described(summary) for summary in calibrated.sensors)
         except HoldfastError as refusal:

@@ -84,10 +84,13 @@ class _FingerReadings:
     """Memory of the readings of one finger."""
 
     def __init__(self, sensor: Sensor, finds_pull: bool) -> None:
+        # The normal force is one sum over readings: the normal, turned into each taxel's frame.
         self._weights = np.einsum("j,ijk->ik", sensor.normal, sensor.rotations)
         self._finds_pull = finds_pull
         self._first: npt.NDArray[Any] | None = None
         self._start = self._last = -math.inf
+        # All below is relative to the first readings, and `update` alone changes it: which axes
+        # have ever changed, in how many samples, and the normal force with its noise at rest.
         self._moved = np.zeros(3, dtype=bool)
         self._n_moved = 0
         self._rest: list[float] = []
@@ -101,7 +104,7 @@ class _FingerReadings:
         if time - self._last < SAMPLE_CHECK_INTERVAL or not np.isfinite(readings).all():
             return []
         self._last = time
-        if self._first is None or time < self._start:
+        if self._first is None or time < self._start:  # the next recording of a player
             self._first, self._start = np.array(readings, dtype=np.float64), time
             return []
         change = readings - self._first
@@ -120,6 +123,8 @@ class _FingerReadings:
         if time - self._start <= START_NOISE_SECONDS:
             self._rest.append(normal)
             self._noise = float(np.std(self._rest))
+        # Noise alone passes no limit of 20 deviations; a share of the largest change leaves out
+        # the creep of an elastomer after a strong press.
         limit = max(PULL_OF_NOISE * self._noise, PULL_OF_LARGEST * self._largest)
         if not self._finds_pull or normal >= -limit:
             self._pulled_since = math.inf

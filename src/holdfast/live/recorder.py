@@ -134,11 +134,13 @@ class Recorder(Closable):
         )
         self._fsync = fsync
         self._synced_at = time.monotonic()
-        self._file_id = _file_id(self.path)
+        self._file_id = _file_id(self.path)  # a file of the same name is another file
         self._buffer = RecordingBuffer(sensors)
+        # `put` and `add_marker` append, the thread of the recorder takes out.
         self._queue: deque[Arrival | _QueuedMarker] = deque()
         self._newest_time = math.nan
         self._n_dropped = self._n_dropped_reported = self._n_markers = 0
+        # What `status` returns is set by the thread of the recorder, after each write.
         self._n_bytes = self._writer.n_bytes
         self._rate = 0.0
         self._counts = deque([(time.monotonic(), 0)])
@@ -186,7 +188,7 @@ class Recorder(Closable):
             self._wake.set()
             time.sleep(_YIELD_TIME)
         if len(self._queue) >= MAX_QUEUED_ARRIVALS or self._closing or self._failure:
-            self._n_dropped += bool(arrival.samples)
+            self._n_dropped += bool(arrival.samples)  # a notice alone is no loss of data
             return
         if arrival.samples:
             self._newest_time = arrival.time
@@ -199,6 +201,7 @@ class Recorder(Closable):
             text: what happened.
             time: of the marker [s]; by default that of the newest sample.
         """
+        # Markers are few and of people: they have room beyond a queue that is full of samples.
         if len(self._queue) < MAX_QUEUED_ARRIVALS + _MAX_QUEUED_MARKERS:
             self._queue.append(_QueuedMarker(self._newest_time if time is None else time, text))
 
@@ -210,6 +213,7 @@ class Recorder(Closable):
         """
         if self._closing:
             return
+        # From now on `put` drops; the thread writes what is in the queue, and ends.
         self._closing = True
         self._wake.set()
         self._thread.join()
@@ -236,6 +240,7 @@ class Recorder(Closable):
 
     def _write_queue(self) -> None:
         """Write what is in the queue now, but not what is put into it meanwhile."""
+        # In chunks with pauses, or a long queue would keep the interpreter from the detector.
         left = len(self._queue)
         while left:
             n = min(left, _CHUNK_SIZE)
@@ -252,6 +257,7 @@ class Recorder(Closable):
                     self._writer.append(name, times, readings)
                     time.sleep(_YIELD_TIME)
             self._write_markers()
+        # `put` drops in another thread: what it has dropped since is reported here.
         n_new = self._n_dropped - self._n_dropped_reported
         if n_new:
             self._n_dropped_reported += n_new
@@ -357,6 +363,7 @@ class SessionRecorder:
         """
         with self._lock:
             recorder = self._running("there is nothing to stop")
+            # In this order: nothing is put into a recorder that is closing.
             self.current = None
             self._session.remove_listener(self._put)
             recorder.close()

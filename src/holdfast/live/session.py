@@ -52,6 +52,7 @@ class RequestQueue:
             cancellable: whether the caller may cancel it while it waits, as after a time-out.
         """
         future: Future[None] = Future()
+        # A future that runs cannot be cancelled any more.
         if not cancellable:
             future.set_running_or_notify_cancel()
         self._requests.append((work, future))
@@ -63,6 +64,7 @@ class RequestQueue:
         A request that fails has its exception as its result. If `follow_up` fails, the other
         requests have that exception, and it is raised.
         """
+        # Those that wait now: one that a request appends comes in the next round.
         waiting = [self._requests.popleft() for _ in range(len(self._requests))]
         done = [future for work, future in waiting if _run(work, future)]
         try:
@@ -106,6 +108,7 @@ class InterpreterSettings:
         with self._lock:
             if not self._n_users:
                 self._before = sys.getswitchinterval()
+                # What the program froze itself would be thawed by `end`: then nothing is frozen.
                 self._freezes = gc.get_freeze_count() <= MAX_FROZEN_BY_PYTHON
                 sys.setswitchinterval(SWITCH_INTERVAL)
             self._n_users += 1
@@ -118,6 +121,7 @@ class InterpreterSettings:
             self._n_users -= 1
             if self._n_users:
                 return
+            # Python stores whole microseconds, so the value is only close to what was set.
             if isclose(sys.getswitchinterval(), SWITCH_INTERVAL):
                 sys.setswitchinterval(self._before)
             if self._freezes:
@@ -168,12 +172,15 @@ class Session:
         self.ended = False
         self.failure: Exception | None = None
         self.lock = ""
+        # By module, counted by the session's thread; `n_packets` is the largest.
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
+        # A new list for each change: the session's thread may be going through the old one.
         self._listeners: list[Listener] = []
         self._requests = RequestQueue()
-        self._started = False
+        self._started = False  # whether `stop` has settings of Python to set back
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
+        # A ring that the session's thread writes: a copy of it may mix two laps, which are alike.
         self._latencies = np.full(MAX_LATENCIES, np.nan)
         self._n_latencies = 0
 
@@ -231,7 +238,7 @@ class Session:
         try:
             request.result(REQUEST_TIMEOUT)
         except TimeoutError as cause:
-            request.cancel()
+            request.cancel()  # or it would be carried out long after its caller was refused
             raise SourceError(f"the source does not answer: {consequence}") from cause
 
     def check_lock(self) -> None:
@@ -260,6 +267,7 @@ class Session:
         self.ended = True
 
     def _step(self) -> None:
+        # Before the read, so that a change does not wait for the next sample.
         self._requests.carry_out()
         update = self.stream.read()
         arrival = update.arrival

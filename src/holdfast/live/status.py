@@ -55,12 +55,14 @@ class StatusPublisher:
         self._session = session
         self._panels, self._document_type = panels, document_type
         self._calibration = calibration
-        self._told = ""
+        self._told = ""  # the newest text of the calibration that became a notice
         self._report = report
         self._faults = FaultWatch()
         self._slips = SlipWatch()
         self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
+        # The next three are kept from document to document, by the service's thread alone: the
+        # newest estimate and readings for documents without any, and the counts of the rate.
         self._newest: HandEstimate | None = None
         self._taxels: dict[str, list[Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
@@ -80,6 +82,7 @@ class StatusPublisher:
         if text and text != self._told:
             self.add_notice(text)
         self._told = text
+        # The session's thread goes on appending: only what is there now belongs to this document.
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
         estimates = [estimate for _, update in updates for estimate in update.estimates]
         for estimate, _ in estimates:
@@ -139,6 +142,7 @@ class StatusPublisher:
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
         """Keep the newest readings of every finger, minus the tare."""
         stream = self._session.stream
+        # One update may have the samples of one finger only: the last ones have those of all.
         newest: dict[str, Array] = {}
         for update in updates[-len(stream.fingers) :]:
             if update.arrival is not None:
@@ -148,6 +152,7 @@ class StatusPublisher:
 
     def _health(self, recorder: Recorder | None) -> schema.Health:
         session, latency = self._session, self._session.latency()
+        # Two counts stay at least: the newest, and the last one that is a period old.
         counts = self._counts
         counts.append((time.monotonic(), session.n_packets))
         while len(counts) > 2 and counts[-1][0] - counts[1][0] >= RATE_PERIOD:

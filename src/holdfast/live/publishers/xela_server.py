@@ -101,8 +101,12 @@ class XelaServer:
         self.n_packets = 0
         self.failure: Exception | None = None
         self._start_failure: Exception | None = None
+        # Clients that get packets; and those that wait for the beginning of the next recording.
+        # The event loop alone changes both.
         self._clients: set[ServerConnection] = set()
         self._joining: set[ServerConnection] = set()
+        # Set by the event loop (listening, a client was seen, one joined), by the thread of the
+        # source (ended) and by `__exit__` (stopping); the others wait for them.
         self._listening = Event()
         self._stopping = Event()
         self._ended = Event()
@@ -111,6 +115,8 @@ class XelaServer:
             self._client_seen.set()
         self._restarts = restart
         self._joined = Event()
+        # From times of the source to stamps since 1970, and the time of the last packet. The
+        # thread of the source alone changes them.
         self._time_offset = self._sent_time = -math.inf
         self._has_offset = False
         self._server_thread = Thread(
@@ -230,6 +236,7 @@ class XelaServer:
     async def _drain(self) -> None:
         """Wait until the last packet has been sent to all clients."""
         deadline = time.monotonic() + DRAIN_TIMEOUT
+        # There is no event for an empty buffer of a transport.
         while any(_unsent_bytes(client) for client in self._clients):
             if self._stopping.is_set() or time.monotonic() > deadline:
                 return
@@ -274,6 +281,7 @@ class XelaServer:
     def _refusal(self, client: ServerConnection, request: Request) -> Response | None:
         """Return the response to a client that is refused; None if it is accepted."""
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        # A second header could show another host to us than to a proxy before us.
         if len(hosts) != 1 or len(origins) > 1:
             return client.respond(HTTPStatus.BAD_REQUEST, "one host and one origin expected\n")
         origin = origins[0] if origins else None
@@ -317,6 +325,7 @@ def _unsent_bytes(client: ServerConnection) -> int:
 
 def _too_slow(backlogs: dict[ServerConnection, int]) -> list[ServerConnection]:
     """Return the clients to disconnect, given the unsent data of each client [bytes]."""
+    # The slowest first: disconnecting few frees most.
     total, slow = sum(backlogs.values()), []
     for client in sorted(backlogs, key=backlogs.__getitem__, reverse=True):
         if backlogs[client] <= MAX_BACKLOG and total <= MAX_TOTAL_BACKLOG:

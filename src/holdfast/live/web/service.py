@@ -78,12 +78,14 @@ class WebSocketClient:
 
     def put(self, text: str) -> None:
         """Append a document to the queue; drop the oldest if the queue is full."""
+        # The oldest goes: for a page and for control, the newest state counts.
         if self._queue.full():
             self._queue.get_nowait()
         self._queue.put_nowait(text)
 
     async def run(self) -> None:
         """Send documents until the client disconnects."""
+        # Reading is needed too: it answers pings, and ends when the client disconnects.
         sending = asyncio.ensure_future(self._send())
         try:
             async for message in self._socket:
@@ -131,7 +133,7 @@ class LiveService:
             panel.add_listener(self._mark)
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
-        self._newest_document = b"{}"
+        self._newest_document = b"{}"  # for GET, made for the WebSockets anyway
         self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
         self.app.add_routes(self._routes())
@@ -211,6 +213,7 @@ class LiveService:
                 client.put(text)
 
     async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
+        # The total first: with it full, the address does not matter.
         if sum(map(len, self._clients.values())) >= MAX_WEBSOCKETS:
             text = f"{MAX_WEBSOCKETS} WebSockets are open; close one of them"
             raise json_error(web.HTTPServiceUnavailable, text)
@@ -224,6 +227,7 @@ class LiveService:
             heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
         )
         await socket.prepare(request)
+        # The constants go first, and only then is the client one of those that get documents.
         client = WebSocketClient(socket, MAX_QUEUED_DOCUMENTS[kind], request.remote)
         client.put(_encode(self._hello()).decode())
         clients = self._clients[kind]
