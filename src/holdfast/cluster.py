@@ -134,7 +134,12 @@ def _submit(
             future.add_done_callback(done.put)
         if not waiting:
             return
-        call, future = waiting.pop(_next_done(done, client).key)
+        while True:  # wait for the next that is done, while there is a worker
+            with suppress(Empty):
+                call, future = waiting.pop(done.get(timeout=NO_WORKER_TIMEOUT).key)
+                break
+            if not _n_threads(client):
+                raise _without_workers(client)
         try:
             result = _watched(client, partial(_result, future))
         except KilledWorker:
@@ -231,15 +236,6 @@ def _check_workers(client: "Client") -> None:
             raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from digest
         if not isinstance(digest, OSError) and digest != expected:  # OSError: it died meanwhile
             raise EngineError(_OTHER_VERSION.format(f"the worker at {address}"))
-
-
-def _next_done(done: "SimpleQueue[Future]", client: "Client") -> "Future":
-    """Wait for the next future that is done."""
-    while True:
-        with suppress(Empty):
-            return done.get(timeout=NO_WORKER_TIMEOUT)
-        if not _n_threads(client):
-            raise _without_workers(client)
 
 
 def _without_workers(client: "Client") -> EngineError:

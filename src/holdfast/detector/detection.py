@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -170,11 +170,16 @@ def detection_of(
         chunks: at least one, in order of time.
     """
     times, hand = list[Array](), list[npt.NDArray[np.int8]]()
-    found = {
-        finger: _empty_trace(recording.modules[finger].times, n_slips)
-        for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True)
-        if finger in recording.modules and recording.modules[finger].n_samples
-    }
+    found = {}
+    for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True):
+        if finger in recording.modules and recording.modules[finger].n_samples:
+            n = recording.modules[finger].n_samples
+            n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
+            columns: list[npt.NDArray[Any]] = [
+                np.empty((n, 3) if field == "force" else n, number)
+                for field, number in TRACE_COLUMNS[:n_columns]
+            ]
+            found[finger] = FingerTrace(recording.modules[finger].times, *columns)
     ends = dict.fromkeys(found, 0)
     for chunk in chunks:
         times.append(chunk.times)
@@ -189,13 +194,3 @@ def detection_of(
                 if column is not None:
                     column[part] = rows[field]
     return Detection(recording.name, found, np.concatenate(times), np.concatenate(hand))
-
-
-def _empty_trace(times: Array, n_slips: int) -> FingerTrace:
-    """Return a trace to be filled, with 0, 1 or 2 heads of slips; see `_slip_heads`."""
-    n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
-    shapes = [(len(times), 3) if field == "force" else len(times) for field, _ in TRACE_COLUMNS]
-    columns = [
-        np.empty(shape, number) for shape, (_, number) in zip(shapes, TRACE_COLUMNS, strict=True)
-    ]
-    return FingerTrace(times, *columns[:n_columns])

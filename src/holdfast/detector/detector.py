@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy import ndarray
 
-from holdfast.classifiers import Linear
+from holdfast.classifiers import Linear, Onnx
 from holdfast.contact import (
     ContactEvent,
     HandEstimate,
@@ -28,7 +28,6 @@ from holdfast.detector.detection import (
     detection_of,
     makers,
 )
-from holdfast.detector.onnx_feeder import OnnxFeeder
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.start import Start, declared_baselines
 from holdfast.features.stream import FeatureStream
@@ -38,7 +37,7 @@ from holdfast.model import FingerModel, Model
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Flags
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
 HAND = "hand"
@@ -84,7 +83,15 @@ class Detector:
         in_contact: bool = False,
         baselines: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
-        sensors = model.fingers_of(fingers) if fingers is not None else _sensors_of(model)
+        if fingers is not None:
+            sensors = model.fingers_of(fingers)
+        elif any(f == "*" or part.sensor is None for f, part in model.fingers.items()):
+            raise ModelError(
+                f"the model {model.name or 'given'} is for any finger: the fingers of the hand and "
+                "their sensors expected"
+            )
+        else:
+            sensors = {f: model.sensors[str(part.sensor)] for f, part in model.fingers.items()}
         first = next(iter(sensors.values()))
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
         known = declared_baselines({BASELINES: baselines}, sensors)
@@ -286,7 +293,15 @@ class Detector:
             StreamError: the recording has no sample of the fingers, another number of taxels,
                 or begins before the last sample.
         """
-        self._check_recording(recording)
+        modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
+        if not any(module.n_samples for module in modules.values()):
+            raise StreamError(
+                f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
+                f"the model is for {', '.join(self._slots)}"
+            )
+        for finger, module in modules.items():
+            self._check_shape(finger, module.readings.shape[1:])
+        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
         self._settle_transitions()
         fingers, chunks = self._stream.plan.fingers, self._estimates(recording)
         return detection_of(recording, fingers, self._parts, chunks)
@@ -314,17 +329,6 @@ class Detector:
         if not last < time < inf:
             after = "" if last == -inf else f" after {last:.15g} s"
             raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
-
-    def _check_recording(self, recording: Recording) -> None:
-        modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
-        if not any(module.n_samples for module in modules.values()):
-            raise StreamError(
-                f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
-                f"the model is for {', '.join(self._slots)}"
-            )
-        for finger, module in modules.items():
-            self._check_shape(finger, module.readings.shape[1:])
-        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
 
     def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
         expected = self._slots[finger][2]
@@ -403,16 +407,6 @@ def _are_linear(parts: Sequence[FingerModel]) -> bool:
     return all(isinstance(part.stable.rule, Linear) for part in parts)
 
 
-def _sensors_of(model: Model) -> dict[str, Sensor]:
-    """Return the sensors of all fingers that a model names."""
-    if any(finger == "*" or part.sensor is None for finger, part in model.fingers.items()):
-        raise ModelError(
-            f"the model {model.name or 'given'} is for any finger: the fingers of the hand and "
-            "their sensors expected"
-        )
-    return {name: model.sensors[str(part.sensor)] for name, part in model.fingers.items()}
-
-
 def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
     """Return the plan without some taxels."""
     for finger, taxels in (ignore or {}).items():
@@ -428,3 +422,39 @@ def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
                     f"it has the indices 0 to {n_taxels - 1}"
                 )
     return replace(plan, ignore=ignore or {})
+
+
+class OnnxFeeder:
+    """Feeder of a kernel with the log odds of ONNX files, which Python computes for each sample.
+
+    It computes the features once more, in a stream of its own: an update takes as long as the
+    classifier.
+
+    Args:
+        parts: models of the fingers of the stream, in its order.
+        stream: of the detector.
+    """
+
+    def __init__(self, parts: Sequence[FingerModel], stream: FeatureStream) -> None:
+        self._kernel = stream.start()
+        self._features = np.empty((1, len(parts), stream.plan.width))
+        self._amplitude = np.empty((1, len(parts)))
+        self._log_odds = np.zeros(len(parts))
+        self._rules = {
+            place: (part.indices(part.stable), part.stable.rule)
+            for place, part in enumerate(parts)
+            if isinstance(part.stable.rule, Onnx)
+        }
+
+    def log_odds(self, readings: Array, present: Flags, time: float) -> Array:
+        """Return (n_fingers,) the log odds of stability of a sample; see `Detector.update`."""
+        self._kernel.advance(
+            readings[None], present[None], np.array([time]), self._features, self._amplitude
+        )
+        for place, (columns, onnx) in self._rules.items():
+            features = self._features[:, place, columns]
+            if present[place] and not np.isnan(features).any():  # NaN: the finger has none
+                probability = onnx.probability(features)[0]
+                with np.errstate(divide="ignore"):
+                    self._log_odds[place] = np.log(probability / (1.0 - probability))
+        return self._log_odds

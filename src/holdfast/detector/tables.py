@@ -46,10 +46,15 @@ def rules_of(model: Model, plan: StreamPlan) -> Rules:
     numbers = [np.empty(0)]
     for part in parts:
         for name in HEAD_NAMES:
-            rows, squares, causes = _numbers(part, part.head(name))
+            head = part.head(name)
+            rows, squares, causes = _numbers(part, head)
             heads.append(
-                _head(part.head(name), plan.rate)
-                | {
+                {
+                    # Without the head they are not read.
+                    "threshold": 0.0 if head is None else head.threshold,
+                    "gain": 1.0 if head is None else head.gain(plan.rate),
+                    "hold": 0.0 if head is None else head.hold,
+                    "highest": 0.0 if head is None else head.highest or 0.0,
                     "n_outputs": len(rows),
                     "n_features": rows.shape[1] - 1,
                     "first": sum(map(len, numbers)),
@@ -80,18 +85,6 @@ def _contact(part: FingerModel) -> Struct:
         if limit is not None:
             return {"contact": kind, "contact_limit": limit}
     return {"contact": ALWAYS_CONTACT, "contact_limit": 0.0}
-
-
-def _head(head: Head | None, rate: float) -> Struct:
-    """Return the settings of a head; without it they are not read."""
-    if head is None:
-        return {"threshold": 0.0, "gain": 1.0, "hold": 0.0, "highest": 0.0}
-    return {
-        "threshold": head.threshold,
-        "gain": head.gain(rate),
-        "hold": head.hold,
-        "highest": head.highest or 0.0,
-    }
 
 
 def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[int]]:

@@ -240,7 +240,17 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             ModelError: the hand has none of the fingers, or a finger has another sensor.
         """
         if ANY_FINGER in self.fingers:
-            return self._any_fingers(modules)
+            wanted = self.fingers[ANY_FINGER].sensor
+            tips = {name: s for name, s in modules.items() if "/" not in name} or dict(modules)
+            fitting = {n: s for n, s in tips.items() if wanted is None or s.name == wanted}
+            if wanted is not None and not fitting:
+                raise _other_sensor(
+                    f"the model is for fingers with the sensor {wanted!r}; given are "
+                    + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
+                )
+            for name, sensor in fitting.items():
+                self._check_sensor(name, sensor)
+            return fitting
         for name in set(self.fingers) & set(modules):
             self._check_sensor(name, modules[name])
         if not set(self.fingers) & set(modules):
@@ -306,21 +316,6 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             features = found[name].features[:, part.indices(part.stable)]
             probabilities[name] = part.stable.rule.probability(features)
         return probabilities
-
-    def _any_fingers(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
-        wanted = self.fingers[ANY_FINGER].sensor
-        tips = {name: sensor for name, sensor in modules.items() if "/" not in name} or modules
-        if wanted is None:
-            return dict(tips)
-        fitting = {name: sensor for name, sensor in tips.items() if sensor.name == wanted}
-        if not fitting:
-            raise _other_sensor(
-                f"the model is for fingers with the sensor {wanted!r}; given are "
-                + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
-            )
-        for name, sensor in fitting.items():
-            self._check_sensor(name, sensor)
-        return fitting
 
     def _check_sensor(self, name: str, sensor: Sensor) -> None:
         wanted = self.finger(name).sensor

@@ -99,43 +99,35 @@ class AnySkinDecoder:
         if begins and (line := _LINE.match(self._buffer, at)):
             numbers = _numbers(line[0])
             if numbers is not None:
-                self._take_line(numbers, samples)
+                if len(numbers) == self._n_mags and _is_plausible(numbers[:, 3], numbers[:, :3]):
+                    self._take(numbers[:, :3].copy(), samples)
+                else:
+                    if len(numbers) != self._n_mags:
+                        self._other_n_mags = len(numbers)
+                    self._n_refused += 1
                 return line.end()
         n_left = len(self._buffer) - at
-        if not n_left or (begins and (n_left < self._length or self._is_half_line(at))):
+        if begins and n_left >= self._length:
+            match = _IN_LINE.match(self._buffer, at)
+            line_end = match.end() if match else at
+            if line_end == len(self._buffer) and n_left <= MAX_LINE_LENGTH:
+                return None  # half a line
+        elif begins or not n_left:
             return None
         sample = _packet(self._buffer, at, self._n_mags) if begins else None
         if sample is not None:
             self._take(sample, samples)
             return at + self._length
         end = self._buffer.find(b"\n", at) + 1 or len(self._buffer)
-        self._skip(end - at)
+        # A packet counts as refused for each length of a packet that begins in these bytes.
+        counted = math.ceil(max(self._n_skipped, 0) / self._length)
+        self._n_skipped += end - at
+        self._n_refused += math.ceil(max(self._n_skipped, 0) / self._length) - counted
         return end
 
     def _take(self, sample: Sample, samples: list[Sample]) -> None:
         samples.append(sample)
         self._n_skipped = self._other_n_mags = 0
-
-    def _take_line(self, numbers: Sample, samples: list[Sample]) -> None:
-        """Take (n_mags, 4) x, y, z and temperature of a line."""
-        if len(numbers) != self._n_mags:
-            self._other_n_mags = len(numbers)
-            self._n_refused += 1
-        elif _is_plausible(numbers[:, 3], numbers[:, :3]):
-            self._take(numbers[:, :3].copy(), samples)
-        else:
-            self._n_refused += 1
-
-    def _is_half_line(self, at: int) -> bool:
-        match = _IN_LINE.match(self._buffer, at)
-        end = match.end() if match else at
-        return end == len(self._buffer) and end - at <= MAX_LINE_LENGTH
-
-    def _skip(self, n_bytes: int) -> None:
-        """Count a packet as refused for each length of a packet that begins in these bytes."""
-        counted = math.ceil(max(self._n_skipped, 0) / self._length)
-        self._n_skipped += n_bytes
-        self._n_refused += math.ceil(max(self._n_skipped, 0) / self._length) - counted
 
 
 def _length(n_mags: int) -> int:

@@ -183,7 +183,11 @@ class Assembler:
         """
         stamp = self._timeline.stamp(time, received)
         self._packet = _PacketTime(time, stamp, received)
-        self._note_pace(received)
+        pace = self._timeline.clock.pace
+        if pace > 1.0 and not self._is_fast:
+            text = f"the clock of the device runs {pace:.2g} times as fast as that of this machine"
+            self.notify("clock", text, received)
+        self._is_fast = pace > 1.0
         if self._packet.jumped:
             for delay in self._delays.values():
                 delay.reset()
@@ -196,7 +200,13 @@ class Assembler:
             readings: (n_taxels, 3) in the order of the packet.
             stamp: the device's own stamp [s]; None to use the packet's.
         """
-        time, faults = self._time_of(number, stamp)
+        packet = self._packet
+        if stamp is None or stamp > packet.time + MAX_STAMP_LEAD:
+            time, faults = packet.stamp
+        else:
+            time = packet.stamp.time if stamp == packet.time else stamp + self._timeline.offset
+            late = self._delays.setdefault(number, TransportDelay()).is_late(time, packet.received)
+            faults = (Fault.CLOCK_JUMP,) * packet.jumped + (Fault.LATE,) * late
         samples = self.devices[number].split(readings)
         instant = self._instants.setdefault(time, _Instant({}, {}))
         instant.samples.update(samples)
@@ -204,7 +214,11 @@ class Assembler:
 
     def finish(self, received: float) -> list[Arrival]:
         """Return the arrivals of a packet in order of time, none if there is nothing to report."""
-        arrivals = [self._arrival(time, received) for time in sorted(self._instants)]
+        arrivals = []
+        for time, (samples, faults) in sorted(self._instants.items()):
+            self._time = max(time, math.nextafter(self._time, math.inf))
+            known = {name: these for name, these in faults.items() if these}
+            arrivals.append(Arrival(self._time, samples, received, known))
         refused = self.n_refused and not self._hold_refusals
         if not arrivals and (self._notices or self._faults or refused):
             arrivals = [notice_arrival(received)]
@@ -219,31 +233,6 @@ class Assembler:
             self.n_lost = self.n_refused = 0
         self._instants, self._faults, self._notices = {}, {}, []
         return arrivals
-
-    def _note_pace(self, received: float) -> None:
-        """Give a notice when the clock begins to run too fast."""
-        pace = self._timeline.clock.pace
-        if pace > 1.0 and not self._is_fast:
-            text = f"the clock of the device runs {pace:.2g} times as fast as that of this machine"
-            self.notify("clock", text, received)
-        self._is_fast = pace > 1.0
-
-    def _time_of(self, number: int, stamp: float | None) -> Stamp:
-        """Return the time of a device's sample, and the faults of its time."""
-        packet = self._packet
-        if stamp is None or stamp > packet.time + MAX_STAMP_LEAD:
-            return packet.stamp
-        same = stamp == packet.time
-        time = packet.stamp.time if same else stamp + self._timeline.offset
-        late = self._delays.setdefault(number, TransportDelay()).is_late(time, packet.received)
-        return Stamp(time, (Fault.CLOCK_JUMP,) * packet.jumped + (Fault.LATE,) * late)
-
-    def _arrival(self, time: float, received: float) -> Arrival:
-        self._time = max(time, math.nextafter(self._time, math.inf))
-        samples, faults = self._instants[time]
-        return Arrival(
-            self._time, samples, received, {name: these for name, these in faults.items() if these}
-        )
 
 
 class _Instant(NamedTuple):

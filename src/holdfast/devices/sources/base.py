@@ -153,10 +153,12 @@ class DeviceSource(Source):
         deadline = time.monotonic() + timeout
         while self._is_open and not self._pending:
             left = max(deadline - time.monotonic(), 0.0)
-            if self._lost_at is None:
-                self._listen(left)
-            else:
+            if self._lost_at is not None:
                 self._retry(left)
+            else:
+                until_silent = self._last_sample_at + self.silence_timeout - time.monotonic()
+                if not self._receive(left if self._silent else min(left, max(until_silent, 0.0))):
+                    self._check_silence(time.monotonic())
             if not left:
                 break
         return self._pending.popleft() if self._pending else None
@@ -218,12 +220,6 @@ class DeviceSource(Source):
 
     def _notify(self, received: float, *notices: str) -> None:
         self._pending.append(notice_arrival(received, *notices))
-
-    def _listen(self, timeout: float) -> None:
-        until_silent = self._last_sample_at + self.silence_timeout - time.monotonic()
-        wait = timeout if self._silent else min(timeout, max(until_silent, 0.0))
-        if not self._receive(wait):
-            self._check_silence(time.monotonic())
 
     def _check_silence(self, now: float) -> None:
         if self._silent or self._lost_at is not None:

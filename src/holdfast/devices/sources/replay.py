@@ -132,6 +132,16 @@ class Player(Source):
         self._notices: list[str] = []
         self._reset()
 
+    def _reset(self) -> None:
+        self._content = iter(())
+        self._notices.clear()
+        self._next: TimedSamples | None = None
+        self._continues = False
+        self._number = 0
+        self._shift = 0.0
+        self._last = math.nan
+        self._start: tuple[float, float] | None = None
+
     def open(self) -> None:
         """Read the beginning of the first recording.
 
@@ -161,14 +171,32 @@ class Player(Source):
     def read(self, timeout: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout` [s] or at the end."""
         now = time.monotonic()
-        item = self._peek() or self._next_recording(timeout)
+        item = self._peek()
+        if item is None and self._continues and self._is_ready(self._number + 1, timeout):
+            self._number += 1
+            item = self._begin(self._late_chunks(self._number))
         if item is None:
             return None
         due = self._due(item.time, now)
         wait = min(due, now + timeout) - time.monotonic()
         if wait > 0:
             time.sleep(wait)
-        return None if due > now + timeout else self._arrival(item)
+        if due > now + timeout:
+            return None
+        received = time.monotonic()
+        if item.n_refused:
+            self._notices.append(f"{item.n_refused} samples are out of order and were left out")
+        if item.notice:
+            self._notices.append(item.notice)
+        notices = tuple(self._notices)
+        self._notices.clear()
+        self._next = None
+        if not item.samples:
+            return notice_arrival(received, *notices, n_refused=item.n_refused)
+        self._last = item.time + self._shift
+        return Arrival(
+            self._last, item.samples, received, n_refused=item.n_refused, notices=notices
+        )
 
     def restart(self) -> None:
         """Play the next recording; time continues after a pause.
@@ -200,16 +228,6 @@ class Player(Source):
         """Return whether recording `number` can begin within `timeout` [s]."""
         return True
 
-    def _reset(self) -> None:
-        self._content = iter(())
-        self._notices.clear()
-        self._next: TimedSamples | None = None
-        self._continues = False
-        self._number = 0
-        self._shift = 0.0
-        self._last = math.nan
-        self._start: tuple[float, float] | None = None
-
     def _peek(self) -> TimedSamples | None:
         """Return the next item of this recording."""
         if self._next is None:
@@ -221,13 +239,6 @@ class Player(Source):
                     self._last - self._shift, {}, f"the rest is lost: {cause}"
                 )
         return self._next
-
-    def _next_recording(self, timeout: float) -> TimedSamples | None:
-        """Return the first item of the next recording, if it is ready within `timeout` [s]."""
-        if not (self._continues and self._is_ready(self._number + 1, timeout)):
-            return None
-        self._number += 1
-        return self._begin(self._late_chunks(self._number))
 
     def _begin(self, chunks: Iterable[Recording]) -> TimedSamples | None:
         """Continue with a recording from its beginning, after a pause. Return its first item."""
@@ -258,22 +269,6 @@ class Player(Source):
             self._start = now, at
         began, start = self._start
         return began + (at + self._shift - start) / self.speed
-
-    def _arrival(self, item: TimedSamples) -> Arrival:
-        received = time.monotonic()
-        if item.n_refused:
-            self._notices.append(f"{item.n_refused} samples are out of order and were left out")
-        if item.notice:
-            self._notices.append(item.notice)
-        notices = tuple(self._notices)
-        self._notices.clear()
-        self._next = None
-        if not item.samples:
-            return notice_arrival(received, *notices, n_refused=item.n_refused)
-        self._last = item.time + self._shift
-        return Arrival(
-            self._last, item.samples, received, n_refused=item.n_refused, notices=notices
-        )
 
 
 class ReplaySource(Player):

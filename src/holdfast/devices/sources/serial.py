@@ -71,7 +71,17 @@ class SerialSource(DeviceSource):
         self._newest = -math.inf
         try:
             self._connect()
-            self._wait_for_sample()
+            deadline, n_refused = time.monotonic() + SERIAL_OPEN_TIMEOUT, 0
+            while not (decoded := self._read_port(max(deadline - time.monotonic(), 0.0))).samples:
+                if decoded.other_n_mags:
+                    raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
+                n_refused += decoded.n_refused
+                if time.monotonic() >= deadline:
+                    came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
+                    raise SourceError(
+                        f"{self.name}: {came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of "
+                        f"{self._n_mags} magnetometers at {self._baud} baud expected"
+                    )
         except (OSError, ValueError) as cause:  # ValueError: the port does not support the speed
             ports = ", ".join(sorted(port.device for port in comports())) or "none"
             raise SourceError(f"{self.name}: {_reason(cause)}; serial ports: {ports}") from cause
@@ -87,22 +97,6 @@ class SerialSource(DeviceSource):
     def _connect(self) -> None:
         self._decoder.reset()
         self._port = Serial(self._path, self._baud, exclusive=True)
-
-    def _wait_for_sample(self) -> None:
-        deadline = time.monotonic() + SERIAL_OPEN_TIMEOUT
-        n_refused = 0
-        while (left := deadline - time.monotonic()) > 0:
-            decoded = self._read_port(left)
-            if decoded.samples:
-                return
-            if decoded.other_n_mags:
-                raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
-            n_refused += decoded.n_refused
-        came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
-        raise SourceError(
-            f"{self.name}: {came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of {self._n_mags} "
-            f"magnetometers at {self._baud} baud expected"
-        )
 
     def _receive(self, timeout: float) -> bool:
         try:
@@ -137,13 +131,14 @@ class SerialSource(DeviceSource):
         data = self._port.read(1)
         if data:
             data += self._port.read(min(self._port.in_waiting, MAX_READ_SIZE))
-        decoded = self._decoder.feed(data)
-        self._assemble(decoded, time.monotonic())
-        return decoded
-
-    def _assemble(self, decoded: DecodedBytes, received: float) -> None:
+        decoded, received = self._decoder.feed(data), time.monotonic()
         if decoded.n_refused:
-            self._refuse(decoded, received)
+            self._assembler.n_refused += decoded.n_refused
+            if decoded.other_n_mags:
+                self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
+            else:
+                self._assembler.notify("packet", "invalid packets are dropped", received)
+            self._queue(self._assembler.finish(received), received)
         n = len(decoded.samples)
         period = 1 / self._sensor.rate
         step = min(period, (received - self._newest) / max(n, 1))
@@ -153,15 +148,7 @@ class SerialSource(DeviceSource):
             arrivals = self._assembler.finish(received)
             self._newest = arrivals[-1].time
             self._queue(arrivals, received)
-
-    def _refuse(self, decoded: DecodedBytes, received: float) -> None:
-        """Report dropped packets, and a wrong number of magnetometers as a fault."""
-        self._assembler.n_refused += decoded.n_refused
-        if decoded.other_n_mags:
-            self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
-        else:
-            self._assembler.notify("packet", "invalid packets are dropped", received)
-        self._queue(self._assembler.finish(received), received)
+        return decoded
 
     def _wrong_count(self, decoded: DecodedBytes) -> str:
         return (

@@ -107,7 +107,17 @@ class XelaSource(DeviceSource):
             else:
                 self._place = place
                 return connection
-        raise SourceError(self._unreachable(failures)) from failures[-1]
+        where = " or ".join(map(str, self._places))
+        if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
+            why = (
+                f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
+                "without a hand, use `holdfast play`"
+            )
+        elif any(isinstance(failure, WebSocketException) for failure in failures):
+            why = f"the server at {where} is no XELA server: {failures[-1]}"
+        else:
+            why = f"{where} cannot be reached: {failures[-1]}"
+        raise SourceError(why) from failures[-1]
 
     def _first_packet(self, connection: ClientConnection) -> tuple[bytes, float]:
         """Return the first packet that defines the modules, and its time of arrival."""
@@ -164,17 +174,6 @@ class XelaSource(DeviceSource):
         keepalive = getattr(connection, "keepalive_thread", None)
         if keepalive is not None:
             keepalive.join(XELA_CONNECT_TIMEOUT)
-
-    def _unreachable(self, failures: list[Exception]) -> str:
-        where = " or ".join(map(str, self._places))
-        if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
-            return (
-                f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
-                "without a hand, use `holdfast play`"
-            )
-        if any(isinstance(failure, WebSocketException) for failure in failures):
-            return f"the server at {where} is no XELA server: {failures[-1]}"
-        return f"{where} cannot be reached: {failures[-1]}"
 
 
 def _connect(place: Place) -> ClientConnection:

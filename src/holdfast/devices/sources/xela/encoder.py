@@ -78,7 +78,11 @@ class XelaEncoder:
         if whole_hand:
             _check_modules(sensors, allegro)
         self._parts: list[_Module | _WholeHand]
-        if whole_hand or _is_whole(sensors, allegro):
+        is_whole = set(sensors) == set(allegro.modules) and all(
+            sensors[name].n_taxels == module.sensor.n_taxels
+            for name, module in allegro.modules.items()
+        )
+        if whole_hand or is_whole:
             self._parts = [_WholeHand(sensors, allegro)]
         else:
             self._parts = [_Module(name, sensor) for name, sensor in sensors.items()]
@@ -265,7 +269,10 @@ class _WholeHand:
         self._sensors = sensors
         self._indices = {name: whole.modules[name].flat_indices for name in sensors}
         self._present = np.concatenate(list(self._indices.values()))
-        self._rest = _rest_samples(whole.n_taxels)
+        random = np.random.default_rng(0)  # taxels at rest are always the same
+        shape = (N_REST_SAMPLES, whole.n_taxels, 3)
+        base = REST_READING + random.integers(-REST_SPREAD, REST_SPREAD + 1, (1, *shape[1:]))
+        self._rest = (base + random.integers(-REST_NOISE, REST_NOISE + 1, shape)).astype(np.uint16)
         self._counts = self._rest[0].copy()
         self._newtons = np.zeros((whole.n_taxels, 3))
         self._calibrated = all(sensor.unit == "N" for sensor in sensors.values())
@@ -318,14 +325,6 @@ def _constant_fields(part: _Module | _WholeHand) -> dict[str, Any]:
     }
 
 
-def _rest_samples(n_taxels: int) -> npt.NDArray[np.uint16]:
-    """Return (N_REST_SAMPLES, n_taxels, 3) readings of taxels at rest, always the same."""
-    random = np.random.default_rng(0)
-    base = REST_READING + random.integers(-REST_SPREAD, REST_SPREAD + 1, (1, n_taxels, 3))
-    noise = random.integers(-REST_NOISE, REST_NOISE + 1, (N_REST_SAMPLES, n_taxels, 3))
-    return (base + noise).astype(np.uint16)
-
-
 def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:
     """Return whether all modules have names and numbers of taxels of an Allegro hand's."""
     try:
@@ -333,12 +332,6 @@ def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _is_whole(sensors: Mapping[str, Sensor], whole: Hand) -> bool:
-    return set(sensors) == set(whole.modules) and all(
-        sensors[name].n_taxels == module.sensor.n_taxels for name, module in whole.modules.items()
-    )
 
 
 def _check_modules(sensors: Mapping[str, Sensor], whole: Hand) -> None:

@@ -134,8 +134,21 @@ def read_packet(text: str | bytes) -> Packet | None:
         >>> read_packet('{"message": 7, "time": 1.5, "1": {}}').counter
         7
     """
-    fields = _fields(text)
-    sensors = {int(key): value for key, value in fields.items() if _is_number(key)}
+    try:
+        given = text.encode() if isinstance(text, str) else text
+        try:
+            fields = _PACKET.decode(given)
+        except msgspec.DecodeError:
+            if not _NOT_A_NUMBER.search(given):
+                raise
+            fields = _PACKET.decode(_NOT_A_NUMBER.sub(b"null", given))
+    except (ValueError, RecursionError) as cause:
+        raise InvalidPacket(str(cause)[:MAX_REASON_LENGTH]) from cause
+    sensors = {
+        int(key): value
+        for key, value in fields.items()
+        if len(key) <= 4 and key.isascii() and key.isdigit()
+    }
     counter = _value(fields, "message")
     if isinstance(counter, bool) or not isinstance(counter, int):
         return None
@@ -177,23 +190,6 @@ def _plain_counts(raw: msgspec.Raw) -> PlainCounts | None:
     if parsed is None:
         return None
     return PlainCounts(part.taxels, part.time, part.model, np.frombuffer(parsed, np.uint16))
-
-
-def _fields(text: str | bytes) -> dict[str, msgspec.Raw]:
-    try:
-        given = text.encode() if isinstance(text, str) else text
-        try:
-            return _PACKET.decode(given)
-        except msgspec.DecodeError:
-            if not _NOT_A_NUMBER.search(given):
-                raise
-            return _PACKET.decode(_NOT_A_NUMBER.sub(b"null", given))
-    except (ValueError, RecursionError) as cause:
-        raise InvalidPacket(str(cause)[:MAX_REASON_LENGTH]) from cause
-
-
-def _is_number(key: str) -> bool:
-    return len(key) <= 4 and key.isascii() and key.isdigit()
 
 
 def _value(fields: Mapping[str, msgspec.Raw], name: str) -> Any:  # noqa: ANN401 (any JSON value)
