@@ -70,10 +70,14 @@ class AnySkinDecoder:
 
     def reset(self) -> None:
         """Drop all bytes, because the board was connected again."""
+        # Bytes that are not decoded yet, and whether a packet may begin with them.
         self._buffer = b""
         self._after_line = False
+        # The newest bytes, in which packets of another length are looked for.
         self._recent = b""
         self._other_n_mags = 0
+        # Bytes skipped since the last sample. It begins one packet below 0: half a packet at the
+        # beginning is normal, and is not counted.
         self._n_skipped = -self._length
         self._n_refused = 0
 
@@ -89,6 +93,7 @@ class AnySkinDecoder:
         if at:
             self._after_line = self._buffer[at - 1 : at] == b"\n"
             self._buffer = self._buffer[at:]
+        # Looked for only where nothing else fits: it is slow, and may find a packet by chance.
         if self._n_refused > before and not samples:
             self._other_n_mags = _other_n_mags(self._recent, self._n_mags) or self._other_n_mags
         return DecodedBytes(samples, self._n_refused - before, self._other_n_mags)
@@ -96,6 +101,7 @@ class AnySkinDecoder:
     def _step(self, at: int, samples: list[Sample]) -> int | None:
         """Decode or skip the bytes at a place; return where they end, None if more are needed."""
         begins = self._buffer[at - 1 : at] == b"\n" if at else self._after_line
+        # Text before binary: hardly any binary packet has digits and blanks only.
         if begins and (line := _LINE.match(self._buffer, at)):
             numbers = _numbers(line[0])
             if numbers is not None:
@@ -168,6 +174,7 @@ def _is_plausible(temperatures: npt.NDArray[np.float32], readings: Sample) -> bo
 def _other_n_mags(data: bytes, n_mags: int) -> int:
     """Return the unexpected number of magnetometers of two successive packets, 0 for none."""
     for count in range(1, MAX_OTHER_MAGS + 1):
+        # Two in a row: one would be found by chance in other packets.
         place = data.find(END)
         while count != n_mags and place >= 0:
             at = place + len(END)

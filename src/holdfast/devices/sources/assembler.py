@@ -85,16 +85,20 @@ class Assembler:
         self.devices: Mapping[int, Device] = {}
         self.n_lost = self.n_refused = 0
         self._timeline = Timeline()
-        self._is_fast = False
-        self._packet = _PacketTime(math.nan, Stamp(math.nan), math.nan)
+        self._is_fast = False  # whether the notice about a fast clock was given
+        self._packet = _PacketTime(math.nan, Stamp(math.nan), math.nan)  # set by `stamp`
+        # By the number of the device: delays of stamps of its own, the identity of its newest
+        # sample, and its sequence counter (None: one counter for all).
         self._delays: dict[int, TransportDelay] = {}
         self._newest: dict[int, Hashable] = {}
         self._sequences: dict[int | None, int | None] = {}
-        self._time = -math.inf
+        self._time = -math.inf  # of the newest arrival with samples
+        # Of the packet that is assembled: `add`, `report_taxel_count` and `notify` fill them,
+        # `finish` empties them.
         self._instants: dict[float, _Instant] = {}
         self._faults: dict[str, Faults] = {}
         self._notices: list[str] = []
-        self._noticed_at: dict[str, float] = {}
+        self._noticed_at: dict[str, float] = {}  # by topic; older ones are forgotten
 
     @property
     def sensors(self) -> dict[str, Sensor]:
@@ -202,9 +206,10 @@ class Assembler:
         """
         packet = self._packet
         if stamp is None or stamp > packet.time + MAX_STAMP_LEAD:
-            time, faults = packet.stamp
+            time, faults = packet.stamp  # a stamp from the future is of before a jump of the clock
         else:
             time = packet.stamp.time if stamp == packet.time else stamp + self._timeline.offset
+            # Each device has its usual delay: one may be measured long before the packet is sent.
             late = self._delays.setdefault(number, TransportDelay()).is_late(time, packet.received)
             faults = (Fault.CLOCK_JUMP,) * packet.jumped + (Fault.LATE,) * late
         samples = self.devices[number].split(readings)
@@ -216,13 +221,16 @@ class Assembler:
         """Return the arrivals of a packet in order of time, none if there is nothing to report."""
         arrivals = []
         for time, (samples, faults) in sorted(self._instants.items()):
+            # Equal or older than another device's: just after it, as times must increase.
             self._time = max(time, math.nextafter(self._time, math.inf))
             known = {name: these for name, these in faults.items() if these}
             arrivals.append(Arrival(self._time, samples, received, known))
+        # A flood of refused packets would be a flood of arrivals without samples.
         refused = self.n_refused and not self._hold_refusals
         if not arrivals and (self._notices or self._faults or refused):
             arrivals = [notice_arrival(received)]
         if arrivals:
+            # On the first one: what is missing was missing before it.
             arrivals[0] = arrivals[0]._replace(
                 faults={**self._faults, **arrivals[0].faults},
                 n_lost=self.n_lost,
@@ -262,5 +270,6 @@ def n_missing(last: int, sequence: int) -> int:
         >>> n_missing(2**32 - 2, 1), n_missing(5000, 0)
         (2, 0)
     """
+    # Modulo the period, so that a counter that overflows goes on by one.
     step = (sequence - last) % SEQUENCE_PERIOD
     return step - 1 if 0 < step < MIN_COUNTER_RESTART else 0

@@ -156,10 +156,11 @@ class DeviceSource(Source):
             if self._lost_at is not None:
                 self._retry(left)
             else:
+                # Wake up when the device counts as silent, so that the notice comes in time.
                 until_silent = self._last_sample_at + self.silence_timeout - time.monotonic()
                 if not self._receive(left if self._silent else min(left, max(until_silent, 0.0))):
                     self._check_silence(time.monotonic())
-            if not left:
+            if not left:  # after a read: a timeout of 0 reads what is there
                 break
         return self._pending.popleft() if self._pending else None
 
@@ -200,7 +201,7 @@ class DeviceSource(Source):
     def _queue(self, arrivals: Sequence[Arrival], received: float) -> None:
         """Queue arrivals for `read`."""
         if not any(arrival.samples for arrival in arrivals):
-            self._check_silence(received)
+            self._check_silence(received)  # faults and notices do not end a silence
         else:
             if self._silent:
                 silence = received - self._last_sample_at
@@ -222,7 +223,7 @@ class DeviceSource(Source):
         self._pending.append(notice_arrival(received, *notices))
 
     def _check_silence(self, now: float) -> None:
-        if self._silent or self._lost_at is not None:
+        if self._silent or self._lost_at is not None:  # it was reported already
             return
         if now - self._last_sample_at >= self.silence_timeout:
             self._silent = True
@@ -240,7 +241,7 @@ class DeviceSource(Source):
         wait = self._retry_at - time.monotonic()
         if wait > 0:
             self._pause(min(wait, timeout))
-        if wait > timeout or self._lost_at is None:
+        if wait > timeout or self._lost_at is None:  # `_pause` may have found it again
             return
         if self._reconnect():
             self._resume()

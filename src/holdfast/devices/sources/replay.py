@@ -58,6 +58,7 @@ def timed_samples(chunks: Iterable[Recording]) -> Iterator[TimedSamples]:
         OSError: as `chunks` does, after all content before that.
     """
     first, last = math.inf, -math.inf
+    # Markers after the samples so far: a chunk may bring those of later times.
     markers: list[tuple[float, str]] = []
     n_refused = 0
     try:
@@ -74,7 +75,7 @@ def timed_samples(chunks: Iterable[Recording]) -> Iterator[TimedSamples]:
                 yield from heapq.merge(instants, due, key=attrgetter("time"))
     except (RecordingError, OSError):
         yield from _rest(markers, last, n_refused)
-        raise
+        raise  # after the markers of what could be read
     yield from _rest(markers, last, n_refused)
 
 
@@ -135,11 +136,15 @@ class Player(Source):
     def _reset(self) -> None:
         self._content = iter(())
         self._notices.clear()
-        self._next: TimedSamples | None = None
+        self._next: TimedSamples | None = None  # the item that `_peek` has read
         self._continues = False
         self._number = 0
+        # From the times of the recording to those of the source, which go on from one recording to
+        # the next; and the time of the last samples of the source.
         self._shift = 0.0
         self._last = math.nan
+        # When the recording began, by the host's clock and by the source's; set with the first
+        # item that is due, and by each new recording.
         self._start: tuple[float, float] | None = None
 
     def open(self) -> None:
@@ -170,6 +175,7 @@ class Player(Source):
 
     def read(self, timeout: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout` [s] or at the end."""
+        # Before the next item is read from disk: that time counts as waiting.
         now = time.monotonic()
         item = self._peek()
         if item is None and self._continues and self._is_ready(self._number + 1, timeout):
@@ -181,7 +187,7 @@ class Player(Source):
         wait = min(due, now + timeout) - time.monotonic()
         if wait > 0:
             time.sleep(wait)
-        if due > now + timeout:
+        if due > now + timeout:  # the item stays for the next read
             return None
         received = time.monotonic()
         if item.n_refused:
@@ -205,6 +211,7 @@ class Player(Source):
         """
         if math.isnan(self._last):
             return
+        # Two clients that connect together get the same recording, not its successor.
         only_begun = self._start is None or self._last <= self._start[1]
         if only_begun or not (self._continues and self._is_ready(self._number + 1, RESTART_WAIT)):
             self._begin(self._same_chunks())

@@ -73,7 +73,7 @@ class SerialSource(DeviceSource):
             self._connect()
             deadline, n_refused = time.monotonic() + SERIAL_OPEN_TIMEOUT, 0
             while not (decoded := self._read_port(max(deadline - time.monotonic(), 0.0))).samples:
-                if decoded.other_n_mags:
+                if decoded.other_n_mags:  # waiting longer would not change it
                     raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
                 n_refused += decoded.n_refused
                 if time.monotonic() >= deadline:
@@ -96,6 +96,7 @@ class SerialSource(DeviceSource):
 
     def _connect(self) -> None:
         self._decoder.reset()
+        # Exclusive: two programs would each get half of the bytes.
         self._port = Serial(self._path, self._baud, exclusive=True)
 
     def _receive(self, timeout: float) -> bool:
@@ -128,6 +129,7 @@ class SerialSource(DeviceSource):
         if self._port is None:
             return DecodedBytes([], 0, 0)
         self._port.timeout = timeout
+        # One byte waits for the board; then what is there already, without another wait.
         data = self._port.read(1)
         if data:
             data += self._port.read(min(self._port.in_waiting, MAX_READ_SIZE))
@@ -141,6 +143,7 @@ class SerialSource(DeviceSource):
             self._queue(self._assembler.finish(received), received)
         n = len(decoded.samples)
         period = 1 / self._sensor.rate
+        # Spread over their period, but not back beyond the newest sample.
         step = min(period, (received - self._newest) / max(n, 1))
         for k, sample in enumerate(decoded.samples):
             self._assembler.stamp(received - (n - 1 - k) * step, received)
@@ -179,6 +182,7 @@ def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
     Raises:
         ValueError: the magnetometers are no whole number of sensors, or a name does not fit.
     """
+    # A board carries several sensors of one kind, one after the other.
     n_modules, left = divmod(n_mags, kind.n_taxels)
     if left:
         raise ValueError(

@@ -74,9 +74,13 @@ class TransportDelay:
 
     def reset(self) -> None:
         """Start again, because the device's clock changed."""
+        # The shortest age of a sample ever, and the age that is usual: the shortest, or one that
+        # was constant for long. Both grow by the drift of the clocks; `update` changes them.
         self._least = self._usual = math.inf
+        # When the last sample came, and when the interval began over which an age is constant.
         self._received = self._begun = math.nan
         self.delay = 0.0
+        # The shortest age in this interval and in the one before.
         self._shortest = self._shortest_before = math.inf
 
     def update(self, time: float, received: float) -> float:
@@ -135,6 +139,7 @@ class ClockPace:
 
     def __init__(self) -> None:
         self.pace, self.unsteady = 1.0, False
+        # Of this interval: how far the clock got ahead, how long it is, how often the clock jumped.
         self._lead = self._passed = 0.0
         self._n_jumps = self._n_jumps_before = 0
         self._paces = [1.0] * N_FAST_INTERVALS
@@ -147,6 +152,7 @@ class ClockPace:
             passed: time since the last sample, on the host's clock [s].
             jumped: whether the clock jumped before this sample.
         """
+        # A jump is counted apart: as a lead it would look like a fast clock.
         self._lead += 0.0 if jumped else max(lead, 0.0)
         self._passed += passed
         self._n_jumps += jumped
@@ -156,6 +162,8 @@ class ClockPace:
         self._paces = [*self._paces[1:], 1 + self._lead / self._passed if fast else 1.0]
         slowest, fastest = min(self._paces), max(self._paces)
         self.pace = self._paces[-1] if slowest > 1.0 else 1.0
+        # A wrong clock is fast at a constant pace. A recording that is played fast is not on a busy
+        # machine, or it is more than four times as fast: its samples are right.
         constant = fastest - slowest < MAX_PACE_CHANGE * slowest
         jumpy = self._n_jumps + self._n_jumps_before >= MIN_REPEATED_JUMPS
         self.unsteady = jumpy or (constant and 1.0 < self.pace <= MAX_FAULTY_PACE)
@@ -185,7 +193,7 @@ class Timeline:
 
     def __init__(self) -> None:
         self.offset = self.delay = 0.0
-        self._last = self._received = math.nan
+        self._last = self._received = math.nan  # times of the last sample, here and at the host
         self._delay = TransportDelay()
         self.clock = ClockPace()
 
@@ -202,11 +210,13 @@ class Timeline:
         if not is_plausible(device_time):
             raise ValueError(f"a time in seconds expected, {device_time} given")
         time = device_time + self.offset
+        # Before the delay is updated: the lead is against the samples before this one.
         lead = self._delay.lead(time, received)
         is_first = math.isnan(self._last)
         back = time <= self._last - MAX_BACKWARD_STEP  # False for the first
         jumped = back or (not is_first and lead > MIN_CLOCK_JUMP)
         if jumped:
+            # The host's clock shows how long it was; what follows keeps this offset.
             time = self._last + max(received - self._received, 0.0)
             self.offset = time - device_time
             self._delay.reset()
@@ -242,6 +252,7 @@ def clock_notice(stamp: float, now: float) -> str | None:
         'the stamps of the device are 2 h behind the clock of this machine: old data?'
     """
     behind = now - stamp
+    # A stamp that counts from the start of the device has no date to be compared.
     if stamp < MIN_EPOCH_TIME or abs(behind) <= NOTICED_CLOCK_DIFFERENCE:
         return None
     where = "behind" if behind > 0 else "ahead of"

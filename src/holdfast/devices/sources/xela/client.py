@@ -68,7 +68,7 @@ class XelaSource(DeviceSource):
         super().__init__()
         self.name = name
         self._places = places
-        self._place = places[0]
+        self._place = places[0]  # the one with the server, for messages
         self._options = (names, calibrated, sensor)
         self._decoder = self._new_decoder()
         self._connection: ClientConnection | None = None
@@ -80,6 +80,7 @@ class XelaSource(DeviceSource):
             SourceError: no server listens, it sends nothing, or other data than expected.
         """
         self.close()
+        # A new one: the server may have other sensors than when it was open before.
         self._decoder = self._new_decoder()
         self._connection = self._connected()
         text, received = self._first_packet(self._connection)
@@ -108,6 +109,7 @@ class XelaSource(DeviceSource):
                 self._place = place
                 return connection
         where = " or ".join(map(str, self._places))
+        # The most helpful first: no server at all, another server, anything else.
         if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
             why = (
                 f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
@@ -130,7 +132,7 @@ class XelaSource(DeviceSource):
                 if self._decoder.identify(text):
                     return text, received
             except InvalidPacket as why:
-                invalid = why
+                invalid = why  # the next one may be valid: the first may have been cut
             except TimeoutError:
                 break
             except ConnectionClosed as why:
@@ -166,11 +168,13 @@ class XelaSource(DeviceSource):
         return True
 
     def _disconnect(self) -> None:
+        # Set to None first: nothing uses it while it closes.
         connection, self._connection = self._connection, None
         if connection is None:
             return
         with suppress(OSError, WebSocketException):
             connection.close()
+        # It ends a little after the connection: no thread outlives the source.
         keepalive = getattr(connection, "keepalive_thread", None)
         if keepalive is not None:
             keepalive.join(XELA_CONNECT_TIMEOUT)

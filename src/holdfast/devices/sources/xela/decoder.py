@@ -50,6 +50,7 @@ class XelaDecoder:
         self._sensor = sensor
         self.version = ""
         self._assembler = Assembler(hold_refusals=True)
+        # Counter and time of the newest packet: a server repeats it while nothing new comes.
         self._newest: tuple[int, float] | None = None
 
     @property
@@ -116,6 +117,7 @@ class XelaDecoder:
                 part = read_sensor(raw, calibrated=self._calibrated)
                 readings = _checked(part.taxels, part.readings())
                 fits = self._assembler.accepts_taxels(number, len(readings), received)
+                # Version 1.8 repeats a sensor whose next sample has not come, with its old stamp.
                 if fits and self._assembler.is_new(number, part.time):
                     self._assembler.add(number, readings, part.time)
             except InvalidPacket as why:

@@ -34,6 +34,7 @@ def xela_devices(
     devices = {}
     for number, (model, n_taxels) in found.items():
         if number in hands:
+            # Two hands have the same names of modules; one hand has them without a prefix.
             prefix = f"hand{number}/" if len(hands) > 1 else ""
             modules = _built_in(number, model, n_taxels)
             order = np.concatenate([hands[number].modules[name].flat_indices for name in modules])
@@ -42,7 +43,7 @@ def xela_devices(
         else:
             name = names.get(number, f"finger{number}")
             device = _separate(number, name, model, n_taxels, given)
-        if calibrated:
+        if calibrated:  # the range is that of counts
             units = {n: replace(m, unit="N", range=None) for n, m in device.modules.items()}
             device = replace(device, modules=units)
         devices[number] = device
@@ -74,6 +75,7 @@ def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
 
 
 def _check(devices: Mapping[int, Device], names: Mapping[int, str], given: Sensor | None) -> None:
+    # The modules of a whole hand have fixed names and layouts.
     separate = [device for device in devices.values() if device.order is None]
     present = ", ".join(f"{device.number} ({device.model})" for device in devices.values())
     if unknown := sorted(set(names) - {device.number for device in separate}):

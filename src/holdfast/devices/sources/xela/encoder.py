@@ -128,7 +128,7 @@ class XelaEncoder:
         sensors: dict[str, Any] = {}
         for number, (part, constant) in enumerate(zip(self._parts, self._constant, strict=True), 1):
             readings = part.readings(samples)
-            if readings is not None:
+            if readings is not None:  # a server leaves out a sensor without a sample
                 own = time if times is None or self.is_hand else times[part.names[0]]
                 sensors[str(number)] = self._sensor(number, part, *readings, constant, own)
         top: dict[str, Any] = {"message": self._counter, "time": time, "sensors": len(sensors)}
@@ -207,6 +207,8 @@ class SampleBatcher:
     def __init__(self, modules: Iterable[str], *, own_stamps: bool) -> None:
         self._modules = frozenset(modules)
         self._own_stamps = own_stamps
+        # The newest sample of each module and its time; which of them were not passed on; and
+        # when the first came. `add` fills them, `flush` passes them on.
         self._samples: dict[str, npt.NDArray[Any]] = {}
         self._times: dict[str, float] = {}
         self._new: set[str] = set()
@@ -216,6 +218,7 @@ class SampleBatcher:
         """Add the samples of one instant [s]; yield the batches that are complete, in order."""
         if self._first_time is None:
             self._first_time = time
+        # A module has its next sample: the packet before is as complete as it gets.
         if not self._own_stamps and not self._new.isdisjoint(samples):
             yield from self.flush()
         self._samples.update(samples)
@@ -282,6 +285,8 @@ class _WholeHand:
         """Return the readings, or None without a sample."""
         found = {name: sample for name, sample in samples.items() if name in self._indices}
         read = {name: _readings(name, self._sensors[name], one) for name, one in found.items()}
+        # Taxels of modules that the source lacks move by their noise, as real ones do: constant
+        # readings would be the fault `stuck`.
         counts = self._rest[self._n_packets % N_REST_SAMPLES].copy()
         counts[self._present] = self._counts[self._present]
         self._n_packets += 1
@@ -306,6 +311,7 @@ def _readings(name: str, sensor: Sensor, given: npt.NDArray[Any]) -> _Readings |
         return given.astype(np.uint16), None
     if not np.isfinite(given).all():
         return None
+    # Limits by half a count: what rounds to a uint16 is one.
     low, high = given.min(), given.max()
     if not (low > -0.5 and high < 65535.5):
         raise ValueError(
