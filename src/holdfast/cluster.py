@@ -62,7 +62,10 @@ def call_on_cluster(
             copies = _watched(
                 client, lambda: client.scatter(list(shared), broadcast=True, hash=False)
             )
+        # The digest goes with each call: a worker may join while the calls run.
         common = (package_digest(), function, *copies)
+        # Calls that were on a worker that died: one of them may have killed it, which shows when
+        # each is made alone.
         suspects: list[Call[K]] = []
         yield from _submit(client, common, calls, suspects)
         for call in suspects:
@@ -123,6 +126,7 @@ def _submit(
     """Make calls on a cluster; append to `suspects` those whose workers died."""
     from distributed import KilledWorker
 
+    # A queue, as calls are added while others run, and a wait must end if there is no worker.
     done: SimpleQueue[Future] = SimpleQueue()
     waiting: dict[str, tuple[Call[K], Future]] = {}
     rest = iter(calls)

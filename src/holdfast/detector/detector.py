@@ -96,6 +96,7 @@ class Detector:
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
         known = declared_baselines({BASELINES: baselines}, sensors)
         plan = replace(plan, start=Start(in_contact, known))
+        # Last, so that a wrong finger or taxel is reported first, as by `for_recording`.
         if plan.tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
@@ -124,6 +125,7 @@ class Detector:
             ValueError: a tare by interval finds no samples, or `ignore` names a finger or a
                 taxel that does not exist.
         """
+        # Past `__init__`, which refuses the tare by interval that a recording may have.
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
         plan = _ignoring(model.plan(sensors, recording.rate), ignore)
@@ -132,6 +134,8 @@ class Detector:
 
     def _start(self, model: Model, stream: FeatureStream) -> None:
         plan = stream.plan
+        # What holds for the life of the detector; only `set_model` and `set_thresholds` replace
+        # parts and rules. `_readings` and `_present` are memory for samples of other types.
         self._names = (*plan.fingers, HAND)
         self._settings = tables.model_table(model, plan)
         self._parts = [model.finger(*finger) for finger in plan.sensors.items()]
@@ -147,6 +151,8 @@ class Detector:
     def _use(self, stream: FeatureStream) -> None:
         """Set a new feature stream, and an empty decision memory."""
         self._stream = stream
+        # The kernel appends to `_transitions` at each change; `events` and `run` turn them into
+        # events, so that an update makes no Python objects for them.
         self._changes = StateChanges(self._names)
         self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
         self._transitions: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
@@ -203,6 +209,7 @@ class Detector:
                 f"threshold of {', '.join(sorted(unknown))} given; "
                 f"the detector has {', '.join(self._slots)}"
             )
+        # A copy, so that nothing has changed if the kernel refuses it.
         limits, heads, weights = self._rules
         rules = limits, [dict(head) for head in heads], weights
         for finger, threshold in thresholds.items():
@@ -229,6 +236,7 @@ class Detector:
                 is not linear; nothing has changed then.
         """
         plan = self._stream.plan
+        # The features first: rules over other features cannot be compared.
         features = {name: model.finger(name).features for name in plan.sensors}
         parts = [model.finger(*finger) for finger in plan.sensors.items()]
         if self._feeder is not None or not _are_linear(parts) or features != dict(plan.features):
@@ -265,6 +273,7 @@ class Detector:
             estimate = self._kernel.update(samples, time)
             if estimate is not None:
                 return estimate
+        # The time first: `_store` changes the memory for samples, which a wrong time must not.
         time = float(time)
         self._check_time(time)
         self._store(samples)
@@ -293,6 +302,7 @@ class Detector:
             StreamError: the recording has no sample of the fingers, another number of taxels,
                 or begins before the last sample.
         """
+        # All is checked before the first sample: a recording is processed as a whole or not.
         modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
         if not any(module.n_samples for module in modules.values()):
             raise StreamError(
@@ -314,6 +324,7 @@ class Detector:
             if self._feeder is None:
                 self._kernel.run(readings, present, times, numbers, hand)
             else:
+                # One by one: the log odds of a sample depend on the features up to it.
                 for k, time in enumerate(times.tolist()):
                     self._kernel.give(self._feeder.log_odds(readings[k], present[k], time))
                     row = slice(k, k + 1)
@@ -439,7 +450,7 @@ class OnnxFeeder:
         self._kernel = stream.start()
         self._features = np.empty((1, len(parts), stream.plan.width))
         self._amplitude = np.empty((1, len(parts)))
-        self._log_odds = np.zeros(len(parts))
+        self._log_odds = np.zeros(len(parts))  # of the latest sample of each finger
         self._rules = {
             place: (part.indices(part.stable), part.stable.rule)
             for place, part in enumerate(parts)
@@ -455,6 +466,7 @@ class OnnxFeeder:
             features = self._features[:, place, columns]
             if present[place] and not np.isnan(features).any():  # NaN: the finger has none
                 probability = onnx.probability(features)[0]
+                # A probability of 0 or 1 is an infinite logit, which the kernel accepts.
                 with np.errstate(divide="ignore"):
                     self._log_odds[place] = np.log(probability / (1.0 - probability))
         return self._log_odds

@@ -77,6 +77,8 @@ def shapes(rules: Rules) -> list[tuple[object, ...]]:
 
 
 def _contact(part: FingerModel) -> Struct:
+    # In this order: a model of relative features has a limit by load, and a limit in the unit of the
+    # readings, which was measured, is better than a multiple of the noise.
     for kind, limit in (
         (BY_LOAD, part.contact_load),
         (BY_FORCE, part.contact_threshold),
@@ -100,10 +102,12 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     # A head reads the features up to the last that it uses; those of slips read all.
     is_slip = head.name in ("slip", "slip_speed")
     n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
+    # A row is the intercept, then a weight for each feature: 0 for those that it does not use.
     rows = np.zeros((head.rule.n_outputs, n + 1))
     rows[:, np.append(0, columns + 1)] = head.rule.raw_weights()
     squares = np.zeros((3 if head.rule.squares else 0, n))
     squares[:, columns] = head.rule.raw_squares()[: len(squares)]
+    # The kernel goes through the causes in the order of their codes, whatever that of the model.
     codes = [CAUSES.index(cause) + 1 for cause in head.classes]
     order = np.argsort(codes)
     kept = [k for k in order if part.slip is None or codes[k] != SLIP_CODE]

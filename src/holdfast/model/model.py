@@ -83,6 +83,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise ModelError(f"a model for any finger ('*') has no others; {list(self.fingers)}")
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
             raise ModelError(f"a rate above 0 Hz expected, {self.rate} given")
+        # A model file is untrusted: each limit bounds the memory that a detector would allocate.
         check_limit("samples in a second", self.rate or 0, MAX_RATE)
         check_limit("fingers", max(len(self.fingers), len(self.sensors)), MAX_FINGERS)
         check_limit("samples in a window", self.window, MAX_WINDOW)
@@ -94,6 +95,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                     f"finger {name!r} names the sensor {finger.sensor!r}; "
                     f"the model holds {list(self.sensors)}"
                 )
+        # Both raise for what cannot be used.
         Tare.parse(self.tare)
         FeatureSpec("sigma", self.window)
 
@@ -241,6 +243,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """
         if ANY_FINGER in self.fingers:
             wanted = self.fingers[ANY_FINGER].sensor
+            # Pads and the palm have a slash: a model of any finger was trained on fingertips.
             tips = {name: s for name, s in modules.items() if "/" not in name} or dict(modules)
             fitting = {n: s for n, s in tips.items() if wanted is None or s.name == wanted}
             if wanted is not None and not fitting:
@@ -327,6 +330,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
                 f"{known.n_taxels} ({known.name})"
             )
+        # The unit after the kind: another sensor has often another unit as well.
         if sensor.unit != known.unit:
             raise _other_sensor(
                 f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"
