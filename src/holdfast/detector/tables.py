@@ -77,8 +77,8 @@ def shapes(rules: Rules) -> list[tuple[object, ...]]:
 
 
 def _contact(part: FingerModel) -> Struct:
-    # In this order: a model of relative features has a limit by load, and a limit in the unit of the
-    # readings, which was measured, is better than a multiple of the noise.
+    # In this order: a model of relative features has a limit by load; and a limit in the unit of
+    # the readings, which was measured, is better than a multiple of the noise.
     for kind, limit in (
         (BY_LOAD, part.contact_load),
         (BY_FORCE, part.contact_threshold),
