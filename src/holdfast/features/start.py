@@ -90,7 +90,7 @@ def declared_baselines(
         try:
             baseline = np.array(stated[finger], dtype=np.float64)
         except (TypeError, ValueError):
-            baseline = np.empty(0)  # no numbers: refused by its shape
+            baseline = np.empty(0)  # words, or rows of different lengths: refused by its shape
         n_taxels = sensors[finger].n_taxels
         if baseline.shape != (n_taxels, 3) or not np.isfinite(baseline).all():
             raise ValueError(

@@ -12,6 +12,7 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
+    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -52,7 +53,7 @@ def detect(
     *,
     options: DetectorOptions,
     start: StartOptions,
-    csv: CsvOptions,
+    csv: Annotated[CsvOptions, RARE],
     seconds: SecondsOption = None,
     as_json: JsonOption = False,
 ) -> None:
