@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import holdfast
+from holdfast import children
 from holdfast.classifiers import recipe, recipe_names
-from holdfast.cli import doctor, main
+from holdfast.cli import main
 from holdfast.cli.extensions import (
     EXPORTER_PLUGINS,
     PANEL_PLUGINS,
@@ -19,6 +20,7 @@ from holdfast.cli.extensions import (
     PUBLISHER_PLUGINS,
     SIMULATOR_PLUGINS,
     flags_of,
+    plugin_states,
 )
 from holdfast.devices.uri import open_source, parse
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, RecordingError
@@ -265,7 +267,7 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
 
 @pytest.mark.slow  # doctor imports each plug-in in a process of its own
 def test_doctor_lists_them(parts, capsys, monkeypatch):
-    monkeypatch.setattr(doctor, "_ask_child", functools.cache(doctor._ask_child))
+    monkeypatch.setattr(children, "answer_of_child", functools.cache(children.answer_of_child))
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
@@ -288,11 +290,11 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
 )
 def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     if name == "hang":
-        monkeypatch.setattr(doctor, "PLUGIN_TIMEOUT", 3.0, raising=False)
+        monkeypatch.setattr(children, "CHILD_TIMEOUT", 3.0)
     points = {"holdfast.laws": {name: f"parts:{name}"}}
     install(tmp_path / "more", "bad", {"parts.py": PARTS}, points)
     with on_the_path(tmp_path / "more", monkeypatch):
-        found = {plugin.name: plugin.error for plugin in doctor._plugins()}
+        found = {plugin.name: plugin.error for plugin in plugin_states()}
     assert error in found[name]
 
 

@@ -12,11 +12,10 @@ from holdfast.features import Tare
 from holdfast.features.specs import (
     ANY_FEATURES,
     ANY_LAGS,
-    MEAN_SECOND_KINDS,
     RELATIVE_KINDS,
-    SECOND_KINDS,
     SLIP_FEATURES,
     FeatureSpec,
+    kinds_of,
 )
 from holdfast.features.stream import extract
 from holdfast.features.tables import (
@@ -234,7 +233,7 @@ def test_a_second_difference_does_not_see_a_steady_motion_but_a_jolt():
     readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
     readings[40:] += np.linspace(0, 1, 50)[:, None, None]
     readings[80:, 4] += 0.01
-    found = features_of(readings, given, specs=of_kinds((*SECOND_KINDS, *MEAN_SECOND_KINDS)))
+    found = features_of(readings, given, specs=of_kinds(kinds_of("second", "mean_second")))
     assert (np.abs(found[60:80, :5]) < 1.5).all()
     assert (found[80, [0, 3]] > 2.5).all()
     assert (found[80, [5, 8]] < found[80, [0, 3]]).all()

@@ -123,7 +123,7 @@ VERBS = [
     ("evaluating", "evaluate builtin:noise-floor data"),
     ("reading", "info data --json"),
     ("importing", "import data {out} --suffix mcap --jobs 1 --json"),
-    ("labelling", "label --auto signal data --dry-run --jobs 1 --json"),
+    ("labelling", "label auto signal data --dry-run --json"),
     ("gaps 0", "record grasp.parquet {out}/a.mcap --speed 0 --json"),
 ]
 """Words on the bar of a verb, and its command line: each kind of display and of result once."""
