@@ -223,17 +223,6 @@ def test_mostly_slip_is_refused():
     assert hand.stream.model == normalised_model()
 
 
-def test_faults_are_refused():
-    recording = handled(held=12.0)
-    thumb = recording.modules["thumb"]
-    readings = np.array(thumb.readings)
-    readings[600:1100] = np.nan
-    modules = {**recording.modules, "thumb": replace(thumb, readings=readings)}
-    hand, document = held_until_finish(replace(recording, modules=modules))
-    refused(document, "thumb: ", "% of the handling has faults (not_finite)")
-    assert hand.stream.model == normalised_model()
-
-
 def test_an_empty_hand_is_refused(monkeypatch):
     hand = Stepped(handled(force=0.0))
     hand.calibration.start()
