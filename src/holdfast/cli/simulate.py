@@ -10,6 +10,7 @@ import typer
 
 from holdfast.cli.extensions import SimulatorOptions
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     ForceOption,
     FpsOption,
@@ -37,7 +38,9 @@ class GraspOptions:
         str, typer.Option(help="Names of objects, separated by commas; by default all objects.")
     ] = ""
     table: Annotated[
-        Path | None, typer.Option(help="Your own objects: a .toml file like that of the twin.")
+        Path | None,
+        typer.Option(help="Your own objects: a .toml file like that of the twin."),
+        RARE,
     ] = None
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2"
     repeats: Annotated[
@@ -50,6 +53,7 @@ class GraspOptions:
             help="Profile of grip and disturbances: gentle, reference, vigorous, slips, "
             "long-hold, finger-gentle, ..."
         ),
+        RARE,
     ] = "reference"
     seed: SeedOption = 0
     server: Annotated[
@@ -57,6 +61,7 @@ class GraspOptions:
         typer.Option(
             "--server", help="Add irregular times and repeated packets, as a XELA server has."
         ),
+        RARE,
     ] = False
 
     def plan(self, engine: "Engine") -> "list[Grasp]":
@@ -78,7 +83,7 @@ def simulate(
     ],
     *,
     options: GraspOptions,
-    simulators: SimulatorOptions,
+    simulators: Annotated[SimulatorOptions, RARE],
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     film: Annotated[
@@ -86,6 +91,7 @@ def simulate(
         typer.Option(
             help="Write a film of the first grasp to this .gif, .png, .webp or .mp4 file."
         ),
+        RARE,
     ] = None,
     video: Annotated[
         bool,
@@ -110,7 +116,7 @@ def simulate(
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
     that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
-    --repeats, --grasps, --seed, --engine, --jobs and --force apply then. With --engine
+    --repeats, --grasps, --seed, --engine, --jobs and --force apply then (--help-all). With --engine
     dask:ADDRESS, the workers write into OUT, which all machines need at the same path.
 
     Example:
