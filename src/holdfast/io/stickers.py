@@ -152,7 +152,7 @@ class _Sticker:
     def start(self, corners: Array) -> None:
         """Take the place from the corners (4, 2) [pixels]."""
         plane = np.column_stack([CORNERS, np.ones(4)])
-        self.place = np.linalg.lstsq(plane, corners.astype(np.float64), rcond=None)[0].T
+        self.place: Array = np.linalg.lstsq(plane, corners.astype(np.float64), rcond=None)[0].T
 
     def follow(self, grey: Picture) -> bool:
         """Find the sticker near its last place; return whether it is there."""

@@ -70,4 +70,4 @@ def _is_black(number: int) -> "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]":
     import cv2
 
     book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
-    return np.asarray(cv2.aruco.generateImageMarker(book, number, 6)) == 0
+    return np.asarray(cv2.aruco.generateImageMarker(book, number, 6) == 0, dtype=np.bool_)

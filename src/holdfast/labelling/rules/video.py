@@ -5,9 +5,10 @@ So the motion that is seen is explained by the force that is felt, and by how th
 
     q = C F + L r + d
 
-q is the place of a fingertip on the object in the plane of the picture, F its force, r the turns of
-both bodies. C and L are fitted to changes, by the least sum of distances, in which sliding is an
-outlier. What remains, d, is flat while the finger sticks, and moves for good when it has slid.
+q is the place of a fingertip on the object, in the plane of the object's sticker, F its force, r
+the turns of both bodies. C and L are fitted to changes, by the least sum of distances, in which
+sliding is an outlier. What remains, d, is flat while the finger sticks, and moves for good when it
+has slid.
 """
 
 from collections.abc import Mapping
@@ -121,7 +122,7 @@ class TipMotion(NamedTuple):
     """Motion of a fingertip on the object, on a regular grid of pictures.
 
     Attributes:
-        place: (n, 2) in the plane of the picture, along the object [mm].
+        place: (n, 2) in the plane of the object's sticker, along its sides [mm].
         turns: (n, 7) turn in the picture and tilts of both bodies [TURN_SCALE mm].
         seen: (n,) where both stickers are seen.
     """
@@ -160,9 +161,11 @@ def propose(
     times, places = read_stickers(video, fps)
     tips = tip_motions(times, places, stickers_of(recording, bodies), rule, video)
     grid = regular_grid(times)
-    clock = VideoClock(offset, 0.0)
-    if offset is None:
-        clock = video_clock(recording, tips, grid, how, video)
+    clock = (
+        video_clock(recording, tips, grid, how, video)
+        if offset is None
+        else VideoClock(offset, 0.0)
+    )
     base = signal.propose(recording, how)
     labels = {}
     for finger, tip in tips.items():
@@ -237,6 +240,8 @@ def tip_motions(
     base, seen = tracks[OBJECT]
     turn, tilt = _turns(base)
     across, along = np.cos(turn), np.sin(turn)
+    usual = np.median(base[:, :, :2], axis=0)
+    flatten = np.median(scales[OBJECT]) * np.linalg.inv(usual)  # the camera looks aslant
     motions = {}
     for body in good:
         if body == OBJECT:
@@ -254,9 +259,10 @@ def tip_motions(
             - rule.object_size * base[:, :, 2] / scales[OBJECT][:, None]
         )
         tip_turn, tip_tilt = _turns(track)
-        place = np.column_stack(
+        upright = np.column_stack(
             [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
         )
+        place = upright @ flatten.T
         n = n_samples_of(TURN_TIME, grid[1] - grid[0])
         turns = np.column_stack([tip_turn - turn, _mean(np.column_stack([tilt, tip_tilt]), n)])
         motions[body] = TipMotion(place, TURN_SCALE * turns, seen & tip_seen)
@@ -512,7 +518,7 @@ def _robust_fit(known: Array, change: Array) -> tuple[Array, Array]:
         fit = np.linalg.solve(weighted.T @ known + ridge, weighted.T @ change)
         distances = np.linalg.norm(change - known @ fit, axis=1)
         weights = 1 / np.maximum(distances, 0.02)  # below the noise of a place, all count alike
-    return fit, distances
+    return np.asarray(fit), np.asarray(distances)
 
 
 def _step_size(values: Array, n: int) -> Array:
