@@ -77,6 +77,11 @@ SourceArgument = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what exists already.")]
+FpsOption = Annotated[
+    float | None,
+    typer.Option("--fps", help="Pictures per second of a video.", show_default="60, or its stamps"),
+    RARE,
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers."), RARE]
 JobsOption = Annotated[
     int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor."), RARE
