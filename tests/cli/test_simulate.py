@@ -231,7 +231,7 @@ MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, fri
 
 
 def test_an_own_object(tmp_path):
-    from holdfast.cli.simulate import plan_grasps
+    from holdfast.twin_recordings import plan_grasps
 
     table = tmp_path / "mine.toml"
     table.write_text(MUG)
