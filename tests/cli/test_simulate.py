@@ -11,10 +11,9 @@ import pytest
 
 from holdfast import files
 from holdfast.cli import main
-from holdfast.cli import simulate as verb
 from holdfast.io import load_dataset, load_recording
 from holdfast.twin import simulation
-from holdfast.twin.profile import profile
+from holdfast.twin.profile import GRASP_ATTEMPTS, profile
 
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
 WEAK = msgspec.structs.replace(SHORT, grip=0.2)
@@ -132,7 +131,7 @@ class TestFailures:
     def test_are_kept_and_repeated_a_limited_number_of_times(self, capsys, out, weak):
         code, printed, _ = run(capsys, out, *ONE, "--json")
         assert code == 0
-        assert weak == list(range(verb.GRASP_ATTEMPTS))
+        assert weak == list(range(GRASP_ATTEMPTS))
         assert names(out) == list(self.FAILED)
         assert json.loads(printed)["failed"] == [
             name.removesuffix(".parquet") for name in names(out)
