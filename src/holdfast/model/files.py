@@ -136,7 +136,9 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
 
 def encode(model: "Model") -> bytes:
     """Return the JSON of a model, without the contents of ONNX files; their digests are in it."""
-    return msgspec.json.encode(_with_contents(model, lambda _: b""), enc_hook=_encode_array)
+    fields = msgspec.to_builtins(_with_contents(model, lambda _: b""), enc_hook=_encode_array)
+    sensors = {name: sensor.to_dict() for name, sensor in model.sensors.items()}
+    return msgspec.json.encode(fields | {"sensors": sensors})
 
 
 def decode(data: bytes, kind: type[ModelT]) -> ModelT:
