@@ -20,7 +20,7 @@ from holdfast.twin.simulation import GRASP_CASES, Grasp
 from holdfast.twin.simulation import simulate as run
 
 T = TypeVar("T")
-Steps = Callable[[Iterable[T], str, float], Iterable[T]]
+GraspSteps = Callable[[Iterable[T], str, float], Iterable[T]]
 """Function that yields items, and shows what they are and how many there will be."""
 
 
@@ -79,7 +79,7 @@ def simulate_grasps(
     engine: Engine,
     force: bool,
     notify: Callable[[str], None],
-    steps: Steps[list[str]] = without_steps,
+    steps: GraspSteps[list[str]] = without_steps,
 ) -> list[str]:
     """Simulate the grasps whose recordings do not exist; return the names of new recordings.
 
@@ -110,7 +110,7 @@ def simulate_all(
     engine: Engine,
     force: bool,
     notify: Callable[[str], None],
-    steps: Steps[list[str]] = without_steps,
+    steps: GraspSteps[list[str]] = without_steps,
 ) -> list[str]:
     """Simulate what is missing, in parallel; return the names of the recordings.
 
