@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from holdfast.errors import OutputError
-from holdfast.files import file_stem
+from holdfast.files import file_stem, whole_file
 from holdfast.io import load_recording, save_recording
 from holdfast.parallel import Engine
 from holdfast.twin.objects import load_objects
@@ -192,3 +192,41 @@ def _is_finished(grasp: Grasp, out: Path) -> bool:
 
 def _exists(grasp: Grasp, path: Path) -> bool:
     return is_recorded(path, {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server})
+
+
+def film_all(
+    grasps: Sequence[Grasp],
+    out: Path,
+    fps: float | None,
+    *,
+    engine: Engine,
+    force: bool,
+    steps: "Callable[[Iterable[None], str, float], Iterable[None]]",
+) -> None:
+    """Write the videos of a webcam that do not exist; `label auto tracking` reads them.
+
+    Args:
+        grasps: those whose recordings are in the folder.
+        out: the folder.
+        fps: pictures per second of the webcam; None for its default.
+        engine: makes the calls.
+        force: overwrite videos.
+        steps: shows the progress.
+    """
+    paths = [engine.path(path_of(grasp.name, out)) for grasp in grasps]
+    missing = [path for path in paths if path.exists() and (force or not _video_of(path).exists())]
+    done = engine.map_ordered(film_recording, ((path, fps, force) for path in missing))
+    for _ in steps(done, "filming", len(missing)):
+        pass
+
+
+def film_recording(path: Path, fps: float | None, force: bool) -> None:
+    """Write the video of a recording beside it."""
+    from holdfast.twin.webcam import Webcam, film_stickers
+
+    with whole_file(_video_of(path), force=force) as part:
+        film_stickers(load_recording(path), part, Webcam() if fps is None else Webcam(fps=fps))
+
+
+def _video_of(path: Path) -> Path:
+    return path.with_suffix(".mp4")

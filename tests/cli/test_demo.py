@@ -5,9 +5,9 @@ import urllib.request
 import msgspec
 import pytest
 
+from command_line import Verb
 from holdfast import twin_recordings
 from holdfast.cli import demo as verb
-from holdfast.cli import main
 from holdfast.io import load_dataset
 from holdfast.model import Model
 from holdfast.parallel import Engine
@@ -31,10 +31,7 @@ def small(monkeypatch):
     )
 
 
-def run(capsys, *words):
-    code = main(["demo", *map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+run = Verb("demo").run
 
 
 def test_simulates_trains_and_replays(capsys, tmp_path):

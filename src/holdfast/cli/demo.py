@@ -85,7 +85,7 @@ def demo(
     metrics = evaluate(ours, recordings)
     trained = _train(recordings, model, seed, force)
     shown = recordings[-1]
-    n_updates = _replay(ours, shown, out, speed, False if as_json else browser)
+    n_updates = _replay(ours, shown, out, speed, page=_on_page(browser, speed, as_json=as_json))
     if as_json:
         print_json(
             {
@@ -138,17 +138,22 @@ def _train(recordings: "Sequence[Recording]", path: Path, seed: int, force: bool
     return named
 
 
-def _replay(
-    model: "Model", recording: "Recording", out: Path, speed: float, browser: bool | None
-) -> int:
+def _on_page(browser: bool | None, speed: float, *, as_json: bool) -> bool:
+    """Return whether the replay is shown on a page."""
+    from holdfast.cli.serve import has_browser
+
+    wanted = has_browser() and sys.stdin.isatty() if browser is None else browser
+    return bool(wanted and speed and not as_json)
+
+
+def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, page: bool) -> int:
     """Replay a recording on a page or in the terminal; return the number of estimates."""
     from holdfast.cli.demo_replay import TrueEvents, replay, replay_on_page
-    from holdfast.cli.serve import has_browser
 
     at_speed = f" at speed {speed:g}" if speed else ""
     print_message(f"5/5  replaying {recording.name} sample by sample{at_speed}")
     path = out / "recordings" / f"{recording.name}.parquet"
-    if speed and (has_browser() and sys.stdin.isatty() if browser is None else browser):
+    if page:
         replay_on_page(model, path, out / "recorded", speed)
         return 0
     return replay(model, path, speed, TrueEvents.of(model, recording))

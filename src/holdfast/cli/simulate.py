@@ -11,6 +11,7 @@ from holdfast.cli.options import (
     RARE,
     EngineOption,
     ForceOption,
+    FpsOption,
     JobsOption,
     JsonOption,
     SeedOption,
@@ -83,13 +84,21 @@ def simulate(
     simulators: Annotated[SimulatorOptions, RARE],
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
-    video: Annotated[
+    film: Annotated[
         Path | None,
         typer.Option(
-            help="Write a video of the first grasp to this .gif, .png, .webp or .mp4 file."
+            help="Write a film of the first grasp to this .gif, .png, .webp or .mp4 file."
         ),
         RARE,
     ] = None,
+    video: Annotated[
+        bool,
+        typer.Option(
+            "--video",
+            help="Write NAME.mp4 beside each recording: stickers on object and fingers, by webcam.",
+        ),
+    ] = False,
+    fps: FpsOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -113,16 +122,21 @@ def simulate(
       holdfast simulate hands/ --randomize --repeats 100
       holdfast simulate hands/ --randomize --repeats 12 --grasps 20
       holdfast simulate few/ --objects can,ball --cases 2 --repeats 1
+      holdfast simulate filmed/ --profile slips --cases 2 --repeats 1 --video
       holdfast simulate /shared/twin --engine dask:tcp://hub:8786
     """
-    require_extras("twin", "parquet")
+    require_extras("twin", "parquet", *(("video",) if video else ()))
     started = start_engine(engine, jobs)
     if chosen := simulators.chosen():
         profile, simulator, values = chosen[0]
         names = simulator.simulate(out, options, values, engine=started, force=force)
         text = f"{len(names)} recordings of {profile} hands in {out}"
     else:
-        names, profile = _simulate(options, out, video, started, force), options.profile
+        from holdfast.twin_recordings import film_all
+
+        names, profile = _simulate(options, out, film, started, force), options.profile
+        if video:
+            film_all(options.plan(started), out, fps, engine=started, force=force, steps=progress)
         n_failed = sum("-failed" in name for name in names)
         text = f"{len(names)} recordings in {out}, {n_failed} of them of failed grasps"
     if as_json:
@@ -133,24 +147,26 @@ def simulate(
 
 
 def _simulate(
-    options: GraspOptions, out: Path, video: Path | None, engine: "Engine", force: bool
+    options: GraspOptions, out: Path, film: Path | None, engine: "Engine", force: bool
 ) -> list[str]:
-    """Simulate the grasps of an Allegro hand, and the video if it is wanted."""
+    """Simulate the grasps of an Allegro hand, and the film if it is wanted."""
     from holdfast.files import refuse_overwrite, whole_file
     from holdfast.twin_recordings import simulate_grasps
 
-    if video is not None:
-        from holdfast.twin.render import check_film, film
+    if film is not None:
+        from holdfast.twin.render import check_film
 
-        check_film(video)
-        refuse_overwrite(video, force=force)
+        check_film(film)
+        refuse_overwrite(film, force=force)
     planned = options.plan(engine)
     out.mkdir(parents=True, exist_ok=True)
     names = simulate_grasps(
         planned, out, engine=engine, force=force, notify=print_message, steps=progress
     )
-    if video is not None:
+    if film is not None:
+        from holdfast.twin.render import film as render
+
         print_message(f"rendering {planned[0].name}: about a minute")
-        with whole_file(video, force=force) as part:
-            film(planned[0], part)
+        with whole_file(film, force=force) as part:
+            render(planned[0], part)
     return names

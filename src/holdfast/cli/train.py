@@ -9,10 +9,10 @@ from holdfast.cli.options import (
     RARE,
     EngineOption,
     ForceOption,
-    InContactOption,
     JobsOption,
     JsonOption,
     ModelOutput,
+    StartOptions,
     start_engine,
 )
 from holdfast.cli.scores import KEPT_RULE, print_metrics, print_slips, print_verdict
@@ -33,6 +33,7 @@ def train(
     data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
     model: ModelOutput,
     options: TrainingOptions,
+    *,
     init: Annotated[
         str | None,
         typer.Option(help="Model to adapt, with its features: a file, or builtin:any."),
@@ -43,7 +44,7 @@ def train(
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     force: ForceOption = False,
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
     r"""Train a model from labelled recordings.
@@ -67,7 +68,6 @@ def train(
     """
     require_extras("train")
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset
     from holdfast.labelling.review.findings import report_hidden_labels
     from holdfast.training import train as fit
     from holdfast.training.tuning import search_journal
@@ -78,7 +78,7 @@ def train(
     started = start_engine(engine, jobs)
     if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
-    recordings = load_dataset(started.path(data), in_contact=in_contact)
+    recordings = start.load_dataset(started.path(data))
     report_hidden_labels(recordings.paths, print_message)
     journal = search_journal(model, resume=resume, force=force)
     try:

@@ -22,8 +22,8 @@ from holdfast.labelling.server.store import ModuleLabels, revision_of, save_stor
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.recordings import Recording
 
-LabelsOf = Callable[[Recording], ModuleLabels]
-"""Function that returns the labels of a recording."""
+LabelsOf = Callable[[Recording, Path], ModuleLabels]
+"""Function that returns the labels of a recording, from it and its path."""
 
 
 def recordings_at(paths: Sequence[Path]) -> list[Path]:
@@ -104,7 +104,7 @@ def compare_file(
     """Return the name of a recording, with the agreement of A and B or why it is left out."""
     try:
         recording = load_recording(path, labels=False)
-        a, b = labels_of_a(recording), labels_of_b(recording)
+        a, b = labels_of_a(recording, path), labels_of_b(recording, path)
         if not (any(a.values()) and any(b.values())):
             side = "B" if any(a.values()) else "A"
             return recording.name, f"{side} has no labels of this recording"
@@ -153,7 +153,7 @@ def label_file(
 
     Args:
         path: of the recording.
-        labels_of: returns its labels.
+        labels_of: returns its labels; called with the recording and its path.
         author: of the label file.
         time: of the label file, in ISO 8601 format; without it nothing is written.
 
@@ -166,7 +166,7 @@ def label_file(
     """
     try:
         recording = load_recording(path, labels=False)
-        labels = labels_of(recording)
+        labels = labels_of(recording, path)
         if time is not None:
             existing = labels_for(path, recording.digest)
             note = "" if existing is None else load_labels(labels_path(path)).notes

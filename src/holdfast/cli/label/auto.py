@@ -1,6 +1,7 @@
 """`holdfast label auto`: write the labels that a rule proposes."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -34,6 +35,7 @@ def auto(
 
     Example:
       holdfast label auto signal recordings/ --dry-run --json
+      holdfast label auto tracking grasp.parquet --video webcam.mp4
       holdfast label auto tracking grasp.parquet --poses markers.csv
       holdfast label auto tracking grasp.mcap --poses run.bag \
         --track object=/aruco/pose
@@ -45,8 +47,8 @@ def auto(
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
     options.arguments(rule)
 
-    def labels_of(recording: "Recording") -> "ModuleLabels":
-        return options.propose(rule, recording)
+    def labels_of(recording: "Recording", path: Path) -> "ModuleLabels":
+        return options.propose(rule, recording, path)
 
     documents = label_all(paths, labels_of, author or f"rule:{rule}", saving)
     _report_loaded_starts(documents, options.tare)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.label.inputs import AnnotatorOption, RuleOptions
-from holdfast.cli.options import JsonOption
+from holdfast.cli.options import RARE, JsonOption
 from holdfast.cli.terminal.console import (
     format_number,
     print_json,
@@ -31,7 +31,7 @@ def compare(
     a: Annotated[Path, typer.Argument(help="A: recordings, labels of them, or a rule.")],
     b: Annotated[Path, typer.Argument(help="B: likewise; one of both is no rule.")],
     *,
-    options: RuleOptions,
+    options: Annotated[RuleOptions, RARE],
     annotator: AnnotatorOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,8 +54,8 @@ def compare(
 
     def labels_of(place: Path) -> "LabelsOf":
         if is_rule(place):
-            return lambda recording: options.propose(str(place), recording)
-        return lambda recording: read_labels(place, recording, annotator)
+            return lambda recording, _: options.propose(str(place), recording)
+        return lambda recording, _: read_labels(place, recording, annotator)
 
     files = recordings_to_compare(a, b)
     both = labels_of(a), labels_of(b)
