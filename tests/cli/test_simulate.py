@@ -179,7 +179,7 @@ class TestFailures:
         (("--repeats", "0"), "repeats of at least 1"),
         (("--seed", "-1"), "a seed of at least 0 expected; 5 and -1 given"),
         (("--seed", "one"), "Invalid value for '--seed'"),
-        (("--video", "film.avi"), "film.avi"),
+        (("--film", "film.avi"), "film.avi"),
     ],
 )
 def test_bad_input_is_one_line_and_makes_no_folder(capsys, out, words, text):

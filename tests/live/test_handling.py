@@ -43,10 +43,16 @@ class Stepped:
         self.source = build.Script.of(recording, patient=True)
         self.stream = StreamDetector(model or normalised_model(), self.source, **options)
         self.session = Session(self.stream)
-        self.session._request = lambda work, consequence: work()
+        self._append = self.session._requests.append
+        self.session._requests.append = self._carry_out
         self.calibration = SessionCalibration(self.session, folder)
         self.estimates = []
         self.session.add_listener(self.keep)
+
+    def _carry_out(self, work):
+        future = self._append(work)
+        self.session._requests.carry_out()
+        return future
 
     def keep(self, update):
         self.estimates += [estimate for estimate, _ in update.estimates]

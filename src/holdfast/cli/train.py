@@ -12,11 +12,11 @@ from holdfast.cli.options import (
     FittingTareOption,
     ForceOption,
     HysteresisOption,
-    InContactOption,
     JobsOption,
     JsonOption,
     ModelOutput,
     SeedOption,
+    StartOptions,
     start_engine,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
@@ -163,6 +163,7 @@ def train(
     data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
     model: ModelOutput,
     options: TrainingOptions,
+    *,
     init: Annotated[
         str | None,
         typer.Option(help="Model to adapt, with its features: a file, or builtin:any."),
@@ -173,7 +174,7 @@ def train(
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     force: ForceOption = False,
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
     r"""Train a model from labelled recordings.
@@ -197,7 +198,6 @@ def train(
     """
     require_extras("train")
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset
     from holdfast.labelling.review.findings import report_hidden_labels
 
     setting = options.setting(init)
@@ -205,7 +205,7 @@ def train(
     started = start_engine(engine, jobs)
     if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
-    recordings = load_dataset(started.path(data), in_contact=in_contact)
+    recordings = start.load_dataset(started.path(data))
     report_hidden_labels(recordings.paths, print_message)
     journal = _search_journal(model, resume=resume, force=force)
     trained = _fit(recordings, setting, journal, started)

@@ -94,7 +94,7 @@ def _manual_author(path: Path) -> str | None:
 
 def label_file(
     path: Path,
-    labels_of: Callable[[Recording], ModuleLabels],
+    labels_of: Callable[[Recording, Path], ModuleLabels],
     author: str,
     time: str | None,
 ) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def label_file(
 
     Args:
         path: of the recording.
-        labels_of: returns its labels.
+        labels_of: returns its labels; called with the recording and its path.
         author: of the label file.
         time: of the label file, in ISO 8601 format; without it nothing is written.
 
@@ -115,7 +115,7 @@ def label_file(
     """
     try:
         recording = load_recording(path, labels=False)
-        labels = labels_of(recording)
+        labels = labels_of(recording, path)
         if time is not None:
             existing = labels_for(path, recording.digest)
             note = "" if existing is None else load_labels(labels_path(path)).notes

@@ -170,7 +170,9 @@ def _in_picture(
     stickers, heights = {}, []
     for finger in VISIBLE:
         tip = truth.fingers[finger]["tip_pose"]
-        bodies.append((170.0, 0.0136 * per_metre, seen(tip, np.array([[-0.0, 0, -0.03], [0.0, 0, 0.018]]))))
+        bodies.append(
+            (170.0, 0.0136 * per_metre, seen(tip, np.array([[-0.0, 0, -0.03], [0.0, 0, 0.018]])))
+        )
         flat = np.array(FLAG) + _square(TIP_SIZE, [0.0, -1.0, 0.0], [0.0, 0.0, 1.0])
         stickers[FINGERS.index(finger) + 1] = seen(tip, flat)
         heights.append(tip[first, 2])

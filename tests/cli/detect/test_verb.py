@@ -19,7 +19,6 @@ from holdfast.devices.sources import open_source
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
-from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
@@ -612,12 +611,14 @@ def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
 
 def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
-    update = ArrivalDetector.update
+    update = StreamDetector.update
 
-    def late(detector, arrival):
-        return update(detector, arrival._replace(faults={"thumb": (Fault.LATE,)}))
+    def late(detector, arrival, **options):
+        if arrival is not None:
+            arrival = arrival._replace(faults={"thumb": (Fault.LATE,)})
+        return update(detector, arrival, **options)
 
-    monkeypatch.setattr(ArrivalDetector, "update", late)
+    monkeypatch.setattr(StreamDetector, "update", late)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     with (
         open_source(str(grasp)) as source,

@@ -50,6 +50,7 @@ def auto(
 
     Example:
       holdfast label auto signal recordings/ --dry-run --json
+      holdfast label auto tracking grasp.parquet --video webcam.mp4
       holdfast label auto tracking grasp.parquet --poses markers.csv
       holdfast label auto tracking grasp.mcap --poses run.bag \
         --track object=/aruco/pose
@@ -61,8 +62,8 @@ def auto(
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
     options.arguments(rule)
 
-    def labels_of(recording: "Recording") -> "ModuleLabels":
-        return options.propose(rule, recording)
+    def labels_of(recording: "Recording", path: Path) -> "ModuleLabels":
+        return options.propose(rule, recording, path)
 
     documents = label_all(paths, labels_of, author or f"rule:{rule}", saving)
     _report_loaded_starts(documents, options.tare)
@@ -71,7 +72,7 @@ def auto(
 
 def label_all(
     paths: Sequence[Path],
-    labels_of: "Callable[[Recording], ModuleLabels]",
+    labels_of: "Callable[[Recording, Path], ModuleLabels]",
     author: str,
     saving: SaveOptions,
 ) -> list[dict[str, Any]]:

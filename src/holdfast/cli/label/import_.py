@@ -52,7 +52,7 @@ def import_(
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
         raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
 
-    def labels_of(recording: "Recording") -> "ModuleLabels":
+    def labels_of(recording: "Recording", _: Path) -> "ModuleLabels":
         return read_labels(source, recording, annotator)
 
     documents = label_all(files, labels_of, author or annotator or login_name(), saving)
