@@ -4,6 +4,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import msgspec
+
 from holdfast.errors import RecordingError
 from holdfast.files import file_stem
 from holdfast.io.header import label_of
@@ -67,7 +69,13 @@ def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
 
 
 def _from_label_file(file: Path, recording: Recording) -> Labels:
-    found = load_labels(file)
+    try:
+        found = load_labels(file)
+    except RecordingError as cause:
+        # Any other JSON may be of a format whose package is missing.
+        if file.name.endswith(SUFFIX) or not isinstance(cause.__cause__, msgspec.DecodeError):
+            raise
+        raise RecordingError(f"{cause}{LABEL_PLUGINS.missing_text()}") from cause
     _check_digest(file, found.recording, found.name, recording)
     try:
         return {
