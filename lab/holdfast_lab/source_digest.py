@@ -42,16 +42,17 @@ def _closure(roots: Iterable[str], without: tuple[str, ...]) -> dict[str, Path]:
     while waiting:
         name = waiting.pop()
         path = _module_files().get(name)
-        if path is None or name in files or name in without or _only_shows(name):
+        if (
+            path is None
+            or name in files
+            or name in without
+            or any(name == package or name.startswith(f"{package}.") for package in WITHOUT_RESULTS)
+        ):
             continue
         files[name] = path
         files.update(_data_files(path.parent))
         waiting += _imported_modules(name)
     return files
-
-
-def _only_shows(name: str) -> bool:
-    return any(name == package or name.startswith(f"{package}.") for package in WITHOUT_RESULTS)
 
 
 @lru_cache
