@@ -321,9 +321,10 @@ def test_add_a_feature(copy_of, tmp_path):
     copy = copy_of("Add a feature")
     copy.change(
         "holdfast/features/specs.py",
-        ('"sigma_xyz", "change")\n"""Kinds that the kernel',
-         '"sigma_xyz", "change", "shear", "range")\n"""Kinds that the kernel'),
-        ('"sigma", "sigma_xyz", "change")', '"sigma", "sigma_xyz", "change", "range")'),
+        ('        # The change of F_tip, and its',
+         '        FeatureKind("shear", "force", "sample"),\n'
+         '        FeatureKind("range", "force", "window"),\n'
+         '        # The change of F_tip, and its'),
     )  # fmt: skip
     copy.change(
         "holdfast/kernel/kernel.h",

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from holdfast.classifiers import Linear
 from holdfast.contact import Cause
 from holdfast.features import FeatureSpec, parse_features
-from holdfast.features.specs import MEAN_SECOND_KINDS, RATIO_KINDS, SECOND_KINDS
+from holdfast.features.specs import kinds_of
 from holdfast.model import FingerModel, Head, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
@@ -29,11 +29,11 @@ RICH = (
 """Every kind, transform and scope, over several windows."""
 
 
-def sensor(n_taxels=2, name="tiny", rate=RATE, limits=(0.0, 1000.0), unit="count"):
+def sensor(n_taxels=2, name="tiny", rate=RATE, limits=(0.0, 1000.0), unit="count", magnetic=False):
     turns, _ = np.linalg.qr(np.random.default_rng(n_taxels).normal(size=(n_taxels, 3, 3)))
     turns *= np.linalg.det(turns)[:, None, None]
     places = np.arange(3.0 * n_taxels).reshape(-1, 3)
-    return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate, unit, limits)
+    return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate, unit, limits, magnetic)
 
 
 def linear(n_features, seed=0, **options):
@@ -76,7 +76,7 @@ SLIP_OWN = (
 """Features of a head of slips; the second is one of the head of stability, too."""
 TAXELS = tuple(
     FeatureSpec(kind, transform="relative", seconds=0.02)
-    for kind in (*SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
+    for kind in kinds_of("second", "mean_second", "ratio")
 )
 """Features of a head of slips that need the taxels."""
 

@@ -12,11 +12,10 @@ from holdfast.features import Tare
 from holdfast.features.specs import (
     ANY_FEATURES,
     ANY_LAGS,
-    MEAN_SECOND_KINDS,
     RELATIVE_KINDS,
-    SECOND_KINDS,
     SLIP_FEATURES,
     FeatureSpec,
+    kinds_of,
 )
 from holdfast.features.stream import extract
 from holdfast.features.tables import (
@@ -175,7 +174,7 @@ def test_are_known_from_the_second_sample_on():
     assert np.isfinite(found[1:]).all()
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(factor=st.floats(0.01, 100.0), seed=st.integers(0, 99))
 def test_do_not_depend_on_the_gain_of_the_sensor(factor, seed):
     given = sensor("papillarray")
@@ -234,7 +233,7 @@ def test_a_second_difference_does_not_see_a_steady_motion_but_a_jolt():
     readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
     readings[40:] += np.linspace(0, 1, 50)[:, None, None]
     readings[80:, 4] += 0.01
-    found = features_of(readings, given, specs=of_kinds((*SECOND_KINDS, *MEAN_SECOND_KINDS)))
+    found = features_of(readings, given, specs=of_kinds(kinds_of("second", "mean_second")))
     assert (np.abs(found[60:80, :5]) < 1.5).all()
     assert (found[80, [0, 3]] > 2.5).all()
     assert (found[80, [5, 8]] < found[80, [0, 3]]).all()

@@ -3,14 +3,7 @@
 import numpy as np
 
 from holdfast.features import Tare
-from holdfast.features.specs import (
-    MEAN_SECOND_KINDS,
-    OF_TWO_TAXELS,
-    RELATIVE_KINDS,
-    SECOND_KINDS,
-    WINDOWED,
-    FeatureSpec,
-)
+from holdfast.features.specs import KINDS, RELATIVE_KINDS, FeatureSpec, kinds_of
 from holdfast.features.tables import StreamPlan
 from holdfast.sensors import Sensor
 
@@ -42,14 +35,14 @@ def random_features(rng, n_taxels):
     relative, force = rng.random() < 0.6, rng.random() < 0.7
     seconds = rng.choice([0.004, 0.02, 0.1, 0.3], size=2, replace=False)
     for kind in RELATIVE_KINDS if relative else ():
-        is_second = kind in (*SECOND_KINDS, *MEAN_SECOND_KINDS)
-        if (kind in OF_TWO_TAXELS and n_taxels < 2) or rng.random() < 0.4:
+        is_second = kind in kinds_of("second", "mean_second")
+        if KINDS[kind].min_taxels > n_taxels or rng.random() < 0.4:
             continue
         scope = "hand" if rng.random() < 0.2 else "finger"
         lag = float(seconds[0] if is_second else rng.choice(seconds))
         specs.append(FeatureSpec(kind, transform="relative", scope=scope, seconds=lag))
     for kind in ("F_a", "F_x", "m", "sigma", "sigma_xyz", "change") if force or not specs else ():
-        window = int(rng.choice([2, 4, 6, 14, 30, 64])) if kind in WINDOWED else 0
+        window = int(rng.choice([2, 4, 6, 14, 30, 64])) if KINDS[kind].window == "window" else 0
         transforms = ["none", "log", "noise"] if kind == "sigma" and window > 2 else ["none", "log"]
         transform = str(rng.choice(transforms))
         for scope in ("finger", "hand") if rng.random() < 0.3 else ("finger",):

@@ -8,7 +8,7 @@ import pytest
 from detector.build import z_of
 from holdfast.detector import detect
 from holdfast.features import parse_features
-from holdfast.features.specs import OF_TWO_TAXELS, SLIP_FEATURES
+from holdfast.features.specs import SLIP_FEATURES
 from holdfast.training import Setting, train
 from holdfast.training.head_fits import MIN_SPEED_SAMPLES, fit_speed
 from holdfast.training.targets import TargetSamples, true_speed
@@ -90,7 +90,7 @@ class TestTrain:
         model, warnings = trained[0].model, trained[1]
         part = model.fingers["*"]
         assert part.stable.features == SETTING.features
-        expected = tuple(spec for spec in SLIP_FEATURES if spec.kind not in OF_TWO_TAXELS)
+        expected = tuple(spec for spec in SLIP_FEATURES if spec.min_taxels < 2)
         assert part.slip.features == expected
         assert len(part.slip.rule.squares[0]) == len(expected)
         (text,) = [text for text in warnings if "taxel" in text]

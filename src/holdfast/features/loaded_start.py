@@ -43,11 +43,21 @@ def declared_baselines(
         return {}
     if not isinstance(stated, Mapping):
         raise ValueError(f"metadata: {BASELINES} by finger expected, {type(stated).__name__} given")
-    return {
-        finger: _baseline(finger, stated[finger], sensor.n_taxels)
-        for finger, sensor in sensors.items()
-        if finger in stated
-    }
+    baselines = {}
+    for finger, sensor in sensors.items():
+        if finger not in stated:
+            continue
+        try:
+            baseline = np.array(stated[finger], dtype=np.float64)
+        except (TypeError, ValueError):
+            baseline = np.empty(0)  # words, or rows of different lengths: refused by its shape
+        if baseline.shape != (sensor.n_taxels, 3) or not np.isfinite(baseline).all():
+            raise ValueError(
+                f"metadata: {BASELINES} of {finger}: {sensor.n_taxels} taxels of 3 finite numbers "
+                f"expected, an array of shape {baseline.shape} given"
+            )
+        baselines[finger] = baseline
+    return baselines
 
 
 def loaded_tare(tare: Tare, sensors: Mapping[str, Sensor], baselines: Sequence[str]) -> Tare:
@@ -66,16 +76,3 @@ def loaded_tare(tare: Tare, sensors: Mapping[str, Sensor], baselines: Sequence[s
         return tare
     known = all(name in baselines or sensor.unit == "N" for name, sensor in sensors.items())
     return Tare("none" if known else "first")
-
-
-def _baseline(finger: str, values: object, n_taxels: int) -> Array:
-    try:
-        baseline = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        baseline = np.empty(0)
-    if baseline.shape != (n_taxels, 3) or not np.isfinite(baseline).all():
-        raise ValueError(
-            f"metadata: {BASELINES} of {finger}: {n_taxels} taxels of 3 finite numbers expected, "
-            f"an array of shape {baseline.shape} given"
-        )
-    return baseline

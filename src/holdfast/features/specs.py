@@ -1,61 +1,114 @@
 """Feature specifications: the input of a classifier as data that a model file can hold."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import msgspec
 import numpy as np
 
-from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, check_window
+from holdfast.features.haar import DEFAULT_WINDOW, check_window
 
-VALUE_KINDS = (*FEATURE_NAMES, "sigma_xyz", "change")
-"""Kinds that the kernel computes from the force."""
-WINDOWED = ("m", "sigma", "sigma_xyz", "change")
-"""Those of them that are computed over a window; the others need one sample."""
-OF_COMPONENTS = ("sigma_xyz",)
-"""Those of them that need Haar windows of the components of the force, too."""
-UNNAMED = ("sigma_xyz", "change")
-"""Those of them that `parse_features` does not accept by name: `holdfast` has them."""
+Family = Literal["force", "change", "load", "second", "mean_second", "ratio"]
 
-CHANGE_KINDS = (
-    "force_change",
-    "shear_change",
-    "residual",
-    "shear_residual",
-    "pressure_shift",
-    "moment_change",
-)
-LAG_KINDS = (*CHANGE_KINDS, "load_to_noise")
-"""Kinds over a lag in seconds that a stream computes together."""
-SECOND_KINDS = ("second_all", "second_shared", "second_shear", "second_own", "second_top")
-"""Kinds of second differences of the taxels, at a spacing in seconds."""
-MEAN_SECOND_KINDS = tuple(f"mean_{kind}" for kind in SECOND_KINDS)
-"""The same, averaged over the last samples."""
-RATIO_KINDS = ("shear_gain", "normal_gain", "ratio_gain")
-"""Kinds of the change of the ratio of tangential to normal force, and of either force."""
-RELATIVE_KINDS = (*LAG_KINDS, *SECOND_KINDS, *MEAN_SECOND_KINDS, *RATIO_KINDS)
-"""Kinds that look back by a lag in seconds, relative to load or noise; see `kernel/motion.c`."""
 
-OF_TWO_TAXELS = (
-    "residual",
-    "shear_residual",
-    "pressure_shift",
-    "moment_change",
-    *(f"{mean}second_{name}" for mean in ("", "mean_") for name in ("shared", "own", "top")),
-)
-"""Kinds that compare taxels, so that a sensor of one taxel has none of them."""
+class FeatureKind(NamedTuple):
+    """A row of the table of features: all that code beside the kernel has to know of a kind.
 
-FEATURE_KINDS = (*VALUE_KINDS, *RELATIVE_KINDS)
-"""All kinds. The code of a kind is its position."""
+    Attributes:
+        name: in model files and on the command line.
+        family: what the kernel computes together. `force` comes from the history of the force
+            (`hf_force_feature` of `kernel/stream.c`); all others from single taxels
+            (`kernel/motion.c`), which computes at a lag only the families that it needs.
+        window: `sample` for kinds of one sample, `window` for those of N_w samples, `lag` for those
+            that look back by seconds.
+        min_taxels: number of taxels from which a sensor has it: 2 for kinds that compare taxels.
+        transforms: that a feature of this kind may have.
+        of_components: whether it needs Haar windows of F_x, F_y and F_z, beside that of F_a.
+        by_name: whether `parse_features` accepts it; the others are in named lists only.
+    """
+
+    name: str
+    family: Family
+    window: Literal["sample", "window", "lag"]
+    min_taxels: int = 1
+    transforms: tuple[str, ...] = ("none", "log")
+    of_components: bool = False
+    by_name: bool = True
+
+
+def _over_lag(name: str, family: Family, min_taxels: int = 1) -> FeatureKind:
+    # A value over a lag has a unit and depends on the hand: only its ratio to the load or to the
+    # noise, whose logarithm is `relative`, carries over.
+    return FeatureKind(name, family, "lag", min_taxels, ("relative",), by_name=False)
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        # The paper's: |F_tip|, its components, and equations 1 and 2 of |F_tip|.
+        FeatureKind("F_a", "force", "sample"),
+        FeatureKind("F_x", "force", "sample"),
+        FeatureKind("F_y", "force", "sample"),
+        FeatureKind("F_z", "force", "sample"),
+        FeatureKind("m", "force", "window"),
+        # The noise of the sensor is measured as a sigma, so `noise` is for sigma alone.
+        FeatureKind("sigma", "force", "window", transforms=("none", "log", "noise")),
+        # The root of the sum of squares of the sigmas of the three components.
+        FeatureKind("sigma_xyz", "force", "window", of_components=True, by_name=False),
+        # The norm of the difference of F_tip between the last and the first sample of the window.
+        FeatureKind("change", "force", "window", by_name=False),
+        # The change of F_tip, and its part across the normal.
+        _over_lag("force_change", "change"),
+        _over_lag("shear_change", "change"),
+        # How far the taxels move against their mean, and the part across the normal.
+        _over_lag("residual", "change", 2),
+        _over_lag("shear_residual", "change", 2),
+        # How far the centre of pressure moves; the change of the moment about the normal.
+        _over_lag("pressure_shift", "change", 2),
+        _over_lag("moment_change", "change", 2),
+        # The load itself, the same at all lags: `any` has it once, and what counts changes (the
+        # activity of own handling) leaves it out.
+        _over_lag("load_to_noise", "load"),
+        # Second differences of the taxels at a spacing: of all; weighted by their share of the
+        # load, and the part of this across the normal; against their common motion; the largest
+        # of loaded taxels.
+        _over_lag("second_all", "second"),
+        _over_lag("second_shared", "second", 2),
+        _over_lag("second_shear", "second"),
+        _over_lag("second_own", "second", 2),
+        _over_lag("second_top", "second", 2),
+        # The same, averaged over the last samples.
+        _over_lag("mean_second_all", "mean_second"),
+        _over_lag("mean_second_shared", "mean_second", 2),
+        _over_lag("mean_second_shear", "mean_second"),
+        _over_lag("mean_second_own", "mean_second", 2),
+        _over_lag("mean_second_top", "mean_second", 2),
+        # The signed change of either force as a share of the normal force, and the change of the
+        # ratio of tangential to normal force.
+        _over_lag("shear_gain", "ratio"),
+        _over_lag("normal_gain", "ratio"),
+        _over_lag("ratio_gain", "ratio"),
+    )
+}
+"""All kinds by name. The order is that of the numbers in `kernel/kernel.h`: the code of a kind is
+its position, so a new one of a family stands at the end of that family in both."""
+RELATIVE_KINDS = tuple(kind.name for kind in KINDS.values() if kind.window == "lag")
 TRANSFORMS = ("none", "log", "noise", "relative")
+"""All transforms. The code of one of the force is its position."""
 SCOPES = ("finger", "hand")
 if TYPE_CHECKING:
     Kind = str
 else:
-    Kind = Literal[FEATURE_KINDS]  # msgspec refuses other kinds in a model file
+    Kind = Literal[tuple(KINDS)]  # msgspec refuses other kinds in a model file
 
 MAX_LAG_SECONDS = 2.0
 """Longest lag of a relative feature [s]."""
+
+
+def kinds_of(*families: Family) -> tuple[str, ...]:
+    """Return the names of the kinds of some families, in the order of the table."""
+    return tuple(kind.name for kind in KINDS.values() if kind.family in families)
+
 
 DEPLOYED_FEATURES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 """Features of the paper's deployed model, which leaves out m."""
@@ -65,21 +118,9 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One feature of a finger at a sample.
 
     Attributes:
-        kind: `F_a`, `F_x`, `F_y`, `F_z`, `m` or `sigma`, as in the paper; `sigma_xyz`, the root
-            of the sum of squares of the sigmas of the three components; or `change`, the norm
-            of the difference of F_tip between the last and the first sample of the window. Or a
-            relative kind, over a lag of `seconds`: `force_change` and `shear_change`, the change
-            of F_tip and its part across the normal; `residual` and `shear_residual`, how far the
-            taxels move against their mean; `pressure_shift`, how far the centre of pressure
-            moves; `moment_change`, the change of the moment about the normal; `load_to_noise`, the
-            load itself. Second differences of the taxels at a spacing of `seconds`: `second_all`,
-            of all; `second_shared`, weighted by their share of the load, and `second_shear`, its
-            part across the normal; `second_own`, against their common motion; `second_top`, the
-            largest of loaded taxels; the same after `mean_`, averaged over the last samples.
-            `ratio_gain`, the change of the ratio of tangential to normal force; `shear_gain` and
-            `normal_gain`, the signed change of either force, as a share of the normal force.
-        window: number of samples in the window, for the last four kinds; 0 for the others.
-        seconds: lag of a relative kind [s]; while a stretch is shorter, the longest that there
+        kind: name of a row of `KINDS`, which says what each is.
+        window: number of samples in the window, for kinds with one; 0 for the others.
+        seconds: lag of a kind with one [s]; while a stretch is shorter, the longest that there
             is, from two samples on.
         transform: `none`; `log`, log(sqrt(value^2 + floor^2)); or `noise`, the logarithm of the
             ratio of sigma to the sigma of the sensor's noise alone; or, for the relative kinds
@@ -100,7 +141,10 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seconds: float = 0.0
 
     def __post_init__(self) -> None:
-        if (self.kind in RELATIVE_KINDS) != (self.transform == "relative"):
+        # From the coarse to the fine: each message may take for granted what was checked before.
+        kind = KINDS[self.kind]
+        over_lag = kind.window == "lag"
+        if over_lag != (self.transform == "relative"):
             raise ValueError(
                 f"the transform 'relative' is for {', '.join(RELATIVE_KINDS)}, and they for it; "
                 f"{self.kind} with {self.transform!r} given"
@@ -109,16 +153,17 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(
                 f"a lag from 0 to {MAX_LAG_SECONDS:g} s expected, {self.seconds} given"
             )
-        if (self.kind in RELATIVE_KINDS) != (self.seconds > 0):
+        if over_lag != (self.seconds > 0):
             raise ValueError(
                 f"a lag above 0 s expected for relative kinds alone; {self.kind} with "
                 f"{self.seconds:g} s given"
             )
-        if self.kind in WINDOWED:
+        if kind.window == "window":
             check_window(self.window)
         elif self.window != 0:
             raise ValueError(f"{self.kind} has no window; {self.window} given")
-        if self.transform == "noise" and (self.kind != "sigma" or self.window < 4):
+        # A window of two samples has one detail, whose deviation from its mean is 0: no logarithm.
+        if self.transform not in kind.transforms or (self.transform == "noise" and self.window < 4):
             raise ValueError(
                 f"the transform 'noise' expects sigma over 4 samples or more; {self} given"
             )
@@ -132,7 +177,7 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def min_taxels(self) -> int:
         """Number of taxels from which a sensor has the feature."""
-        return 2 if self.kind in OF_TWO_TAXELS else 1
+        return KINDS[self.kind].min_taxels
 
     def __str__(self) -> str:
         text = f"{self.kind}[{self.window}]" if self.window else self.kind
@@ -166,7 +211,7 @@ ANY_LAGS = (0.017, 0.067, 0.133, 0.267, 0.533)
 ANY_FEATURES = (
     *(
         FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in CHANGE_KINDS
+        for kind in kinds_of("change")
         for seconds in ANY_LAGS
     ),
     FeatureSpec("load_to_noise", transform="relative", seconds=ANY_LAGS[0]),
@@ -183,16 +228,16 @@ SLIP_FEATURES = (
     *HOLDFAST_FEATURES,
     *(
         FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in SECOND_KINDS
+        for kind in kinds_of("second")
         for seconds in SLIP_SPACINGS
     ),
     *(
         FeatureSpec(kind, transform="relative", seconds=SLIP_SPACINGS[0])
-        for kind in MEAN_SECOND_KINDS
+        for kind in kinds_of("mean_second")
     ),
     *(
         FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in RATIO_KINDS
+        for kind in kinds_of("ratio")
         for seconds in SLIP_LAGS
     ),
 )
@@ -209,7 +254,7 @@ def parse_features(
     """Return the specifications of named features.
 
     Args:
-        names: names from `VALUE_KINDS` without those in `UNNAMED`, as a list or separated by
+        names: names of the `KINDS` that have one for users (`by_name`), as a list or separated by
             commas. `F_tip` stands for F_x, F_y, F_z. `holdfast` alone stands for the project's
             own features, which have their own windows; `any` alone for the relative features of
             any hand.
@@ -228,7 +273,7 @@ def parse_features(
     wanted: list[str] = []
     for name in (name.strip() for name in given):
         wanted += ["F_x", "F_y", "F_z"] if name == "F_tip" else [name]
-    known = [kind for kind in VALUE_KINDS if kind not in UNNAMED]
+    known = [kind.name for kind in KINDS.values() if kind.by_name]
     if unknown := [name for name in wanted if name not in known]:
         raise ValueError(
             f"unknown feature {unknown[0]!r}; there are {', '.join(known)}, F_tip for F_x, F_y "
@@ -237,4 +282,4 @@ def parse_features(
     if len(set(wanted)) < len(wanted):
         raise ValueError(f"a feature is given twice in {','.join(wanted)}")
     check_window(window)
-    return tuple(FeatureSpec(n, window if n in WINDOWED else 0) for n in wanted)
+    return tuple(FeatureSpec(n, window if KINDS[n].window == "window" else 0) for n in wanted)

@@ -85,8 +85,24 @@ class FeatureStream:
             baselines = dict(plan.baselines) or declared_baselines(recording.metadata, plan.sensors)
             plan = replace(plan, in_contact=True, baselines=baselines)
         stream = cls(plan)
-        if plan.tare.kind == "interval":
-            stream._take_baseline(recording)
+        if plan.tare.kind != "interval":
+            return stream
+        for finger, taxels in stream.slices.items():
+            if finger not in recording.modules:
+                continue
+            module = recording.modules[finger]
+            rows = slice(*np.searchsorted(module.times, plan.tare.interval))
+            readings = np.array(module.readings[rows], dtype=np.float64)
+            # An ignored taxel may be broken: its readings must not make the samples not finite.
+            readings[:, list(plan.ignore.get(finger, ()))] = 0.0
+            try:
+                baseline, _ = baseline_of(readings, module.times[rows], plan.tare, 1 / plan.rate)
+            except ValueError as cause:
+                raise ValueError(
+                    f"{finger} of {recording.name!r}, which runs from {recording.start:.15g} to "
+                    f"{recording.end:.15g} s: {cause}"
+                ) from cause
+            stream.baseline[taxels] = baseline
         return stream
 
     def tables(self) -> tuple[*StreamTables, Array]:
@@ -114,36 +130,23 @@ class FeatureStream:
             for place, (finger, taxels) in enumerate(self.slices.items())
             if finger in recording.modules
         ]
-        times = reduce(_union, (module.times for _, _, module in modules))
+        # Fingers of one device have the same times, as a rule: no sorting then.
+        times = reduce(
+            lambda times, more: times if np.array_equal(times, more) else np.union1d(times, more),
+            (module.times for _, _, module in modules),
+        )
         for start in range(0, len(times), CHUNK_SAMPLES):
             chunk = np.ascontiguousarray(times[start : start + CHUNK_SAMPLES])
             present = np.zeros((len(chunk), len(self.slices)), dtype=np.bool_)
             readings = np.zeros((len(chunk), *self.baseline.shape))
             for place, taxels, module in modules:
+                # Both ends of the chunk are instants, and no time lies between two instants.
                 first = np.searchsorted(module.times, chunk[0], side="left")
                 last = np.searchsorted(module.times, chunk[-1], side="right")
                 rows = np.searchsorted(chunk, module.times[first:last])
                 present[rows, place] = True
                 readings[rows, taxels] = module.readings[first:last]
             yield HandSamples(chunk, present, readings)
-
-    def _take_baseline(self, recording: Recording) -> None:
-        plan = self.plan
-        for finger, taxels in self.slices.items():
-            if finger not in recording.modules:
-                continue
-            module = recording.modules[finger]
-            rows = slice(*np.searchsorted(module.times, plan.tare.interval))
-            readings = np.array(module.readings[rows], dtype=np.float64)
-            readings[:, list(plan.ignore.get(finger, ()))] = 0.0
-            try:
-                baseline, _ = baseline_of(readings, module.times[rows], plan.tare, 1 / plan.rate)
-            except ValueError as cause:
-                raise ValueError(
-                    f"{finger} of {recording.name!r}, which runs from {recording.start:.15g} to "
-                    f"{recording.end:.15g} s: {cause}"
-                ) from cause
-            self.baseline[taxels] = baseline
 
 
 def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]:
@@ -174,7 +177,3 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
         finger: FingerFeatures(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
         for finger, found in chunks.items()
     }
-
-
-def _union(one: Array, two: Array) -> Array:
-    return one if np.array_equal(one, two) else np.union1d(one, two)

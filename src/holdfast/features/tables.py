@@ -9,13 +9,8 @@ import numpy as np
 from holdfast.features.haar import n_levels
 from holdfast.features.loaded_start import loaded_tare
 from holdfast.features.specs import (
-    FEATURE_KINDS,
-    LAG_KINDS,
-    MEAN_SECOND_KINDS,
-    OF_COMPONENTS,
-    RATIO_KINDS,
+    KINDS,
     SCOPES,
-    SECOND_KINDS,
     TRANSFORMS,
     FeatureSpec,
 )
@@ -47,6 +42,9 @@ OFFSET_SHARE = 0.25
 the full range of every taxel changes by 7 %; real recordings had 0.5 %."""
 SUM_OF_WEIGHTS = 1.0 + float(np.sqrt(2.0)) / 1.5 + float(np.sqrt(3.0)) / 1.6
 """Of the axes in the sum of the readings, see `kernel/faults.c`."""
+MAX_EARTH_FIELDS = {"anyskin": 130.0}
+"""Twice the field of the earth, by sensors whose readings are in microtesla: it is at most 65 µT,
+and changes by twice that when a hand is turned over [µT]."""
 GAP_LIMIT_PERIODS = 3.0003
 """A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
 MAX_BRIDGED_SECONDS = 0.10001
@@ -119,6 +117,7 @@ def stream_tables(plan: StreamPlan) -> StreamTables:
     lags = [_lag(lag, plan.rate, [s for specs in features for s in specs]) for lag in seconds]
     used = [plan.used(finger) for finger in plan.fingers]
     n_taxels = [len(flags) for flags in used]
+    # Fingers begin at whole vectors of the processor, so that its loops need no remainder.
     n_lanes = [-(-n // _extension.LANES) * _extension.LANES for n in n_taxels]
     sensors = plan.sensors.values()
     fingers = [
@@ -134,6 +133,7 @@ def stream_tables(plan: StreamPlan) -> StreamTables:
         lags,
         np.concatenate([_in_lanes(flags.astype(np.float64), n) for _, flags, n in taxels]),
         np.concatenate(
+            # A rotation of 0 takes an ignored taxel out of all sums without a branch.
             [_in_lanes(np.where(u[:, None, None], s.rotations, 0), n) for s, u, n in taxels]
         ),
         np.concatenate([_in_lanes(_places(s, u), n) for s, u, n in taxels]),
@@ -145,6 +145,11 @@ def _hand(
 ) -> Struct:
     tare, specs = plan.used_tare, [spec for own in features for spec in own]
     n_history = max([plan.window, *(spec.window for spec in specs)])
+    # The stretch of the tare shows the noise too, as nothing touches; where the tare takes no
+    # time, the first samples after it do. Under load the hand may move soon, so less is taken.
+    noise_seconds = plan.tare.seconds if plan.tare.kind == "seconds" else NOISE_SECONDS
+    if plan.in_contact:
+        noise_seconds = LOADED_NOISE_SECONDS
     # A second difference looks back by two lags.
     reach = max([lag["samples"] * (1 + lag["has_seconds"]) for lag in lags], default=0)
     return {
@@ -152,13 +157,13 @@ def _hand(
         "n_features": plan.width,
         "n_lags": len(lags),
         "n_history": n_history,
-        "n_channels": N_COMPONENTS if any(spec.kind in OF_COMPONENTS for spec in specs) else 1,
+        "n_channels": N_COMPONENTS if any(KINDS[spec.kind].of_components for spec in specs) else 1,
         "n_levels": n_levels(n_history),
         "n_track": RING_SPARE * reach + 1,
         "period": 1.0 / plan.rate,
         "tare_kind": TARE_KINDS.index(tare.kind),
         "tare_seconds": tare.seconds,
-        "noise_seconds": _noise_seconds(plan),
+        "noise_seconds": noise_seconds,
         "average_gain": -float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
         "alike": len({tuple(own) for own in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
@@ -166,17 +171,14 @@ def _hand(
     }
 
 
-def _noise_seconds(plan: StreamPlan) -> float:
-    if plan.in_contact:
-        return LOADED_NOISE_SECONDS
-    return plan.tare.seconds if plan.tare.kind == "seconds" else NOISE_SECONDS
-
-
 def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[FeatureSpec]) -> Struct:
     """Return the constants of a finger; each used taxel rounds its readings."""
+    # Without a range nothing is near its end, and the mean of the readings may change at will.
     low, high = sensor.range or (-np.inf, np.inf)
     end = END_SHARE * (high - low) if sensor.range else 0.0
     noise = COUNT_NOISE if sensor.unit == "count" else NEWTON_NOISE
+    # Haar windows count samples, which a gap breaks; lags in seconds bridge a short one by time. So
+    # a finger bridges gaps only if all its features are over lags, and is ready after two samples.
     in_seconds = all(spec.seconds for spec in specs)
     bridges, gap = in_seconds and bool(specs), GAP_LIMIT_PERIODS / plan.rate
     return {
@@ -188,6 +190,11 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "max_offset": OFFSET_SHARE * (high - low) * n_used * SUM_OF_WEIGHTS,
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
+        "is_magnetic": bool(sensor.magnetic),
+        # The load of the start, when it goes, may look like a field.
+        "max_field": MAX_EARTH_FIELDS.get(sensor.name, np.inf)
+        if sensor.magnetic and not plan.zero_unknown
+        else 0.0,
         "max_step": max(gap, MAX_BRIDGED_SECONDS) if bridges else gap,
         **{f"normal[{axis}]": float(value) for axis, value in enumerate(sensor.normal)},
         "sigma_window": plan.window,
@@ -198,6 +205,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
 
 def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]) -> list[Struct]:
     """Return the features of a finger, padded to those of the finger that has most."""
+    # Scope is left out: `hand` takes the largest of values that each finger has computed anyway.
     own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
     padding: Struct = {
         "kind": -1, "transform": 0, "of_hand": False, "window": 0, "lag": 0, "same_as": 0,
@@ -205,7 +213,7 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
     }  # fmt: skip
     return [
         {
-            "kind": FEATURE_KINDS.index(spec.kind),
+            "kind": list(KINDS).index(spec.kind),
             "transform": 0 if spec.seconds else TRANSFORMS.index(spec.transform),
             "of_hand": spec.scope == SCOPES[1],
             "window": spec.window,
@@ -218,14 +226,14 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
 
 
 def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Struct:
-    kinds = {spec.kind for spec in specs if spec.seconds == seconds}
+    families = {KINDS[spec.kind].family for spec in specs if spec.seconds == seconds}
     return {
         "samples": max(1, round(seconds * rate)),
         "seconds": seconds,
-        "has_changes": not kinds.isdisjoint(LAG_KINDS),
-        "has_seconds": not kinds.isdisjoint((*SECOND_KINDS, *MEAN_SECOND_KINDS)),
-        "has_means": not kinds.isdisjoint(MEAN_SECOND_KINDS),
-        "has_ratios": not kinds.isdisjoint(RATIO_KINDS),
+        "has_changes": not families.isdisjoint(("change", "load")),
+        "has_seconds": not families.isdisjoint(("second", "mean_second")),
+        "has_means": "mean_second" in families,
+        "has_ratios": "ratio" in families,
     }
 
 

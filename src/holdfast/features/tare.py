@@ -52,28 +52,20 @@ class Tare:
         if given in ("first", "none"):
             return cls(given)  # type: ignore[arg-type]
         try:
-            if isinstance(given, str) and ":" in given:
-                start, end = given.split(":")
-                return cls._interval(float(start), float(end))
-            if isinstance(given, tuple):
-                return cls._interval(*(float(value) for value in given))
-            return cls._seconds(float(given))
+            times = given.split(":") if isinstance(given, str) and ":" in given else given
+            if isinstance(times, list | tuple):
+                start, end = (float(time) for time in times)
+                if not (math.isfinite(start) and math.isfinite(end) and start < end):
+                    raise ValueError("an interval must end after its start")
+                return cls("interval", interval=(start, end))
+            seconds = float(times)
+            if not (math.isfinite(seconds) and seconds > 0):
+                raise ValueError("a duration above 0 s is needed")
+            return cls("seconds", seconds)
         except (TypeError, ValueError) as cause:
             raise ValueError(
                 f"tare: seconds above 0, 'first', 'none' or START:END expected, {given!r} given"
             ) from cause
-
-    @classmethod
-    def _interval(cls, start: float, end: float) -> Self:
-        if not (math.isfinite(start) and math.isfinite(end) and start < end):
-            raise ValueError("an interval must end after its start")
-        return cls("interval", interval=(start, end))
-
-    @classmethod
-    def _seconds(cls, seconds: float) -> Self:
-        if not (math.isfinite(seconds) and seconds > 0):
-            raise ValueError("a duration above 0 s is needed")
-        return cls("seconds", seconds)
 
     @property
     def without_contact(self) -> bool:
@@ -81,11 +73,11 @@ class Tare:
         return self.kind == "seconds"
 
     def __str__(self) -> str:
-        if self.kind == "seconds":
-            return _exact(self.seconds)
-        if self.kind == "interval":
-            return ":".join(map(_exact, self.interval))
-        return self.kind
+        # `repr` is the shortest text that is read back as the same number: a model file has it.
+        numbers = {"seconds": (self.seconds,), "interval": self.interval}.get(self.kind)
+        if numbers is None:
+            return self.kind
+        return ":".join(repr(number).removesuffix(".0") for number in numbers)
 
 
 def baseline_of(
@@ -117,6 +109,7 @@ def baseline_of(
     start = first_finite(readings)
     if tare.kind == "first":
         return readings[start].astype(np.float64), start
+    # From the first finite sample on: a device may begin with samples that it has not filled yet.
     inside = times - times[start] + 0.5 * period < tare.seconds
     inside[: start + 1] = True  # one sample at least
     return _mean(readings[inside], tare), int(inside.sum())
@@ -151,9 +144,5 @@ def _mean(readings: npt.NDArray[Any], tare: Tare) -> Array:
     values = readings[np.isfinite(readings).all(axis=(1, 2))].astype(np.float64)
     if not len(values):
         raise ValueError(f"tare {tare}: no finite sample in that time")
+    # Not `mean`, which adds by pairs: a stream adds one sample after the other.
     return np.asarray(np.add.accumulate(values, axis=0)[-1] / len(values))
-
-
-def _exact(number: float) -> str:
-    """Return the shortest text that is read back as the same number."""
-    return repr(number).removesuffix(".0")

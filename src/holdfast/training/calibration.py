@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from holdfast.errors import ModelError, TrainingError
-from holdfast.features.specs import CHANGE_KINDS
+from holdfast.features.specs import KINDS
 from holdfast.model import FingerModel, Handling, Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
@@ -204,7 +204,7 @@ def activity(part: FingerModel, features: Array) -> float:
         The median over the samples of the mean over the features, in default scales; 0 without
         such features.
     """
-    columns = [k for k, spec in enumerate(part.features) if spec.kind in CHANGE_KINDS]
+    columns = [k for k, spec in enumerate(part.features) if KINDS[spec.kind].family == "change"]
     if not columns:
         return 0.0
     location, scale = part.default_handling

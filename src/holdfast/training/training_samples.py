@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.contact import NO_CONTACT, UNKNOWN
 from holdfast.features import FeatureSpec, Tare
@@ -146,6 +145,7 @@ def _read(
     """
     n_seen = Counter[str]()
     parts = [(index, OneRecording(recordings, index)) for index in plan.indices]
+    # In this process the number is known from the recordings before; other processes work ahead.
     counts: Iterator[Mapping[str, int]] | None = None
     if plan.step > 1 and not engine.in_this_process:
         counts = iter(list(engine.map_ordered(_count_usable, parts, shared=(plan,))))
@@ -201,10 +201,17 @@ def _samples_of_part(
     group = int(plan.data_split.group_of[index])
     for finger, rows in stable_rows.items():
         module = recording.modules[finger]
-        states = _states_to_learn(module, scan.relative)
+        states = label_states(module.labels, module.times)
+        if scan.relative:
+            # The load separates no contact there, so those labels would teach what is known.
+            states = np.where(states == NO_CONTACT, UNKNOWN, states).astype(np.int8)
         units = plan.data_split.units_of(index, module.n_samples)
         usable = usable_rows(rows, states)[::recording_step]
+        # Every step-th of all recordings one after the other: the first one here is due once the
+        # samples before are a multiple of the step.
         kept = usable[-n_seen.get(finger, 0) % step :: step]
+        # F_a at rest says where contact begins. A loaded start shows no rest, and a model for any
+        # unit has a threshold on the load instead.
         has_rest = tare.without_contact and not scan.relative and not loaded
         stable = FingerSamples(
             None if scan.relative else module.sensor,
@@ -238,12 +245,6 @@ def sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
         for finger, module in modules.items()
         if module.n_samples and (scan.relative or module.sensor == scan.sensors[finger])
     }
-
-
-def _states_to_learn(module: Tactile, relative: bool) -> npt.NDArray[np.int8]:
-    """Return (n,) the labels, without those of no contact if the load separates them."""
-    states = label_states(module.labels, module.times)
-    return np.where(states == NO_CONTACT, UNKNOWN, states).astype(np.int8) if relative else states
 
 
 def resample_if_needed(recording: Recording, rate: float) -> Recording:

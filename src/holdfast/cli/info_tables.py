@@ -1,105 +1,142 @@
-"""What `holdfast info` prints of a model file."""
+"""Tables of `holdfast info`: of a recording, of a folder of them, and of a model."""
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from statistics import mean
+from typing import Any
 
-from holdfast.cli.terminal.console import print_json, print_table
+from holdfast.cli.terminal.console import print_line, print_lines, print_paragraph, print_table
 
-if TYPE_CHECKING:
-    from holdfast.model import FingerModel, Handling, Head, Model
-
+MAX_VALUE_LENGTH = 90
+"""Maximum number of characters of a metadata value in the table."""
 ANSWERS = {"stable": "STABLE", "slip": "slides"}
 """What a finger does from the threshold of a head on."""
 N_NAMES = 3
 """Number of names that are printed of a long list."""
 
 
-def is_model(path: Path) -> bool:
-    """Return whether a path names a model: a built-in one, or a JSON file."""
-    return str(path).startswith("builtin:") or (path.suffix == ".json" and path.is_file())
+def print_recording(content: Mapping[str, Any]) -> None:
+    """Print tables of a recording, of its modules and markers, and one paragraph per finding."""
+    rows = [
+        ("duration", f"{content['duration']:.3f} s from {content['start']:.3f} s"),
+        ("complete", "yes" if content["complete"] else "no: the end of the file is cut off"),
+        ("digest", content["digest"] or "not known: loading the recording takes too much memory"),
+        *((key, _shorten(value)) for key, value in content["metadata"].items()),
+        *((f"media at {x['offset']:g} s", x["path"]) for x in content["media"]),
+    ]
+    if truth := content["truth"]:
+        fingers = truth["fingers"].items()
+        channels = [f"{finger}.{name}" for finger, names in fingers for name in names]
+        rows.append(("truth", _shorten(", ".join([*truth["hand"], *channels]))))
+    print_table(("recording", content["name"]), rows)
+    print_line()
+    _print_modules(content["modules"])
+    if content["findings"]:
+        print_lines(("", "findings:"))
+    for finding in content["findings"]:
+        text = f"{finding['module']}: {finding['text']}" if finding["module"] else finding["text"]
+        print_paragraph(text, "- ", "  ")
+    if content["markers"]:
+        from holdfast.recordings import shown_origin
+
+        origin = shown_origin(content["start"])
+        print_line()
+        if origin:
+            print_line("markers since the first sample")
+        markers = [(f"{m['time'] - origin:.3f}", m["text"]) for m in content["markers"]]
+        print_table(("marker [s]", "text"), markers)
 
 
-def print_model(path: Path, as_json: bool) -> None:
+def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print two tables: the samples of each module, then its labels and faults."""
+    header = ("module", "sensor", "taxels", "unit", "samples", "rate [Hz]", "gaps", "repeats")
+    print_table(
+        header,
+        [
+            (name, m["sensor"], m["n_taxels"], m["unit"], m["n_samples"], f"{m['rate']:.1f}",
+             m["gaps"], m["repeats"])
+            for name, m in modules.items()
+        ],
+    )  # fmt: skip
+    print_line()
+    faults = (", ".join(f"{x} {n}" for x, n in m["faults"].items()) for m in modules.values())
+    print_table(
+        ("module", *_label_headings(), "faults"),
+        [
+            (name, *_label_cells([m]), text or "none")
+            for (name, m), text in zip(modules.items(), faults, strict=True)
+        ],
+    )
+
+
+def _label_states() -> list[str]:
+    from holdfast.contact import LABEL_STATES
+
+    return [state.value.lower() for state in LABEL_STATES]
+
+
+def _label_headings() -> list[str]:
+    return [f"{state} [s]" for state in _label_states()]
+
+
+def _label_cells(modules: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the duration of the labels of each state, the mean over the modules."""
+    return [f"{mean(m['labels'][state] for m in modules):.2f}" for state in _label_states()]
+
+
+def print_folder(documents: list[dict[str, Any]]) -> None:
+    """Print two tables: the labels of each recording, then its samples and findings."""
+    readable = [document for document in documents if "error" not in document]
+    if readable:
+        print_table(
+            ("labels of", *_label_headings()),
+            [(x["name"], *_label_cells([*x["modules"].values()])) for x in readable],
+        )
+        print_line()
+    print_table(
+        ("recording", "modules", "samples", "rate [Hz]", "duration [s]", "gaps", "state"),
+        [_summary(document) for document in documents],
+    )
+
+
+def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
+    """Return a row of the table of recordings."""
+    if "error" in document:
+        return (document["name"], *5 * ("-",), "unreadable")
+    modules = list(document["modules"].values())
+    rates = sorted(m["rate"] for m in modules if m["n_samples"])
+    faults = sorted({fault for m in modules for fault in m["faults"]})
+    findings = dict.fromkeys(finding["kind"] for finding in document["findings"])
+    return (
+        document["name"],
+        len(modules),
+        sum(m["n_samples"] for m in modules),
+        f"{rates[len(rates) // 2]:.1f}",
+        f"{document['duration']:.2f}",
+        sum(m["gaps"] for m in modules),
+        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *findings]) or "ok",
+    )
+
+
+def _shorten(value: object) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else " ".join(str(value).split())
+    return text if len(text) <= MAX_VALUE_LENGTH else f"{text[: MAX_VALUE_LENGTH - 3]}..."
+
+
+def print_model(document: dict[str, Any], name: str) -> None:
     """Print what a model is for, how it decides, and what it was trained and tuned on."""
-    from holdfast.model import Model
-
-    document = model_document(Model.load(path))
-    if as_json:
-        print_json(document)
-        return
-    print_table(("model", document["name"] or path.name), _rows(document))
-
-
-def model_document(model: "Model") -> dict[str, Any]:
-    """Return the facts about a model, for JSON and for the table."""
-    import msgspec
-
-    training = None
-    if model.training is not None:
-        training = msgspec.to_builtins(model.training)
-        training["recordings"] = list(model.training.recordings)
-    return {
-        "name": model.name,
-        "rate": model.rate,
-        "tare": model.tare,
-        "debounce": msgspec.to_builtins(model.debounce),
-        "fingers": {name: _finger(model, part) for name, part in model.fingers.items()},
-        "training": training,
-    }
-
-
-def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
-    sensor = None if part.sensor is None else model.sensors[part.sensor]
-    return {
-        "sensor": part.sensor,
-        "unit": None if sensor is None else sensor.unit,
-        "heads": {head.name: _head(head) for head in part.heads},
-        "contact_threshold": part.contact_threshold,
-        "contact_noise": part.contact_noise,
-        "contact_load": part.contact_load,
-        "normalised": part.normalised,
-        "handling": {name: _handling(handling) for name, handling in part.handling.items()},
-    }
-
-
-def _head(head: "Head") -> dict[str, Any]:
-    """Return the facts about a head; means, scales and weights are in the model file."""
-    import msgspec
-
-    fields: dict[str, Any] = msgspec.to_builtins(head)
-    rule, n = fields.pop("rule"), head.rule.n_features
-    fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
-    fields["features"] = [str(spec) for spec in head.features]
-    if head.choice is not None:
-        fields["choice"] |= {"recordings": list(head.choice.recordings)}
-    if head.link != "logit":
-        del fields["threshold"]
-    return fields
-
-
-def _handling(handling: "Handling") -> dict[str, Any]:
-    """Return the facts about own handling; location and scale are in the model file."""
-    return {
-        "seconds": handling.seconds,
-        "thresholds": handling.thresholds,
-        "recordings": list(handling.recordings),
-    }
-
-
-def _filter(debounce: dict[str, float]) -> str:
-    rate = debounce.get("switching", 0.0)
-    return f", filter for {rate:g} switches per second" if rate else ""
+    print_table(("model", document["name"] or name), _rows(document))
 
 
 def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     debounce, rate = document["debounce"], document["rate"]
+    switching = debounce.get("switching", 0.0)
     yield "rate", "any" if rate is None else f"{rate:g} Hz"
     yield "tare", document["tare"]
     yield (
         "debouncing",
         f"hold {debounce['hold']:g} s, minimum {debounce['min_duration']:g} s, hysteresis "
-        f"{debounce['hysteresis']:g}{_filter(debounce)}",
+        f"{debounce['hysteresis']:g}"
+        + (f", filter for {switching:g} switches per second" if switching else ""),
     )
     for name, part in document["fingers"].items():
         finger = "any finger" if name == "*" else name
