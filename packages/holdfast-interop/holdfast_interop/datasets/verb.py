@@ -242,7 +242,7 @@ def _print_result(
         )
     print_message(f"licence: {public.licence} ({public.page}); downloads are in {folder}")
     first = result.imported[0].document["path"]
-    option = " --in-contact" if public.in_contact else ""
+    option = " --in-contact" if public.starts_loaded else ""
     print_message(f"next: holdfast detect builtin:any {first}{option}")
 
 
