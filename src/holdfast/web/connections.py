@@ -67,7 +67,7 @@ class ConnectionLimit:
     @classmethod
     def of_process(cls) -> "ConnectionLimit":
         """Return limits that leave the process enough file descriptors."""
-        total = min(MAX_CONNECTIONS, (_max_descriptors() - RESERVED_DESCRIPTORS) // 2)
+        total = min(MAX_CONNECTIONS, (max_descriptors() - RESERVED_DESCRIPTORS) // 2)
         total = max(total, MIN_CONNECTIONS)
         return cls(total, min(MAX_CONNECTIONS_PER_ADDRESS, max(total // 2, MIN_CONNECTIONS)))
 
@@ -160,7 +160,7 @@ def log_exceptions_briefly(loop: asyncio.AbstractEventLoop) -> None:
     loop.set_exception_handler(log)
 
 
-def _max_descriptors() -> int:
+def max_descriptors() -> int:
     """Return how many files the process may open."""
     with suppress(ImportError, OSError, ValueError):  # Windows has no such limit
         from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit
@@ -192,15 +192,9 @@ def refusal(host: str, origin: str | None, *, only_local: bool) -> str | None:
         >>> refusal("evil.example", None, only_local=True)
         "host 'evil.example' refused: this machine expected"
     """
-    if only_local and not is_local(_without_port(host)):
+    name = host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]
+    if only_local and not is_local(name):  # another name, though it leads here: DNS rebinding
         return f"host {host!r} refused: this machine expected"
     if origin is not None and origin.partition("://")[2] != host:
         return f"origin {origin!r} refused: {host!r} expected"
     return None
-
-
-def _without_port(host: str) -> str:
-    """Return a host without its port."""
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.partition(":")[0]
