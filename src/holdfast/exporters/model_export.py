@@ -72,33 +72,19 @@ def export(
         return ExportedModel(target, outputs, len(content))
     if target.suffix != HEADER_SUFFIX:
         raise ValueError(f"{target}: a model is exported as {HEADER_SUFFIX} (C99) or {ONNX_SUFFIX}")
-    header, names = _header(model, like, fingers, single=single, in_contact=in_contact)
+    if like is None:
+        sensors = dict(fingers) if fingers is not None else named_fingers(model)
+        rate = next(iter(model.fingers_of(sensors).values())).rate
+        loaded, baselines = in_contact is True, None
+    else:
+        sensors, rate = _fingers_like(model, like), like.rate
+        loaded = begins_in_contact(like.metadata, in_contact)
+        baselines = declared_baselines(like.metadata, sensors)
+    header = header_of(model, sensors, rate, single=single, in_contact=loaded, baselines=baselines)
+    names = tuple(model.fingers_of(sensors))
     data = header.text.encode()
     write_whole(target, data, force=force)
     return ExportedModel(target, names, len(data), header)
-
-
-def _header(
-    model: Model,
-    like: Recording | None,
-    fingers: Mapping[str, Sensor] | None,
-    *,
-    single: bool,
-    in_contact: bool | None,
-) -> tuple[CHeader, tuple[str, ...]]:
-    if like is None:
-        sensors = dict(fingers) if fingers is not None else named_fingers(model)
-        first = next(iter(model.fingers_of(sensors).values()))
-        loaded = in_contact is True
-        header = header_of(model, sensors, first.rate, single=single, in_contact=loaded)
-        return header, tuple(model.fingers_of(sensors))
-    sensors = _fingers_like(model, like)
-    header = header_of(
-        model, sensors, like.rate, single=single,
-        in_contact=begins_in_contact(like.metadata, in_contact),
-        baselines=declared_baselines(like.metadata, sensors),
-    )  # fmt: skip
-    return header, tuple(model.fingers_of(sensors))
 
 
 def named_fingers(model: Model) -> dict[str, Sensor]:
