@@ -21,17 +21,19 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
-
-from rich_update import FINGERS, RATE, paper_model  # noqa: E402
+sys.path.insert(0, str(ROOT / "tests"))
 
 from exporters.c_detector import both, compare, random_samples  # noqa: E402
+from holdfast.classifiers import Linear  # noqa: E402
 from holdfast.detector import Detector  # noqa: E402
 from holdfast.exporters import header_of  # noqa: E402
 from holdfast.exporters.c_compiler import code_size  # noqa: E402
-from holdfast.model import Model  # noqa: E402
+from holdfast.features import DEPLOYED_FEATURES, parse_features  # noqa: E402
+from holdfast.model import FingerModel, Head, Model  # noqa: E402
 from holdfast.sensors import sensor  # noqa: E402
 
+FINGERS = ("thumb", "index", "middle", "ring")
+RATE = 150.0
 BARS = {"paper": 0.5, "builtin:twin": 3.0, "builtin:any": 4.0}
 """Goals of an update in C [us]."""
 N_ROUNDS, BLOCK = 5, 100
@@ -64,6 +66,16 @@ int main(int n, char **words) {
     return 0;
 }
 """
+
+
+def paper_model() -> Model:
+    """Return a model with the features of the paper; its numbers have no effect on the speed."""
+    features = parse_features(DEPLOYED_FEATURES, 14)
+    ones = np.ones(len(features))
+    rule = Linear.of(ones, ones, 0.01 * ones, 0.1)
+    stable = Head(name="stable", link="logit", features=features, rule=rule)
+    finger = FingerModel(heads=(stable,), contact_threshold=20.0)
+    return Model(fingers={"*": finger}, rate=RATE)
 
 
 def models() -> dict[str, Model]:

@@ -55,7 +55,7 @@ copy = load_recording('copy.mcap')
 print(len(copy.modules), copy.digest)
 with open_source(sys.argv[1]) as source:
     for estimate in StreamDetector(Model.load('builtin:any'), source):
-        print(msgspec.json.encode(estimate).decode())
+        print(msgspec.json.encode(estimate, enc_hook=dict).decode())
 """
 
 

@@ -25,16 +25,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from real_slips import SCORES, TUG_QUIET, auc, boxes, tugs
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import HoldfastError
 from holdfast.io.importers import import_recordings
+from holdfast.io.importers.table import SLIPPED
+from holdfast.metrics.statistics import mann_whitney_u
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 from holdfast.training.calibration import calibrate
 
+TUG_QUIET = (0.2, 0.5)
+"""Interval in which every tug is quiet, after the first windows are full [s]."""
 TUG_START = 0.5
 """Time after which a sequence is scored [s]; before it nobody tugs."""
 QUIET_FROM = 0.4
@@ -60,6 +63,14 @@ ALWAYS_STABLE = {
 }
 """Figures of the trivial baseline; its score is the same for all samples, so each AUC is 0.5."""
 
+Score = Callable[[FingerTrace], np.ndarray]
+SCORES: dict[str, Score] = {
+    "1 - stable": lambda trace: 1.0 - trace.stable_probability,
+    "slip": lambda trace: (
+        np.full(len(trace), np.nan) if trace.slip_probability is None else trace.slip_probability
+    ),
+}
+
 Calibrated = Callable[[Sequence[Recording]], Model]
 """Returns the model for recordings of own handling; the model itself if it is untouched."""
 
@@ -74,8 +85,11 @@ class Finger(NamedTuple):
 
 def main(folder: Path, names: Sequence[str]) -> None:
     sets = (
-        boxes(folder / "uskin_pick_move"),
-        list(tugs(folder / "eflesh_slip")),
+        list(import_recordings(folder / "uskin_pick_move")),
+        [
+            (tug, tug.metadata[SLIPPED])
+            for tug in import_recordings(folder / "eflesh_slip", "eflesh")
+        ],
         list(import_recordings(folder / "gtac_v2")),
     )
     columns: dict[str, dict[str, float]] = {}
@@ -106,6 +120,12 @@ def figures(
         | tug_figures(model_for, tugged)
         | hold_figures(model_for, holds)
     )
+
+
+def auc(positive: np.ndarray, negative: np.ndarray) -> float:
+    positive, negative = positive[~np.isnan(positive)], negative[~np.isnan(negative)]
+    pairs = len(positive) * len(negative)
+    return mann_whitney_u(positive, negative) / pairs if pairs else math.nan
 
 
 def box_figures(model_for: Calibrated, recordings: Sequence[Recording]) -> dict[str, float]:

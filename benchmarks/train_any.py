@@ -170,15 +170,6 @@ def out_of_fold(
             )
 
 
-def calibration_error(probability: np.ndarray, stable: np.ndarray) -> float:
-    """Mean distance of probability and share of stable samples over ten bins."""
-    bins = np.minimum((10 * probability).astype(int), 9)
-    return sum(
-        abs(probability[bins == b].mean() - stable[bins == b].mean()) * (bins == b).mean()
-        for b in np.unique(bins)
-    )
-
-
 def untrained() -> Linear:
     """Return a rule that knows nothing, for features and contact."""
     zeros = np.zeros(len(FEATURES))

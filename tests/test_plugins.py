@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import holdfast
+from holdfast import children
 from holdfast.classifiers import recipe, recipe_names
-from holdfast.cli import doctor, main
+from holdfast.cli import main
 from holdfast.cli.extensions import (
     EXPORTER_PLUGINS,
     PANEL_PLUGINS,
@@ -19,6 +20,7 @@ from holdfast.cli.extensions import (
     PUBLISHER_PLUGINS,
     SIMULATOR_PLUGINS,
     flags_of,
+    plugin_states,
 )
 from holdfast.devices.uri import open_source, parse
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, RecordingError
@@ -263,8 +265,9 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
 
 
+@pytest.mark.slow  # doctor imports each plug-in in a process of its own
 def test_doctor_lists_them(parts, capsys, monkeypatch):
-    monkeypatch.setattr(doctor, "_ask_child", functools.cache(doctor._ask_child))
+    monkeypatch.setattr(children, "answer_of_child", functools.cache(children.answer_of_child))
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
@@ -276,6 +279,7 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
     assert "SKIPPED: RuntimeError: no device" in " ".join(out.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "error"),
     [
@@ -286,11 +290,11 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
 )
 def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     if name == "hang":
-        monkeypatch.setattr(doctor, "PLUGIN_TIMEOUT", 3.0, raising=False)
+        monkeypatch.setattr(children, "CHILD_TIMEOUT", 3.0)
     points = {"holdfast.laws": {name: f"parts:{name}"}}
     install(tmp_path / "more", "bad", {"parts.py": PARTS}, points)
     with on_the_path(tmp_path / "more", monkeypatch):
-        found = {plugin.name: plugin.error for plugin in doctor._plugins()}
+        found = {plugin.name: plugin.error for plugin in plugin_states()}
     assert error in found[name]
 
 
@@ -366,6 +370,7 @@ def run(tmp_path, monkeypatch, capsys):
         yield run
 
 
+@pytest.mark.slow  # doctor imports each plug-in in a process of its own
 def test_the_template_is_listed_by_doctor(run):
     plugins = json.loads(run("doctor", "--json"))["plugins"]
     assert [(plugin["kind"], plugin["name"], plugin["error"]) for plugin in plugins] == [

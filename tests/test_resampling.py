@@ -135,7 +135,6 @@ def test_everything_else_stays():
     jitter=st.floats(0, 0.4),
     seed=st.integers(0, 9),
 )
-@settings(deadline=None)
 def test_every_value_depends_on_samples_up_to_the_first_at_or_after_it(cut, pair, jitter, seed):
     source, rate = pair
     rng = np.random.default_rng(seed)
@@ -178,7 +177,6 @@ def uneven(source, jitter, gaps, seed, start=0.0, n=300):
     start=st.sampled_from([0.0, -3.7, 1.7e9]),
     seed=st.integers(0, 999),
 )
-@settings(deadline=None)
 def test_live_is_offline(pair, jitter, gaps, start, seed):
     source, rate = pair
     module = uneven(source, jitter, gaps, seed, start)
@@ -190,7 +188,6 @@ def test_live_is_offline(pair, jitter, gaps, start, seed):
 
 
 @given(pair=st.sampled_from(RATES), n=st.integers(1, 300), seed=st.integers(0, 99))
-@settings(deadline=None)
 def test_live_returns_new_samples_at_once(pair, n, seed):
     """The first samples of a recording give as many new samples as offline."""
     source, rate = pair
@@ -256,12 +253,12 @@ def changes(n_rows, ratio, start=0.0):
 
 class TestRowsPerUpdate:
     @given(st.floats(1.6, 12.0), st.floats(0.0, 10.0), st.integers(80, 400))
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=60)
     def test_of_a_sensor_that_updates_evenly(self, ratio, start, n_rows):
         assert rows_per_update(changes(n_rows, ratio, start)) == pytest.approx(ratio, rel=0.15)
 
     @given(st.floats(0.02, 0.98), st.integers(0, 1000))
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=60)
     def test_of_readings_that_repeat_at_random(self, share, seed):
         assert rows_per_update(np.random.default_rng(seed).random(1000) < share) == 1.0
 

@@ -15,10 +15,11 @@ import numpy as np
 from attack.mutations import cut, damaged, encoded, flipped, lying
 from attack.result import CpuResult
 from holdfast.contact import ContactState
+from holdfast.devices.sources import Arrival
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording, mcap_writer, parquet, read_chunks, save_recording
 from holdfast.io.header import encode_header
-from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.live.recorder import Recorder
 from holdfast.recordings import Label, Recording, Tactile, Truth
 from holdfast.sensors import sensor
 
@@ -159,13 +160,14 @@ def _killed_recorder(path: Path, seconds: float) -> float:
 
 
 def _record_forever(path: Path, pipe: int) -> None:
-    writer = RecordingWriter(path, {"thumb": sensor("anyskin")})
+    recorder = Recorder(path, {"thumb": sensor("anyskin")})
     os.write(pipe, b"\x00" * 8)
     begin, k = time.monotonic(), 0
     while True:
         while k / KILL_RATE > time.monotonic() - begin:
             time.sleep(1e-3)
-        writer.append("thumb", [k / KILL_RATE], np.full((1, 5, 3), k, np.uint16))
+        readings = {"thumb": np.full((5, 3), k, np.uint16)}
+        recorder.put(Arrival(k / KILL_RATE, readings, received=time.monotonic()))
         os.write(pipe, b"\x00")
         k += 1
 

@@ -87,6 +87,8 @@ class Fault(_Coded):
     RATE = "rate"
     OFFSET = "offset"
     REPEATED = "repeated"
+    FIELD = "field"
+    INVALID = "invalid"
 
 
 class Cause(_Coded):

@@ -31,6 +31,23 @@ EXTRA_MODULES = {
     "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
+EXTRA_PURPOSES = {
+    "all": "all of the others but deep",
+    "parquet": "recordings as Parquet files",
+    "train": "holdfast train, evaluate and tune",
+    "twin": "holdfast simulate and the source twin:",
+    "plot": "figures, --plot",
+    "label": "holdfast label",
+    "onnx": "classifiers as ONNX files",
+    "cluster": "a Dask cluster, --engine dask:ADDRESS",
+    "deep": "the neural network of holdfast study",
+    "ros": "topics of ROS without a ROS 2 installation, and bags",
+    "serial": "sensors on a serial port",
+    "hdf5": "import of HDF5 recordings",
+    "grip": "holdfast hold: control of the grip force of a hand",
+    "interop": "LeRobot, Foxglove, Label Studio and public data sets",
+}
+"""Purpose of each extra, also of those that install packages beside the core."""
 
 LABORATORY = "holdfast-lab"
 PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
@@ -218,6 +235,31 @@ def install_command(extra: str) -> str:
         return f"uv sync --inexact{options}" if with_uv else pip
     package = f"holdfast[{extra}] @ {origin['url']}" if origin else f"holdfast[{extra}]"
     return f'{"uv " * with_uv}pip install "{package}"'
+
+
+def package_versions() -> dict[str, dict[str, str | None]]:
+    """Return the version of each required package, by extra ("" without one); None if missing."""
+    import re
+    from importlib.metadata import requires
+
+    requirement = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
+    versions: dict[str, dict[str, str | None]] = {}
+    for match in filter(None, map(requirement.match, requires("holdfast") or [])):
+        if match["package"] != "holdfast":
+            group = versions.setdefault(match["extra"] or "", {})
+            group[match["package"]] = _version(match["package"])
+    # "all" requires other extras of this package, not packages
+    others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra not in ("all", "deep"))
+    return versions | {"all": {name: found for group in others for name, found in group.items()}}
+
+
+def _version(package: str) -> str | None:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 def listen_error(host: str, port: int, cause: Exception) -> OutputError:

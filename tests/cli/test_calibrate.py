@@ -16,6 +16,8 @@ from holdfast.model import Model
 from holdfast.training import calibrate
 from training.build import PAD, handling_recording, normalised_model
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 32.0
 
 

@@ -1,21 +1,21 @@
 import json
 import socket
+import sys
 from importlib import metadata
 
 import numpy as np
 import pytest
 
-from holdfast.cli import doctor as verb
 from holdfast.cli import main
-from holdfast.cli.doctor import EXTRA_PURPOSES
 from holdfast.devices.sources.xela import places
-from holdfast.errors import install_command
+from holdfast.devices.uri import source_states
+from holdfast.errors import EXTRA_PURPOSES, install_command
 
 
 @pytest.fixture(autouse=True)
 def no_children(monkeypatch):
     """Start no Python for each plug-in: `tests/test_plugins.py` has what the children answer."""
-    monkeypatch.setattr(verb, "_ask_child", lambda *words: "")
+    monkeypatch.setattr("holdfast.children.answer_of_child", lambda *words: "")
 
 
 def report(capsys):
@@ -54,7 +54,7 @@ def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):
 
 
 def test_missing_packages_are_reported(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.cli.doctor._version", lambda package: None)
+    monkeypatch.setattr("holdfast.errors._version", lambda package: None)
     found = report(capsys)
     assert found["packages"]["numpy"] is None
     assert found["extras"]["hdf5"]["installed"] is False
@@ -115,10 +115,10 @@ def test_what_can_be_reached(capsys, monkeypatch):
 def test_a_listening_server_is_reported(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setattr(places, "PORT", server.getsockname()[1])
-        assert verb.check_sources()["xela"].startswith("a server listens at 127.0.0.1:")
+        assert source_states()["xela"].startswith("a server listens at 127.0.0.1:")
 
 
 def test_missing_extras_are_reported(monkeypatch):
-    monkeypatch.setattr(verb, "is_installed", lambda name: False)
-    found = verb.check_sources()
-    assert found["serial"] == f"not installed: {install_command('serial')}"
+    monkeypatch.setitem(sys.modules, "serial", None)
+    monkeypatch.delitem(sys.modules, "holdfast.devices.sources.serial", raising=False)
+    assert source_states()["serial"] == f"not installed: {install_command('serial')}"

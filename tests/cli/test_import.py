@@ -205,8 +205,8 @@ def test_refusals(capsys, table, tmp_path):
     )
     for path in (empty, text):
         assert refusal(capsys, path, out) == (
-            f"{path} is of no supported format; supported are {formats} (choose one with --format; "
-            "for a CSV file of any other logger give --sensor and --columns)"
+            f"{path} is of no supported format; there are {formats} (--format); "
+            "for a table or arrays of any other logger give --sensor"
         )
     assert refusal(capsys, text, out, "--format", "bag") == (
         f"unknown format 'bag'; there are {formats}"

@@ -283,7 +283,7 @@ def test_a_model_without_a_figure_is_refused(capsys, path):
 def test_parts_of_any_size_give_the_same(capsys, path, monkeypatch):
     whole = info_json(capsys, path)
     for n_samples in (1, 100):
-        monkeypatch.setattr("holdfast.cli.info.SAMPLES_OF_PART", n_samples)
+        monkeypatch.setattr("holdfast.labelling.review.content.SAMPLES_OF_PART", n_samples)
         assert info_json(capsys, path) == whole
 
 

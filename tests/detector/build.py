@@ -29,11 +29,11 @@ RICH = (
 """Every kind, transform and scope, over several windows."""
 
 
-def sensor(n_taxels=2, name="tiny", rate=RATE, limits=(0.0, 1000.0), unit="count"):
+def sensor(n_taxels=2, name="tiny", rate=RATE, limits=(0.0, 1000.0), unit="count", magnetic=False):
     turns, _ = np.linalg.qr(np.random.default_rng(n_taxels).normal(size=(n_taxels, 3, 3)))
     turns *= np.linalg.det(turns)[:, None, None]
     places = np.arange(3.0 * n_taxels).reshape(-1, 3)
-    return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate, unit, limits)
+    return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate, unit, limits, magnetic)
 
 
 def linear(n_features, seed=0, **options):

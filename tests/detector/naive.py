@@ -11,7 +11,7 @@ NAN = math.nan
 
 ORDER = (
     "not_finite", "stuck", "saturated", "tare_loaded", "dead", "noisy", "out_of_range",
-    "tare_drift", "offset", "repeated",
+    "tare_drift", "offset", "repeated", "field", "invalid",
 )  # fmt: skip
 
 
@@ -181,6 +181,9 @@ class Finger:
         self.longest = max([window, *(spec.window for spec in part.features)])
         self.samples = []  # every finite sample: (time, readings)
         self.frames, self.rest_readings = [], None
+        self.jumped = set()
+        self.field = self.still_field = self.common = np.zeros(3)
+        self.is_turned, self.is_load, self.n_unclear = False, False, 0
         self.stretch = []  # forces since the last interruption
         self.last = None
         self.gapped = False
@@ -224,14 +227,16 @@ class Finger:
             self.taxels[i].at = self.n_news
         bad = {i for i in self.used if not np.isfinite(readings[i]).all()}
         outside = {i for i in self.used if ((readings[i] < low) | (readings[i] > high)).any()} - bad
-        if bad or outside:
+        jumps = set() if fresh else self.jumps(readings)
+        if bad or outside or jumps:
+            faults |= {"invalid"} if jumps else set()
             faults |= {"not_finite"} if bad else set()
             faults |= {"out_of_range"} if outside else set()
-            invalid |= bad | outside
+            invalid |= bad | outside | jumps
             if self.baseline is None:
                 self.lose(faults, invalid)
                 return self.refuse(faults, invalid)
-            for i in bad | outside:
+            for i in bad | outside | jumps:
                 readings[i] = self.samples[-1][1][i]
                 self.taxels[i].at = self.n_news
             masked = invalid | self.mask.taxels | self.wrong_taxels
@@ -262,6 +267,74 @@ class Finger:
             self.faults = tuple(fault for fault in ORDER if fault in faults)
             return None
         return self.process_force(readings, faults, invalid, time, was_tared)
+
+    def jumps(self, readings):
+        """Magnetometers that fall to zero, or jump while all others are quiet, for one sample."""
+        before, self.jumped = self.jumped, set()
+        if not (self.sensor.magnetic and self.samples):
+            return set()
+        last, n = self.samples[-1][1], len(self.used)
+        steps = {i: float(((readings[i] - last[i]) ** 2).sum()) for i in self.used}
+        others = {i: step for i, step in steps.items() if readings[i].any()}
+        noise = 0.0 if math.isnan(self.noise) else 6 * self.noise**2 / n
+        most = max(steps.values())
+        if len(others) == n and most < 0.9 * sum(steps.values()):
+            return set()
+        usual = max(noise, sum(others.values()) / max(len(others), 1))
+        zeros = {i for i in self.used if i not in others and 0 < steps[i] > 400 * usual}
+        quiet = 9 * noise * (len(others) - 1)
+        lone = sum(others.values()) - most <= quiet and len(others) >= 4
+        if lone and noise > 0 and most > 2500 * noise:
+            self.jumped = {i for i in self.used if steps[i] > quiet} - zeros - before
+        return zeros | self.jumped
+
+    def take_out_field(self, readings, left_out):
+        """Subtract what all magnetometers read of a field; whether it may be a load instead."""
+        if not self.sensor.magnetic or math.isnan(self.noise):
+            return False
+        limit = 130.0 if self.sensor.name == "anyskin" else math.inf
+        kept = [i for i in self.used if i not in left_out]
+        unclear = len(kept) >= 4 and self.follow_field(readings, kept, limit)
+        self.n_unclear = self.n_unclear + 1 if unclear else 0
+        for i in self.used:
+            turn = self.sensor.rotations[i].T if self.is_turned else np.eye(3)
+            readings[i] = readings[i] - turn @ self.field
+        return self.n_unclear * self.period >= 0.1
+
+    def follow_field(self, readings, kept, limit):
+        plain = readings[kept] - self.baseline[kept]
+        turned = np.einsum("ijk,ik->ij", self.sensor.rotations[kept], plain)
+        n, means = len(kept), (plain.mean(axis=0), turned.mean(axis=0))
+        is_turned = bool(means[1] @ means[1] > 1.01 * (means[0] @ means[0]))
+        mean = means[is_turned]
+        apart = float((((turned if is_turned else plain) - mean) ** 2).sum())
+        same = is_turned == self.is_turned
+        motion = mean - self.common if same else np.zeros(3)
+        self.common = mean - (1 - min(1, self.period / 0.05)) * motion
+        change = mean - self.field if same else mean
+        least, moved = (4 * self.noise / n) ** 2, float(motion @ motion)
+        if moved <= least:
+            self.still_field = self.field
+        size = float(change @ change)
+        if size <= least:
+            self.is_load = False
+            return False
+        along = float(change @ self.sensor.normal) if is_turned else float(change[2])
+        fast, strong = moved > (0.15 * limit) ** 2, mean @ mean > limit**2
+        press = along**2 >= 0.49 * size and (along > 0 or limit == math.inf)
+        small = size < self.field @ self.field / 4
+        load = press and (not small if limit == math.inf else fast or strong or self.is_load)
+        noise = 12 * self.noise**2
+        if apart > n * 0.01 * (mean @ mean) + noise:
+            self.is_load = False
+            return not load and apart <= n * 0.0625 * size + noise
+        self.is_load = load
+        if load and limit < math.inf and fast:
+            self.field = self.still_field
+        if load or strong:
+            return not load
+        self.field, self.is_turned = mean, is_turned
+        return False
 
     def untrue(self, readings):
         """Faults of a finger whose readings are valid and cannot be true."""
@@ -311,12 +384,15 @@ class Finger:
         faults, taxels = faults | found[0], invalid | found[1]
         if was_tared:
             self.mask.note_saturated(readings)
-        enough = True
+        left_out = taxels | self.mask.taxels
+        enough, unclear = True, self.take_out_field(readings, left_out)
         if faults or self.mask.taxels or self.mask.fades:
             enough = self.mask.update(readings, taxels, time)
         force = naive.force(readings[self.used], self.baseline[self.used], self.rotations)
         self.force = tuple(force)
         serious = set() if enough else set(faults)
+        if unclear:
+            serious.add("field")
         if self.is_stuck():
             serious.add("stuck")
         faults |= serious

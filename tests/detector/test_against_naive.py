@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.contact import Cause
+from holdfast.contact import Cause, Fault
 from holdfast.detector import Detector
 from holdfast.features import Tare
 from holdfast.model import ANY_FINGER, Debounce, Model
@@ -108,6 +108,35 @@ def test_equals_the_naive_detector(options, seed):
         same(estimate, slow.update(samples, time))
         seen |= {(x.state, x.reason, *x.faults) for x in estimate.fingers.values()}
     assert len(seen) >= 5  # of states, reasons and faults together
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("name", ["anyskin", "other"])  # the unit of one is known
+def test_equals_the_naive_detector_in_a_field(name, seed):
+    """Fields that turn, presses, both at once, and magnetometers that are read too early."""
+    rng = np.random.default_rng(seed)
+    which = sensor(6, name, limits=None, magnetic=True)
+    values = 300 * rng.normal(size=(6, 3)) + rng.normal(size=(900, 6, 3))
+    frames = which.rotations if seed % 2 else np.broadcast_to(np.eye(3), (6, 3, 3))
+    for start in rng.integers(40, 800, size=6):
+        ramp = np.clip((np.arange(900) - start) / rng.integers(1, 100), 0, 1)
+        field = rng.normal(size=3) * rng.choice([5, 40, 90])
+        values += ramp[:, None, None] * np.einsum("ikj,k->ij", frames, field)
+        end = np.clip((start + 90 - np.arange(900)) / 20, 0, 1)
+        press = rng.uniform(0, 1, (6, 1)) ** rng.choice([0.0, 0.3, 1.0]) * [10, 5, 150]
+        values += (ramp * end)[:, None, None] * press
+    for k in rng.integers(5, 900, size=40):
+        values[k, rng.integers(6)] = rng.choice([0.0, 1500.0])
+    values[rng.integers(100, 800) :][:80, 2] = 0
+    hand_model = model(("thumb",), tare="0.2", threshold=25.0, which=which)
+    detector = Detector(hand_model)
+    slow = naive.Hand(hand_model, {"thumb": which}, Tare.parse("0.2"), RATE)
+    seen = set()
+    for k, readings in enumerate(values):
+        estimate = detector.update({"thumb": readings}, k / RATE)
+        same(estimate, slow.update({"thumb": readings}, k / RATE))
+        seen |= {*estimate.fingers["thumb"].faults, *estimate.fingers["thumb"].state}
+    assert Fault.INVALID in seen
 
 
 def test_equals_the_naive_detector_with_contact_by_noise():

@@ -73,6 +73,9 @@ static void make_finger(input *in, holdfast_finger *finger, size_t n_lags)
     finger->max_offset = in_counts ? 50000 * finger->n_used : HF_INFINITY;
     finger->min_noise = in_counts ? 1 : (hf_real)1e-6;
     finger->rounding_noise = in_counts ? (hf_real)0.3 : HF_NAN;
+    const hf_real fields[4] = {0, 130, HF_INFINITY, 0};
+    finger->max_field = fields[take(in, 1) % 4];
+    finger->is_magnetic = finger->max_field > 0;
     finger->max_step = (hf_real)0.1;
     finger->normal[2] = 1;
     finger->sigma_window = 6;

@@ -122,4 +122,4 @@ class TestCheck:
 
     def test_normals_are_finite(self, stream):
         wrong = refused(stream, lambda tables: tables[1][1].update({"normal[2]": np.inf}))
-        assert wrong == "normal of a finger"
+        assert wrong == "normal or max_field of a finger"

@@ -67,6 +67,7 @@ def one_module(indices):
         ({"rate": 0}, "pair: a rate above 0 Hz expected, 0 given"),
         ({"rate": float("inf")}, "pair: a rate above 0 Hz expected, inf given"),
         ({"unit": "V"}, "pair: unit 'count' or 'N' expected, 'V' given"),
+        ({"magnetic": 1}, "pair: magnetic true or false expected, 1 given"),
         ({"range": (1, 0)}, "range of pair: smallest, largest expected, 1.0, 0.0 given"),
         ({"range": (1, 2, 3)}, "range of pair: shape (2,) expected, (3,) given"),
     ],
@@ -162,6 +163,18 @@ class TestFromJson:
     def test_a_range_under_both_names_is_refused(self, tmp_path):
         with pytest.raises(ValueError, match=r"unknown fields \['limits'\] in a sensor"):
             Sensor.from_json(written(tmp_path, range=[0, 1], limits=[0, 4095]))
+
+    def test_what_is_magnetic_is_known_by_the_name_of_a_built_in_sensor(self, tmp_path):
+        plain, magnetic = (
+            Sensor.from_json(written(tmp_path, magnetic=value)) for value in ("absent", True)
+        )
+        assert (plain.magnetic, magnetic.magnetic, plain == magnetic) == (False, True, False)
+        assert Sensor.from_dict(magnetic.to_dict()) == magnetic
+        assert {name: sensor(name).magnetic for name in built_in_sensors()} == {
+            "uskin-curved": True, "uskin-4x4": True, "uskin-4x6": True, "gtac": False,
+            "anyskin": True, "papillarray": False,
+        }  # fmt: skip
+        assert all("magnetic" not in sensor(name).to_dict() for name in built_in_sensors())
 
     def test_unit_and_range_may_be_left_out(self, tmp_path):
         one = Sensor.from_json(written(tmp_path, unit="absent", range="absent"))

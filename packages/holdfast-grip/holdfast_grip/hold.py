@@ -68,11 +68,13 @@ def hold(
     No command was ever tried on a real hand: read docs/grip.md first.
 
     Example:
-      holdfast hold builtin:twin "twin:?object=can&seed=1" --hand twin: --armed --speed 0
+      holdfast hold builtin:twin twin:?object=can --hand twin: --armed --speed 0
       holdfast hold builtin:any xela://auto --hand log:commands.jsonl
-      holdfast hold model.json xela://auto --hand call:my_gripper:set_force --armed \
-        --confirm call:my_gripper:set_force --max-scale 1.2 --on-fault open
-      holdfast hold builtin:any xela://auto --hand "ros2:plexus?effort=0.1&max_effort=0.3"
+      holdfast hold model.json xela://auto --hand call:my_gripper:set_force \
+        --armed --confirm call:my_gripper:set_force \
+        --max-scale 1.2 --on-fault open
+      holdfast hold builtin:any xela://auto \
+        --hand "ros2:plexus?effort=0.1&max_effort=0.3"
     """
     from holdfast.live.session import Session
 

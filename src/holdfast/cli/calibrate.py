@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import (
+    RARE,
     ForceOption,
     InContactOption,
     JsonOption,
@@ -76,7 +77,7 @@ def calibrate(
             "--seconds", help="Time for which a live source is recorded [s].", show_default="60"
         ),
     ] = None,
-    speed: SpeedOption = 1.0,
+    speed: Annotated[SpeedOption, RARE] = 1.0,
     in_contact: InContactOption = False,
     force: ForceOption = False,
     as_json: JsonOption = False,

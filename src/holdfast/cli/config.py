@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlencode
 
 import msgspec
@@ -116,6 +117,26 @@ def load_config(path: Path) -> Config:
         if (value := getattr(config, key)) is not None
     }
     return msgspec.structs.replace(config, **files)
+
+
+def config_state(config: Config | None) -> dict[str, Any]:
+    """Return the path, the content and the error of the configuration file, for JSON.
+
+    Args:
+        config: of `--config`; by default that of the file which verbs read.
+    """
+    path, error = None, None
+    try:
+        path = find_config()
+        config = config or (None if path is None else load_config(path))
+    except ValueError as cause:
+        error = str(cause)
+    content = {} if config is None else msgspec.to_builtins(config)
+    return {
+        "path": None if path is None else str(path),
+        "content": {key: value for key, value in content.items() if value},
+        "error": error,
+    }
 
 
 def _check(config: Config, path: Path) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     InContactOption,
     JobsOption,
@@ -52,7 +53,7 @@ def evaluate(
         Path, typer.Argument(help="A labelled recording or CSV file, or a folder of them.")
     ],
     *,
-    csv: CsvOptions,
+    csv: Annotated[CsvOptions, RARE],
     seed: SeedOption = 0,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,

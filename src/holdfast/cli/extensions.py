@@ -7,9 +7,12 @@ docs/plugins.md has what each kind does besides.
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import partial
+from importlib import import_module
 from typing import Any, ClassVar
 
-from holdfast.plugins import PluginGroup
+from holdfast import children
+from holdfast.plugins import GROUP_PLUGINS, Plugin, PluginGroup
 
 
 class PluginOptions:
@@ -102,3 +105,43 @@ class SimulatorOptions(PluginOptions):
     """Options of simulators."""
 
     group = SIMULATOR_PLUGINS
+
+
+PLUGIN_GROUPS = {
+    "sensors": ("sensors", "SENSOR_PLUGINS"),
+    "sources": ("devices.uri", "SOURCE_PLUGINS"),
+    "importers": ("io.importers", "IMPORTER_PLUGINS"),
+    "labels": ("labelling.exchange.read_labels", "LABEL_PLUGINS"),
+    "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
+    "verbs": ("cli.app", "VERB_PLUGINS"),
+    "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),
+    "publishers": ("cli.extensions", "PUBLISHER_PLUGINS"),
+    "panels": ("cli.extensions", "PANEL_PLUGINS"),
+    "players": ("cli.extensions", "PLAYER_PLUGINS"),
+    "simulators": ("cli.extensions", "SIMULATOR_PLUGINS"),
+}
+"""Module and name of each group of plug-ins, by kind; a child imports one of them. Packages may
+have kinds of their own, see `GROUP_PLUGINS`."""
+
+
+def plugin_states() -> list[Plugin]:
+    """Return the plug-ins of other packages, and why some of them are skipped.
+
+    Each is imported in a child process, which it may end or block.
+    """
+    kinds = (*PLUGIN_GROUPS, *GROUP_PLUGINS.load_all())
+    error = partial(children.answer_of_child, __name__, "plugin_error")
+    return [plugin for kind in kinds for plugin in _plugin_group(kind).states(error)]
+
+
+def plugin_error(kind: str, name: str) -> str:
+    """Return why a plug-in is skipped; empty if it can be used."""
+    return _plugin_group(kind).error(name)
+
+
+def _plugin_group(kind: str) -> PluginGroup[Any]:
+    if kind not in PLUGIN_GROUPS:
+        return GROUP_PLUGINS.require(kind, f"the kind {kind} of plug-ins")
+    module, name = PLUGIN_GROUPS[kind]
+    group: PluginGroup[Any] = getattr(import_module(f"holdfast.{module}"), name)
+    return group

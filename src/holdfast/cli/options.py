@@ -32,6 +32,9 @@ TOKEN_VARIABLE = "HOLDFAST_TOKEN"
 MAX_TOKEN_LENGTH = 1024
 """Longest token that is read from a file [characters]."""
 LOCALHOST = "127.0.0.1"
+RARE = "rare"
+"""Mark of an option, or of a group of options, that few users need: `Annotated[JobsOption, RARE]`.
+The help of a verb shows it with `--help-all` only."""
 PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
@@ -73,13 +76,14 @@ SourceArgument = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what exists already.")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers."), RARE]
 JobsOption = Annotated[
-    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
+    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor."), RARE
 ]
 EngineOption = Annotated[
     str,
     typer.Option("--engine", help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
+    RARE,
 ]
 _TARE = typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s].")
 TareOption = Annotated[str, _TARE]
@@ -92,10 +96,12 @@ HysteresisOption = Annotated[
         help="Distance from the threshold that the probability must exceed to change the state; "
         "by default that of the model.",
     ),
+    RARE,
 ]
 IgnoreOption = Annotated[
     str,
     typer.Option("--ignore", help="Taxels to ignore, counted from 1: index:7,index:12."),
+    RARE,
 ]
 InContactOption = Annotated[
     bool,
@@ -140,6 +146,7 @@ class DetectorOptions:
         typer.Option(
             help="If the rate is not within 20 % of the model's: resample the source, or refuse it."
         ),
+        RARE,
     ] = RatePolicy.RESAMPLE
     debounce: Annotated[
         float | None,
@@ -147,6 +154,7 @@ class DetectorOptions:
             help="Minimum time a new state must last before it is reported [s].",
             show_default="as in the model",
         ),
+        RARE,
     ] = None
     hysteresis: HysteresisOption = None
     raw: Annotated[
@@ -154,6 +162,7 @@ class DetectorOptions:
         typer.Option(
             "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
         ),
+        RARE,
     ] = False
     ignore: IgnoreOption = ""
     in_contact: InContactOption = False
@@ -219,6 +228,7 @@ class ServerOptions:
             help="Secret that clients must send; required for other hosts. Other users of this "
             "machine can read it in the list of processes: prefer --token-file."
         ),
+        RARE,
     ] = None
     token_file: Annotated[
         Path | None,

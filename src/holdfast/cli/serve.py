@@ -14,6 +14,7 @@ import typer
 from holdfast.cli.extensions import PanelOptions, PublisherOptions
 from holdfast.cli.options import (
     LOCALHOST,
+    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -48,7 +49,7 @@ def serve(
     speed: SpeedOption = 1.0,
     once: OnceOption = False,
     options: DetectorOptions,
-    panels: PanelOptions,
+    panels: Annotated[PanelOptions, RARE],
     publishers: PublisherOptions,
     as_json: JsonOption = False,
 ) -> None:
@@ -60,7 +61,8 @@ def serve(
     this machine can connect. With --json, the address is printed as JSON. Stop it with Ctrl-C.
 
     With --hand, it also controls the grip force of a hand, as holdfast hold does, and the page
-    has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first.
+    has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first; --help-all has
+    the options.
 
     SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
     ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.

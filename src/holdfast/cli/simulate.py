@@ -10,6 +10,7 @@ import typer
 
 from holdfast.cli.extensions import SimulatorOptions
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     ForceOption,
     JobsOption,
@@ -36,7 +37,9 @@ class GraspOptions:
         str, typer.Option(help="Names of objects, separated by commas; by default all objects.")
     ] = ""
     table: Annotated[
-        Path | None, typer.Option(help="Your own objects: a .toml file like that of the twin.")
+        Path | None,
+        typer.Option(help="Your own objects: a .toml file like that of the twin."),
+        RARE,
     ] = None
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2"
     repeats: Annotated[
@@ -49,6 +52,7 @@ class GraspOptions:
             help="Profile of grip and disturbances: gentle, reference, vigorous, slips, "
             "long-hold, finger-gentle, ..."
         ),
+        RARE,
     ] = "reference"
     seed: SeedOption = 0
     server: Annotated[
@@ -56,6 +60,7 @@ class GraspOptions:
         typer.Option(
             "--server", help="Add irregular times and repeated packets, as a XELA server has."
         ),
+        RARE,
     ] = False
 
     def plan(self, engine: "Engine") -> "list[Grasp]":
@@ -77,7 +82,7 @@ def simulate(
     ],
     *,
     options: GraspOptions,
-    simulators: SimulatorOptions,
+    simulators: Annotated[SimulatorOptions, RARE],
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     video: Annotated[
@@ -85,6 +90,7 @@ def simulate(
         typer.Option(
             help="Write a video of the first grasp to this .gif, .png, .webp or .mp4 file."
         ),
+        RARE,
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -101,7 +107,7 @@ def simulate(
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
     that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
-    --repeats, --grasps, --seed, --engine, --jobs and --force apply then. With --engine
+    --repeats, --grasps, --seed, --engine, --jobs and --force apply then (--help-all). With --engine
     dask:ADDRESS, the workers write into OUT, which all machines need at the same path.
 
     Example:

@@ -67,7 +67,7 @@ def tune(
 
     Example:
       holdfast tune model.json recordings/ -o tuned.json --false-alarms 1
-      holdfast tune model.json recordings/ -o tuned.json --false-alarms 1 --for slip
+      holdfast tune model.json grasps/ -o mine.json --false-alarms 1 --for slip
       holdfast tune builtin:any recordings/ -o mine.json --false-alarms 0.5 --json
     """
     require_extras("train")

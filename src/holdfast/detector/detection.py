@@ -83,7 +83,7 @@ class FingerTrace(NamedTuple):
     stable_probability: Array
     instability: Array
     force: Array
-    faults: npt.NDArray[np.int16]
+    faults: npt.NDArray[np.int32]
     faulty_taxels: Integers
     cause: npt.NDArray[np.int8]
     slip_probability: Array | None = None
@@ -149,7 +149,7 @@ class Chunk(NamedTuple):
 
 TRACE_COLUMNS = (
     ("state", np.int8), ("reason", np.int8), ("probability", np.float64), ("sigma", np.float64),
-    ("force", np.float64), ("faults", np.int16), ("taxels", np.int64), ("cause", np.int8),
+    ("force", np.float64), ("faults", np.int32), ("taxels", np.int64), ("cause", np.int8),
     ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
 )  # fmt: skip
 """Fields of `ESTIMATE` in the order of `FingerTrace` after its times, and their types there."""

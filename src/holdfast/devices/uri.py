@@ -10,7 +10,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast.errors import missing_part, require_extras
+from holdfast import children
+from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import Sensor, sensor, sensor_names
 
@@ -194,6 +195,28 @@ def source_module(scheme: str) -> ModuleType | None:
         ValueError: the plug-in of the scheme cannot be used.
     """
     return None if scheme == "twin" else sys.modules.get(_source_maker(scheme).__module__)
+
+
+def source_state(scheme: str) -> str:
+    """Return the state of the sources of a scheme, or why its plug-in is skipped; may be empty."""
+    if scheme not in SCHEMES and (error := SOURCE_PLUGINS.error(scheme)):
+        return error
+    try:
+        return getattr(source_module(scheme), "state", str)()
+    except MissingExtra as missing:
+        return f"not installed: {install_command(missing.args[1])}"
+
+
+def source_states() -> dict[str, str]:
+    """Return in a few words whether the live sources of each scheme can be reached.
+
+    Plug-ins answer in a child process, which they may end or block.
+    """
+    states = {"xela": source_state("xela")}
+    for scheme in SOURCE_PLUGINS.names():
+        if state := children.answer_of_child(__name__, "source_state", scheme):
+            states[scheme] = state
+    return {**states, "serial": source_state("serial")}
 
 
 def _source_maker(scheme: str) -> "Callable[[Address], Source]":

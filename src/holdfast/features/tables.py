@@ -42,6 +42,9 @@ OFFSET_SHARE = 0.25
 the full range of every taxel changes by 7 %; real recordings had 0.5 %."""
 SUM_OF_WEIGHTS = 1.0 + float(np.sqrt(2.0)) / 1.5 + float(np.sqrt(3.0)) / 1.6
 """Of the axes in the sum of the readings, see `kernel/faults.c`."""
+MAX_EARTH_FIELDS = {"anyskin": 130.0}
+"""Twice the field of the earth, by sensors whose readings are in microtesla: it is at most 65 µT,
+and changes by twice that when a hand is turned over [µT]."""
 GAP_LIMIT_PERIODS = 3.0003
 """A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
 MAX_BRIDGED_SECONDS = 0.10001
@@ -187,6 +190,11 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "max_offset": OFFSET_SHARE * (high - low) * n_used * SUM_OF_WEIGHTS,
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
+        "is_magnetic": bool(sensor.magnetic),
+        # The load of the start, when it goes, may look like a field.
+        "max_field": MAX_EARTH_FIELDS.get(sensor.name, np.inf)
+        if sensor.magnetic and not plan.zero_unknown
+        else 0.0,
         "max_step": max(gap, MAX_BRIDGED_SECONDS) if bridges else gap,
         **{f"normal[{axis}]": float(value) for axis, value in enumerate(sensor.normal)},
         "sigma_window": plan.window,

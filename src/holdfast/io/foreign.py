@@ -102,7 +102,7 @@ def read_foreign(
     Args:
         path: path of the part.
         name: name of the format, one of `importers.FORMATS`.
-        sensors: as in `importers.generic_csv.read`; for `csv` only.
+        sensors: as in `importers.import_recordings`, of formats that take them.
         columns: the same.
         report: the same.
 
@@ -334,7 +334,7 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 
 def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    from holdfast.io.importers import extra_of, importer
+    from holdfast.io.importers import extra_of, importer, takes_sensors
     from holdfast.io.importers.csv_columns import Columns
 
     name = str(request.options["format"])
@@ -344,7 +344,7 @@ def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     _limit_memory(request)
     lines: list[str] = []
     more: tuple[object, ...] = ()
-    if name == "csv":
+    if takes_sensors(name):
         sensors = {key: Sensor.from_dict(one) for key, one in request.options["sensors"].items()}
         columns = msgspec.convert(request.options["columns"], Columns | None)
         more = sensors, columns, lines.append

@@ -59,7 +59,8 @@ static int hf_contact_by_load(
     const hf_finger *f, holdfast_decision *d, hf_real limit, bool zero_unknown, double time)
 {
     /* No contact: load < limit noise, or a small share of the peak. It begins after 0.2 s of that
-     * without motion, and ends with the load alone. */
+     * without motion, or once all taxels read what they did in the tare; and ends with the load
+     * alone. */
     const holdfast_motion *const m = &f->state->motion;
     const hf_real threshold = limit * m->noise;
     hf_real peak = m->peak_contact_load;
@@ -77,7 +78,8 @@ static int hf_contact_by_load(
         return m->moved_by > least ? HF_UNSTEADY : HF_IN_CONTACT;
     }
     const double last = d->loaded_at > m->moved_at ? d->loaded_at : m->moved_at;
-    if (d->candidate == HOLDFAST_NO_CONTACT || time - last > HF_REST_SECONDS) {
+    if (d->candidate == HOLDFAST_NO_CONTACT || f->state->is_untouched ||
+        time - last > HF_REST_SECONDS) {
         return HF_WITHOUT_CONTACT;
     }
     /* A grip was seen: peak >= 100 noise. A stream may begin in contact undeclared. */

@@ -10,6 +10,7 @@
 #include "faults.c"
 #include "untrue.c"
 #include "tare.c"
+#include "field.c"
 #include "masks.c"
 #include "motion.c"
 #include "stream.c"

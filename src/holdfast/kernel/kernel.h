@@ -5,7 +5,8 @@
  *   which reports a force in three axes. At a sample, each finger that is present goes through:
  *
  *     readings -> valid? (faults.c) -> true? (untrue.c) -> changes and faulty taxels (faults.c)
- *              -> tare and noise (tare.c) -> faulty taxels filled in (masks.c)
+ *              -> tare and noise (tare.c) -> magnetic field taken out (field.c)
+ *              -> faulty taxels filled in (masks.c)
  *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c)
  *              -> features (stream.c)
  *
@@ -124,7 +125,9 @@ enum {
     HOLDFAST_NOISY = 32,        /* a taxel jumps by far more than its noise */
     HOLDFAST_OUT_OF_RANGE = 64, /* a reading that the sensor cannot send */
     HOLDFAST_OFFSET = 8192,     /* all readings have left the tare together */
-    HOLDFAST_REPEATED = 16384   /* the last samples repeat those before them */
+    HOLDFAST_REPEATED = 16384,  /* the last samples repeat those before them */
+    HOLDFAST_FIELD = 32768,     /* a magnetic field, or a load: all taxels changed nearly alike */
+    HOLDFAST_INVALID = 65536    /* a reading of one taxel that its magnetometer cannot have */
 };
 
 /* How the baseline is found. */
@@ -196,11 +199,14 @@ typedef struct {
     hf_real high_end;       /* readings above this, too */
     hf_real max_offset;     /* largest change of the weighted sum of the readings, see hf_scan */
     hf_real min_noise;      /* least noise of a component of the force: by the step of readings */
+    hf_real max_field;      /* largest common field, see field.c; 0 where none is found, inf where
+                               the unit of the readings is not known */
     hf_real rounding_noise; /* noise of a reading by its step; NaN where the step is not known */
     hf_real max_step;       /* a longer step in time is a gap of the finger [s] */
     hf_real normal[3];      /* of the patch, in the fingertip frame; of length 1 */
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */
     size_t ready_window;    /* samples of a stretch from which on all features are known */
+    bool is_magnetic;       /* each taxel is a magnetometer */
     bool bridges;           /* all windows are in seconds: gaps of up to 0.1 s are bridged */
 } holdfast_finger;
 
@@ -348,7 +354,16 @@ typedef struct {
     bool fading;          /* the value of a taxel that came back still fades */
     hf_real fill_squares; /* sum of the squares of last_healthy, of the healthy taxels */
     hf_real fill_ratio;   /* load of the healthy taxels, beside that when the mask changed */
+    /* Magnetic field that all taxels read (field.c). */
+    hf_real field[3];       /* that is taken out of all readings */
+    hf_real still_field[3]; /* the same, when the readings did not move together last */
+    hf_real common[3];      /* the readings' mean beyond the tare, smoothed over 0.05 s */
+    bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
+    bool field_is_load;     /* the taxels moved alike, as no field does */
+    bool is_untouched;      /* but for it, all taxels read what they did in the tare */
+    int64_t n_unclear;      /* successive samples that may be of a field or of a load */
     /* Samples that cannot be true (untrue.c). */
+    uint64_t jumped;      /* bits of the taxels that were refused as a jump at the last sample */
     hf_real rest_sum;     /* weighted sum of the readings at rest, see hf_scan; NaN before */
     uint64_t n_frames;    /* samples without an invalid reading */
     uint64_t ring_period; /* of the ring of samples that is followed; 0 without one */

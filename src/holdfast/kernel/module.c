@@ -112,9 +112,10 @@ static const field finger_fields[] = {
     OF_FINGER(SIZE, first_taxel), OF_FINGER(SIZE, n_taxels), OF_FINGER(SIZE, first),
     OF_FINGER(REAL, n_used), OF_FINGER(REAL, low), OF_FINGER(REAL, high), OF_FINGER(REAL, low_end),
     OF_FINGER(REAL, high_end), OF_FINGER(REAL, max_offset), OF_FINGER(REAL, min_noise),
-    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_step), OF_FINGER(REAL, normal[0]),
+    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_field), OF_FINGER(REAL, max_step), OF_FINGER(REAL, normal[0]),
     OF_FINGER(REAL, normal[1]), OF_FINGER(REAL, normal[2]),
-    OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window), OF_FINGER(FLAG, bridges),
+    OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window), OF_FINGER(FLAG, is_magnetic),
+    OF_FINGER(FLAG, bridges),
     {NULL, SIZE, 0},
 };
 

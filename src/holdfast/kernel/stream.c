@@ -77,8 +77,10 @@ static void hf_begin_gap(const hf_finger *f, hf_real *own)
 
 /* Compute the force of a valid sample, and return the reason.
  *
- * enough: whether the finger goes on without its faulty taxels. */
-static int32_t hf_process_force(const hf_finger *f, bool enough, double time)
+ * enough: whether the finger goes on without its faulty taxels.
+ * finger_faults: that were found for the finger as a whole. */
+static int32_t hf_process_force(
+    const hf_finger *f, bool enough, uint32_t finger_faults, double time)
 {
     holdfast_finger_memory *const s = f->state;
     holdfast_values *const v = f->values;
@@ -92,7 +94,7 @@ static int32_t hf_process_force(const hf_finger *f, bool enough, double time)
         normal = hf_sum_taxels(f, f->baseline, force);
         hf_append_force(f, force);
     }
-    uint32_t finger_faults = enough ? 0 : v->faults;
+    finger_faults |= enough ? 0 : v->faults;
     if (hf_is_stuck(f)) {
         finger_faults |= HOLDFAST_STUCK;
     }
@@ -122,12 +124,22 @@ static int32_t hf_process_force(const hf_finger *f, bool enough, double time)
     return HOLDFAST_READY;
 }
 
-/* Replace the readings of a sample that are not valid, if enough are. Return false if not. */
-static bool hf_replace_or_refuse(const hf_finger *f, bool is_finite)
+/* Return whether all readings are finite, and low <= every reading <= high. */
+static bool hf_are_valid(const hf_finger *f, const hf_scan *scan)
 {
-    /* Also of taxels beyond the mask. */
-    uint32_t faults = is_finite ? HOLDFAST_OUT_OF_RANGE : HOLDFAST_NOT_FINITE;
-    const uint64_t bits = hf_find_invalid(f, &faults);
+    return isfinite(scan->total) && scan->least >= f->finger->low && scan->most <= f->finger->high;
+}
+
+/* Replace the readings of a sample that are not valid, if enough are. Return false if not. */
+static bool hf_replace_or_refuse(const hf_finger *f, const hf_scan *scan, uint64_t jumps)
+{
+    uint32_t faults = jumps ? HOLDFAST_INVALID : 0;
+    uint64_t bits = jumps;
+    if (!hf_are_valid(f, scan)) {
+        /* Also of taxels beyond the mask. */
+        faults |= isfinite(scan->total) ? HOLDFAST_OUT_OF_RANGE : HOLDFAST_NOT_FINITE;
+        bits |= hf_find_invalid(f, &faults);
+    }
     f->values->faults |= faults;
     f->values->taxels |= bits;
     if (!f->state->is_tared) {
@@ -154,10 +166,10 @@ static int32_t hf_process(const hf_finger *f, double time)
     if (s->lost) {
         hf_hold_lost(f);
     }
-    /* Valid: finite, and low <= every reading <= high. */
     hf_scan scan = hf_scan_readings(f, f->readings);
-    if (!isfinite(scan.total) || scan.least < low || scan.most > high) {
-        if (!hf_replace_or_refuse(f, isfinite(scan.total))) {
+    const uint64_t jumps = after_gap ? 0 : hf_find_jumps(f);
+    if (jumps || !hf_are_valid(f, &scan)) {
+        if (!hf_replace_or_refuse(f, &scan, jumps)) {
             s->n_stretch = 0;
             return HOLDFAST_FAULT;
         }
@@ -190,9 +202,10 @@ static int32_t hf_process(const hf_finger *f, double time)
         v->faults |= HOLDFAST_SATURATED;
         v->taxels |= at_limit;
     }
+    const uint32_t field = hf_take_out_field(f, v->taxels | s->masked);
     const bool has_mask = v->faults || s->masked || s->fading;
     const bool enough = !has_mask || hf_mask_taxels(f, v->taxels, time);
-    return hf_process_force(f, enough, time);
+    return hf_process_force(f, enough, field, time);
 }
 
 /* Return a value computed from a force feature. */

@@ -104,8 +104,8 @@ static const char *hf_check_finger(
     if (finger->bridges && hand->n_lags == 0) {
         return "bridges of a finger without lags";
     }
-    if (!hf_are_finite(finger->normal, 3)) {
-        return "normal of a finger";
+    if (!hf_are_finite(finger->normal, 3) || !(finger->max_field >= 0)) {
+        return "normal or max_field of a finger";
     }
     return NULL;
 }

@@ -1,4 +1,4 @@
-/* Samples that are valid but cannot be true: faults of a whole finger.
+/* Readings that are valid but cannot be true: of a whole finger, or of a taxel at one sample.
  *
  * They are judged by the readings alone, whatever the tare, and refused: they reach no tare, force
  * or window. Each rule costs a few comparisons at a sample that is true. */
@@ -7,6 +7,15 @@
 /* No sensor sends readings that are all smaller than this but not all zero. It is a number of
  * single precision too. */
 #define HF_LEAST_READING ((hf_real)1e-37)
+
+/* A magnetometer that reads zero in all axes was read too early if it jumps there by this many
+ * times as far as the other taxels move at this sample. */
+#define HF_ZERO_TO_STEPS ((hf_real)20)
+/* One taxel alone that jumps by this many times its noise is not true before it stays there for a
+ * second sample: a touch spreads over the skin. */
+#define HF_JUMP_TO_NOISE ((hf_real)50)
+/* Steps of noise, as a root mean square: the others are still below this many times as much. */
+#define HF_QUIET_STEPS ((hf_real)3)
 
 enum {
     HF_MIN_PERIOD = 3,   /* of a ring: the shortest [samples] */
@@ -148,6 +157,91 @@ static bool hf_is_near_end(const hf_finger *f, const hf_scan *scan)
         n_near += near_end && f->used[i] > 0;
     }
     return (hf_real)(2 * n_near) > f->finger->n_used;
+}
+
+/* Steps of the taxels from the last sample to this one. */
+typedef struct {
+    hf_real total;    /* sum of their squares */
+    hf_real largest;  /* of their squares */
+    hf_real quietest; /* least sum of the absolute readings of a taxel: 0 if one reads zeros */
+} hf_steps;
+
+static hf_steps hf_find_steps(const hf_finger *f)
+{
+    const size_t n = f->n;
+    hf_sum total, largest, minus_quietest;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide sum = {0}, most = {0};
+        const hf_wide none = sum - HF_INFINITY;
+        hf_wide least = none;
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors now = hf_load_vectors(f->readings, n, i);
+            const hf_wide square = hf_squares(hf_minus(now, hf_load_vectors(f->previous, n, i)));
+            const hf_wide size = hf_wide_abs(now.x) + hf_wide_abs(now.y) + hf_wide_abs(now.z);
+            sum += square;
+            most = hf_greater(square, most);
+            least = hf_greater(hf_where(hf_load(f->used + i) > 0, -size, none), least);
+        }
+        hf_put(&total, lane, sum);
+        hf_put(&largest, lane, most);
+        hf_put(&minus_quietest, lane, least);
+    }
+    const hf_steps steps = {
+        hf_total(total), hf_largest_lane(largest), -hf_largest_lane(minus_quietest)};
+    return steps;
+}
+
+/* Return the bits of the magnetometers that read zeros, or jump alone, at this sample. */
+static uint64_t hf_find_jumps(const hf_finger *f)
+{
+    holdfast_finger_memory *const s = f->state;
+    const uint64_t before = s->jumped;
+    s->jumped = 0;
+    if (!f->finger->is_magnetic || s->n_seen == 0) {
+        return 0;
+    }
+    hf_steps steps = hf_find_steps(f);
+    if (steps.quietest > 0 && steps.largest < HF_LONE_SHARE * steps.total) {
+        return 0;
+    }
+    /* Steps of noise: two samples in three axes. Not known before the noise is. */
+    const size_t n = f->n;
+    const hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
+    uint64_t bits = 0;
+    hf_real n_others = f->finger->n_used;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        if (f->used[i] > 0 && !hf_has_reading(f->readings, n, i)) {
+            const hf_real *const then = f->previous + i;
+            const hf_real fallen[3] = {then[0], then[n], then[2 * n]};
+            steps.total -= hf_square(fallen);
+            n_others -= 1;
+            bits |= hf_square(fallen) > 0 ? hf_bit(i) : 0;
+        }
+    }
+    /* Zero: |f_i(k-1)|^2 > (20)^2 max(mean |df|^2 of the others, of noise). */
+    const hf_real typical = hf_max(of_noise, hf_max(0, steps.total) / hf_max(n_others, 1));
+    for (size_t i = 0; bits && i < f->n_taxels; ++i) {
+        const hf_real *const then = f->previous + i;
+        const hf_real fallen[3] = {then[0], then[n], then[2 * n]};
+        if (hf_square(fallen) <= HF_ZERO_TO_STEPS * HF_ZERO_TO_STEPS * typical) {
+            bits &= ~hf_bit(i);
+        }
+    }
+    /* Jump: |df_i|^2 > (50)^2 of noise, and the others' mean |df|^2 <= (3)^2 of noise. */
+    const hf_real quiet = HF_QUIET_STEPS * HF_QUIET_STEPS * of_noise * (n_others - 1);
+    if (steps.largest > HF_JUMP_TO_NOISE * HF_JUMP_TO_NOISE * of_noise && of_noise > 0 &&
+        n_others >= HF_MIN_TAXELS && steps.total - steps.largest <= quiet) {
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            hf_real step[3];
+            for (size_t axis = 0; axis < 3; ++axis) {
+                step[axis] = f->readings[axis * n + i] - f->previous[axis * n + i];
+            }
+            if (!(bits & hf_bit(i)) && hf_square(step) > quiet) {
+                s->jumped |= hf_bit(i) & ~before;
+            }
+        }
+    }
+    return bits | s->jumped;
 }
 
 /* Return the faults of a finger whose readings, all valid, cannot be true; 0 without any. */

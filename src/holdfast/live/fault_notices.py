@@ -70,6 +70,15 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     Fault.OFFSET: FaultText(
         "offset", "all readings have jumped together: check the cable and the supply of the sensor"
     ),
+    Fault.FIELD: FaultText(
+        "field",
+        f"all taxels changed nearly alike, by a magnetic field or a load: {_NEW_TARE}; "
+        "keep magnets and motors away",
+    ),
+    Fault.INVALID: FaultText(
+        "invalid readings",
+        "readings jump for a single sample, or to zero: check the cable and the driver's timing",
+    ),
     Fault.REPEATED: FaultText(
         "repeated", "the same few samples come again and again: restart the device or its server"
     ),

@@ -14,6 +14,7 @@ from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
 from holdfast.errors import ModelError, OutputError
 from holdfast.files import check_keys, read_input, whole_file, write_whole
 from holdfast.model.first_schema import upgraded
+from holdfast.model.heads import Head
 from holdfast.model.parts import FingerModel
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import with_range
@@ -53,6 +54,57 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         raise ModelError(f"{path} is not a model of {MODEL_SCHEMA}: {cause}") from cause
 
 
+def facts_of(model: "Model") -> dict[str, Any]:
+    """Return what a model is for, how it decides and what it was made from, as JSON has it.
+
+    Means, scales and weights, and the location and scale of own handling, are in the file only.
+    """
+    fingers = {}
+    for name, part in model.fingers.items():
+        sensor = None if part.sensor is None else model.sensors[part.sensor]
+        fingers[name] = {
+            "sensor": part.sensor,
+            "unit": None if sensor is None else sensor.unit,
+            "heads": {head.name: _facts_of_head(head) for head in part.heads},
+            "contact_threshold": part.contact_threshold,
+            "contact_noise": part.contact_noise,
+            "contact_load": part.contact_load,
+            "normalised": part.normalised,
+            "handling": {
+                sensor_name: {
+                    "seconds": handling.seconds,
+                    "thresholds": handling.thresholds,
+                    "recordings": list(handling.recordings),
+                }
+                for sensor_name, handling in part.handling.items()
+            },
+        }
+    training = None
+    if model.training is not None:
+        training = msgspec.to_builtins(model.training)
+        training["recordings"] = list(model.training.recordings)
+    return {
+        "name": model.name,
+        "rate": model.rate,
+        "tare": model.tare,
+        "debounce": msgspec.to_builtins(model.debounce),
+        "fingers": fingers,
+        "training": training,
+    }
+
+
+def _facts_of_head(head: Head) -> dict[str, Any]:
+    fields: dict[str, Any] = msgspec.to_builtins(head)
+    rule, n = fields.pop("rule"), head.rule.n_features
+    fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
+    fields["features"] = [str(spec) for spec in head.features]
+    if head.choice is not None:
+        fields["choice"] |= {"recordings": list(head.choice.recordings)}
+    if head.link != "logit":
+        del fields["threshold"]
+    return fields
+
+
 def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
     """Write a model and its ONNX files: all of them or none.
 
@@ -84,7 +136,9 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
 
 def encode(model: "Model") -> bytes:
     """Return the JSON of a model, without the contents of ONNX files; their digests are in it."""
-    return msgspec.json.encode(_with_contents(model, lambda _: b""), enc_hook=_encode_array)
+    fields = msgspec.to_builtins(_with_contents(model, lambda _: b""), enc_hook=_encode_array)
+    sensors = {name: sensor.to_dict() for name, sensor in model.sensors.items()}
+    return msgspec.json.encode(fields | {"sensors": sensors})
 
 
 def decode(data: bytes, kind: type[ModelT]) -> ModelT:

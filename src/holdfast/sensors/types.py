@@ -23,6 +23,11 @@ MAX_RATE = 1e6
 MAX_SENSOR_FILE_SIZE = 1 << 26
 """Maximum size of the file of a sensor [bytes]."""
 
+MAGNETIC_SENSORS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin")
+"""Built-in sensors whose taxels are magnetometers. Files do not repeat it for them.
+
+The sections of `gtac` lie on different fingers, and half of what they read is no field."""
+
 ROTATION_TOLERANCE = 1e-5
 """Maximum error of a rotation matrix as read; tables are rounded to six digits."""
 
@@ -52,6 +57,8 @@ class Sensor:
         unit: unit of raw readings, `count` or `N`.
         range: smallest and largest reading that the device can send; None if unknown. Readings
             of most taxels near an end of it are a fault.
+        magnetic: whether each taxel is a magnetometer, which also reads the earth's field. None
+            stands for what is known by the name: True for the built-in `uskin-*` and `anyskin`.
 
     Raises:
         ValueError: a shape is wrong, a number is not finite, or a rotation is not valid.
@@ -64,6 +71,7 @@ class Sensor:
     rate: float
     unit: Unit = "count"
     range: tuple[float, float] | None = None
+    magnetic: bool | None = None
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -83,6 +91,10 @@ class Sensor:
             )
         if self.unit not in ("count", "N"):
             raise ValueError(f"{self.name}: unit 'count' or 'N' expected, {self.unit!r} given")
+        magnetic = self.name in MAGNETIC_SENSORS if self.magnetic is None else self.magnetic
+        if not isinstance(magnetic, bool):
+            raise ValueError(f"{self.name}: magnetic true or false expected, {magnetic!r} given")
+        object.__setattr__(self, "magnetic", magnetic)
         object.__setattr__(self, "range", _checked_range(self.range, self.name))
         object.__setattr__(self, "positions", _locked(positions))
         object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
@@ -100,7 +112,7 @@ class Sensor:
         """Return whether two sensors are the same, but for the last digits of numbers."""
         if self is other or not isinstance(other, Sensor):
             return self is other
-        own, given = ((x.name, x.n_taxels, x.unit, x.range) for x in (self, other))
+        own, given = ((x.name, x.n_taxels, x.unit, x.range, x.magnetic) for x in (self, other))
         return (
             own == given
             and abs(self.rate - other.rate) <= EQUAL_TOLERANCE * self.rate
@@ -119,7 +131,7 @@ class Sensor:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the sensor as plain data, in the form that `from_json` reads."""
-        return {
+        fields = {
             "name": self.name,
             "positions": self.positions.tolist(),
             "rotations": self.rotations.tolist(),
@@ -128,6 +140,9 @@ class Sensor:
             "unit": self.unit,
             "range": None if self.range is None else list(self.range),
         }
+        # Only what the name does not say: files of built-in sensors are as before version 0.4.
+        is_known = self.magnetic == (self.name in MAGNETIC_SENSORS)
+        return fields if is_known else fields | {"magnetic": self.magnetic}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -139,8 +154,8 @@ class Sensor:
             ValueError: a field is missing, unknown, or not valid for `Sensor`.
         """
         data = with_range(data)
-        known = {"name", "positions", "rotations", "normal", "rate", "unit", "range"}
-        needed = known - {"unit", "range"}
+        known = {"name", "positions", "rotations", "normal", "rate", "unit", "range", "magnetic"}
+        needed = known - {"unit", "range", "magnetic"}
         if unknown := sorted(set(data) - known):
             raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
         if missing := sorted(needed - set(data)):
@@ -153,6 +168,7 @@ class Sensor:
             rate=float(data["rate"]),
             unit=data.get("unit", "count"),
             range=data.get("range"),
+            magnetic=data.get("magnetic"),
         )
 
     @classmethod

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.csv_columns import TIME_UNITS, Columns, seconds_of
+from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.csv_times import TIME_UNITS, seconds_of
 
 
 def header(form, n=3, modules=("",), first=0):

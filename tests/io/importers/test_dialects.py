@@ -7,7 +7,7 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
-from holdfast.io.importers.csv_columns import clock_seconds
+from holdfast.io.importers.csv_times import clock_seconds
 from holdfast.sensors import sensor
 
 ANYSKIN = {"*": sensor("anyskin")}

@@ -6,7 +6,6 @@ import runpy
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -21,7 +20,6 @@ from holdfast.io import load_dataset, save_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 from holdfast_lab.study.benchmark import protocol as protocol_module
-from holdfast_lab.study.benchmark.method_scores import BothTargets, load_features
 from holdfast_lab.study.benchmark.protocol import (
     BenchmarkProtocol,
     BenchmarkSplit,
@@ -29,11 +27,9 @@ from holdfast_lab.study.benchmark.protocol import (
     protocol,
 )
 from holdfast_lab.study.benchmark.scoring import log_odds
-from holdfast_lab.study.methods import METHODS
 from study.example_recordings import SLIPS, recording_with_truth
 
 SCRIPTS = Path(__file__).parents[4] / "benchmarks"
-WHOLE_HAND = "jl_global_logreg"
 SEEDS = {"tuning": (0, 1, 2), "new-objects": (3, 4, 5), "new-hand-and-objects": (6, 7)}
 
 
@@ -186,54 +182,6 @@ def test_a_program_without_holdfast_reads_and_writes_csv(capsys, folder, tmp_pat
     assert err == "no scores, and not scored: new-hand-and-objects\n"
     assert list(document["tables"]) == ["stability", "events", "slips"]
     assert figure(document, "stability", "AUC", on="new-objects") > 0.7
-
-
-def test_the_script_scores_the_methods_of_the_study(capsys, folder, tmp_path, monkeypatch):
-    """A fit scores its split and `tuning`; results that exist are kept."""
-    benchmark, out = tmp_path / "benchmark", tmp_path / "out"
-    benchmark.mkdir()
-    for split, recordings in {**{name: name for name in SEEDS}, "train": "tuning"}.items():
-        (benchmark / split).symlink_to(folder / recordings)
-    words = ["score", str(benchmark), str(folder / "tuning"), str(out)]
-    for n_made in (4, 0):
-        run_script(monkeypatch, "benchmark_methods.py", *words, "--methods", "logreg", WHOLE_HAND)
-        assert capsys.readouterr().out.count("done\n") == n_made
-    run_script(monkeypatch, "benchmark_methods.py", "table", str(out))
-    head, _, *lines = (line.split(" | ") for line in capsys.readouterr().out.splitlines())
-    assert [line[0] for line in lines] == ["| `new-objects`"] * 2 + ["| `new-hand-and-objects`"] * 2
-    assert {line[1] for line in lines} == {METHODS[n].title for n in ("logreg", WHOLE_HAND)}
-    assert all(float(line[head.index("AUC")]) > 0.9 for line in lines)
-    document, _ = scored(capsys, benchmark, out / "logreg.new-objects.parquet")
-    results = json.loads((out / "logreg.new-objects.json").read_text())
-    assert results["tables"] == document["tables"]
-    assert document["left_out"] == ["new-hand-and-objects"]
-
-
-def test_a_method_that_does_not_fit_a_sensor_has_no_scores(folder):
-    recordings = load_features(METHODS["logreg"], folder / "tuning")
-    fitted = BothTargets.fit(METHODS["logreg"], recordings)
-    fewer = {name: rows[:, :-1] for name, rows in recordings[0].features.items()}
-    other = replace(recordings[0], features=fewer)
-    assert set(fitted.scores(recordings[0])) == {"thumb", "index"}
-    with pytest.raises(ValueError, match="no estimate of thumb in grasp0"):
-        fitted.scores(other)
-
-
-def test_a_hand_of_another_unit_has_the_contact_threshold_of_its_own_rest(folder):
-    """Readings ten thousand times smaller: nothing touches by the threshold of training."""
-    method = METHODS["tangential"]
-    recordings = load_features(method, folder / "tuning")
-    features = recordings[0]
-    small = replace(
-        features,
-        amplitude={name: 1e-4 * rows for name, rows in features.amplitude.items()},
-        at_rest={n: (k, 1e-4 * a, 1e-8 * b) for n, (k, a, b) in features.at_rest.items()},
-    )
-    own, trained = (BothTargets.fit(method, recordings, own_rest=rest) for rest in (True, False))
-    assert trained.scores(small)["thumb"].stable.max() < 1e-9
-    scores = own.scores(small)["thumb"].stable
-    assert (scores == own.scores(recordings[0])["thumb"].stable).all()
-    assert scores.max() > 0.5
 
 
 def test_only_the_order_of_scores_counts_for_events_and_slips(capsys, folder, tmp_path):

@@ -12,6 +12,7 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
+    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -50,7 +51,7 @@ def detect(
     ] = False,
     *,
     options: DetectorOptions,
-    csv: CsvOptions,
+    csv: Annotated[CsvOptions, RARE],
     seconds: SecondsOption = None,
     as_json: JsonOption = False,
 ) -> None:

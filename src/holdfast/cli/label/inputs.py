@@ -1,7 +1,6 @@
 """Inputs of the modes of `holdfast label`: recordings, and options that modes share."""
 
 import getpass
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -10,11 +9,33 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import FittingTareOption, ForceOption
+from holdfast.cli.options import (
+    LOCALHOST,
+    RARE,
+    FittingTareOption,
+    ForceOption,
+    ServerOptions,
+)
 
 if TYPE_CHECKING:
     from holdfast.labelling.rules.poses import Poses
     from holdfast.recordings import Label, Recording
+
+
+LABEL_ADDRESS = ServerOptions(LOCALHOST, port=8081)
+"""Default address of the labelling page."""
+PathsArgument = Annotated[list[Path], typer.Argument(help="Recordings, or folders of them.")]
+AuthorOption = Annotated[
+    str | None,
+    typer.Option("--author", help="Author of the labels.", show_default="login name, or rule:RULE"),
+]
+AnnotatorOption = Annotated[
+    str | None,
+    typer.Option("--annotator", help="Annotator whose labels are read from Label Studio."),
+]
+PageOption = Annotated[
+    bool, typer.Option("--page", help="Show the contradicted labels on the page.")
+]
 
 
 @dataclass(frozen=True)
@@ -32,10 +53,12 @@ class RuleOptions:
             metavar="BODY=NAME",
             help="Topic or frame of a body in the bag; BODY is object or a finger.",
         ),
+        RARE,
     ] = None
     parameters: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
+        RARE,
     ] = None
 
     @cached_property
@@ -92,55 +115,10 @@ class RuleOptions:
 class SaveOptions:
     """Group of options: how labels of a rule or of other programs are saved."""
 
-    author: Annotated[
-        str | None,
-        typer.Option(help="Author of the labels.", show_default="login name, or rule:RULE"),
-    ] = None
-    annotator: Annotated[
-        str | None, typer.Option(help="Annotator whose labels are read from Label Studio.")
-    ] = None
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="With --auto or --import: write nothing.")
-    ] = False
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Write no labels; only show them.")] = (
+        False
+    )
     force: ForceOption = False
-
-
-def recordings_at(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings at these paths, without duplicates; of a folder all recordings.
-
-    Raises:
-        RecordingError: a path does not exist or is no recording, or a folder has none.
-    """
-    from holdfast.errors import RecordingError
-    from holdfast.io import load_dataset
-    from holdfast.io.recording_files import SUFFIXES
-
-    files: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            files.extend(load_dataset(path).paths)
-        elif not path.exists():
-            raise RecordingError(f"{path} does not exist; a recording or a folder expected")
-        elif path.suffix not in SUFFIXES:
-            raise RecordingError(
-                f"{path} is not a recording: {' or '.join(SUFFIXES)} expected "
-                "(`holdfast import` reads other formats)"
-            )
-        else:
-            files.append(path)
-    return list(dict.fromkeys(files))
-
-
-def check_rule(rule: str) -> None:
-    """Check that a rule exists.
-
-    Raises:
-        ValueError: the rule is unknown.
-    """
-    from holdfast.labelling.rules import RULES
-
-    if rule not in RULES:
-        raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
 
 
 def login_name() -> str:

@@ -179,6 +179,11 @@ def source(address: Address) -> Source:
     return SerialSource(address)
 
 
+def state() -> str:
+    """Return the serial ports of this machine."""
+    return ", ".join(port.device for port in comports()) or "no serial port"
+
+
 def _positive(address: Address, name: str, default: int) -> int:
     text = address.parameters.get(name, str(default))
     if not (text.isascii() and text.isdecimal() and int(text)):

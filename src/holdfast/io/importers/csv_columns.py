@@ -6,12 +6,12 @@ They are written as in `--columns`: `time=stamp:ms,taxels=F{axis}{taxel},label=s
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from itertools import product, takewhile
 
 import numpy as np
 
 from holdfast.errors import RecordingError
+from holdfast.io.importers.csv_times import TIME_UNITS
 from holdfast.io.importers.table import some_names
 from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number, taxel_numbers
 from holdfast.sensors.types import Array
@@ -19,24 +19,14 @@ from holdfast.sensors.types import Array
 Layout = Mapping[str, Mapping[tuple[int, str], str]]
 """Column by taxel (from 1) and axis, by module; the module is empty without a name."""
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Seconds in each unit of time."""
-PLAUSIBLE_RATES = (5.0, 5000.0)
-"""Rates that decide the unit of times without one [Hz]; it is unambiguous, because units are a
-factor of 1000 apart."""
-DOUBTFUL_STEPS = (0.2, 1.0)
-"""Steps of times without a unit that are 1 to 5 Hz in s, or 1000 to 5000 Hz in ms; a step of 1 may
-also be a number of samples."""
-STATED_RATES = (0.5, 50_000.0)
-"""Rates at which the unit that a header names is believed [Hz]."""
 MAX_PATTERNS = 1 << 18
 """Maximum number of patterns that a guess compares; 368 taxels have some thousand."""
+MAX_FEW_AXES = 4096
+"""Maximum number of columns among which taxels of one or two axes are looked for."""
 MAX_GUESSED_NAME = 200
 """Maximum length of the name of a column that a guess considers [characters]."""
-DAY = 86_400.0
-"""Length of a day [s]."""
-MAX_EQUAL_SHARE = 90.0
-"""Share of equal times from which they were written with too few digits [%]."""
+THREE_AXES = "three axes (x, y, z) of each taxel are needed: normal force and shear"
+"""Answer to data of one or two axes."""
 RUN = ".."
 """Between the first and the last of consecutive columns."""
 
@@ -49,18 +39,10 @@ _OF_ROWS = {
 """Names of columns that say to which module or episode a row belongs."""
 _UNIT = re.compile(r"(?:^|[\W_])(?P<unit>mm|um|µm|m|N|mN|counts?)\W*$")
 _TIME_NAMES = (
-    "time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis",
+    "time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis", "ts", "clock",
     "zeit", "temps", "tiempo", "tempo", "tijd", "czas",
 )  # fmt: skip
-_CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:\.\d*)?)")
 _RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s*hz", re.IGNORECASE)
-_UNIT_WORDS = {
-    **dict.fromkeys(("s", "sec", "secs", "seconds"), "s"),
-    **dict.fromkeys(("ms", "millis", "milliseconds"), "ms"),
-    **dict.fromkeys(("us", "micros", "microseconds"), "us"),
-    **dict.fromkeys(("ns", "nanos", "nanoseconds"), "ns"),
-}
-_UNIT_AT_END = re.compile(rf"(?:^|[\W_])(?P<unit>{'|'.join(_UNIT_WORDS)})\W*$", re.IGNORECASE)
 _ONE_FINGER = re.compile(r"(?P<module>.+)(?P<rest>[._]t\{taxel\}[._]\{axis\})")
 _TOKEN = re.compile(r"\d+|[A-Za-z]+|[^A-Za-z\d]+")
 _WORD = re.compile(r"\{\w+\}|\d+|[A-Za-z]+|[^A-Za-z\d{]+")
@@ -157,27 +139,34 @@ class Columns:
         Raises:
             RecordingError: nothing in the header looks like times or taxels.
         """
-        given = None if self.rate is not None else self.time
-        time = named_column(names, given) if given else self.time
-        time = time or _guessed_time(names) or _first_of_run(names, n_taxels)
+        fields = ("label", "cause", "module", "episode", *(() if self.rate else ("time",)))
+        texts = {field: getattr(self, field) for field in fields if getattr(self, field)}
+        given = {field: named_column(names, text) for field, text in texts.items()}
+        if missing := [column for column in given.values() if column not in names]:
+            raise RecordingError(f"column {missing[0]!r} is missing; it has {some_names(names)}")
+        time = given.get("time", self.time)
+        time = time or guessed_time(names) or _first_of_run(names, n_taxels)
         others = [name for name in names if name != time]
         taxels = self.taxels or _guessed_taxels(others, n_taxels, units)
-        taxels = taxels or _guessed_run(others, n_taxels) or _guessed_taxels(others, (), units)
-        label = self.label or ("label" if "label" in names else None)
-        cause = self.cause or ("cause" if "cause" in names else None)
+        taxels = taxels or _few_axes(others) or _guessed_run(others, n_taxels)
+        taxels = taxels or _guessed_taxels(others, (), units)
+        given = {name: name for name in ("label", "cause") if name in names} | given
         if time is None:
             raise RecordingError(
                 f"no column of times among {some_names(names)}: give --columns time=COLUMN, or "
                 "time=100Hz if there is none" + (_RUN_HINT if names[:1] == ("column1",) else "")
             )
+        if taxels is None and any(len(others) in (n, 2 * n) for n in n_taxels if n > 1):
+            raise RecordingError(
+                f"{len(others)} columns given for {' or '.join(map(str, n_taxels))} taxels; "
+                f"{THREE_AXES}"
+            )
         if taxels is None:
             raise RecordingError(
                 f"no taxel columns such as x1, y1, z1, x2 among {some_names(names)}: give "
-                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, "
-                "taxels=FIRST..LAST, or --sensor alone if all other columns are x, y, z of its "
-                "taxels"
+                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, taxels=FIRST..LAST"
             )
-        return replace(self, time=time, taxels=taxels, label=label, cause=cause)
+        return replace(self, **{**given, "time": time, "taxels": taxels})
 
     def layout(self, names: Sequence[str], n_taxels: Collection[int] = ()) -> Layout:
         """Return the column of each taxel and axis, by module.
@@ -195,6 +184,9 @@ class Columns:
         layout = _run_layout(pattern, names, n_taxels) if is_run else pattern_layout(pattern, names)
         if not layout:
             raise RecordingError(f"no column is named as {pattern!r}; it has {some_names(names)}")
+        axes = sorted({axis for columns in layout.values() for _, axis in columns})
+        if len(axes) < len("xyz"):
+            raise RecordingError(f"{' and '.join(axes)} alone given, as {pattern!r}; {THREE_AXES}")
         return layout
 
 
@@ -219,163 +211,7 @@ def named_column(names: Sequence[str], text: str) -> str:
     return names[int(text) - 1] if is_number else text
 
 
-def stated_unit(name: str) -> str | None:
-    """Return the unit at the end of the name of a column of times; None without one.
-
-    Example:
-        >>> [stated_unit(name) for name in ("time_ms", "t [us]", "timestamp", "time")]
-        ['ms', 'us', None, None]
-    """
-    match = _UNIT_AT_END.search(name)
-    return _UNIT_WORDS[match["unit"].lower()] if match else None
-
-
-def unit_of_column(name: str, values: Array, where: str) -> str:
-    """Return the unit of a column of times: as its name states, or that of a plausible rate.
-
-    Args:
-        name: name of the column.
-        values: (n,) times.
-        where: the file, for messages.
-
-    Raises:
-        RecordingError: name and values contradict each other, or two units are possible.
-    """
-    step = _median_step(values)
-    unit = stated_unit(name)
-    if unit is None:
-        _check_clear(name, step, where)
-        return _unit_of(values)
-    rate = 1 / (step * TIME_UNITS[unit]) if step else 0.0
-    low, high = STATED_RATES
-    if step and not low <= rate <= high:
-        likely = _unit_of(values)
-        raise RecordingError(
-            f"{where}: column {name!r} with steps of {step:.6g} given, {rate:.4g} Hz in {unit}; "
-            f"{PLAUSIBLE_RATES[0]:g} to {PLAUSIBLE_RATES[1]:g} Hz expected: give --columns "
-            f"time={name}:{likely}, or the unit that is true"
-        )
-    return unit
-
-
-def clock_seconds(cells: Sequence[str]) -> Array | None:
-    """Return wall-clock times in seconds, past midnight too; None if the first cell has none.
-
-    Args:
-        cells: dates with times (ISO 8601), or times such as 23:59:59.999.
-
-    Raises:
-        RecordingError: another cell has no such time.
-
-    Example:
-        >>> clock_seconds(["23:59:59.5", "00:00:00,5"]).tolist()
-        [86399.5, 86400.5]
-    """
-    times = []
-    for row, cell in enumerate(cells):
-        time = _clock_time(cell)
-        if time is None and row == 0:
-            return None
-        if time is None:
-            raise RecordingError(f"time {cell[:40]!r} given after {cells[0][:40]!r}")
-        times.append(time)
-    values = np.array(times)
-    if "-" in cells[0]:  # with a date
-        return values
-    days: Array = np.cumsum(np.diff(values, prepend=values[0]) < -DAY / 2)
-    return values + DAY * days
-
-
-def _clock_time(cell: str) -> float | None:
-    """Return the seconds of a date with a time, or since midnight; None if it is neither."""
-    text = cell.strip().replace(",", ".")
-    if match := _CLOCK.fullmatch(text):
-        return 3600 * int(match["h"]) + 60 * int(match["m"]) + float(match["s"])
-    try:
-        date = datetime.fromisoformat(text) if "-" in text[1:] else None
-    except ValueError:
-        return None
-    if date is None:
-        return None
-    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
-
-
-def check_steps(name: str, times: Array) -> None:
-    """Check that times increase; name the option that works if they do not.
-
-    Args:
-        name: of their column.
-        times: (n,) in the unit of the file.
-
-    Raises:
-        RecordingError: a time is not later than the one before.
-    """
-    steps = np.diff(times)
-    wrong = np.flatnonzero(~(steps > 0))
-    if not len(wrong):
-        return
-    first, share = int(wrong[0]), 100 * len(wrong) / len(steps)
-    option = "give --columns time=100Hz with the true rate"
-    before, after = times[first], times[first + 1]
-    if not np.isfinite(after) or not np.isfinite(before):
-        raise RecordingError(f"column {name!r} has no time in row {first + 2} of the samples")
-    if after < before:
-        raise RecordingError(
-            f"column {name!r}: times go back at sample {first + 1}: {after:.12g} after "
-            f"{before:.12g}; strictly increasing times expected: {option} if the samples are "
-            "evenly spaced, or cut the file there"
-        )
-    lost = ": their last digits are lost" if share > MAX_EQUAL_SHARE else ""
-    raise RecordingError(
-        f"column {name!r}: times stand still at sample {first + 1}: {after:.12g} after "
-        f"{before:.12g}, in {share:.0f} % of the samples{lost}; strictly increasing times "
-        f"expected: {option} if the samples are evenly spaced"
-    )
-
-
-def _check_clear(name: str, step: float, where: str) -> None:
-    """Check that times without a unit have a single plausible one."""
-    low, high = DOUBTFUL_STEPS
-    if not low < step <= high:
-        return
-    counted = "a number of samples, " if step == 1 else ""
-    samples = ", or time=100Hz with the true rate if it counts samples" if counted else ""
-    raise RecordingError(
-        f"{where}: column {name!r} with steps of {step:.6g} and without a unit given, which may be "
-        f"{counted}{1 / step:.4g} Hz in s or {1e3 / step:.4g} Hz in ms: give --columns "
-        f"time={name}:s or time={name}:ms{samples}"
-    )
-
-
-def _median_step(values: Array) -> float:
-    """Return the median of the steps above 0; 0 without any."""
-    steps = np.diff(values)
-    steps = steps[np.isfinite(steps) & (steps > 0)]
-    return float(np.median(steps)) if len(steps) else 0.0
-
-
-def seconds_of(values: Array, unit: str | None) -> tuple[Array, str]:
-    """Return times in seconds, and their unit; without one, that of a plausible rate.
-
-    Example:
-        >>> times, unit = seconds_of(np.array([0.0, 10.0, 20.0]), None)
-        >>> times.tolist(), unit
-        ([0.0, 0.01, 0.02], 'ms')
-    """
-    known = unit or _unit_of(values)
-    return values * TIME_UNITS[known], known
-
-
-def _unit_of(values: Array) -> str:
-    step = _median_step(values)
-    low, high = PLAUSIBLE_RATES
-    fitting = (
-        unit for unit, size in TIME_UNITS.items() if low <= 1 / max(step * size, 1e-12) < high
-    )
-    return next(fitting, "s")
-
-
-def _guessed_time(names: Sequence[str]) -> str | None:
+def guessed_time(names: Sequence[str]) -> str | None:
     """Return the column of times: a usual name, with or without a unit, or one with "time"."""
     bare = {re.sub(r"[\W_]*\b(s|ms|us|ns)\b\W*$", "", _spaced(name)): name for name in names}
     usual = (bare[name] for name in _TIME_NAMES if name in bare)
@@ -432,6 +268,20 @@ def _run_layout(text: str, names: Sequence[str], n_taxels: Collection[int]) -> L
         }
         for k, start in enumerate(starts)
     }
+
+
+def _few_axes(names: Sequence[str]) -> str | None:
+    """Return the pattern of most of the columns if it has taxels of one or two axes only."""
+    found: dict[str, set[tuple[int, str]]] = {}
+    for name in names[:MAX_FEW_AXES]:
+        for pattern, key in _patterns(name):
+            found.setdefault(pattern, set()).add(key)
+    for pattern, keys in found.items():
+        axes = {axis for _, axis in keys}
+        taxels = {taxel for taxel, _ in keys}
+        if len(taxels) > 1 and len(axes) < len("xyz") and 2 * len(keys) > len(names):
+            return pattern if len(keys) == len(taxels) * len(axes) else None
+    return None
 
 
 def _guessed_taxels(

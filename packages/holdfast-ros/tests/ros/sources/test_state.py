@@ -2,7 +2,7 @@
 
 import pytest
 
-from holdfast.cli.doctor import check_sources
+from holdfast.devices.uri import source_states
 from holdfast_ros import rospy_node
 from holdfast_ros.sources import ros1, ros2
 
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.slow
 
 def test_both_are_in_the_report(monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "7")
-    found = check_sources()
+    found = source_states()
     assert list(found) == ["xela", "ros1", "ros2", "serial"]
     assert found["ros2"] == ros2.state() == "cyclonedds, domain 7"
     assert found["ros1"] == ros1.state()

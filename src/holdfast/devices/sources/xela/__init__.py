@@ -1,10 +1,15 @@
 """Source of XELA's server: `xela://HOST:PORT` or `xela://auto`."""
 
+import socket
+from contextlib import suppress
+
 from holdfast.devices.sources.base import Source
-from holdfast.devices.uri import Address
+from holdfast.devices.uri import Address, parse
 
 PARAMETERS = ("values", "fingers", "sensor")
 """Names of the parameters of the URI."""
+PROBE_TIMEOUT = 0.3
+"""Time in which a server must accept a connection [s]."""
 
 
 def source(address: Address) -> Source:
@@ -29,3 +34,14 @@ def source(address: Address) -> Source:
         calibrated=address.calibrated(),
         sensor=address.sensor(),
     )
+
+
+def state() -> str:
+    """Return whether a server listens at this machine's own addresses."""
+    from holdfast.devices.sources.xela.places import places
+
+    addresses = places(parse("xela://auto")[1])
+    for address in addresses:
+        with suppress(OSError), socket.create_connection(address, PROBE_TIMEOUT):
+            return f"a server listens at {address}"
+    return f"no server listens at {' or '.join(map(str, addresses))}"

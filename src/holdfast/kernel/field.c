@@ -1,0 +1,193 @@
+/* Magnetic fields: a hand that turns in the field of the earth changes what its magnetometers read.
+ *
+ * A field changes all readings of a module by the same vector: in the fingertip frame, or in the
+ * taxel frames, for drivers that turn the readings of all chips alike. A load differs from taxel to
+ * taxel. So the part that is common to all taxels is a field where nothing else differs; it is
+ * taken out of the readings, and stays out while a load hides it. docs/sensors.md says what is
+ * lost. */
+#include "finger.h"
+
+/* Share by which the gains of magnetometers differ, and what they read of a field. */
+#define HF_FIELD_TOLERANCE ((hf_real)0.1)
+/* Share by which taxels differ, as a root mean square, from which on it is a load. Between both it
+ * may be either. */
+#define HF_LOAD_SHARE ((hf_real)0.25)
+/* A field, and its motion, count from this many times the noise of a component of the force: less
+ * than any contact does. */
+#define HF_FIELD_TO_NOISE ((hf_real)4)
+/* Factor of the squared noise of taxels: twice what is expected, because the tare has noise, too. */
+#define HF_FIELD_MARGIN ((hf_real)4)
+/* Share of a change that is normal in a press; a field has any direction. */
+#define HF_PRESSED_SHARE ((hf_real)0.7)
+/* Time for which it must be unclear whether a change is a field or a load [s]. */
+#define HF_UNCLEAR_SECONDS ((hf_real)0.1)
+/* Time constant over which the common part is smoothed [s]. */
+#define HF_COMMON_SECONDS ((hf_real)0.05)
+/* A field changes within a second by at most this many times its largest value: a third of a second
+ * for half a turn of the hand. */
+#define HF_FIELD_SPEED ((hf_real)3)
+
+/* What the taxels of a finger have in common, beyond the tare. */
+typedef struct {
+    hf_real n;           /* taxels */
+    hf_real mean[3];     /* in the fingertip frame if it is turned, else in the taxel frames */
+    bool is_turned;      /* the frame in which more is common */
+    hf_real differences; /* sum of the squared distances of the taxels from the mean */
+} hf_common;
+
+/* Return what the taxels that are not left out have in common. */
+static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
+{
+    /* h_i = f_i - b_i: sum h_i, sum R_i h_i, sum |h_i|^2. */
+    const size_t n = f->n;
+    hf_sum parts[7];
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_vectors plain = {{0}, {0}, {0}}, turned = {{0}, {0}, {0}};
+        hf_wide squares = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors h =
+                hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
+            const hf_vectors g = hf_turned(f->rotations, n, i, h);
+            const hf_wide used = hf_load(f->used + i);
+            plain.x += used * h.x;
+            plain.y += used * h.y;
+            plain.z += used * h.z;
+            turned.x += g.x;
+            turned.y += g.y;
+            turned.z += g.z;
+            squares += used * hf_squares(h);
+        }
+        const hf_wide all[7] = {plain.x,  plain.y,  plain.z, turned.x,
+                                turned.y, turned.z, squares};
+        for (size_t k = 0; k < 7; ++k) {
+            hf_put(&parts[k], lane, all[k]);
+        }
+    }
+    hf_real sums[7];
+    for (size_t k = 0; k < 7; ++k) {
+        sums[k] = hf_total(parts[k]);
+    }
+    hf_common common = {f->finger->n_used, {0, 0, 0}, false, 0};
+    for (size_t i = 0; left_out && i < f->n_taxels; ++i) {
+        if ((left_out & hf_bit(i)) && f->used[i] > 0) {
+            hf_real h[3];
+            for (size_t axis = 0; axis < 3; ++axis) {
+                h[axis] = f->readings[axis * n + i] - f->baseline[axis * n + i];
+                sums[axis] -= h[axis];
+            }
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const hf_real *const turn = f->rotations + 3 * axis * n + i;
+                sums[3 + axis] -= turn[0] * h[0] + turn[n] * h[1] + turn[2 * n] * h[2];
+            }
+            sums[6] -= hf_square(h);
+            common.n -= 1;
+        }
+    }
+    /* sum |h_i - mean|^2 = sum |h_i|^2 - |sum h_i|^2 / n. Rounding decides nothing: 1 %. */
+    common.is_turned = hf_square(sums + 3) > (hf_real)1.01 * hf_square(sums);
+    const hf_real *const sum = common.is_turned ? sums + 3 : sums;
+    const hf_real share = 1 / hf_max(common.n, 1);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        common.mean[axis] = share * sum[axis];
+    }
+    common.differences = hf_max(sums[6] - share * hf_square(sum), 0);
+    return common;
+}
+
+/* Return whether a common change is along the normal, as that of a press. */
+static bool hf_is_press(const hf_finger *f, const hf_common *common, const hf_real change[3])
+{
+    const hf_real along = common->is_turned ? hf_dot(change, f->finger->normal) : change[2];
+    /* Where the unit is not known, a press of the tare that goes, too. */
+    return (along > 0 || isinf(f->finger->max_field)) &&
+           along * along >= HF_PRESSED_SHARE * HF_PRESSED_SHARE * hf_square(change);
+}
+
+/* Update the field of a finger by what its taxels have in common. Return whether it may be either
+ * a field or a load. */
+static bool hf_update_field(const hf_finger *f, const hf_common *common)
+{
+    holdfast_finger_memory *const s = f->state;
+    const hf_real most = f->finger->max_field, *const mean = common->mean;
+    const bool same_frame = common->is_turned == s->field_is_turned;
+    const hf_real gain = hf_min(1, f->hand->period / HF_COMMON_SECONDS);
+    /* c(k) = c(k-1) + (T / tau) (mean(k) - c(k-1)); change = mean - field. */
+    hf_real motion[3], change[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        motion[axis] = same_frame ? mean[axis] - s->common[axis] : 0;
+        s->common[axis] = mean[axis] - (1 - gain) * motion[axis];
+        change[axis] = mean[axis] - (same_frame ? s->field[axis] : 0);
+    }
+    /* n |v| > 4 noise: F of that vector is above the noise of F. */
+    const hf_real noise = HF_FIELD_TO_NOISE * s->noise / common->n, least = noise * noise;
+    const hf_real moved = hf_square(motion), square = hf_square(change);
+    if (moved <= least) {
+        memcpy(s->still_field, s->field, sizeof s->field);
+    }
+    /* Untouched: sum |h_i - field|^2 <= 4 times that of noise. */
+    const hf_real of_noise = HF_FIELD_MARGIN * 3 * (s->noise * s->noise);
+    s->is_untouched = common->differences + common->n * square <= of_noise;
+    if (square <= least) {
+        s->field_is_load = false;
+        return false;
+    }
+    /* Alike: sum |h_i - mean|^2 <= n (0.1 |mean|)^2 + 4 times that of noise. */
+    const hf_real limit = common->n * (HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE) * hf_square(mean);
+    const bool is_alike = common->differences <= limit + of_noise;
+    /* A load: a press that is too fast for a field, or too strong. Where the unit is not known, any
+     * press is one, unless it is small beside a field that was found. */
+    const hf_real fastest = HF_FIELD_SPEED * HF_COMMON_SECONDS * most;
+    const bool is_known = !isinf(most), is_strong = hf_square(mean) > most * most;
+    const bool is_fast = moved > fastest * fastest;
+    const bool is_small = square < hf_square(s->field) / 4;
+    const bool is_load = hf_is_press(f, common, change) &&
+                         (is_known ? is_fast || is_strong || s->field_is_load : !is_small);
+    if (!is_alike) {
+        s->field_is_load = false;
+        const hf_real nearly = common->n * (HF_LOAD_SHARE * HF_LOAD_SHARE) * square;
+        return !is_load && common->differences <= nearly + of_noise;
+    }
+    s->field_is_load = is_load;
+    if (is_load) {
+        if (is_known && is_fast) { /* what was taken for a field before */
+            memcpy(s->field, s->still_field, sizeof s->field);
+        }
+        return false;
+    }
+    if (is_strong) {
+        return true;
+    }
+    memcpy(s->field, mean, sizeof s->field);
+    s->field_is_turned = common->is_turned;
+    return false;
+}
+
+/* Take the field out of the readings of a finger. Return its faults.
+ *
+ * left_out: bits of the taxels that do not count. */
+static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
+{
+    holdfast_finger_memory *const s = f->state;
+    if (!(f->finger->max_field > 0) || isnan(s->noise)) {
+        return 0;
+    }
+    const hf_common common = hf_find_common(f, left_out);
+    /* Of fewer taxels, all may be loaded alike. A touch may be unclear while it begins. */
+    const bool is_unclear = common.n >= HF_MIN_TAXELS && hf_update_field(f, &common);
+    s->n_unclear = is_unclear ? s->n_unclear + 1 : 0;
+    if (hf_square(s->field) > 0) {
+        /* f_i -= field, or R_i^T field. */
+        const size_t n = f->n;
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const hf_real *const turn = f->rotations + axis * n + i;
+                f->readings[axis * n + i] -=
+                    s->field_is_turned ? turn[0] * s->field[0] + turn[3 * n] * s->field[1] +
+                                             turn[6 * n] * s->field[2]
+                                       : f->used[i] * s->field[axis];
+            }
+        }
+    }
+    const bool lasts = (hf_real)s->n_unclear * f->hand->period >= HF_UNCLEAR_SECONDS;
+    return lasts ? HOLDFAST_FIELD : 0;
+}

@@ -1,0 +1,116 @@
+"""The content of a recording, as `holdfast info` shows it."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from holdfast.contact import LABEL_STATES, Fault
+from holdfast.detector import Detector
+from holdfast.errors import RecordingError
+from holdfast.features import Tare
+from holdfast.io import read_chunks
+from holdfast.labelling.review.findings import findings_of_scan, hidden_labels
+from holdfast.labelling.review.scan import FindingsScan
+from holdfast.labelling.server.workspace import summary_of
+from holdfast.model import Model
+from holdfast.recordings import Label, Recording
+
+SAMPLES_OF_PART = 4096
+"""Samples that are read at a time; it bounds the memory."""
+
+
+def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> dict[str, Any]:
+    """Return the content of a recording, as JSON has it.
+
+    Args:
+        path: of the recording.
+        tare: tare for the faults.
+        recording: the recording, if it was loaded; by default it is read in parts, so that it
+            may be larger than the memory.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    scan, faults = FindingsScan(), _FaultCounts(tare)
+    for part in [recording] if recording else read_chunks(path, SAMPLES_OF_PART):
+        scan.add(part)
+        faults.add(part)
+        truth = part.truth
+    found, hidden = scan.recording, hidden_labels(path)
+    findings = findings_of_scan(scan) + ([] if hidden is None else [hidden])
+    return {
+        "name": found.name,
+        "modules": {
+            name: {
+                "sensor": module.sensor.name,
+                "n_taxels": module.sensor.n_taxels,
+                "unit": module.sensor.unit,
+                "n_samples": module.force.n_samples,
+                "rate": module.force.rate,
+                "gaps": module.force.n_gaps,
+                "repeats": int(module.repeats.sum()),
+                "labels": label_seconds(module.labels),
+                "faults": {fault.value: n for fault, n in faults.of(name) if n},
+            }
+            for name, module in scan.modules.items()
+        },
+        "start": found.start,
+        "duration": found.duration,
+        "complete": found.complete,
+        "metadata": found.metadata,
+        "markers": [{"time": time, "text": text} for time, text in found.markers],
+        "media": [{"path": path, "offset": offset} for path, offset in found.media],
+        "truth": truth
+        and {
+            "n_samples": scan.n_truth,
+            "hand": list(truth.hand),
+            "fingers": {finger: list(arrays) for finger, arrays in truth.fingers.items()},
+        },
+        "digest": recording.digest if recording else _digest(path),
+        "findings": [finding._asdict() for finding in findings],
+    }
+
+
+def label_seconds(labels: Iterable[Label]) -> dict[str, float]:
+    """Return the total duration of the labels of each state [s]."""
+    seconds = {state.value.lower(): 0.0 for state in LABEL_STATES}
+    for label in labels:
+        seconds[label.state.value.lower()] += label.end - label.start
+    return seconds
+
+
+def _digest(path: Path) -> str | None:
+    """Return the digest of a recording; None if its file has none and it is too large to load."""
+    try:
+        return summary_of(path).digest
+    except RecordingError:  # its parts were read without an error
+        return None
+
+
+class _FaultCounts:
+    """Number of samples of each module with each fault that a detector finds."""
+
+    def __init__(self, tare: Tare) -> None:
+        self._counts: dict[str, dict[Fault, int]] = {}
+        self._model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
+        self._detectors: dict[str, Detector] = {}
+
+    def of(self, name: str) -> Iterable[tuple[Fault, int]]:
+        """Return the faults of a module, each with its number of samples."""
+        return self._counts.get(name, {}).items()
+
+    def add(self, part: Recording) -> None:
+        """Add a recording, or its next part."""
+        for name, module in part.modules.items():
+            if not module.n_samples:
+                continue
+            alone = replace(part, modules={name: module}, truth=None)
+            if name not in self._detectors:
+                self._detectors[name] = Detector.for_recording(self._model, alone)
+                self._counts[name] = dict.fromkeys(Fault, 0)
+            masks = self._detectors[name].run(alone).fingers[name].faults
+            for bit, fault in enumerate(Fault):
+                self._counts[name][fault] += int((masks >> bit & 1).sum())
