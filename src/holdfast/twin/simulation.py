@@ -209,9 +209,7 @@ class Simulation:
             scales = slipping.grip_scale * (np.ones(len(FINGERS)) if scales is None else scales)
         moved, released = None, protocol.is_released(self.time)
         if scales is not None and self._pressing is not None and not released:
-            if self._motor_part < 1.0:  # forces follow their commands as the motors do
-                self._forces = scales = self._forces + self._motor_part * (scales - self._forces)
-            moved = self._pressing.displacement(scales)
+            moved = self._pressing.displacement(self.followed(scales))
         world.advance(command, self.plan, protocol.anchor, moved)
         slip_truth: dict[str, Array | float] = {}  # of what only slip events change
         if self._profile.slips is not None:
@@ -246,6 +244,13 @@ class Simulation:
             acceleration=state.acceleration + shaken,
             friction=load.friction * state.friction,
         )
+
+    def followed(self, scales: Array) -> Array:
+        """Return the scales that act, which follow those of the commands as the motors do."""
+        if self._motor_part < 1.0:
+            self._forces = self._forces + self._motor_part * (scales - self._forces)
+            return self._forces
+        return scales
 
     def joint_angles(self) -> Array:
         """Return the joint angles (16,) that the hand's driver publishes now [rad]."""
