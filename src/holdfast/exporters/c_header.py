@@ -123,6 +123,7 @@ def _sizes(
     for name, value in sizes.items():
         yield f"#define HOLDFAST_{name.upper()} {value}"
     normals = {tuple(sensor.normal.tolist()) for sensor in sensors.values()}
+    # Where all normals are one axis, the compiler drops the products with the others.
     for axis, unit in enumerate(np.eye(3).tolist()):
         if normals == {tuple(unit)}:
             yield f"#define HOLDFAST_NORMAL_AXIS {axis}"

@@ -114,6 +114,7 @@ def _is_built_in(item: Sensor) -> bool:
     """Return whether the importer finds this sensor by its name, apart from the unit."""
     if item.name not in built_in_sensors():
         return False
+    # A built-in name with other positions is another sensor: it needs a file of its own.
     known = sensor(item.name)
     calibrated = replace(known, unit=item.unit, range=None)  # as `Tactile` makes it
     return item in (known, calibrated)

@@ -55,6 +55,7 @@ def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
     """
     n_recordings = len(metrics.recordings)
     named = n_recordings <= MAX_NAMED_RECORDINGS
+    # The texts beside few recordings need the height of four rows; dots without names need half.
     n_rows = max(4, n_recordings if named else MAX_NAMED_RECORDINGS // 2)
     heights = [1.0 + 0.16 * n_rows, 3.3, *([] if metrics.slips is None else [SLIPS_HEIGHT])]
     figure = page_figure(0.4 + sum(heights), WIDTH)
@@ -106,6 +107,7 @@ def _draw_recordings(
         values = [finger.accuracy for finger in recording.fingers.values()]
         return float(np.mean([v for v in values if v is not None] or [-1.0]))
 
+    # Sorted as a whole, so that both panels have a recording in the same row.
     ordered = sorted(metrics.recordings, key=mean_accuracy)
     _draw_dots(left, metrics, ordered, "accuracy", styles)
     _draw_dots(right, metrics, ordered, "auc_contact", styles)
@@ -165,6 +167,7 @@ def _draw_calibration(
         axes.plot(table[:, 0], table[:, 1], color=style.color, linewidth=0.8, alpha=0.7)
     every = calibration([finger for decision in decisions for finger in decision.fingers.values()])
     if len(every):
+        # Bars of the samples lie under the curve: where there are few, it means little.
         share = every[:, 2] / every[:, 2].sum()
         axes.bar(every[:, 0], 0.25 * share / share.max(), width=0.06, color="#dddddd", zorder=0)
         axes.plot(every[:, 0], every[:, 1], "o-", color=HAND_COLOUR, linewidth=1.4, markersize=3)
@@ -206,6 +209,7 @@ def _draw_delay_curve(
     delays = event_delays(matches)
     if not len(delays):
         return
+    # The curve ends below 1 by the share of missed events, whose delay is infinite.
     detected = delays[delays <= MAX_DELAY]
     times = np.concatenate([[-EARLY_TOLERANCE], detected, [MAX_DELAY]])
     counts = np.concatenate([[0], np.arange(1, len(detected) + 1), [len(detected)]])

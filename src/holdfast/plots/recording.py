@@ -137,6 +137,7 @@ def _stacks(
     grid = figure.subplots(
         len(heights), n_columns, sharex=True, squeeze=False, height_ratios=heights
     )
+    # One time axis for all fingers, which may begin and end at different times.
     start = min(series.times[0] for series in curves.values())
     end = max(series.times[-1] for series in curves.values())
     grid[0, 0].set_xlim(start, end if end > start else start + 1)
@@ -176,6 +177,7 @@ def _draw_markers(axes: Sequence[Axes], recording: Recording, origin: float, nam
     """Draw a dotted line for each marker, with its text above where texts do not overlap."""
     left, right = axes[0].get_xlim()
     letter = MARKER_LETTER_WIDTH * (right - left)
+    # Texts begin behind the title of the panel, and each behind the one before.
     free = left + letter * (len(axes[0].get_title("left")) + 4)
     for time, text in sorted(recording.markers):
         at = time - origin

@@ -110,6 +110,7 @@ def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, A
         places[:, 0], places[:, 1], c=colours, s=130, edgecolors="black", linewidths=0.6, zorder=2
     )
     for k, (x, y) in enumerate(places):
+        # Numbers are readable on dark and on light colours.
         ink = "white" if colours[k, :3].mean() < 0.55 else "black"
         axes.text(x, y, str(taxel_number(k)), ha="center", va="center", fontsize=6.5, color=ink)
     right, up = view
@@ -124,6 +125,7 @@ def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, A
 
 def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
     colour = PART_COLOURS.get(name.split("/", maxsplit=1)[0], "#777777")
+    # Fingertips stand out against the pads of the same finger.
     strength = 0.55 if "/" not in name else 0.28
     for k, (row, column) in enumerate(module.grid):
         cell = FancyBboxPatch(

@@ -106,6 +106,7 @@ def draw_slip_decisions(
     draw_line(probability, decisions.times, decisions.probability, INK, 0.8)
     probability.axhline(decisions.threshold, color=GREY, linewidth=0.8, linestyle="--", zorder=1)
     if speed is not None and speed.get_yticks().size:
+        # Linear below the limit of a slip, so that creep and fast slides are both seen.
         speed.set_yscale("symlog", linthresh=MM_PER_M * SLIP_SPEED)
         speed.yaxis.set_major_formatter(FormatStrFormatter("%g"))
         speed.axhline(MM_PER_M * SLIP_SPEED, color=GREY, linewidth=0.8, linestyle="--", zorder=1)

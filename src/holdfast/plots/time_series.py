@@ -179,6 +179,7 @@ def draw_sigma(axes: Axes, series: FingerSeries) -> None:
         axes.set_ylim(bottom=0)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         return
+    # From the 0.5 % quantile: single values near 0 would take most of a logarithmic axis.
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(np.quantile(known, 0.005) / 1.5, known.max() * 1.5)
     axes.yaxis.set_major_locator(LogLocator(numticks=4))

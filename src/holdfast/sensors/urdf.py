@@ -71,6 +71,7 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
 class _Joint:
     def __init__(self, element: ET.Element) -> None:
         origin = element.find("origin")
+        # A joint without an origin has the frame of its parent link, as the format says.
         attributes = {} if origin is None else origin.attrib
         self.name = element.get("name", "")
         self.parent = _link(element, "parent")

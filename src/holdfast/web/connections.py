@@ -81,6 +81,7 @@ class ConnectionLimit:
         address = str(peer[0]) if isinstance(peer, tuple) else ""
         self._open[transport] = _Connection(address)
         same = [one for one, known in self._open.items() if known.address == address]
+        # The limit of an address first: one client then loses its own connections, not others'.
         if len(same) > self._max_per_address:
             self._replace(same)
         elif len(self._open) > self._max_total:
@@ -111,6 +112,7 @@ class ConnectionLimit:
 
     def _replace(self, transports: list[asyncio.BaseTransport]) -> None:
         """Close one of these connections, of which the last is the new one."""
+        # Of equal use the oldest: `min` returns the first.
         *others, new = transports
         oldest = min(others, key=lambda one: self._open[one].use, default=new)
         chosen = new if self._open[oldest].use is Use.STREAM else oldest
