@@ -323,9 +323,11 @@ class Finger:
         fast, strong = moved > (0.15 * limit) ** 2, mean @ mean > limit**2
         press = along**2 >= 0.49 * size and (along > 0 or limit == math.inf)
         small = size < self.field @ self.field / 4
-        load = press and (not small if limit == math.inf else fast or strong or self.is_load)
+        load = press and not (small or is_turned)
+        if limit < math.inf:
+            load = press and (fast or strong or self.is_load)
         noise = 12 * self.noise**2
-        if apart > n * 0.01 * (mean @ mean) + noise:
+        if apart > n * 0.01 * max(mean @ mean, size) + noise:
             self.is_load = False
             return not load and apart <= n * 0.0625 * size + noise
         self.is_load = load
