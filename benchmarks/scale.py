@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.io import load_dataset, save_recording
-from holdfast.metrics import Decisions, FingerDecisions, score_recording, summarise_results
+from holdfast.metrics import Decisions, FingerDecisions, ResultTotal, score_recording
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.synthetic import SYNTHETIC_RATE, synthetic_recording
@@ -133,7 +133,10 @@ def summarise_only(n_samples: int, length: int) -> dict[str, object]:
     received = pickle.dumps(score_recording(Decisions.of("made", fingers, len(fingers))))
     n_recordings = n_samples // (length * len(FINGERS))
     start = cpu_time()
-    metrics = summarise_results(pickle.loads(received) for _ in range(n_recordings))
+    total = ResultTotal()
+    for _ in range(n_recordings):
+        total.add(pickle.loads(received))
+    metrics = total.metrics()
     return {
         "samples": n_samples,
         "recordings": n_recordings,

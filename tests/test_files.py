@@ -4,7 +4,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.errors import OutputError
@@ -135,7 +135,6 @@ def test_a_valid_name_is_kept(name):
     assert file_stem(name) == name
 
 
-@settings(deadline=None)
 @given(st.text() | st.sampled_from(ODD_NAMES))
 def test_a_stem_is_one_part_of_a_path_that_every_system_accepts(name):
     stem = file_stem(name)

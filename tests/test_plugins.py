@@ -265,6 +265,7 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
 
 
+@pytest.mark.slow  # doctor imports each plug-in in a process of its own
 def test_doctor_lists_them(parts, capsys, monkeypatch):
     monkeypatch.setattr(children, "answer_of_child", functools.cache(children.answer_of_child))
     assert main(["doctor", "--json"]) == 0
@@ -278,6 +279,7 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
     assert "SKIPPED: RuntimeError: no device" in " ".join(out.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "error"),
     [
@@ -368,6 +370,7 @@ def run(tmp_path, monkeypatch, capsys):
         yield run
 
 
+@pytest.mark.slow  # doctor imports each plug-in in a process of its own
 def test_the_template_is_listed_by_doctor(run):
     plugins = json.loads(run("doctor", "--json"))["plugins"]
     assert [(plugin["kind"], plugin["name"], plugin["error"]) for plugin in plugins] == [

@@ -24,6 +24,7 @@ EXTRA_MODULES = {
     "twin": ("mujoco", "scipy", "PIL", "joblib"),
     "plot": ("matplotlib",),
     "label": ("scipy",),
+    "video": ("cv2", "scipy"),
     "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),

@@ -1,7 +1,7 @@
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.classifiers import Linear
@@ -21,7 +21,6 @@ def classifiers(n):
 
 
 @given(rule=classifiers(3), seed=st.integers(0, 99))
-@settings(deadline=None)
 def test_weights_decision_and_probability_agree(rule, seed):
     features = np.random.default_rng(seed).normal(scale=100, size=(20, 3))
     with np.errstate(over="ignore"):

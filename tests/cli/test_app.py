@@ -45,18 +45,27 @@ def one_line(capsys):
     return err.rstrip("\n")
 
 
-@pytest.mark.parametrize("verb", app.VERBS)
+@pytest.mark.parametrize("verb", [*app.VERBS, *app.SUB_VERBS])
 def test_every_verb_has_help_with_an_example(verb, capsys):
-    assert main([verb, "--help"]) == 0
+    assert main([*verb.split(), "--help"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
     assert f"\n  Example:\n    holdfast {verb}" in out
     assert "--json" in out
 
 
-@pytest.mark.parametrize("verb", app.VERBS)
-def test_help_lists_the_first_line_of_every_verb(verb):
-    assert app.load_verb(verb).__doc__.splitlines()[0] == app.VERBS[verb]
+@pytest.mark.parametrize(("verb", "line"), [*app.VERBS.items(), *app.SUB_VERBS.items()])
+def test_help_lists_the_first_line_of_every_verb(verb, line):
+    assert app.load_verb(verb).__doc__.splitlines()[0] == line
+
+
+def test_the_help_of_a_verb_lists_its_commands(capsys):
+    assert main(["label", "--help"]) == 0
+    out = capsys.readouterr().out
+    for name, line in app.SUB_VERBS.items():
+        assert f"\n  {name.split()[1]:9}{line}\n" in out
+    assert main(["label", "auto", "--fast"]) == 2
+    assert "(see holdfast label auto --help)" in capsys.readouterr().err
 
 
 def test_without_words_the_help_is_shown(capsys):

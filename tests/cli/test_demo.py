@@ -5,8 +5,8 @@ import urllib.request
 import msgspec
 import pytest
 
+from command_line import Verb
 from holdfast.cli import demo as verb
-from holdfast.cli import main
 from holdfast.cli import simulate as simulate_verb
 from holdfast.io import load_dataset
 from holdfast.model import Model
@@ -30,10 +30,7 @@ def small(monkeypatch):
     )
 
 
-def run(capsys, *words):
-    code = main(["demo", *map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+run = Verb("demo").run
 
 
 def test_simulates_trains_and_replays(capsys, tmp_path):

@@ -38,7 +38,7 @@ def declarations(verb):
 
 def test_every_flag_is_declared_once():
     declared = defaultdict(set)
-    for name in app.VERBS:
+    for name in (*app.VERBS, *app.SUB_VERBS):
         for flag, option in declarations(app.load_verb(name)):
             declared[flag].add(id(option))
     twice = {flag for flag, options in declared.items() if len(options) > 1}
@@ -46,13 +46,13 @@ def test_every_flag_is_declared_once():
 
 
 def test_flags_are_those_of_the_command_line():
-    for name in app.VERBS:
-        command = app.get_command(app._app([name])).commands[name]
+    for name in (*app.VERBS, *app.SUB_VERBS):
+        command = app.get_command(app._app(name.split())).commands[name]
         shown = {
             flag for option in command.params for flag in (*option.opts, *option.secondary_opts)
         }
         flags = {flag for flag, _ in declarations(app.load_verb(name))}
-        assert flags == {flag for flag in shown if flag.startswith("-")}, name
+        assert {*flags, "--help-all"} == {flag for flag in shown if flag.startswith("-")}, name
 
 
 @pytest.mark.parametrize(("words", "port"), [([], "8080"), (["--port", "9"], "9")])

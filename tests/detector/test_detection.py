@@ -110,7 +110,7 @@ def test_readings_of_any_type(kind):
 
 
 @given(cuts=st.lists(st.integers(1, 260), max_size=5), clock=st.sampled_from(sorted(CLOCKS)))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_pieces_give_the_same(cuts, clock):
     made = recording(**CLOCKS[clock])
     hand_model = model(features=RICH, threshold=20.0)
@@ -139,7 +139,7 @@ def test_any_pieces_give_the_same(cuts, clock):
 
 
 @given(cuts=st.lists(st.integers(1, 199), min_size=1, max_size=4, unique=True))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_run_and_update_take_turns(cuts):
     made = recording(**CLOCKS["broken"])
     hand_model = model(threshold=20.0)

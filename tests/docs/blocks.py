@@ -8,9 +8,12 @@ A comment directly above a block says what is special about it:
     <!-- live -->              the Python program runs until its source ends
 
 Blocks of `sh` and `python` run, others (`json`, `text`, ...) do not. A `holdfast` command without
-a pipe runs in this process, which saves the time to load the package.
+a pipe runs in this process, which saves the time to load the package. A block of `text` below a
+block that ran is its output: these lines, one after the other, are among those that it printed.
+Spaces, decimal fractions and folders may differ.
 """
 
+import io
 import os
 import re
 import shlex
@@ -18,6 +21,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,6 +37,8 @@ FENCE = re.compile(
     r"^(?:<!-- (?P<note>[^\n]*?) -->\n)?```(?P<language>\w*)\n(?P<text>.*?)^```$", re.M | re.S
 )
 SHELL_SYMBOLS = re.compile(r"[|><&;$*`]")
+VARYING = re.compile(r"\d+\.\d+|[\w./-]*/")
+"""What differs from run to run: decimal fractions, and the folder of a path."""
 
 
 class Block(NamedTuple):
@@ -88,15 +94,43 @@ def run_page(
         sections: only blocks under these headings; by default all blocks.
     """
     names: dict[str, object] = {"__name__": "__main__"}
-    n_run = 0
+    n_run, printed = 0, None
     for block in blocks_of(path):
         if sections is not None and block.section not in sections:
+            continue
+        if block.language == "text" and printed is not None:
+            check_output(block, printed)
             continue
         text = block.text
         for old, new in (replace or {}).items():
             text = text.replace(old, new)
-        n_run += run_block(block._replace(text=text), names)
+        printed = run_printing(block._replace(text=text), names)
+        n_run += printed is not None
     return n_run
+
+
+def run_printing(block: Block, names: dict[str, object]) -> str | None:
+    """Run a block; return what it printed, which is printed again, or None if it did not run."""
+    out, err = io.StringIO(), io.StringIO()
+    try:
+        with redirect_stdout(out), redirect_stderr(err):
+            ran = run_block(block, names)
+    finally:
+        sys.stdout.write(out.getvalue())
+        sys.stderr.write(err.getvalue())
+    return out.getvalue() + err.getvalue() if ran else None
+
+
+def check_output(block: Block, printed: str) -> None:
+    """Check that the lines of a block are lines of what was printed, one after the other."""
+    shown, found = ([plain(line) for line in text.splitlines()] for text in (block.text, printed))
+    places = range(len(found) - len(shown) + 1)
+    is_there = any(found[k : k + len(shown)] == shown for k in places)
+    assert is_there, f"{block.place}: this is not what was printed:\n{printed}"
+
+
+def plain(line: str) -> str:
+    return " ".join(VARYING.sub("", line).split())
 
 
 def run_block(block: Block, names: dict[str, object]) -> bool:
@@ -137,17 +171,25 @@ def run_line(line: str, block: Block, *, endless: bool) -> None:
             ["bash", "-euo", "pipefail", "-c", line], env=environment(), check=False,
             capture_output=True, text=True, timeout=PATIENCE,
         )  # fmt: skip
+        print(done.stdout, done.stderr, sep="", end="")  # noqa: T201
         assert done.returncode == 0, f"{block.place}: {line!r}: {done.stderr}"
 
 
 def interrupt(line: str, block: Block) -> None:
-    """Run a command until it has printed a line, then interrupt it as Ctrl-C does."""
+    """Run a command until it says what stops it, then interrupt it as Ctrl-C does.
+
+    An earlier interrupt could come while modules are imported, and be lost there.
+    """
     process = subprocess.Popen(
         ["bash", "-c", f"exec env {line}"], env=environment(), text=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
     )  # fmt: skip
     try:
-        first = process.stderr.readline()
+        first = ""
+        for line_of_it in process.stderr:
+            first += line_of_it
+            if "Ctrl-C stops it" in line_of_it:
+                break
         os.killpg(process.pid, signal.SIGINT)
         _, rest = process.communicate(timeout=PATIENCE)
     finally:

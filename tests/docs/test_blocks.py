@@ -71,8 +71,23 @@ def test_options_of_commands_that_do_not_run_must_exist(folder):
 
 def test_an_endless_command_is_interrupted(folder):
     page = "<!-- until Ctrl-C -->\n```sh\n{}\n```\n"
-    forever = "python -c 'import sys, time; print(1, file=sys.stderr, flush=True); time.sleep(60)'"
+    program = 'import sys, time; print("Ctrl-C stops it", file=sys.stderr); time.sleep(60)'
     with pytest.raises(AssertionError, match="Traceback"):
-        blocks.run_page(write(folder, page.format(forever)))
+        blocks.run_page(write(folder, page.format(f"python -c '{program}'")))
     with pytest.raises(AssertionError, match="holdfast: No such"):
         blocks.run_page(write(folder, page.format("holdfast demonstrate")))
+
+
+@pytest.mark.parametrize(
+    ("shown", "is_printed"),
+    [("b 2.5 s\nc", True), ("a\nb 1.0 s", True), ("a\nc", False), ("b 2.5 min", False)],
+)
+def test_shown_output_is_what_is_printed(folder, capsys, shown, is_printed):
+    """Decimal fractions may differ; no line is left out between two."""
+    page = write(folder, f"```python\nprint('a\\nb  1.5 s\\nc')\n```\n```text\n{shown}\n```\n")
+    if is_printed:
+        assert blocks.run_page(page) == 1
+        assert capsys.readouterr().out == "a\nb  1.5 s\nc\n"
+    else:
+        with pytest.raises(AssertionError, match=r"^page\.md:4: this is not what was pri"):
+            blocks.run_page(page)

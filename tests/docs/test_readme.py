@@ -1,5 +1,4 @@
 import dataclasses
-import json
 import re
 
 import pytest
@@ -12,11 +11,9 @@ from holdfast.recordings import Tactile
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
-from holdfast_lab.study.summary import STRONGEST
 
 from . import blocks
 
-STUDY = json.loads((blocks.ROOT / "docs" / "study" / "study.json").read_text("utf-8"))
 README = blocks.ROOT / "README.md"
 DEMO, RECORDINGS = ("", "Look at what the demo made"), ("Your own recordings",)
 HAND = ("Your own hand", "Python")
@@ -77,27 +74,6 @@ def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
 def test_every_section_is_run():
     sections = {block.section for block in blocks.blocks_of(README)}
     assert sections == {*DEMO, *RECORDINGS, *HAND}
-
-
-def figure(table, **keys):
-    (row,) = [row for row in STUDY["tables"][table] if keys.items() <= row.items()]
-    return f"{row['ours']:.1f}", f"{row.get('paper', 0):.1f}", row
-
-
-def test_the_figures_are_those_of_the_published_study():
-    accuracy = {"on": "held out", "figure": "accuracy"}
-    logreg, svm = (figure("confusion", classifier=name, **accuracy) for name in ("LogReg", "SVM"))
-    ours = figure("strongest", figure="holdfast [%]", **STRONGEST)
-    baseline = figure("strongest", figure="baseline [%]", **STRONGEST)
-    assert baseline[2]["baseline"] == "LogReg of log F_a, log sigma and the hand's largest"
-    text = " ".join(README.read_text("utf-8").split())
-    for sentence in (
-        f"the paper's two classifiers are correct in {logreg[0]} and {svm[0]} % of the held-out "
-        f"samples (the paper reports {logreg[1]} and {svm[1]} %)",
-        f"the strongest rival has {baseline[0]} % errors by hands, our own method {ours[0]} %",
-    ):
-        assert sentence in text, f"README.md should say: {sentence}"
-    assert ("figures of the quick study" in text) == STUDY["quick"]
 
 
 def test_the_links_exist():

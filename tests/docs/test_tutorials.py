@@ -54,15 +54,9 @@ def test_from_python(folder, short_grasps, capsys):
 
 def test_your_own_sensor(folder, capsys):
     assert blocks.run_page(DOCS / "tutorials" / "own-sensor.md") == 7
-    out, err = capsys.readouterr()
-    assert "finger1 9 taxels; columns that are not used: temperature" in err
-    assert "--columns 'time=timestamp:ms,taxels=F{axis}{taxel}'" in err
-    changes = re.findall(r"^ +([\d.]+) +finger1 +(\w+) +\w+$", out, re.M)  # times: of the model
-    states = [state for _, state in changes]
-    assert states == [
-        "NO_CONTACT", "UNSTABLE", "STABLE", "UNSTABLE", "STABLE", "UNSTABLE", "NO_CONTACT"
-    ]  # fmt: skip
-    assert 5.0 <= float(changes[3][0]) <= 5.2
+    out = capsys.readouterr().out  # its lines are compared with those of the page
+    (pushed,) = re.findall(r"^ +([\d.]+) +finger1 +UNSTABLE +STABLE$", out, re.M)[:1]
+    assert 5.0 <= float(pushed) <= 5.2
     assert "findings" not in out
 
 

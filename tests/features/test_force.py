@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.errors import RecordingError
@@ -131,7 +131,6 @@ def test_no_samples(tare):
 
 
 @given(k=st.integers(1, 119), tare=st.sampled_from([0.1, 0.5, "first", "none"]))
-@settings(deadline=None)
 def test_the_future_changes_nothing(k, tare):
     values = readings(120).astype(float)
     later = values.copy()

@@ -139,7 +139,7 @@ def test_takes_any_layout_and_changes_nothing(order):
     cuts=st.lists(st.integers(0, 1500), max_size=6),
     seed=st.integers(0, 9),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_chunking_gives_the_same_bits(n, half, cuts, seed):
     force, window = walk(n, seed), 2 * half
     bounds = sorted({0, n, *(cut for cut in cuts if cut < n)})
@@ -168,14 +168,12 @@ forces = st.builds(walk, st.integers(30, 80), st.integers(0, 99), st.sampled_fro
 
 
 @given(force=forces, power=st.integers(-40, 40))
-@settings(deadline=None)
 def test_scales_with_the_force(force, power):
     scale = 2.0**power  # exact in floating point
     assert np.array_equal(haar_features(scale * force), scale * haar_features(force), True)
 
 
 @given(force=forces, seed=st.integers(0, 99))
-@settings(deadline=None)
 def test_rotation_changes_the_components_only(force, seed):
     turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     turned, plain = haar_features(force @ turn.T), haar_features(force)
@@ -185,7 +183,6 @@ def test_rotation_changes_the_components_only(force, seed):
 
 
 @given(force=forces, shift=st.integers(0, 20), half=st.integers(1, 7))
-@settings(deadline=None)
 def test_a_later_start_changes_nothing_else(force, shift, half):
     window = 2 * half
     found = haar_features(force[shift:], window)[window - 1 :]
@@ -193,7 +190,6 @@ def test_a_later_start_changes_nothing_else(force, shift, half):
 
 
 @given(force=forces, k=st.integers(20, 79))
-@settings(deadline=None)
 def test_the_future_changes_nothing(force, k):
     later = force.copy()
     later[k:] += 1e3

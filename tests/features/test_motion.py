@@ -174,7 +174,7 @@ def test_are_known_from_the_second_sample_on():
     assert np.isfinite(found[1:]).all()
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(factor=st.floats(0.01, 100.0), seed=st.integers(0, 99))
 def test_do_not_depend_on_the_gain_of_the_sensor(factor, seed):
     given = sensor("papillarray")

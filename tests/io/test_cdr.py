@@ -3,7 +3,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.io.cdr import MessageDecoder, MessageEncoder
@@ -26,14 +26,12 @@ def wire(request):
 
 
 @given(values())
-@settings(deadline=None)
 def test_any_message_that_rosbags_writes_is_read(wire, given):
     write, decode = wire
     assert plain(decode(write(given))) == given
 
 
 @given(values(), st.data())
-@settings(deadline=None)
 def test_a_cut_or_longer_message_is_refused(wire, given, data):
     write, decode = wire
     whole = write(given)
@@ -45,7 +43,6 @@ def test_a_cut_or_longer_message_is_refused(wire, given, data):
 
 
 @given(st.binary(max_size=200))
-@settings(deadline=None)
 def test_garbage_is_refused_or_read_but_nothing_else(wire, given):
     _, decode = wire
     with suppress(ValueError):
@@ -83,7 +80,6 @@ def both():
 
 
 @given(values())
-@settings(deadline=None)
 def test_the_bytes_are_those_that_rosbags_writes(both, given):
     theirs, ours, decode = both
     assert plain(decode(ours(given))) == given

@@ -22,7 +22,7 @@ from holdfast.recordings import Truth
 SAMPLE_TOPICS = ("/tactile/thumb", "/tactile/index/1")
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_what_is_written_is_read(data, recordings, assert_same, tmp_path_factory):
     recording = data.draw(recordings)

@@ -21,7 +21,7 @@ def readings(n, number=np.uint16):
     return np.arange(n * 15).reshape(n, 5, 3).astype(number)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(cuts=st.lists(st.integers(0, 100), max_size=20))
 def test_samples_come_back_however_they_were_given(cuts, tmp_path_factory):
     path = tmp_path_factory.mktemp("writer") / "a.mcap"

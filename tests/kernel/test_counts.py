@@ -5,7 +5,7 @@ import json
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.devices.sources.xela.packet import Counts, InvalidPacket, PlainCounts, read_sensor
@@ -51,7 +51,6 @@ def test_other_lists_are_left_to_python(integer):
     assert parsed('"0001,0002"', integer) is None
 
 
-@settings(deadline=None)
 @given(
     counts=st.lists(st.integers(0, 65535), min_size=3, max_size=9),
     place=st.integers(0, 60),

@@ -5,11 +5,13 @@ import pytest
 
 from holdfast import Model
 from holdfast.devices.sources import Arrival
-from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.readings_monitor import MISSING_AXES, NO_CHANGE, PULLED, ReadingsMonitor
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
+
+from . import build
 
 PATCH = sensor("uskin-4x4")
 TIMES = np.arange(0, 12, 0.01)
@@ -113,7 +115,9 @@ def test_the_live_detector_passes_notices_on(name, expected):
     recording = synthetic_recording("grasp", seed=0)
     thumb = recording.modules["thumb"]
     turned = replace(thumb, readings=-thumb.readings)
-    detector = ArrivalDetector(Model.load(name), {"thumb": thumb.sensor})
+    detector = StreamDetector(Model.load(name), build.Script({"thumb": thumb.sensor}))
+    passed = []
     for time, sample in zip(turned.times.tolist(), turned.readings, strict=True):
-        detector.update(Arrival(time=time, samples={"thumb": sample}, received=time))
-    assert detector.notices == [f"thumb: {PULLED}"] * expected
+        arrival = Arrival(time=time, samples={"thumb": sample}, received=time)
+        passed += detector.update(arrival).arrival.notices
+    assert passed == [f"thumb: {PULLED}"] * expected

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.metrics import Decisions, FingerDecisions, summarise, summary
@@ -30,7 +30,6 @@ def recordings(n, n_samples=60):
 
 
 @given(st.lists(st.floats(0, 1), min_size=2))
-@settings(deadline=None)
 def test_bins_keep_the_order(scores):
     ordered = np.sort(scores)
     bins = bins_of(ordered)

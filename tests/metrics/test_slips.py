@@ -130,7 +130,7 @@ class TestFalseAlarms:
         assert counts.held_seconds == pytest.approx(9.98)
 
     @given(st.floats(0.5, 9.0))
-    @settings(max_examples=20, deadline=None)
+    @settings(max_examples=20)
     def test_a_flag_that_is_always_raised_has_two_a_second(self, onset):
         counts = count_slips(decisions([(0.0, 10.0)], [slip(onset, onset + 0.5)]))
         assert counts.false_held >= 2 * counts.held_seconds - 1e-6
@@ -185,7 +185,7 @@ intervals_of_time = st.lists(
 
 
 @given(raised=intervals_of_time, starts=st.lists(st.integers(50, 900), max_size=3, unique=True))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_as_the_slow_twin(raised, starts):
     slips = [slip(start / RATE, (start + 20) / RATE) for start in sorted(starts)]
     made = decisions(raised, slips)

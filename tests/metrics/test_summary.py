@@ -175,7 +175,7 @@ def test_samples_of_earlier_recordings_are_released():
     assert len(summarise(stream(), n_resamples=10).recordings) == 6
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.permutations(range(5)))
 def test_the_order_of_recordings_changes_nothing(order):
     one = summarise([decisions(seed) for seed in range(5)], n_resamples=5)

@@ -262,7 +262,7 @@ def grasps(draw):
     return truth(*spans, slip=[(start, start + long, 0.01) for start, long in slips])
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(grasps())
 def test_laws(data):
     labels = labels_from_truth(data, "thumb")

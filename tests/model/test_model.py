@@ -62,7 +62,7 @@ class TestSaveAndLoad:
         assert Model.load(saved(hand_model, tmp_path / "m.json")) == hand_model
 
     @given(st.integers(0, 2**32), st.floats(0, 1), st.floats(0, 1e300))
-    @settings(max_examples=30, deadline=None)
+    @settings(max_examples=30)
     def test_every_bit(self, seed, threshold, contact):
         part = finger_model(None, seed, threshold=threshold, contact_threshold=contact)
         hand_model = Model(fingers={ANY_FINGER: part}, rate=1 / 3)

@@ -63,7 +63,7 @@ def test_held_out_samples_are_left_out(grasps):
 
 
 @given(max_samples=st.integers(1, 3000), n=st.integers(2, 4))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_max_samples_bounds_rows_and_thins_evenly(max_samples, n):
     given_recordings = [tiny_recording(seed) for seed in range(n)]
     whole = finger_samples(given_recordings)["thumb"].samples

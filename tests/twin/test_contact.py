@@ -76,7 +76,7 @@ def test_same_as_the_naive_twin(name: str) -> None:
     assert grip.state.load.max() > 0.1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=seeds, name=st.sampled_from(NAMES))
 def test_nodes_add_up_and_momentum_is_kept(seed: int, name: str) -> None:
     grip = Grip(object_named(name), angles=(0.0, 2.5, 3.7))
@@ -99,7 +99,7 @@ def test_nodes_add_up_and_momentum_is_kept(seed: int, name: str) -> None:
     shaken(grip, seed, 20, check)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=seeds, name=st.sampled_from(NAMES))
 def test_coulomb_is_never_passed_and_nothing_pulls(seed: int, name: str) -> None:
     grip = Grip(object_named(name), depth=2e-3)
@@ -129,7 +129,7 @@ def test_shaking_slides_so_that_the_limit_is_tried(name: str) -> None:
     assert max(slipped) > 1e-5
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=seeds, name=st.sampled_from(NAMES))
 def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None:
     rng = np.random.default_rng(seed)

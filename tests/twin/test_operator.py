@@ -116,7 +116,7 @@ class TestHold:
 
 class TestPush:
     @pytest.mark.slow
-    @settings(deadline=None, max_examples=200)
+    @settings(max_examples=200)
     @given(
         place=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
         velocity=st.tuples(*[st.floats(-2, 2)] * 6),

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.features import fingertip_force
@@ -84,7 +84,6 @@ def test_shares_of_a_node_far_from_all_taxels_are_finite():
     assert taxel_shares([[1.0, 0, 0]], TIP.positions, REAL.spread).sum() == pytest.approx(1.0)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e2))
 def test_taxel_forces_sum_to_the_force_on_the_object(seed, scale):
     forces = scale * np.random.default_rng(seed).normal(size=(3, len(SKIN.nodes), 3))
@@ -130,7 +129,6 @@ def test_scale_is_that_of_the_data_sheet(axis, newton_per_count, newton):
     assert counts[0].tolist() == expected.tolist()
 
 
-@settings(deadline=None)
 @given(st.floats(-1e3, 1e3), st.floats(0.0, 10.0), st.sampled_from(REAL.limits))
 def test_saturation_is_odd_monotone_and_never_passes_the_limits(newton, step, limit):
     low, high = saturated(newton, limit), saturated(newton + step, limit)
@@ -288,7 +286,6 @@ READ_IN_TURN = replace(REAL, n_averaged=3, scan_time=0.012, noise_by_axis=(1.0, 
 COLOURED = replace(READ_IN_TURN, slow_share=0.7, walk=0.8, step=3, still_share=0.2)
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.integers(1, 40), min_size=1, max_size=8),
     st.integers(0, 1000),
@@ -501,7 +498,6 @@ def test_bad_parameters_are_refused(field, value, message):
         replace(REAL, **{field: value})
 
 
-@settings(deadline=None)
 @given(st.integers(2, 400), st.integers(0, 1000), st.floats(0, 0.1))
 def test_server_times_increase_and_packets_stay_in_order(n, seed, jitter):
     times = np.arange(n) / RATE
@@ -515,7 +511,6 @@ def test_server_times_increase_and_packets_stay_in_order(n, seed, jitter):
     assert (sent <= np.arange(n)).all()  # nothing is sent before it is measured
 
 
-@settings(deadline=None)
 @given(st.floats(1.0, 5.0), st.floats(0.0, 1.0), st.integers(1, 300))
 def test_rows_show_the_last_update_and_none_of_the_future(rows, phase, n):
     shown = last_updates(np.arange(n) / RATE, RATE / rows, phase)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     ForceOption,
     JobsOption,
@@ -103,9 +104,9 @@ def study(
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     seed: SeedOption = 0,
-    tare: TareOption = "0.5",
+    tare: Annotated[TareOption, RARE] = "0.5",
     benchmark: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Recordings of the benchmark, for score.")
+        Path, typer.Option(metavar="FOLDER", help="Recordings of the benchmark, for score."), RARE
     ] = Path("benchmark"),
     force: ForceOption = False,
     as_json: JsonOption = False,

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     ForceOption,
     JobsOption,
@@ -30,11 +31,13 @@ def trial(
     model: Annotated[str, typer.Option("--model", help="Model of the detector.")] = "builtin:any",
     quick: QuickOption = False,
     n: Annotated[
-        int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS))
+        int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS)), RARE
     ] = None,
     seed: SeedOption = 0,
     jobs: JobsOption = -1,
-    plant: Annotated[str, typer.Option("--plant", help="Hand of the twin: mild or hard.")] = "mild",
+    plant: Annotated[
+        str, typer.Option("--plant", help="Hand of the twin: mild or hard."), RARE
+    ] = "mild",
     engine: EngineOption = "loky",
     force: ForceOption = False,
     as_json: JsonOption = False,

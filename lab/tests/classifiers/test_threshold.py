@@ -60,7 +60,7 @@ def test_cuts_computed_by_hand():
     assert balanced_accuracy(called, stable) == 0.75 == 0.5 + cut.gain / (2 * 4 * 3)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(labelled, st.sampled_from(["below", "above", "either"]))
 def test_against_brute_force(rows, side):
     values = np.array([value for value, _ in rows]) * 0.37

@@ -4,8 +4,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
+from command_line import Verb
 from holdfast import cluster
-from holdfast.cli import main
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
@@ -41,16 +41,8 @@ def written(folder, recordings):
     return folder
 
 
-def run(capsys, *words):
-    code = main(["study", *map(str, words)])
-    printed, err = capsys.readouterr()
-    return code, printed, err
-
-
-def refusal(capsys, *words):
-    code, printed, err = run(capsys, *words)
-    assert (code, printed, err.count("\n")) == (2, "", 1)
-    return err.removeprefix("holdfast: ").rstrip("\n")
+VERB = Verb("study")
+run, refusal = VERB.run, VERB.refusal
 
 
 def test_own_recordings(capsys, data, tmp_path):
@@ -185,12 +177,6 @@ class TestBadInput:
         err = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
         assert err.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
         assert not (tmp_path / "out").exists()
-
-    def test_out(self, capsys, data, tmp_path):
-        file = data / "grasp-0.parquet"
-        assert "is a file; a study is written to a folder" in refusal(capsys, data, "-o", file)
-        assert "holds other files" in refusal(capsys, data, "-o", data)
-        assert "does not exist" in refusal(capsys, data, "-o", tmp_path / "no" / "out")
 
 
 def stable(recording):

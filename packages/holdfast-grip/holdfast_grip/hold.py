@@ -12,12 +12,12 @@ import typer
 from holdfast.cli.options import (
     DetectorOptions,
     IgnoreOption,
-    InContactOption,
     JsonOption,
     ModelArgument,
     SecondsOption,
     SourceArgument,
     SpeedOption,
+    StartOptions,
     check_seconds,
 )
 from holdfast.cli.terminal.console import print_line, print_message
@@ -44,13 +44,14 @@ def hold(
     model: ModelArgument,
     source: SourceArgument,
     settings: GripSettings,
+    *,
     record: Annotated[
         Path | None, typer.Option("--record", help="Record samples and the log to NAME.mcap.")
     ] = None,
     seconds: SecondsOption = None,
     speed: SpeedOption = 1.0,
     ignore: IgnoreOption = "",
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
     r"""Control the grip force of a hand by the estimates of a source.
@@ -68,17 +69,19 @@ def hold(
     No command was ever tried on a real hand: read docs/grip.md first.
 
     Example:
-      holdfast hold builtin:twin "twin:?object=can&seed=1" --hand twin: --armed --speed 0
+      holdfast hold builtin:twin twin:?object=can --hand twin: --armed --speed 0
       holdfast hold builtin:any xela://auto --hand log:commands.jsonl
-      holdfast hold model.json xela://auto --hand call:my_gripper:set_force --armed \
-        --confirm call:my_gripper:set_force --max-scale 1.2 --on-fault open
-      holdfast hold builtin:any xela://auto --hand "ros2:plexus?effort=0.1&max_effort=0.3"
+      holdfast hold model.json xela://auto --hand call:my_gripper:set_force \
+        --armed --confirm call:my_gripper:set_force \
+        --max-scale 1.2 --on-fault open
+      holdfast hold builtin:any xela://auto \
+        --hand "ros2:plexus?effort=0.1&max_effort=0.3"
     """
     from holdfast.live.session import Session
 
     settings.check()
     check_seconds(seconds)
-    options = DetectorOptions(ignore=ignore, in_contact=in_contact)
+    options = DetectorOptions(ignore=ignore)
     loaded = options.load_model(model)
     opened, commanded = find_source_and_hand(source, settings.hand, speed=speed)
     check_armed(settings)
@@ -86,7 +89,7 @@ def hold(
         stop = stack.enter_context(handle_stop_signals())
         watchdog = connect_hand(stack, settings, commanded)
         stack.enter_context(opened)
-        stream = options.create_stream(loaded, opened)
+        stream = options.create_stream(loaded, opened, start)
         log = _new_log(stack, record, opened, as_json=as_json)
         session = stack.enter_context(Session(stream))  # ends after the loop, which reads it
         loop = stack.enter_context(open_loop(settings, commanded, stream, watchdog, log.event))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.options import RARE
 from holdfast.cli.terminal.console import print_message
 from holdfast.errors import require_extras
 
@@ -60,6 +61,7 @@ class GripSettings:
     min_scale: Annotated[
         float | None,
         typer.Option(help="Smallest multiple of the first force.", show_default="0.8"),
+        RARE,
     ] = None
     max_force: Annotated[
         float | None,
@@ -69,10 +71,11 @@ class GripSettings:
         ),
     ] = None
     on_fault: Annotated[
-        FaultAction, typer.Option(help="What the hand does in a fault, or when it is stopped.")
+        FaultAction,
+        typer.Option(help="What the hand does in a fault, or when it is stopped."),
     ] = FaultAction.HOLD
     newtons: Annotated[
-        float | None, typer.Option(help="Calibration: newtons for each unit of the readings.")
+        float | None, typer.Option(help="Calibration: newtons for each unit of the readings."), RARE
     ] = None
 
     def check(self) -> None:

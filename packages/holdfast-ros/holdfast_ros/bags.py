@@ -58,6 +58,7 @@ class Bag:
 
     Attributes:
         ros2: whether it is a bag of ROS 2.
+        complete: whether it has its end; else it is read up to where it was cut.
         topics: its topics, in the order of their names.
     """
 
@@ -66,6 +67,7 @@ class Bag:
         self._budget = budget
         self._definitions: dict[tuple[str, str], Definition | None] = {}
         self.ros2 = ros2
+        self.complete = storage.complete
         connections = sorted(storage.connections, key=lambda one: one.topic)
         self.topics = [self._topic(connection) for connection in connections]
 

@@ -193,7 +193,8 @@ class _BagImport:
         clock = self._clock()
         name = self._path.name if self._path.is_dir() else self._path.stem
         try:
-            return Recording(name, self._modules(clock), self._metadata(topics, clock))
+            modules, metadata = self._modules(clock), self._metadata(topics, clock)
+            return Recording(name, modules, metadata, complete=self._bag.complete)
         except (RecordingError, ValueError) as cause:
             raise RecordingError(f"{self._path}: {cause}") from cause
 
@@ -230,7 +231,7 @@ class _BagImport:
                 self._add(part.name, sample, time)
         for topic in topics:
             n_expected = sum(part.n_messages for part in topic.parts)
-            if n_read[topic.name] < n_expected:
+            if self._bag.complete and n_read[topic.name] < n_expected:
                 raise RecordingError(
                     f"{self._path} is cut or damaged: {n_read[topic.name]} messages on "
                     f"{topic.name}, {n_expected} expected"

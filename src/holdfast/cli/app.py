@@ -1,7 +1,8 @@
 """Run a verb of the command line, and report its failure in one line.
 
 A verb is a function in the file of its name (`train.py`: `train`; `import_.py`: `import_`). It
-is imported only when it is used. To add a verb, write the file and add a line to `VERBS`.
+is imported only when it is used. To add a verb, write the file and add a line to `VERBS`; a verb
+with commands is a folder, and its commands are in `SUB_VERBS`.
 """
 
 import inspect
@@ -13,13 +14,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from holdfast.cli.extensions import PluginOptions
+from holdfast.cli.options import RARE, SourceArgument
 from holdfast.cli.terminal.console import print_error, print_line
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
 from holdfast.plugins import PluginGroup
@@ -57,6 +59,16 @@ VERB_GROUPS = {
 of the packages beside the core are listed as well; verbs of other plug-ins follow them."""
 VERBS = {name: summary for verbs in VERB_GROUPS.values() for name, summary in verbs.items()}
 """Verbs with the first line of their docstrings."""
+SUB_VERBS = {
+    "label auto": "Write the labels that a rule proposes.",
+    "label compare": "Compare two sets of labels: kappa and differences of onsets.",
+    "label audit": "Find labels that a classifier contradicts.",
+    "label export": "Export labels to Label Studio, or as CSV.",
+    "label import": "Import labels from Label Studio, or CSV.",
+    "label markers": "Print stickers by which a camera sees slips.",
+}
+"""Commands of verbs, with the first line of their docstrings; for `label auto`,
+`cli/label/auto.py` has the function `auto`."""
 
 HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or
 disturbed, from its tactile sensors, at every sample.
@@ -78,6 +90,8 @@ OWN_VERBS = tuple(
     if all(verb not in parts.get("verbs", ()) for parts in PACKAGE_PARTS.values())
 )
 """Verbs of the core; the others of `VERBS` are plug-ins."""
+SHOWS_ALL = "holdfast.shows_all"
+"""Key of click's `Context.meta`: the help shows the rare options as well."""
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
@@ -136,20 +150,79 @@ def _app(words: list[str]) -> typer.Typer:
     }
     for name, summary in {**VERBS, **others}.items():
         if name in words:
-            verb = load_verb(name)
-            app.command(name, help=_help(verb))(spread_groups(verb))
+            _add(app, name)
         else:
             app.command(name, help=summary)(_placeholder)
+    for name in SUB_VERBS:
+        if set(name.split()) <= set(words):
+            _add(app, name, hidden=True)
     return app
+
+
+def _add(app: typer.Typer, name: str, *, hidden: bool = False) -> None:
+    """Import a verb, and add it with its options and `--help-all`."""
+    verb = load_verb(name)
+    spread = spread_groups(verb)
+
+    def run(*, help_all: HelpAllOption = False, **values: Any) -> None:  # noqa: ANN401
+        spread(**values)
+
+    own, shared = (inspect.signature(x).parameters for x in (run, spread))
+    options = [*shared.values(), own["help_all"]]
+    run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+    run.__annotations__ = {option.name: option.annotation for option in options}
+    app.command(name, cls=_Verb, help=_help(verb), hidden=hidden)(run)
+
+
+class _Verb(TyperCommand):
+    """A verb whose help lists its commands, and the options that most users need."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 (of click)
+        """Write a section of commands, then the options; rare ones only for `--help-all`."""
+        prefix = f"{self.name} "
+        commands = {name: text for name, text in SUB_VERBS.items() if name.startswith(prefix)}
+        if commands:
+            with formatter.section("Commands"):
+                formatter.write_dl([(n.removeprefix(prefix), t) for n, t in commands.items()])
+        options = inspect.signature(self.callback or _placeholder, eval_str=True).parameters
+        rare = {
+            name
+            for name, option in options.items()
+            if RARE in getattr(option.annotation, "__metadata__", ())
+        }
+        hidden = () if ctx.meta.get(SHOWS_ALL) else rare or {"help_all"}
+        for option in self.params:
+            option.hidden = option.name in hidden  # type: ignore[attr-defined]
+        super().format_options(ctx, formatter)
+
+
+def _show_all(context: typer.Context, value: bool) -> None:
+    if value:
+        context.meta[SHOWS_ALL] = True
+        typer.echo(context.get_help())
+        raise typer.Exit
+
+
+HelpAllOption = Annotated[
+    bool,
+    typer.Option(
+        "--help-all", help="Show all options and exit.", callback=_show_all, is_eager=True
+    ),
+]
 
 
 class _GroupedVerbs(TyperGroup):
     """Verbs that the help lists by group."""
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 (of click)
+        """Take a verb and its command as one name."""
+        name = " ".join(args[:2])
+        return super().resolve_command(ctx, [name, *args[2:]] if name in SUB_VERBS else args)
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 (of click)
         """Write a section for each group, and one for verbs of plug-ins."""
-        others = {name: "" for name in self.commands if name not in VERBS}
-        width = max(map(len, self.commands))
+        others = {name: "" for name in self.commands if name not in {**VERBS, **SUB_VERBS}}
+        width = max(map(len, (*VERBS, *others)))
         limit = formatter.width - 6 - width
         for title, verbs in {**VERB_GROUPS, "Plug-ins": others}.items():
             rows = [
@@ -193,10 +266,11 @@ def load_verb(name: str) -> Callable[..., None]:
     Raises:
         HoldfastError: it is a verb of another package, which cannot be used, or is not installed.
     """
-    if name not in OWN_VERBS:
+    if name not in (*OWN_VERBS, *SUB_VERBS):
         return VERB_PLUGINS.require(name, f"the verb {name}")
-    module = f"{name}_" if keyword.iskeyword(name) else name
-    verb: Callable[..., None] = getattr(import_module(f"holdfast.cli.{module}"), module)
+    names = [f"{word}_" if keyword.iskeyword(word) else word for word in name.split()]
+    module = import_module(".".join(("holdfast.cli", *names)))
+    verb: Callable[..., None] = getattr(module, names[-1])
     return verb
 
 
@@ -205,7 +279,8 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
 
     A group is a parameter whose type is a dataclass; the fields are its options. The default of
     the parameter, or else those of the fields, are the defaults of the options. The options of
-    plug-ins are a group as well, see `PluginOptions`.
+    plug-ins are a group as well, see `PluginOptions`. An option, or a group, that is annotated
+    with `RARE` is shown by `--help-all` only.
 
     Example:
         >>> from dataclasses import dataclass
@@ -224,10 +299,11 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
     parameters: list[inspect.Parameter] = []
     groups: dict[str, tuple[Callable[[Values], object], list[str]]] = {}
     for name, parameter in inspect.signature(verb, eval_str=True).parameters.items():
-        if _is_group(parameter.annotation):
-            options = _options_of(parameter.annotation, parameter.default)
-            groups[name] = _maker_of(parameter.annotation), [option.name for option in options]
-            parameters += options
+        kind, is_rare = _unmarked(parameter.annotation)
+        if _is_group(kind):
+            options = _options_of(kind, parameter.default)
+            groups[name] = _maker_of(kind), [option.name for option in options]
+            parameters += [_marked(option) for option in options] if is_rare else options
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 
@@ -243,6 +319,16 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
 
 Values = dict[str, Any]
 """Values of options, by name."""
+
+
+def _unmarked(annotation: Any) -> tuple[Any, bool]:  # noqa: ANN401
+    """Return the type of a parameter, and whether it is marked as rare."""
+    is_rare = RARE in getattr(annotation, "__metadata__", ())
+    return (get_args(annotation)[0] if is_rare else annotation), is_rare
+
+
+def _marked(option: inspect.Parameter) -> inspect.Parameter:
+    return option.replace(annotation=Annotated[option.annotation, RARE])
 
 
 def _is_group(kind: object) -> bool:
@@ -312,8 +398,6 @@ def _is_configured(verb: str) -> bool:
     """
     if verb in VERBS and verb in OWN_VERBS:
         return verb in CONFIGURED_VERBS
-    from holdfast.cli.options import SourceArgument
-
     parameters = inspect.signature(load_verb(verb), eval_str=True).parameters.values()
     return any(parameter.annotation == SourceArgument for parameter in parameters)
 

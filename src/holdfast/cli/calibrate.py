@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import (
+    RARE,
     ForceOption,
-    InContactOption,
     JsonOption,
     ModelArgument,
     ModelOutput,
     SpeedOption,
+    StartOptions,
     check_seconds,
     check_speed,
     complete_source,
@@ -62,6 +63,7 @@ def calibrate(
         ),
     ],
     out: ModelOutput,
+    *,
     false_alarms: Annotated[
         float | None,
         typer.Option(
@@ -76,8 +78,8 @@ def calibrate(
             "--seconds", help="Time for which a live source is recorded [s].", show_default="60"
         ),
     ] = None,
-    speed: SpeedOption = 1.0,
-    in_contact: InContactOption = False,
+    speed: Annotated[SpeedOption, RARE] = 1.0,
+    start: StartOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -100,7 +102,6 @@ def calibrate(
     """
     from holdfast.devices.uri import is_uri
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training.calibration import calibrate_with_report, check_normalised
 
@@ -114,11 +115,9 @@ def calibrate(
     check_speed(data, speed)
     recordings: Sequence[Recording]
     if live:
-        recordings = [
-            _recorded(loaded, data, seconds or HANDLING_SECONDS, speed, in_contact=in_contact)
-        ]
+        recordings = [_recorded(loaded, data, seconds or HANDLING_SECONDS, speed, start)]
     else:
-        recordings = load_dataset(data, labels=False, in_contact=in_contact)
+        recordings = start.load_dataset(data, labels=False)
     calibrated = calibrate_with_report(
         loaded, recordings, false_alarms=false_alarms, progress=_with_progress
     )
@@ -148,7 +147,7 @@ def _check(calibrated: "CalibratedModel") -> None:
 
 
 def _recorded(
-    model: "Model", data: str, seconds: float, speed: float, *, in_contact: bool
+    model: "Model", data: str, seconds: float, speed: float, start: StartOptions
 ) -> "Recording":
     """Return the handling of a live source, and print how much of it is held.
 
@@ -158,13 +157,12 @@ def _recorded(
     from holdfast.devices import sources
     from holdfast.errors import SourceError
     from holdfast.live.handling import HandlingBuffer
-    from holdfast.live.stream_detector import StreamDetector
     from holdfast.training.own_handling import ENOUGH_HANDLING
 
     with handle_stop_signals() as stop, sources.open_source(data, speed=speed) as source:
         stop.graceful = True
         print_message(f"recording {source.name} for {seconds:g} s; Ctrl-C stops")
-        stream = StreamDetector(model, source, in_contact=in_contact)
+        stream = start.create_stream(model, source)
         buffer, shown = HandlingBuffer(stream), 0.0
         end = time.monotonic() + (seconds / speed + 1.0 if speed else math.inf)
         while not (source.ended or stop.requested or time.monotonic() > end):

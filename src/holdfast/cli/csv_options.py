@@ -21,9 +21,11 @@ SensorsOption = Annotated[
     list[str] | None,
     typer.Option(
         "--sensor",
+        "--array",
+        "--topic",
         metavar="NAME|FILE.json",
-        help="Sensor of a CSV file: a name of `holdfast sensors` or a file; MODULE=NAME for "
-        "one module. May be repeated.",
+        help="Sensor of a CSV file, array or topic: a name of `holdfast sensors` or a file; "
+        "MODULE=NAME, ARRAY=NAME or /TOPIC=NAME for one. May be repeated.",
     ),
 ]
 ColumnsOption = Annotated[
@@ -73,8 +75,9 @@ class CsvOptions:
         sensors = parse_sensors(self.sensor or ())
         guesses: list[str] = []  # kept back, so that a missing sensor is one line
         report = print_message if sensors else guesses.append
+        name = None if sensors else CSV_FORMAT
         imported = import_recordings(
-            path, CSV_FORMAT, sensors=sensors, columns=self.columns, report=report
+            path, name, sensors=sensors, columns=self.columns, report=report
         )
         recordings = list(imported)
         for guess in guesses:

@@ -1,7 +1,6 @@
 """`holdfast evaluate`: metrics of a model on labelled recordings."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,13 +8,14 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
-    InContactOption,
     JobsOption,
     JsonOption,
     ModelArgument,
     PlotOptions,
     SeedOption,
+    StartOptions,
     report_handling,
     start_engine,
 )
@@ -52,12 +52,12 @@ def evaluate(
         Path, typer.Argument(help="A labelled recording or CSV file, or a folder of them.")
     ],
     *,
-    csv: CsvOptions,
+    csv: Annotated[CsvOptions, RARE],
     seed: SeedOption = 0,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     figure: PlotOptions,
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
     """Evaluate a model on labelled recordings.
@@ -87,7 +87,10 @@ def evaluate(
     figure.check()
     loaded = Model.load(model)
     started = start_engine(engine, jobs)
-    recordings = _recordings(started.path(data), csv, in_contact=in_contact)
+    path = started.path(data)
+    recordings: Sequence[Recording] = (
+        list(map(start.of, csv.read(path))) if csv.fits(str(path)) else start.load_dataset(path)
+    )
     report_handling(loaded, recordings)
     evaluation = evaluate_recordings(
         loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
@@ -108,20 +111,6 @@ def evaluate(
     print_slips(metrics.slips, has_rule=loaded.has_slip_rule)
     print_line()
     print_line(f"{model} on {len(recordings)} recordings")
-
-
-def _recordings(data: Path, csv: CsvOptions, *, in_contact: bool) -> "Sequence[Recording]":
-    """Return the recordings of a path; those of CSV files are in memory."""
-    from holdfast.io import load_dataset
-    from holdfast.recordings import STARTS_LOADED
-
-    if not csv.fits(str(data)):
-        return load_dataset(data, in_contact=in_contact)
-    declared = {STARTS_LOADED: True} if in_contact else {}
-    return [
-        replace(recording, metadata={**recording.metadata, **declared})
-        for recording in csv.read(data)
-    ]
 
 
 def _draw(evaluation: "Evaluation") -> "Figure":

@@ -41,7 +41,7 @@ def export(
 
     Example:
       holdfast export builtin:twin model.h --like grasp.parquet
-      holdfast export builtin:any model.h --sensor uskin-curved --fingers 4 --float
+      holdfast export builtin:any model.h --sensor uskin-curved --fingers 4
       holdfast export builtin:twin model.onnx
       holdfast export grasps/ dataset/ --format lerobot
       holdfast export grasp.parquet view/ --format foxglove --model builtin:any

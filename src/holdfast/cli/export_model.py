@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.options import RARE
 from holdfast.cli.terminal.console import print_json, print_line
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class HeaderOptions:
             help="Whether the object is held at the first sample.",
             show_default="as the recording says, else open",
         ),
+        RARE,
     ] = None
 
 

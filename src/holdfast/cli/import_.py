@@ -239,11 +239,13 @@ def _import_part(
     def report(text: str) -> None:
         messages[text.replace(part.name, "")] = text
 
-    recordings = (
-        replace(recording, name=f"{prefix}{recording.name}")
-        for recording in _recordings(part, task, report)
-    )
-    return [_write(recording, folder, task) for recording in recordings], messages
+    written: list[_Imported] = []
+    for recording in _recordings(part, task, report):
+        if not recording.complete:
+            report(f"{part} is cut off: {recording.duration:.2f} s recovered")
+        named = replace(recording, name=f"{prefix}{recording.name}")
+        written.append(_write(named, folder, task))
+    return written, messages
 
 
 def _collect(
@@ -282,7 +284,7 @@ def _recordings(
     from holdfast.io import import_recordings
 
     if task.data_format is None:
-        return iter([_load(part, report, labels=task.labels)])
+        return iter([_load(part, labels=task.labels)])
     return import_recordings(
         part,
         task.data_format,
@@ -306,12 +308,10 @@ def _own_files(path: Path) -> list[Path]:
     return [path] if is_recording(path) else []
 
 
-def _load(file: Path, report: Callable[[str], None], *, labels: bool) -> "Recording":
+def _load(file: Path, *, labels: bool) -> "Recording":
     from holdfast.io import load_recording
 
     recording = load_recording(file, labels=labels)
-    if not recording.complete:
-        report(f"{file} is cut off: {recording.duration:.2f} s recovered")
     return recording if labels else recording.with_labels({})
 
 

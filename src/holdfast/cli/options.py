@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from holdfast.devices.sources import Source
+    from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.parallel import Engine
@@ -32,6 +33,9 @@ TOKEN_VARIABLE = "HOLDFAST_TOKEN"
 MAX_TOKEN_LENGTH = 1024
 """Longest token that is read from a file [characters]."""
 LOCALHOST = "127.0.0.1"
+RARE = "rare"
+"""Mark of an option, or of a group of options, that few users need: `Annotated[JobsOption, RARE]`.
+The help of a verb shows it with `--help-all` only."""
 PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
@@ -73,13 +77,19 @@ SourceArgument = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what exists already.")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
+FpsOption = Annotated[
+    float | None,
+    typer.Option("--fps", help="Pictures per second of a video.", show_default="60, or its stamps"),
+    RARE,
+]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers."), RARE]
 JobsOption = Annotated[
-    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
+    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor."), RARE
 ]
 EngineOption = Annotated[
     str,
     typer.Option("--engine", help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
+    RARE,
 ]
 _TARE = typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s].")
 TareOption = Annotated[str, _TARE]
@@ -92,10 +102,12 @@ HysteresisOption = Annotated[
         help="Distance from the threshold that the probability must exceed to change the state; "
         "by default that of the model.",
     ),
+    RARE,
 ]
 IgnoreOption = Annotated[
     str,
     typer.Option("--ignore", help="Taxels to ignore, counted from 1: index:7,index:12."),
+    RARE,
 ]
 InContactOption = Annotated[
     bool,
@@ -132,6 +144,38 @@ ModelOutput = Annotated[
 
 
 @dataclass(frozen=True)
+class StartOptions:
+    """Group of options: how the recordings or the source of a verb begin."""
+
+    in_contact: InContactOption = False
+
+    def load_dataset(self, folder: Path | str, *, labels: bool = True) -> "Dataset":
+        """Return the recordings of a folder with this start.
+
+        Raises:
+            RecordingError: the folder does not exist, or has no recording.
+        """
+        from holdfast.io import load_dataset
+
+        return load_dataset(folder, labels=labels, in_contact=self.in_contact)
+
+    def of(self, recording: "Recording") -> "Recording":
+        """Return a recording with this start."""
+        return recording.with_start(loaded=self.in_contact or None)
+
+    def create_stream(
+        self,
+        model: "Model",
+        source: "Source",
+        **options: Any,  # noqa: ANN401 (of the class)
+    ) -> "StreamDetector":
+        """Return the detector of an open source with this start."""
+        from holdfast.live.stream_detector import StreamDetector
+
+        return StreamDetector(model, source, in_contact=self.in_contact, **options)
+
+
+@dataclass(frozen=True)
 class DetectorOptions:
     """Group of options: how a model detects."""
 
@@ -140,6 +184,7 @@ class DetectorOptions:
         typer.Option(
             help="If the rate is not within 20 % of the model's: resample the source, or refuse it."
         ),
+        RARE,
     ] = RatePolicy.RESAMPLE
     debounce: Annotated[
         float | None,
@@ -147,6 +192,7 @@ class DetectorOptions:
             help="Minimum time a new state must last before it is reported [s].",
             show_default="as in the model",
         ),
+        RARE,
     ] = None
     hysteresis: HysteresisOption = None
     raw: Annotated[
@@ -154,9 +200,9 @@ class DetectorOptions:
         typer.Option(
             "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
         ),
+        RARE,
     ] = False
     ignore: IgnoreOption = ""
-    in_contact: InContactOption = False
 
     def load_model(self, name: str) -> "Model":
         """Load a model, and apply `--debounce`, `--hysteresis` and `--raw`.
@@ -192,15 +238,13 @@ class DetectorOptions:
         )
         return replace(model, name=model.name or name, debounce=debounce)
 
-    def create_stream(self, model: "Model", source: "Source") -> "StreamDetector":
+    def create_stream(
+        self, model: "Model", source: "Source", start: StartOptions
+    ) -> "StreamDetector":
         """Create the detector of an open source, and report what the source lacks."""
-        from holdfast.live.stream_detector import StreamDetector
-
         taxels = parse_taxels(self.ignore, source.sensors)
         strict = self.rate is RatePolicy.STRICT
-        stream = StreamDetector(
-            model, source, strict=strict, ignore=taxels, in_contact=self.in_contact
-        )
+        stream = start.create_stream(model, source, strict=strict, ignore=taxels)
         report_missing_fingers(model, source.name, source.sensors)
         report_other_handling(model, stream.fingers)
         report_blind_features(model, stream.fingers)
@@ -219,6 +263,7 @@ class ServerOptions:
             help="Secret that clients must send; required for other hosts. Other users of this "
             "machine can read it in the list of processes: prefer --token-file."
         ),
+        RARE,
     ] = None
     token_file: Annotated[
         Path | None,

@@ -10,6 +10,7 @@ import typer
 from holdfast.cli.extensions import PlayerOptions
 from holdfast.cli.options import (
     LOCALHOST,
+    RARE,
     HostOption,
     JsonOption,
     OnceOption,
@@ -35,7 +36,7 @@ PLAY_REFRESH_INTERVAL = 1.0
 def play(
     source: SourceArgument,
     *,
-    version: Annotated[str, typer.Option(help="Version of the server: 1.7 or 1.8.")] = "1.8",
+    version: Annotated[str, typer.Option(help="Version of the server: 1.7 or 1.8."), RARE] = "1.8",
     host: HostOption = LOCALHOST,
     port: PortOption = 5000,
     speed: Annotated[
@@ -50,11 +51,12 @@ def play(
             help="Send the fingertips within the packet of a whole hand, or as sensors 1, 2, ...",
             show_default="whole hand if the modules have the names of an Allegro hand",
         ),
+        RARE,
     ] = None,
-    players: PlayerOptions,
+    players: Annotated[PlayerOptions, RARE],
     as_json: JsonOption = False,
 ) -> None:
-    """Send a recording or the twin as a XELA server does.
+    r"""Send a recording or the twin as a XELA server does.
 
     A program for xela_server receives the same packets over a WebSocket, in real time. Their
     times are those of the recording, shifted to now. The modules of an Allegro hand are sent as
@@ -71,7 +73,8 @@ def play(
     Example:
       holdfast play twin:?object=can
       holdfast play grasp.parquet --once --separate --version 1.7
-      holdfast play twin:?object=can --hand "ros2:plexus?effort=0.1&max_effort=0.3"
+      holdfast play twin:?object=can \
+        --hand "ros2:plexus?effort=0.1&max_effort=0.3"
       holdfast detect builtin:any xela://127.0.0.1:5000
     """
     check_speed(source, speed)

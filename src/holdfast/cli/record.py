@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.options import (
+    RARE,
     ForceOption,
     JsonOption,
     SecondsOption,
@@ -39,22 +40,24 @@ def record(
         Path, typer.Argument(help="NAME.mcap, or a folder, which is created if missing.")
     ],
     seconds: SecondsOption = None,
-    speed: SpeedOption = 1.0,
+    speed: Annotated[SpeedOption, RARE] = 1.0,
     object_name: Annotated[str, typer.Option("--object", help="Name of the object.")] = "",
     case: Annotated[str, typer.Option(help="Case of the experiment.")] = "",
     note: Annotated[str, typer.Option(help="Note about the recording.")] = "",
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Other metadata; may be repeated."),
+        RARE,
     ] = None,
     fingers_only: Annotated[
-        bool, typer.Option("--fingers-only", help="Leave out pads and palm.")
+        bool, typer.Option("--fingers-only", help="Leave out pads and palm."), RARE
     ] = False,
     fsync: Annotated[
         bool,
         typer.Option(
             "--fsync", help="Wait for the disk: a power failure loses at most the last second."
         ),
+        RARE,
     ] = False,
     force: ForceOption = False,
     as_json: JsonOption = False,

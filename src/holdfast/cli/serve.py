@@ -14,6 +14,7 @@ import typer
 from holdfast.cli.extensions import PanelOptions, PublisherOptions
 from holdfast.cli.options import (
     LOCALHOST,
+    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -21,6 +22,7 @@ from holdfast.cli.options import (
     ServerOptions,
     SourceArgument,
     SpeedOption,
+    StartOptions,
     awaited,
     check_speed,
     report_missing_slip_rules,
@@ -48,7 +50,8 @@ def serve(
     speed: SpeedOption = 1.0,
     once: OnceOption = False,
     options: DetectorOptions,
-    panels: PanelOptions,
+    start: StartOptions,
+    panels: Annotated[PanelOptions, RARE],
     publishers: PublisherOptions,
     as_json: JsonOption = False,
 ) -> None:
@@ -60,7 +63,8 @@ def serve(
     this machine can connect. With --json, the address is printed as JSON. Stop it with Ctrl-C.
 
     With --hand, it also controls the grip force of a hand, as holdfast hold does, and the page
-    has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first.
+    has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first; --help-all has
+    the options.
 
     SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
     ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
@@ -90,7 +94,7 @@ def serve(
 
     opened = _find(source, openers, speed=speed, loop=not once)
     with (
-        _open_session(options, loaded, opened, openers) as (session, shown),
+        _open_session(options, start, loaded, opened, openers) as (session, shown),
         _publish(session, shown, publishers),
     ):
         run_page(
@@ -117,7 +121,11 @@ def _find(source: str, openers: "Sequence[PanelOpener]", *, speed: float, loop: 
 
 @contextmanager
 def _open_session(
-    options: DetectorOptions, model: "Model", source: "Source", openers: "Sequence[PanelOpener]"
+    options: DetectorOptions,
+    start: StartOptions,
+    model: "Model",
+    source: "Source",
+    openers: "Sequence[PanelOpener]",
 ) -> "Iterator[tuple[Session, Sequence[Panel]]]":
     """Yield the session of a source, and the panels that run beside it."""
     from holdfast.live.session import Session
@@ -127,7 +135,7 @@ def _open_session(
             opener.connect(stack)
         with message_if_slow(awaited(source.name)):
             stack.enter_context(source)
-        session = stack.enter_context(Session(options.create_stream(model, source)))
+        session = stack.enter_context(Session(options.create_stream(model, source, start)))
         yield session, [stack.enter_context(opener.open(session)) for opener in openers]
 
 

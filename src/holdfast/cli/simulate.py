@@ -10,8 +10,10 @@ import typer
 
 from holdfast.cli.extensions import SimulatorOptions
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     ForceOption,
+    FpsOption,
     JobsOption,
     JsonOption,
     SeedOption,
@@ -36,7 +38,9 @@ class GraspOptions:
         str, typer.Option(help="Names of objects, separated by commas; by default all objects.")
     ] = ""
     table: Annotated[
-        Path | None, typer.Option(help="Your own objects: a .toml file like that of the twin.")
+        Path | None,
+        typer.Option(help="Your own objects: a .toml file like that of the twin."),
+        RARE,
     ] = None
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2"
     repeats: Annotated[
@@ -49,6 +53,7 @@ class GraspOptions:
             help="Profile of grip and disturbances: gentle, reference, vigorous, slips, "
             "long-hold, finger-gentle, ..."
         ),
+        RARE,
     ] = "reference"
     seed: SeedOption = 0
     server: Annotated[
@@ -56,6 +61,7 @@ class GraspOptions:
         typer.Option(
             "--server", help="Add irregular times and repeated packets, as a XELA server has."
         ),
+        RARE,
     ] = False
 
     def plan(self, engine: "Engine") -> "list[Grasp]":
@@ -77,15 +83,24 @@ def simulate(
     ],
     *,
     options: GraspOptions,
-    simulators: SimulatorOptions,
+    simulators: Annotated[SimulatorOptions, RARE],
     engine: EngineOption = "loky",
     jobs: JobsOption = -1,
-    video: Annotated[
+    film: Annotated[
         Path | None,
         typer.Option(
-            help="Write a video of the first grasp to this .gif, .png, .webp or .mp4 file."
+            help="Write a film of the first grasp to this .gif, .png, .webp or .mp4 file."
         ),
+        RARE,
     ] = None,
+    video: Annotated[
+        bool,
+        typer.Option(
+            "--video",
+            help="Write NAME.mp4 beside each recording: stickers on object and fingers, by webcam.",
+        ),
+    ] = False,
+    fps: FpsOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -101,7 +116,7 @@ def simulate(
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
     that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
-    --repeats, --grasps, --seed, --engine, --jobs and --force apply then. With --engine
+    --repeats, --grasps, --seed, --engine, --jobs and --force apply then (--help-all). With --engine
     dask:ADDRESS, the workers write into OUT, which all machines need at the same path.
 
     Example:
@@ -109,16 +124,19 @@ def simulate(
       holdfast simulate hands/ --randomize --repeats 100
       holdfast simulate hands/ --randomize --repeats 12 --grasps 20
       holdfast simulate few/ --objects can,ball --cases 2 --repeats 1
+      holdfast simulate filmed/ --profile slips --cases 2 --repeats 1 --video
       holdfast simulate /shared/twin --engine dask:tcp://hub:8786
     """
-    require_extras("twin", "parquet")
+    require_extras("twin", "parquet", *(("video",) if video else ()))
     started = start_engine(engine, jobs)
     if chosen := simulators.chosen():
         profile, simulator, values = chosen[0]
         names = simulator.simulate(out, options, values, engine=started, force=force)
         text = f"{len(names)} recordings of {profile} hands in {out}"
     else:
-        names = _simulate_planned(options, out, video, engine=started, force=force)
+        names = _simulate_planned(options, out, film, engine=started, force=force)
+        if video:
+            _film_stickers(options.plan(started), out, fps, engine=started, force=force)
         n_failed = len(_failed(names))
         profile = options.profile
         text = f"{len(names)} recordings in {out}, {n_failed} of them of failed grasps"
@@ -134,21 +152,46 @@ def _failed(names: list[str]) -> list[str]:
 
 
 def _simulate_planned(
-    options: GraspOptions, out: Path, video: Path | None, *, engine: "Engine", force: bool
+    options: GraspOptions, out: Path, film: Path | None, *, engine: "Engine", force: bool
 ) -> list[str]:
-    """Simulate the grasps of an Allegro hand, and the video if it is wanted."""
-    if video is not None:
+    """Simulate the grasps of an Allegro hand, and the film if it is wanted."""
+    if film is not None:
         from holdfast.files import refuse_overwrite
         from holdfast.twin.render import check_film
 
-        check_film(video)
-        refuse_overwrite(video, force=force)
+        check_film(film)
+        refuse_overwrite(film, force=force)
     planned = options.plan(engine)
     out.mkdir(parents=True, exist_ok=True)
     names = simulate_grasps(planned, out, engine=engine, force=force)
-    if video is not None:
-        _write_video(planned[0], video, force)
+    if film is not None:
+        _write_film(planned[0], film, force)
     return names
+
+
+def _film_stickers(
+    grasps: "Sequence[Grasp]", out: Path, fps: float | None, *, engine: "Engine", force: bool
+) -> None:
+    """Write the videos of a webcam that do not exist; `label auto tracking` reads them."""
+    paths = [engine.path(path_of(grasp.name, out)) for grasp in grasps]
+    missing = [path for path in paths if path.exists() and (force or not _video_of(path).exists())]
+    with ProgressBar("filming", len(missing)) as bar:
+        for _ in engine.map_ordered(film_recording, ((path, fps, force) for path in missing)):
+            bar.advance()
+
+
+def film_recording(path: Path, fps: float | None, force: bool) -> None:
+    """Write the video of a recording beside it."""
+    from holdfast.files import whole_file
+    from holdfast.io import load_recording
+    from holdfast.twin.webcam import Webcam, film_stickers
+
+    with whole_file(_video_of(path), force=force) as part:
+        film_stickers(load_recording(path), part, Webcam() if fps is None else Webcam(fps=fps))
+
+
+def _video_of(path: Path) -> Path:
+    return path.with_suffix(".mp4")
 
 
 def simulate_grasps(
@@ -338,10 +381,10 @@ def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
             path_of(name, out).unlink(missing_ok=True)
 
 
-def _write_video(grasp: "Grasp", video: Path, force: bool) -> None:
+def _write_film(grasp: "Grasp", path: Path, force: bool) -> None:
     from holdfast.files import whole_file
     from holdfast.twin.render import film
 
     print_message(f"rendering {grasp.name}: about a minute")
-    with whole_file(video, force=force) as part:
+    with whole_file(path, force=force) as part:
         film(grasp, part)

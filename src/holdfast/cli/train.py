@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.options import (
+    RARE,
     EngineOption,
     FittingTareOption,
     ForceOption,
     HysteresisOption,
-    InContactOption,
     JobsOption,
     JsonOption,
     ModelOutput,
     SeedOption,
+    StartOptions,
     start_engine,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
@@ -62,6 +63,7 @@ class TrainingOptions:
     window: Annotated[
         int | None,
         typer.Option(help="N_w: even number of samples in the Haar window.", show_default="14"),
+        RARE,
     ] = None
     features: Annotated[
         str | None,
@@ -71,7 +73,7 @@ class TrainingOptions:
             show_default="F_a,F_x,F_y,F_z,sigma",
         ),
     ] = None
-    tare: FittingTareOption = None
+    tare: Annotated[FittingTareOption, RARE] = None
     split: Annotated[
         str,
         typer.Option(
@@ -88,6 +90,7 @@ class TrainingOptions:
             help="Loss that the search minimises: error (share of wrong decisions) or log_loss.",
             show_default="log_loss; error for svm",
         ),
+        RARE,
     ] = None
     seed: SeedOption = 0
     shared: Annotated[
@@ -97,6 +100,7 @@ class TrainingOptions:
             help="Train one classifier for all fingers, or one for each.",
             show_default="--shared with --features any",
         ),
+        RARE,
     ] = None
     contact_threshold: Annotated[
         float | None,
@@ -104,10 +108,12 @@ class TrainingOptions:
             help="F_a below this value is no contact, in the unit of the readings.",
             show_default="from the tare",
         ),
+        RARE,
     ] = None
     hold: Annotated[
         float | None,
         typer.Option(help="Time for which UNSTABLE is kept after the last unstable sample [s]."),
+        RARE,
     ] = None
     hysteresis: HysteresisOption = None
     own_slip_features: Annotated[
@@ -124,6 +130,7 @@ class TrainingOptions:
         typer.Option(
             help="Maximum number of samples per finger; of more, every n-th sample is used."
         ),
+        RARE,
     ] = 200_000
 
     def setting(self, init: str | None) -> "Setting":
@@ -156,20 +163,21 @@ def train(
     data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
     model: ModelOutput,
     options: TrainingOptions,
+    *,
     init: Annotated[
         str | None,
         typer.Option(help="Model to adapt, with its features: a file, or builtin:any."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue a search that was stopped.")
+        bool, typer.Option("--resume", help="Continue a search that was stopped."), RARE
     ] = False,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     force: ForceOption = False,
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
-    """Train a model from labelled recordings.
+    r"""Train a model from labelled recordings.
 
     Print cross-validated metrics: each recording (or object) is evaluated by a model that was
     trained without it. The random split repeats the protocol of the paper. Its metrics are
@@ -183,13 +191,13 @@ def train(
       holdfast train recordings/ -o model.json
       holdfast train recordings/ -o model.json --split object --classifier svm
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
-      holdfast train recordings/ -o model.json --features holdfast --own-slip-features
+      holdfast train recordings/ -o model.json --features holdfast \
+        --own-slip-features
       holdfast train recordings/ -o model.json --init builtin:any
       holdfast train recordings/ -o model.json --engine dask:tcp://hub:8786
     """
     require_extras("train")
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset
     from holdfast.labelling.review.findings import report_hidden_labels
 
     setting = options.setting(init)
@@ -197,7 +205,7 @@ def train(
     started = start_engine(engine, jobs)
     if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
-    recordings = load_dataset(started.path(data), in_contact=in_contact)
+    recordings = start.load_dataset(started.path(data))
     report_hidden_labels(recordings.paths, print_message)
     journal = _search_journal(model, resume=resume, force=force)
     trained = _fit(recordings, setting, journal, started)

@@ -9,10 +9,10 @@ import typer
 from holdfast.cli.evaluate import print_verdict, warn_about_recordings
 from holdfast.cli.options import (
     ForceOption,
-    InContactOption,
     JsonOption,
     ModelArgument,
     ModelOutput,
+    StartOptions,
     report_handling,
 )
 from holdfast.cli.slip_scores import print_slip_points, slips_origin
@@ -38,6 +38,7 @@ def tune(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
     out: ModelOutput,
+    *,
     false_alarms: Annotated[
         float,
         typer.Option(
@@ -51,7 +52,7 @@ def tune(
         typer.Option("--for", help="Threshold to choose: that of STABLE, or that of a slip."),
     ] = TunedQuestion.STABLE,
     force: ForceOption = False,
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
     """Choose the threshold for a wanted rate of false alarms.
@@ -67,12 +68,11 @@ def tune(
 
     Example:
       holdfast tune model.json recordings/ -o tuned.json --false-alarms 1
-      holdfast tune model.json recordings/ -o tuned.json --false-alarms 1 --for slip
+      holdfast tune model.json grasps/ -o mine.json --false-alarms 1 --for slip
       holdfast tune builtin:any recordings/ -o mine.json --false-alarms 0.5 --json
     """
     require_extras("train")
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training import tune as choose
     from holdfast.training.evaluation import evaluate_recordings
@@ -80,7 +80,7 @@ def tune(
 
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
-    recordings = load_dataset(data, in_contact=in_contact)
+    recordings = start.load_dataset(data)
     n = len(recordings)
     report_handling(loaded, recordings)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from holdfast.errors import ModelError
 from holdfast.exporters.c_header import CHeader, header_of
 from holdfast.exporters.onnx_head import onnx_of
-from holdfast.features.loaded_start import begins_in_contact, declared_baselines
+from holdfast.features.start import Start
 from holdfast.files import refuse_overwrite, write_whole
 from holdfast.model import ANY_FINGER, Model
 from holdfast.recordings import Recording
@@ -72,33 +72,16 @@ def export(
         return ExportedModel(target, outputs, len(content))
     if target.suffix != HEADER_SUFFIX:
         raise ValueError(f"{target}: a model is exported as {HEADER_SUFFIX} (C99) or {ONNX_SUFFIX}")
-    header, names = _header(model, like, fingers, single=single, in_contact=in_contact)
+    if like is None:
+        sensors = named_fingers(model) if fingers is None else dict(fingers)
+        rate, start = next(iter(model.fingers_of(sensors).values())).rate, Start(in_contact is True)
+    else:
+        sensors = _fingers_like(model, like)
+        rate, start = like.rate, Start.of(like.with_start(loaded=in_contact).metadata, sensors)
+    header = header_of(model, sensors, rate, single=single, start=start)
     data = header.text.encode()
     write_whole(target, data, force=force)
-    return ExportedModel(target, names, len(data), header)
-
-
-def _header(
-    model: Model,
-    like: Recording | None,
-    fingers: Mapping[str, Sensor] | None,
-    *,
-    single: bool,
-    in_contact: bool | None,
-) -> tuple[CHeader, tuple[str, ...]]:
-    if like is None:
-        sensors = dict(fingers) if fingers is not None else named_fingers(model)
-        first = next(iter(model.fingers_of(sensors).values()))
-        loaded = in_contact is True
-        header = header_of(model, sensors, first.rate, single=single, in_contact=loaded)
-        return header, tuple(model.fingers_of(sensors))
-    sensors = _fingers_like(model, like)
-    header = header_of(
-        model, sensors, like.rate, single=single,
-        in_contact=begins_in_contact(like.metadata, in_contact),
-        baselines=declared_baselines(like.metadata, sensors),
-    )  # fmt: skip
-    return header, tuple(model.fingers_of(sensors))
+    return ExportedModel(target, tuple(model.fingers_of(sensors)), len(data), header)
 
 
 def named_fingers(model: Model) -> dict[str, Sensor]:

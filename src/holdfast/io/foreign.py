@@ -102,7 +102,7 @@ def read_foreign(
     Args:
         path: path of the part.
         name: name of the format, one of `importers.FORMATS`.
-        sensors: as in `importers.generic_csv.read`; for `csv` only.
+        sensors: as in `importers.import_recordings`, of formats that take them.
         columns: the same.
         report: the same.
 
@@ -134,6 +134,31 @@ def read_foreign_arrays(
     """
     ((document, arrays),) = _values(task, path, options)
     return dict(zip(msgspec.json.decode(document, type=list[str]), arrays, strict=True))
+
+
+def read_stickers(
+    path: Path, fps: float | None = None
+) -> tuple[npt.NDArray[np.float64], dict[int, npt.NDArray[np.float64]]]:
+    """Return the times (n,) of the pictures of a video, and the places (n, 2, 3) of its stickers.
+
+    They are as `holdfast.io.stickers.sticker_places` yields them, in a child process.
+
+    Raises:
+        RecordingError: as `read_foreign`.
+    """
+    times: list[npt.NDArray[np.float64]] = []
+    parts: list[dict[int, npt.NDArray[np.float64]]] = []
+    for document, (part_times, *places) in _values("stickers", path, {"fps": fps}):
+        numbers = msgspec.json.decode(document, type=list[int])
+        times.append(part_times)
+        parts.append(dict(zip(numbers, places, strict=True)))
+    unseen = [np.full((len(part), 2, 3), np.nan) for part in times]
+    return np.concatenate([np.zeros(0), *times]), {
+        number: np.concatenate(
+            [part.get(number, gap) for part, gap in zip(parts, unseen, strict=True)]
+        )
+        for number in sorted({number for part in parts for number in part})
+    }
 
 
 def limits() -> dict[str, bool]:
@@ -334,7 +359,7 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 
 def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    from holdfast.io.importers import extra_of, importer
+    from holdfast.io.importers import extra_of, importer, takes_sensors
     from holdfast.io.importers.csv_columns import Columns
 
     name = str(request.options["format"])
@@ -344,7 +369,7 @@ def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     _limit_memory(request)
     lines: list[str] = []
     more: tuple[object, ...] = ()
-    if name == "csv":
+    if takes_sensors(name):
         sensors = {key: Sensor.from_dict(one) for key, one in request.options["sensors"].items()}
         columns = msgspec.convert(request.options["columns"], Columns | None)
         more = sensors, columns, lines.append
@@ -374,6 +399,15 @@ def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     yield msgspec.json.encode(list(poses)), list(poses.values())
 
 
+def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    from holdfast.io.stickers import sticker_places
+
+    import_module("cv2")
+    _limit_memory(request)
+    for times, places in sticker_places(path, request.options["fps"]):
+        yield msgspec.json.encode(list(places)), [times, *places.values()]
+
+
 def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     _limit_memory(request)
     try:
@@ -388,6 +422,7 @@ def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
     "import": _import,
     "poses": _poses,
+    "stickers": _stickers,
     "limits": _try_limits,
 }
 

@@ -27,7 +27,7 @@ JSON_EXPANSION = 32
 WORK_PER_SAMPLE = 128
 """Memory that verbs need of each sample of a module beside its readings, as for estimates [bytes].
 
-Measured: `evaluate` 75, `label --auto` 70."""
+Measured: `evaluate` 75, `label auto` 70."""
 WAY_OUT = f"cut it into shorter files, or set {LIMIT_VARIABLE} to read it anyway"
 """End of the message about a file that needs too much memory."""
 PARTS_WAY_OUT = f"{WAY_OUT}; `holdfast info` and `detect` read it in parts"

@@ -109,10 +109,13 @@ class _FingerReadings:
 
     def __init__(self, sensor: Sensor, finds_pull: bool) -> None:
         self._sensor = sensor
+        # The normal force is one sum over readings: the normal, turned into each taxel's frame.
         self._weights = np.einsum("j,ijk->ik", sensor.normal, sensor.rotations)
         self._finds_pull = finds_pull
         self._first: npt.NDArray[Any] | None = None
         self._start = self._last = -math.inf
+        # All below is relative to the first readings, and `update` alone changes it: which axes
+        # have ever changed, in how many samples, and the normal force with its noise at rest.
         self._moved = np.zeros(3, dtype=bool)
         self._n_moved = 0
         self._rest: list[float] = []
@@ -127,7 +130,7 @@ class _FingerReadings:
         if time - self._last < CHECK_INTERVAL or not np.isfinite(readings).all():
             return []
         self._last = time
-        if self._first is None or time < self._start:
+        if self._first is None or time < self._start:  # the next recording of a player
             self._first, self._start = np.array(readings, dtype=np.float64), time
             return []
         change = readings - self._first
@@ -135,11 +138,27 @@ class _FingerReadings:
         self._moved |= moved
         self._n_moved += bool(moved.any())
         self._drift.update(np.einsum("ijk,ik->j", self._sensor.rotations, change), time)
-        found = [
-            *self._drifting(),
-            *self._still(time),
-            *self._pull(float((self._weights * change).sum()), time),
-        ]
+        found = self._drifting()
+        if not self._n_moved:
+            if time - self._start >= STILL_SECONDS:
+                found.append(NO_CHANGE)
+        elif not self._moved.all() and self._n_moved * CHECK_INTERVAL >= MOVED_SECONDS:
+            axes = [axis for axis, known in zip("xyz", self._moved, strict=True) if not known]
+            found.append(MISSING_AXES.format(" and ".join(axes)))
+        normal = float((self._weights * change).sum())
+        self._largest = max(self._largest, abs(normal))
+        if time - self._start <= START_NOISE_SECONDS:
+            self._rest.append(normal)
+            self._noise = float(np.std(self._rest))
+        # Noise alone passes no limit of 20 deviations; a share of the largest change leaves out
+        # the creep of an elastomer after a strong press.
+        limit = max(PULL_OF_NOISE * self._noise, PULL_OF_LARGEST * self._largest)
+        if not self._finds_pull or normal >= -limit:
+            self._pulled_since = math.inf
+        else:
+            self._pulled_since = min(self._pulled_since, time)
+            if time - self._pulled_since >= PULL_SECONDS:
+                found.append(PULLED)
         new = [text for text in found if text not in self._reported]
         self._reported.update(new)
         return new
@@ -153,25 +172,3 @@ class _FingerReadings:
         if abs(drift.per_minute) < max(DRIFT_SHARE * drift.load, PULL_OF_NOISE * self._noise):
             return []
         return [DRIFTS.format(drift.per_minute, self._sensor.unit)]
-
-    def _still(self, time: float) -> list[str]:
-        """Return what has not changed for too long."""
-        if not self._n_moved:
-            return [NO_CHANGE] if time - self._start >= STILL_SECONDS else []
-        if self._moved.all() or self._n_moved * CHECK_INTERVAL < MOVED_SECONDS:
-            return []
-        axes = [axis for axis, moved in zip("xyz", self._moved, strict=True) if not moved]
-        return [MISSING_AXES.format(" and ".join(axes))]
-
-    def _pull(self, normal: float, time: float) -> list[str]:
-        """Return a notice if the normal force is far below its first value."""
-        self._largest = max(self._largest, abs(normal))
-        if time - self._start <= START_NOISE_SECONDS:
-            self._rest.append(normal)
-            self._noise = float(np.std(self._rest))
-        limit = max(PULL_OF_NOISE * self._noise, PULL_OF_LARGEST * self._largest)
-        if not self._finds_pull or normal >= -limit:
-            self._pulled_since = math.inf
-            return []
-        self._pulled_since = min(self._pulled_since, time)
-        return [PULLED] if time - self._pulled_since >= PULL_SECONDS else []

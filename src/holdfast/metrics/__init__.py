@@ -20,7 +20,6 @@ from holdfast.metrics.summary import (
     ResultTotal,
     score_recording,
     summarise,
-    summarise_results,
 )
 
 __all__ = [
@@ -47,5 +46,4 @@ __all__ = [
     "sample_metrics",
     "score_recording",
     "summarise",
-    "summarise_results",
 ]

@@ -112,10 +112,17 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
     times = np.unique(np.concatenate([np.empty(0), *(finger.times for finger in hand)]))
 
     def of_hand(codes: Sequence[Codes]) -> Codes:
-        pairs = zip(hand, codes, strict=True)
-        latest = [_latest_codes(finger.times, states, times) for finger, states in pairs]
-        return _hand_states(latest, len(times), n_model_fingers)
+        # (n_fingers, n) latest code of each finger at each instant: index 0, before its first
+        # sample, is UNKNOWN.
+        table = np.full((len(hand), len(times)), UNKNOWN, dtype=np.int8)
+        for row, finger, states in zip(table, hand, codes, strict=True):
+            latest = np.searchsorted(finger.times, times, side="right")
+            row[:] = np.concatenate([[UNKNOWN], states])[latest]
+        unstable, unknown = (table == UNSTABLE).any(axis=0), (table == UNKNOWN).any(axis=0)
+        in_grasp = enough_contacts((table == STABLE).sum(axis=0), n_model_fingers)
+        return hand_states(unstable, unknown, in_grasp)
 
+    # Exact labels of some fingers alone would mix events of two kinds in the hand.
     exact = [finger.exact_labels for finger in hand if finger.exact_labels is not None]
     return FingerDecisions(
         times,
@@ -146,17 +153,3 @@ def check_times(times: Array) -> None:
     """
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValueError("finite, strictly increasing times expected; the given times are not")
-
-
-def _latest_codes(times: Array, codes: Codes, at: Array) -> Codes:
-    """Return the latest code at each instant; UNKNOWN before the first."""
-    padded = np.concatenate([np.array([UNKNOWN], dtype=np.int8), codes])
-    return padded[np.searchsorted(times, at, side="right")]
-
-
-def _hand_states(codes: list[Codes], n_times: int, n_model_fingers: int) -> Codes:
-    """Return the state of the hand at every instant, from (n_times,) codes of each finger."""
-    table = np.array(codes, dtype=np.int8).reshape(len(codes), n_times)
-    unstable, unknown = (table == UNSTABLE).any(axis=0), (table == UNKNOWN).any(axis=0)
-    in_grasp = enough_contacts((table == STABLE).sum(axis=0), n_model_fingers)
-    return hand_states(unstable, unknown, in_grasp)

@@ -39,7 +39,7 @@ MIN_STABLE_DURATION = 0.5
 """Minimum duration of unbroken stable labels directly before an event [s]."""
 
 EARLY_TOLERANCE = 0.02
-"""Maximum time of an alarm before the onset of its event [s]."""
+"""Maximum time of an alarm before the onset of its event [s]: three samples at 150 Hz."""
 
 LATE_TOLERANCE = 0.25
 """Maximum time of an alarm after the end of its event [s]."""
@@ -238,12 +238,22 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     label, state = np.asarray(labels, dtype=np.int8), np.asarray(states, dtype=np.int8)
     check_lengths(times=time, labels=label, states=state)
     check_times(time)
-    stable = _spans(label == STABLE, time)
-    events = _events(_spans(_not_stable(label), time), stable)
+    stable, unstable = _spans(label == STABLE, time), _spans(_not_stable(label), time)
+    # Gaps are closed before the runs are measured: a shake that leaves the finger for a moment is
+    # one event, and its parts alone would be too short. So the end of a run counts only if the next
+    # begins late enough, and the beginning only if the run before ended early enough.
+    wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
+    first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
+    onsets, ends = unstable[first, 0], unstable[last, 1]
+    # An alarm needs a detector that was STABLE before, so an event needs a hold in which it can be.
+    held = stable[stable[:, 1] - stable[:, 0] >= MIN_STABLE_DURATION - TIME_TOLERANCE]
+    is_long = ends - onsets >= MIN_EVENT_DURATION - TIME_TOLERANCE
+    events = np.column_stack([onsets, ends])[is_long & np.isin(onsets, held[:, 1])]
     windows = alarm_windows(events)
     alarms = alarm_indices(state)
     first = first_alarms(time, alarms, windows)[0]
     others = alarms[outside(time, windows)[alarms]]
+    # Where nothing is labelled nobody can say that an alarm is wrong.
     false = others[label[others] != UNKNOWN]
     return AlarmMatch(
         tuple(
@@ -338,15 +348,3 @@ def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     instants = np.append(times, times[-1:] + period)
     return instants[runs(mask)]
-
-
-def _events(unstable: Array, stable: Array) -> Array:
-    """Return (n_events, 2) onset and end of the not-stable runs that are events [s]."""
-    wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
-    first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
-    onsets, ends = unstable[first, 0], unstable[last, 1]
-    long_stable = stable[stable[:, 1] - stable[:, 0] >= MIN_STABLE_DURATION - TIME_TOLERANCE]
-    chosen = (ends - onsets >= MIN_EVENT_DURATION - TIME_TOLERANCE) & np.isin(
-        onsets, long_stable[:, 1]
-    )
-    return np.asarray(np.column_stack([onsets, ends])[chosen])

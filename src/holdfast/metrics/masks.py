@@ -57,6 +57,11 @@ def drop_short_runs(mask: Mask, n_samples: int) -> Mask:
     return kept
 
 
+def without_short_runs(mask: Mask, positions: Positions, length: float) -> Mask:
+    """Fill the gaps that are shorter than `length`, then remove the runs that are."""
+    return ~join_runs(~join_runs(mask, positions, length), positions, length)
+
+
 def widen_runs(mask: Mask, positions: Positions, margin: float) -> Mask:
     """Extend every run by `margin` at both ends.
 

@@ -134,7 +134,13 @@ class BinnedSamples:
     def ordered_pairs(self) -> tuple[float, float]:
         """Return the Mann-Whitney statistics of STABLE against UNSTABLE and NO_CONTACT."""
         stable, unstable, no_contact = self.counts
-        return _ordered_pairs(stable, unstable), _ordered_pairs(stable, no_contact)
+
+        def pairs(lower: Integers) -> float:
+            # Pairs in which the stable sample has the higher bin; the same bin counts half.
+            below = np.cumsum(lower) - lower
+            return float((stable.astype(np.float64) * (below + 0.5 * lower)).sum())
+
+        return pairs(unstable), pairs(no_contact)
 
 
 class SampleTotal:
@@ -209,6 +215,8 @@ def score_samples(
     label, state = np.asarray(labels, dtype=np.int8), np.asarray(states, dtype=np.int8)
     score = np.asarray(stable_probability, dtype=np.float64)
     check_lengths(labels=label, states=state, stable_probability=score)
+    # What is left out of a numerator is left out of the denominator: undecided samples are counted
+    # beside all ratios, never as wrong or right.
     known = (label != UNKNOWN) & (state != UNKNOWN)
     n_undecided = int(((label != UNKNOWN) & (state == UNKNOWN)).sum())
     label, state, score = label[known], state[known], score[known]
@@ -221,7 +229,10 @@ def score_samples(
         unstable=score[label == UNSTABLE],
         no_contact=score[label == NO_CONTACT],
         confusion=confusion,
-        squared_error=_squared_error(score, truth),
+        # The score of a method that is no probability has no Brier score.
+        squared_error=(
+            math.nan if ((score < 0) | (score > 1)).any() else float(np.square(score - truth).sum())
+        ),
         n_undecided=n_undecided,
     )
 
@@ -294,12 +305,6 @@ def calibration_sums(decisions: Sequence[FingerDecisions]) -> Array:
     return np.column_stack(sums).astype(np.float64)  # without samples, bincount returns integers
 
 
-def _squared_error(score: Array, truth: npt.NDArray[np.bool_]) -> float:
-    if ((score < 0) | (score > 1)).any():
-        return math.nan
-    return float(np.square(score - truth).sum())
-
-
 def bins_of(scores: Array) -> npt.NDArray[np.intp]:
     """Return (n,) the bin of each score.
 
@@ -307,15 +312,10 @@ def bins_of(scores: Array) -> npt.NDArray[np.intp]:
         >>> bins_of(np.array([0.0, 0.5, 1.0])).tolist()
         [0, 2000, 4000]
     """
+    # 0 and 1 have infinite log odds, and go into the first and the last bin.
     inside = np.clip(scores, 0.0, 1.0)
     with np.errstate(divide="ignore"):
         log_odds = np.log(inside) - np.log1p(-inside)
     bounded = np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)
     bins: npt.NDArray[np.intp] = np.rint((bounded + MAX_LOG_ODDS) * BINS_PER_UNIT).astype(np.intp)
     return bins
-
-
-def _ordered_pairs(upper: Integers, lower: Integers) -> float:
-    """Return the number of pairs in which the upper has the higher score; a tie counts half."""
-    below = np.cumsum(lower) - lower
-    return float((upper.astype(np.float64) * (below + 0.5 * lower)).sum())

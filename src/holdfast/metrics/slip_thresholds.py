@@ -23,7 +23,7 @@ from holdfast.metrics.statistics import (
     bootstrap_interval,
     draw_recordings,
 )
-from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.sensors.types import Array, Integers
 
 LOG_ODDS = np.arange(-160, 161) * 0.05
 """Log odds of the thresholds that are tried, for every head."""
@@ -97,12 +97,6 @@ def choose_threshold(
     choice = ThresholdChoice(false_alarms, counted_in)
     index = int(_places(_limited([_ratios(curve)], choice), choice, np.ones((1, 1)))[0])
     return index if index < len(curve) else None
-
-
-def _lowest(fits: Flags) -> Integers:
-    """Return the first place from which on all fit, along the last axis; its length for none."""
-    from_end = np.logical_and.accumulate(fits[..., ::-1], axis=-1)
-    return np.asarray(fits.shape[-1] - from_end.sum(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -199,7 +193,10 @@ def slip_intervals(
     if choice is None:
         indices = np.zeros((n, 1), dtype=np.int64)
     elif training:
-        indices = _resampled(training, choice, n, seed)[:, None]
+        # The other recordings are another sample of the world: their draws have their own seed.
+        drawn = draw_recordings(len(training), n, seed + 1)
+        limited = _limited([_ratios(curve) for curve in training], choice)
+        indices = np.minimum(_places(limited, choice, drawn), len(training[0]) - 1)[:, None]
     else:
         indices = _held_out(table, choice, groups or range(len(curves)), draws)
     intervals: dict[str, dict[str, Interval | None]] = {}
@@ -220,16 +217,6 @@ def slip_intervals(
 
 Table = Sequence[Mapping[tuple[str, str], _Ratio]]
 """Metrics of each recording."""
-
-
-def _resampled(
-    training: Sequence[SlipCurve], choice: ThresholdChoice, n: int, seed: int
-) -> Integers:
-    """Return the place of the threshold in n resamples of the training recordings, (n,)."""
-    table = [_ratios(curve) for curve in training]
-    draws = draw_recordings(len(training), n, seed + 1)
-    indices = _places(_limited(table, choice), choice, draws)
-    return np.minimum(indices, len(training[0]) - 1)
 
 
 def _held_out(
@@ -282,8 +269,13 @@ def _places(limited: "Sequence[_Sums]", choice: ThresholdChoice, draws: Array) -
     fits = []
     for sums, (name, limit) in zip(limited, _limits(choice).items(), strict=True):
         parts, wholes = sums.drawn(draws)
+        # Without held time the rate is not known, so no threshold fits; without quiet hold nothing
+        # can be raised in it.
         fits.append((parts <= limit * wholes) & ((wholes > 0) | (name[0] == "raised_quiet")))
-    return _lowest(np.logical_and.reduce(fits))
+    # The lowest threshold from which on all higher ones fit, too: its place is what is left of the
+    # unbroken run at the end, so a lucky low threshold below a bad one is not taken.
+    from_end = np.logical_and.accumulate(np.logical_and.reduce(fits)[..., ::-1], axis=-1)
+    return np.asarray(from_end.shape[-1] - from_end.sum(axis=-1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from holdfast.contact import (
     Cause,
     ContactState,
 )
-from holdfast.metrics.masks import Mask, join_runs, runs
+from holdfast.metrics.masks import Mask, join_runs, runs, without_short_runs
 from holdfast.metrics.truth_labels import Onsets, labels_by_rule
 from holdfast.recordings import Label, Recording, Truth
 from holdfast.sensors.types import Array
@@ -113,6 +113,9 @@ class SlipDecisions:
             (n_thresholds, n).
         """
         times, probability = self.times, self.probability
+        # The rule of `kernel/heads.c` for many thresholds at once: raised where the probability is
+        # over the threshold, and for `hold` after it, unless a gap or a fault (NaN), or a finger
+        # without contact (0), came between. Half a period allows for rounding of times.
         with np.errstate(invalid="ignore"):
             ended = ~(probability > 0)
             over = probability >= np.asarray(thresholds)[:, None]
@@ -140,29 +143,27 @@ def finger_slips(truth: Truth, finger: str) -> tuple[Slip, ...]:
     share = arrays.get("slipping_share", np.full(len(times), np.nan))
     steps = sample_durations(times)
     period = float(np.median(steps)) if len(steps) else 0.0
+    # `join_runs` measures from the last sample of a run to the first of the next, a period more
+    # than the pause lasts.
     joined = join_runs(sliding, times, MIN_STILL_DURATION + period - TIME_TOLERANCE)
-    slips = (_slip(times, steps, speed, share, int(a), int(b)) for a, b in runs(joined))
-    return tuple(
-        slip
-        for slip in slips
-        if slip.end - slip.onset >= MIN_SLIP_DURATION - TIME_TOLERANCE
-        or slip.distance >= MIN_SLIP_DISTANCE
-    )
-
-
-def _slip(times: Array, steps: Array, speed: Array, share: Array, start: int, end: int) -> Slip:
-    """Return the slip of the samples from `start` up to `end`."""
-    slid = np.cumsum((speed * steps)[start:end])
-    ends = times[start:end] + steps[start:end]
-    gross = np.flatnonzero((share[start:end] >= GROSS_SHARE) & (speed[start:end] > 0))
-    indices = np.searchsorted(slid, np.array(DISTANCES) * (1 - ROUNDING))
-    return Slip(
-        float(times[start]),
-        float(ends[-1]),
-        float(times[start + gross[0]]) if len(gross) else math.nan,
-        float(slid[-1]),
-        tuple(float(ends[k]) if k < len(ends) else math.nan for k in indices),
-    )
+    slips = []
+    for start, end in runs(joined).tolist():
+        slid = np.cumsum((speed * steps)[start:end])
+        ends = times[start:end] + steps[start:end]
+        # In a pause within a slip the share says nothing: nothing slides.
+        gross = np.flatnonzero((share[start:end] >= GROSS_SHARE) & (speed[start:end] > 0))
+        indices = np.searchsorted(slid, np.array(DISTANCES) * (1 - ROUNDING))
+        slip = Slip(
+            float(times[start]),
+            float(ends[-1]),
+            float(times[start + gross[0]]) if len(gross) else math.nan,
+            float(slid[-1]),
+            tuple(float(ends[k]) if k < len(ends) else math.nan for k in indices),
+        )
+        is_long = slip.end - slip.onset >= MIN_SLIP_DURATION - TIME_TOLERANCE
+        if is_long or slip.distance >= MIN_SLIP_DISTANCE:
+            slips.append(slip)
+    return tuple(slips)
 
 
 def label_slips(labels: Sequence[Label]) -> tuple[Slip, ...]:
@@ -195,17 +196,29 @@ def slip_truth(
     Returns:
         The truth; None if the recording has neither.
     """
-    module, truth = recording.modules[finger], recording.truth
-    stable = module_states(module.labels, times) if quiet is None else quiet
+    labels, truth = recording.modules[finger].labels, recording.truth
+    stable = np.zeros(len(times), dtype=bool) if quiet is None else quiet
+    codes = np.full(len(times), NOT_HELD, dtype=np.int8)
+    for label in labels:
+        start, end = label.start - TIME_TOLERANCE, label.end - TIME_TOLERANCE
+        rows = slice(*np.searchsorted(times, (start, end)).tolist())
+        is_stable = label.state is ContactState.STABLE
+        if quiet is None and is_stable:
+            stable[rows] = True
+        if label.state is ContactState.NO_CONTACT or label.cause in _OUT_OF_HOLD:
+            codes[rows] = NOT_HELD
+        elif label.cause is Cause.SLIP:
+            codes[rows] = SLIDING
+        else:  # what is unstable for no stated cause may slide: it is neither right nor wrong
+            codes[rows] = STILL if is_stable or label.cause is not None else CREEPING
     if truth is not None and has_slip_truth(truth, finger):
         index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
-        codes = _truth_codes(truth, finger)[index]
+        codes = _truth_codes(truth, finger)[index]  # they outrank the labels
         return SlipTruth(codes, stable & (codes == STILL), finger_slips(truth, finger), "truth")
-    if not module.labels:
+    if not labels:
         return None
-    codes = _label_codes(module.labels, times)
-    onsets: Onsets = "rule" if labels_by_rule(module.labels) else "labels"
-    return SlipTruth(codes, stable & (codes == STILL), label_slips(module.labels), onsets)
+    onsets: Onsets = "rule" if labels_by_rule(labels) else "labels"
+    return SlipTruth(codes, stable & (codes == STILL), label_slips(labels), onsets)
 
 
 def truth_without(times: Array, truth: SlipTruth, left_out: Mask) -> SlipTruth:
@@ -235,46 +248,14 @@ def sample_durations(times: Array) -> Array:
     return np.append(steps, np.median(steps))
 
 
-def module_states(labels: Sequence[Label], times: Array) -> Mask:
-    """Return (n,) True where a label is STABLE."""
-    stable = np.zeros(len(times), dtype=bool)
-    for label in labels:
-        if label.state is ContactState.STABLE:
-            stable[_places(label, times)] = True
-    return stable
-
-
 def _truth_codes(truth: Truth, finger: str) -> Codes:
     """Return (n,) the code of each sample of the truth."""
     arrays, times = truth.fingers[finger], truth.times
     force = np.linalg.norm(arrays["contact_force"], axis=1)
-    touching = ~join_runs(
-        ~join_runs(force > CONTACT_FORCE, times, MIN_CONTACT_DURATION), times, MIN_CONTACT_DURATION
-    )
+    touching = without_short_runs(force > CONTACT_FORCE, times, MIN_CONTACT_DURATION)
     speed = arrays["slip_speed"]
     codes = np.full(len(times), CREEPING, dtype=np.int8)
     codes[speed > SLIP_SPEED] = SLIDING
     codes[speed < STILL_SPEED] = STILL
     codes[~(touching & np.isin(truth.hand["phase"], HELD_PHASES))] = NOT_HELD
     return codes
-
-
-def _label_codes(labels: Sequence[Label], times: Array) -> Codes:
-    codes = np.full(len(times), NOT_HELD, dtype=np.int8)
-    for label in labels:
-        codes[_places(label, times)] = _label_code(label)
-    return codes
-
-
-def _label_code(label: Label) -> int:
-    if label.state is ContactState.NO_CONTACT or label.cause in _OUT_OF_HOLD:
-        return NOT_HELD
-    if label.cause is Cause.SLIP:
-        return SLIDING
-    is_known = label.state is ContactState.STABLE or label.cause is not None
-    return STILL if is_known else CREEPING
-
-
-def _places(label: Label, times: Array) -> slice:
-    first, last = np.searchsorted(times, (label.start - TIME_TOLERANCE, label.end - TIME_TOLERANCE))
-    return slice(int(first), int(last))

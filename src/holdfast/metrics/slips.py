@@ -16,9 +16,7 @@ from holdfast.metrics.slip_truth import (
     DISTANCES,
     SLIDING,
     STILL,
-    Slip,
     SlipDecisions,
-    SlipTruth,
     sample_durations,
 )
 from holdfast.metrics.statistics import percent
@@ -223,21 +221,40 @@ class SlipCounter:
         times, slips = decisions.times, truth.slips
         steps = sample_durations(times)
         steps = np.minimum(steps, GAP_PERIODS * np.median(steps)) if len(steps) else steps
-        windows = _slip_times(slips)
+        early, late = EARLIEST_ALARM + TIME_TOLERANCE, LATEST_ALARM + TIME_TOLERANCE
+        windows = np.array(
+            [(slip.onset - early, slip.end + late, slip.onset, slip.gross) for slip in slips]
+        ).reshape(-1, 4)
+        reached = np.array([slip.reached for slip in slips]).reshape(-1, len(DISTANCES))
         away = outside(times, windows[:, :2])
         counted = away & (truth.codes == STILL)
         quiet = counted & truth.quiet
-        return cls(
-            times,
-            windows,
-            away,
-            np.array([slip.reached for slip in slips]).reshape(-1, len(DISTANCES)),
-            _elapsed(steps, quiet),
-            _elapsed(steps, counted),
-            _without_alarms(
-                decisions, truth, float(steps[quiet].sum()), float(steps[counted].sum())
-            ),
+
+        def elapsed(mask: Mask) -> Array:
+            return np.concatenate([[0.0], np.cumsum(np.where(mask, steps, 0.0))])
+
+        known = ~np.isnan(decisions.probability)
+        histograms = [
+            np.bincount(
+                bins_of(decisions.probability[known & (truth.codes == code)]), minlength=N_BINS
+            )
+            for code in (STILL, SLIDING)
+        ]
+        silent = SlipCounts(
+            delays=np.full(len(slips), np.inf),
+            gross_delays=np.full(sum(not math.isnan(slip.gross) for slip in slips), np.inf),
+            distances=np.array([slip.distance for slip in slips]),
+            found_before=np.zeros(len(DISTANCES), dtype=np.int64),
+            n_reached=(~np.isnan(reached)).sum(axis=0),
+            false_quiet=0,
+            false_held=0,
+            quiet_seconds=float(steps[quiet].sum()),
+            held_seconds=float(steps[counted].sum()),
+            raised_seconds=0.0,
+            scores=np.array(histograms),
+            onsets=frozenset({truth.onsets}),
         )
+        return cls(times, windows, away, reached, elapsed(quiet), elapsed(counted), silent)
 
     def count(self, raised: Mask) -> SlipCurve:
         """Return the counts at several thresholds.
@@ -245,6 +262,8 @@ class SlipCounter:
         Args:
             raised: (n_thresholds, n) True where the decision is raised.
         """
+        # An alarm within a slip's time finds it; a run counts as wrong where it is away from slips,
+        # so that one which goes on after a slip is wrong only there.
         rows, starts, _ = _runs_of_rows(raised)
         alarms = rows * len(self.times) + starts
         first = first_alarms(self.times, alarms, self.slips[:, :2], len(raised))
@@ -255,13 +274,19 @@ class SlipCounter:
         def by_row(values: Array) -> Array:
             return np.asarray(np.bincount(rows, weights=values, minlength=len(raised)), np.float64)
 
+        def n_false(seconds: Array) -> Integers:
+            # A decision that stays raised is wrong again in each begun 0.5 s, so that one which is
+            # never taken back is no single false alarm.
+            begun = np.ceil(seconds / FALSE_ALARM_DURATION - TIME_TOLERANCE).clip(min=0)
+            return by_row(begun).astype(np.int64)
+
         return SlipCurve(
             self.silent,
             delays=first - onset,
             gross_delays=(first - gross)[:, ~np.isnan(gross)],
             found_before=(first[:, :, None] <= self.reached + TIME_TOLERANCE).sum(axis=1),
-            false_quiet=by_row(_n_false(quiet)).astype(np.int64),
-            false_held=by_row(_n_false(outside)).astype(np.int64),
+            false_quiet=n_false(quiet),
+            false_held=n_false(outside),
             raised_seconds=by_row(quiet),
         )
 
@@ -271,57 +296,6 @@ def _runs_of_rows(masks: Mask) -> tuple[Integers, Integers, Integers]:
     padded = np.pad(masks, ((0, 0), (1, 1))).view(np.int8)
     rows, samples = np.divmod(np.flatnonzero(np.diff(padded)), padded.shape[1] - 1)
     return rows[::2], samples[::2], samples[1::2]
-
-
-def _without_alarms(
-    decisions: SlipDecisions, truth: SlipTruth, quiet_seconds: float, held_seconds: float
-) -> SlipCounts:
-    """Return the counts of decisions that are never raised."""
-    reached = np.array([slip.reached for slip in truth.slips]).reshape(-1, len(DISTANCES))
-    n_gross = sum(not math.isnan(slip.gross) for slip in truth.slips)
-    known = ~np.isnan(decisions.probability)
-    histograms = [
-        np.bincount(bins_of(decisions.probability[known & (truth.codes == code)]), minlength=N_BINS)
-        for code in (STILL, SLIDING)
-    ]
-    return SlipCounts(
-        delays=np.full(len(truth.slips), np.inf),
-        gross_delays=np.full(n_gross, np.inf),
-        distances=np.array([slip.distance for slip in truth.slips]),
-        found_before=np.zeros(len(DISTANCES), dtype=np.int64),
-        n_reached=(~np.isnan(reached)).sum(axis=0),
-        false_quiet=0,
-        false_held=0,
-        quiet_seconds=quiet_seconds,
-        held_seconds=held_seconds,
-        raised_seconds=0.0,
-        scores=np.array(histograms),
-        onsets=frozenset({truth.onsets}),
-    )
-
-
-def _slip_times(slips: Sequence[Slip]) -> Array:
-    """Return (n_slips, 4) first and last time of the alarms, onset and gross onset [s]."""
-    rows = [
-        (
-            slip.onset - EARLIEST_ALARM - TIME_TOLERANCE,
-            slip.end + LATEST_ALARM + TIME_TOLERANCE,
-            slip.onset,
-            slip.gross,
-        )
-        for slip in slips
-    ]
-    return np.array(rows).reshape(-1, 4)
-
-
-def _elapsed(steps: Array, counted: Mask) -> Array:
-    """Return the counted time before each sample, and in all, (n + 1,) [s]."""
-    return np.concatenate([[0.0], np.cumsum(np.where(counted, steps, 0.0))])
-
-
-def _n_false(lengths: Array) -> Array:
-    """Return the false alarms of raised runs: of each, its counted time in begun parts of 0.5 s."""
-    return np.ceil(lengths / FALSE_ALARM_DURATION - TIME_TOLERANCE).clip(min=0)
 
 
 class SlipMetrics(msgspec.Struct, frozen=True):

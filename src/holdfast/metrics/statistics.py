@@ -73,6 +73,7 @@ def quantile(ordered: Array, q: float) -> float | None:
     """
     if not len(ordered):
         return None
+    # Rounded: 0.95 * 20 is a little more than 19, and would give an infinite neighbour a weight.
     position = round(q * (len(ordered) - 1), 9)
     lower = math.floor(position)
     fraction = position - lower
@@ -153,7 +154,14 @@ def auc_of(positives: Sequence[Array], negatives: Sequence[Array]) -> Statistic:
     """
     ordered = np.sort(np.concatenate([*positives, *negatives]))
     edges = np.unique(ordered[:: max(1, -(-len(ordered) // MAX_SCORE_BINS))])
-    return auc_of_counts(_histograms(positives, edges), _histograms(negatives, edges))
+
+    def histograms(scores: Sequence[Array]) -> Array:
+        # Sorted scores are found faster, as neighbours end in the same bins.
+        bins = [np.searchsorted(edges, np.sort(score), side="right") for score in scores]
+        rows = [np.bincount(bins_of_row, minlength=len(edges) + 1) for bins_of_row in bins]
+        return np.array(rows, dtype=np.float64)
+
+    return auc_of_counts(histograms(positives), histograms(negatives))
 
 
 def auc_of_counts(positive: Array, negative: Array) -> Statistic:
@@ -195,13 +203,6 @@ def draw_recordings(n_recordings: int, n: int, seed: int) -> Array:
     draws = np.random.default_rng(seed).multinomial(n_recordings, shares, size=n).astype(float)
     draws.flags.writeable = False
     return draws
-
-
-def _histograms(scores: Sequence[Array], edges: Array) -> Array:
-    """Return (n_recordings, n_edges + 1) number of scores of each recording in each bin."""
-    bins = [np.searchsorted(edges, np.sort(score), side="right") for score in scores]
-    rows = [np.bincount(bins_of_row, minlength=len(edges) + 1) for bins_of_row in bins]
-    return np.array(rows, dtype=np.float64)
 
 
 def _divide(part: Array, whole: Array) -> Array:

@@ -25,7 +25,6 @@ from holdfast.metrics.samples import (
     score_samples,
 )
 from holdfast.metrics.slip_thresholds import (
-    SlipIntervals,
     SlipSummary,
     slip_curve,
     slip_intervals,
@@ -180,12 +179,14 @@ def summarise(decisions: Iterable[Decisions], *, n_resamples: int = 1000, seed: 
         >>> metrics.pooled.accuracy, metrics.events.hand.n_events, metrics.intervals
         (100.0, 0, None)
     """
-    results = (score_recording(decision) for decision in decisions)
-    return summarise_results(results, n_resamples=n_resamples, seed=seed)
+    total = ResultTotal()
+    for decision in decisions:
+        total.add(score_recording(decision))
+    return total.metrics(n_resamples, seed)
 
 
 def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> RecordingResults:
-    """Return what `summarise_results` needs of the decisions about a recording.
+    """Return what `ResultTotal` needs of the decisions about a recording.
 
     Args:
         decisions: about the recording.
@@ -226,16 +227,6 @@ def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> Recor
     )
 
 
-def summarise_results(
-    results: Iterable[RecordingResults], *, n_resamples: int = 1000, seed: int = 0
-) -> Metrics:
-    """Compute the metrics of several recordings, in a fixed order, from the results of each."""
-    total = ResultTotal()
-    for result in results:
-        total.add(result)
-    return total.metrics(n_resamples, seed)
-
-
 class _Group:
     """Recordings that the bootstrap draws together: one, or every 1000th of more."""
 
@@ -248,22 +239,31 @@ class ResultTotal:
     """Results of the recordings so far, and their metrics."""
 
     def __init__(self) -> None:
+        # `add` changes all of them; `metrics` only reads.
         self.recordings: list[RecordingMetrics] = []
         self.fingers: dict[str, SampleTotal] = {}
         self.pooled = SampleTotal()
         self.events: list[Mapping[str, EventCounts]] = []
         self.hands: list[EventCounts | None] = []
-        self.slips: dict[str, SlipCounts] = {}
-        self.groups: list[_Group] = []
-        self.n_labelled = self.n_scores = 0
-        self.binned = False
+        self.slips: dict[str, SlipCounts] = {}  # of each finger, of all recordings
+        self.groups: list[_Group] = []  # what the bootstrap draws
+        self.n_labelled = self.n_scores = 0  # recordings with labels; labelled samples
+        self.binned = False  # whether scores became histograms, for good
 
     def add(self, results: RecordingResults) -> None:
         """Add the results of a recording."""
         self.recordings.append(results.metrics)
         self.events.append(results.events)
         self.hands.append(results.hand)
-        group = self._group() if results.events else _Group()
+        # Only recordings with labels are drawn, so the others go into a group that is thrown away.
+        # Beyond `MAX_GROUPS` they join the groups in turn: each stays a random share of all.
+        group = _Group()
+        if results.events:
+            index = self.n_labelled % MAX_GROUPS
+            self.n_labelled += 1
+            if index == len(self.groups):
+                self.groups.append(group)
+            group = self.groups[index]
         if results.hand is not None:
             group.hand.append(results.hand)
         for name, counts in results.slips.items():
@@ -272,14 +272,18 @@ class ResultTotal:
             group.slips = SlipCounts.total([group.slips, counts])
         for name, samples in results.samples.items():
             part = BinnedSamples.of(samples) if self.binned else samples
-            for total in (self._finger(name), self.pooled, group.samples):
+            for total in (self.fingers.setdefault(name, SampleTotal()), self.pooled, group.samples):
                 total.add(part)
             self.n_scores += sum(samples.n_scores)
         if self.n_scores > MAX_EXACT_SCORES and not self.binned:
-            self._bin()
+            self.binned = True
+            for total in (*self.fingers.values(), self.pooled, *(g.samples for g in self.groups)):
+                total.bin()
 
     def metrics(self, n_resamples: int = 1000, seed: int = 0) -> Metrics:
         """Compute the metrics; the arguments are those of `summarise`."""
+        curves = [SlipCurve.of_one(group.slips) for group in self.groups] if self.slips else []
+        slips = slip_intervals(curves, n=n_resamples, seed=seed, level=LEVEL)
         return Metrics(
             fingers={
                 name: metrics_of_samples(total.samples) for name, total in self.fingers.items()
@@ -289,30 +293,8 @@ class ResultTotal:
             events=_event_metrics(self.events, self.hands, list(self.fingers)),
             intervals=self._intervals(n_resamples, seed),
             score_bins=N_BINS if self.binned else None,
-            slips=slip_summary([self.slips], self._slip_intervals(n_resamples, seed)),
+            slips=slip_summary([self.slips], slips),
         )
-
-    def _slip_intervals(self, n: int, seed: int) -> SlipIntervals | None:
-        curves = [SlipCurve.of_one(group.slips) for group in self.groups] if self.slips else []
-        return slip_intervals(curves, n=n, seed=seed, level=LEVEL)
-
-    def _finger(self, name: str) -> SampleTotal:
-        if name not in self.fingers:
-            self.fingers[name] = SampleTotal()
-        return self.fingers[name]
-
-    def _group(self) -> _Group:
-        """Return the group of the next recording with labels."""
-        index = self.n_labelled % MAX_GROUPS
-        self.n_labelled += 1
-        if index == len(self.groups):
-            self.groups.append(_Group())
-        return self.groups[index]
-
-    def _bin(self) -> None:
-        self.binned = True
-        for total in (*self.fingers.values(), self.pooled, *(g.samples for g in self.groups)):
-            total.bin()
 
     def _intervals(self, n: int, seed: int) -> Intervals | None:
         n_groups = len(self.groups)
@@ -352,27 +334,26 @@ def _sample_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
     samples = [group.samples.samples for group in groups]
     confusion = np.array([sample.confusion for sample in samples])
     ratios = confusion_ratios(confusion.transpose(1, 2, 0))
-    return {
-        **{name: ratio_of_sums(100 * part, whole) for name, (part, whole) in ratios.items()},
-        **_auc_statistics(samples),
-        "brier": ratio_of_sums([sample.squared_error for sample in samples], ratios["accuracy"][1]),
-    }
-
-
-def _auc_statistics(samples: Sequence[ScoredSamples | BinnedSamples]) -> dict[str, Statistic]:
     exact = [sample for sample in samples if isinstance(sample, ScoredSamples)]
-    if exact:
+    if exact:  # then all are: `ResultTotal` turns all into histograms, or none
         stable = [sample.stable for sample in exact]
-        return {
+        auc = {
             "auc": auc_of(stable, [sample.not_stable for sample in exact]),
             "auc_contact": auc_of(stable, [sample.unstable for sample in exact]),
         }
-    counts = np.array([sample.counts for sample in samples if isinstance(sample, BinnedSamples)])
-    used = counts.any(axis=(0, 1))
-    positive, unstable, no_contact = counts[:, :, used].transpose(1, 0, 2).astype(np.float64)
+    else:
+        binned = [sample.counts for sample in samples if isinstance(sample, BinnedSamples)]
+        counts = np.array(binned)
+        used = counts.any(axis=(0, 1))  # few of the bins have a score, and U is (bins, bins) wide
+        high, unstable, no_contact = counts[:, :, used].transpose(1, 0, 2).astype(np.float64)
+        auc = {
+            "auc": auc_of_counts(high, unstable + no_contact),
+            "auc_contact": auc_of_counts(high, unstable),
+        }
     return {
-        "auc": auc_of_counts(positive, unstable + no_contact),
-        "auc_contact": auc_of_counts(positive, unstable),
+        **{name: ratio_of_sums(100 * part, whole) for name, (part, whole) in ratios.items()},
+        **auc,
+        "brier": ratio_of_sums([sample.squared_error for sample in samples], ratios["accuracy"][1]),
     }
 
 

@@ -24,7 +24,7 @@ from holdfast.contact import (
     ContactState,
     Phase,
 )
-from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
+from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs, without_short_runs
 from holdfast.recordings import Label, Recording, Truth, cut_labels, labels_from_samples
 from holdfast.sensors.types import Array
 
@@ -92,23 +92,47 @@ def labels_from_truth(
     times = truth.times
     arrays = truth.fingers[finger]
     phase = truth.hand["phase"]
-    touching = _without_short_runs(
+    touching = without_short_runs(
         np.linalg.norm(arrays["contact_force"], axis=1) > rule.contact, times, rule.min_contact
     )
     held = np.isin(phase, HELD_PHASES)
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     glitched = held & glitches(truth, rule)
+    # A slip that the hand's own glitch causes is no slip of the object by itself.
     slip_of_glitch = runs_with(sliding, glitched)
     glitched, sliding = glitched | slip_of_glitch, sliding & ~slip_of_glitch
     pushed = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
+    # Between two touches of one shake no force acts: the phase says that the shake goes on.
     pushed |= np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING))
     unstable = sliding | pushed
     unstable = held & widen_runs(join_runs(unstable, times, rule.merge), times, rule.margin)
-    unstable = held & _joined_to(phase == Phase.CLOSING, unstable, times, rule.merge)
-    lost = _from_first(held) & ~_from_first(phase == Phase.RELEASED) & (phase == Phase.FREE)
-    closing = phase == Phase.CLOSING
-    disturbed = runs_with(unstable, pushed)
-    states = _states(touching, held, unstable, disturbed, sliding, closing, lost, glitched)
+    closing, free = phase == Phase.CLOSING, phase == Phase.FREE
+    # A person who draws labels would not put a short hold between closing and the first push.
+    for _, end in runs(closing):
+        start = end + int(np.argmax(unstable[end:])) if unstable[end:].any() else end
+        if start > end and times[start] - times[end] < rule.merge:
+            unstable[end:start] = held[end:start]
+    # Free again after a hold, and not because the hand let go: the object was lost.
+    was_held = np.logical_or.accumulate(held)
+    lost = was_held & ~np.logical_or.accumulate(phase == Phase.RELEASED) & free
+    # The first rule that applies decides. Instability outranks loss of contact: a finger that is
+    # thrown off the object for a moment is disturbed. Contact outranks the phases that follow: a
+    # finger that does not touch has no state of its own. The last one is what is left.
+    unstable_by = ContactState.UNSTABLE
+    rules = (
+        (unstable & sliding, (unstable_by, Cause.SLIP)),
+        (runs_with(unstable, pushed), (unstable_by, Cause.DISTURBANCE)),
+        (unstable, (unstable_by, None)),
+        (~touching & lost, (ContactState.NO_CONTACT, Cause.LOST)),
+        (~touching, (ContactState.NO_CONTACT, None)),
+        (glitched, (unstable_by, Cause.GLITCH)),
+        (held, (ContactState.STABLE, None)),
+        (closing, (unstable_by, Cause.CLOSING)),
+        (lost, (unstable_by, Cause.LOST)),
+        (np.full_like(held, True), (unstable_by, Cause.RELEASED)),
+    )
+    first = np.argmax([mask for mask, _ in rules], axis=0)
+    states = [rules[k][1] for k in first.tolist()]
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
 
@@ -224,44 +248,3 @@ def phases_from_touch(
         if len(touches):
             touched[touches[0] : touches[-1] + 1] = True
     return np.where(planned & ~touched, Phase.LOCKED.value, phase)
-
-
-def _states(
-    touching: Mask, held: Mask, unstable: Mask, disturbed: Mask, sliding: Mask, closing: Mask,
-    lost: Mask, glitched: Mask,
-) -> list[tuple[ContactState, Cause | None]]:  # fmt: skip
-    """Return the state and cause of each sample: those of the first rule that applies."""
-    rules = (
-        (unstable & sliding, (ContactState.UNSTABLE, Cause.SLIP)),
-        (unstable & disturbed, (ContactState.UNSTABLE, Cause.DISTURBANCE)),
-        (unstable, (ContactState.UNSTABLE, None)),
-        (~touching & lost, (ContactState.NO_CONTACT, Cause.LOST)),
-        (~touching, (ContactState.NO_CONTACT, None)),
-        (glitched, (ContactState.UNSTABLE, Cause.GLITCH)),
-        (held, (ContactState.STABLE, None)),
-        (closing, (ContactState.UNSTABLE, Cause.CLOSING)),
-        (lost, (ContactState.UNSTABLE, Cause.LOST)),
-        (np.full_like(held, True), (ContactState.UNSTABLE, Cause.RELEASED)),
-    )
-    first = np.argmax([mask for mask, _ in rules], axis=0)
-    return [rules[k][1] for k in first.tolist()]
-
-
-def _joined_to(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
-    """Extend the mask back to the end of a run of `before` that is less than `gap` earlier."""
-    joined = mask.copy()
-    for _, end in runs(before):
-        start = end + int(np.argmax(mask[end:])) if mask[end:].any() else end
-        if start > end and times[start] - times[end] < gap:
-            joined[end:start] = True
-    return joined
-
-
-def _without_short_runs(mask: Mask, times: Array, min_contact: float) -> Mask:
-    """Return the mask without gaps, and then without runs, shorter than `min_contact`."""
-    return ~join_runs(~join_runs(mask, times, min_contact), times, min_contact)
-
-
-def _from_first(mask: Mask) -> Mask:
-    """Return a mask that is True from the first True on."""
-    return np.logical_or.accumulate(mask)

@@ -1,11 +1,11 @@
 """How far a model is adapted to recordings: chosen by folds, in doubt not at all; warnings."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.classifiers import Linear, Parameters, Samples
+from holdfast.classifiers import Linear, Parameters
 from holdfast.classifiers.folds import group_folds, time_folds
 from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.model import Model
@@ -94,8 +94,17 @@ def choose_adaptation(
     many = n_recordings >= ENOUGH_RECORDINGS
     candidates = CAUTIOUS + BOLD if many else CAUTIOUS
     losses = np.full((len(candidates), len(times)), np.nan)
+    recipe = Adapted(prior)
     for fold in _folds(recordings, blocks, times):
-        losses[:, fold.tested] = _held_out_losses(samples, fold, candidates, prior, step)
+        trained, tested = samples.take(fold.trained), samples.take(fold.tested)
+        for row, candidate in zip(losses, candidates, strict=True):
+            # Every step-th sample is used, and stands for as many. What cannot be fitted is no
+            # change: the prior.
+            weighted = {**candidate, "C": step * candidate["C"]}
+            rule = prior if trained.one_class else recipe.fit(trained, weighted, 0).rule
+            row[fold.tested] = log_losses(rule.probability(tested.features), tested.positive)
+    # What is alike within a grasp is alike for all its samples: errors are counted by recording, of
+    # few recordings by block of time.
     units = recordings if many else TIME_FOLDS * recordings + blocks
     known = ~np.isnan(losses[0])
     by_unit = [losses[:, known & (units == unit)].mean(axis=1) for unit in np.unique(units[known])]
@@ -178,26 +187,3 @@ def _folds(recordings: Integers, blocks: Integers, times: Array) -> Iterator[_Fo
         tested = blocks == block
         low, high = times[tested].min() - TIME_GAP, times[tested].max() + TIME_GAP
         yield _Fold((times < low) | (times > high), tested)
-
-
-def _held_out_losses(
-    samples: Samples, fold: _Fold, candidates: Sequence[Parameters], prior: Linear,
-    step: int,
-) -> Array:  # fmt: skip
-    """Return (n_candidates, n_tested) log losses; a candidate that cannot be fitted is the prior.
-
-    Args:
-        samples: of all folds.
-        fold: which of them to fit and to test.
-        candidates: to fit.
-        prior: to adapt.
-        step: every step-th sample is used, and stands for as many.
-    """
-    trained, tested = samples.take(fold.trained), samples.take(fold.tested)
-    recipe = Adapted(prior)
-    losses = []
-    for candidate in candidates:
-        weighted = {**candidate, "C": step * candidate["C"]}
-        rule = prior if trained.one_class else recipe.fit(trained, weighted, 0).rule
-        losses.append(log_losses(rule.probability(tested.features), tested.positive))
-    return np.array(losses)

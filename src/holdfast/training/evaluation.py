@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import SLIP_CODE, STABLE, UNKNOWN, Fault
-from holdfast.detector import FingerTrace, detect
+from holdfast.detector import detect
 from holdfast.metrics import (
     Decisions,
     FingerDecisions,
@@ -27,7 +27,7 @@ from holdfast.metrics.truth_labels import (
 )
 from holdfast.model import Model
 from holdfast.parallel import Engine
-from holdfast.recordings import Label, Recording, label_states
+from holdfast.recordings import Recording, label_states
 from holdfast.sensors.types import Integers
 from holdfast.training.dataset_scan import (
     OneRecording,
@@ -64,44 +64,36 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
     detection = detect(model, recording)
     loaded = any((trace.faults & TARE_LOADED_BIT).any() for trace in detection.fingers.values())
     by_truth = labels_by_truth(recording, LabelRule(margin=0.0))
+    # The truth outranks labels. Labels by a rule leave out a margin about each change; the exact
+    # ones have it, so that an onset is where the rule saw it.
     labels = {name: module.labels for name, module in recording.modules.items()} | by_truth
     by_rule = any(map(labels_by_rule, labels.values()))
     exact = {name: without_margin(own) for name, own in labels.items()} if by_rule else by_truth
-    fingers = {
-        name: FingerDecisions(
+    fingers = {}
+    for name, trace in detection.fingers.items():
+        head, slip = model.finger(name).slip, None
+        if head is not None and trace.slip_probability is not None:
+            # Quiet hold, in which nothing may be reported, is where the true label is STABLE.
+            known = by_truth.get(name)
+            quiet = None if known is None else label_states(known, trace.times) == STABLE
+            slip = SlipDecisions(
+                trace.times,
+                trace.slip_probability,
+                trace.cause == SLIP_CODE,
+                head.hold,
+                slip_truth(recording, name, trace.times, quiet),
+            )
+        fingers[name] = FingerDecisions(
             times=trace.times,
             labels=label_states(recording.modules[name].labels, trace.times),
             states=trace.state,
             stable_probability=trace.stable_probability,
             exact_labels=label_states(exact[name], trace.times) if name in exact else None,
-            slip=_slip_decisions(model, recording, name, trace, by_truth.get(name)),
+            slip=slip,
             onsets="rule" if by_rule else "truth",
         )
-        for name, trace in detection.fingers.items()
-    }
     hand = replace(hand_decisions(fingers, len(model.fingers)), states=detection.hand)
     return Decisions(recording.name, fingers, hand), loaded
-
-
-def _slip_decisions(
-    model: Model,
-    recording: Recording,
-    finger: str,
-    trace: FingerTrace,
-    exact: tuple[Label, ...] | None,
-) -> SlipDecisions | None:
-    """Return the decisions about the slips of a finger; None without a slip rule."""
-    head = model.finger(finger).slip
-    if head is None or trace.slip_probability is None:
-        return None
-    quiet = None if exact is None else label_states(exact, trace.times) == STABLE
-    return SlipDecisions(
-        trace.times,
-        trace.slip_probability,
-        trace.cause == SLIP_CODE,
-        head.hold,
-        slip_truth(recording, finger, trace.times, quiet),
-    )
 
 
 def was_trained_on(model: Model, recording: Recording | ScannedRecording) -> bool:
@@ -222,6 +214,7 @@ def evaluate_recordings(
         if is_copy:
             copies.append((name, originals[origin.digest]))
         originals.setdefault(origin.digest, name)
+        # All figures have every recording; the verdict rests on what is new to the model, once.
         if origin.trained_on:
             trained_on.append(name)
         elif not is_copy:
@@ -294,6 +287,8 @@ def combine_decisions(
     """
     fingers = {}
     for name, first in decisions[0].fingers.items():
+        # Row by row of a stack (n_models, n): the model of its unit. Models were trained beside
+        # samples of unit -1, so these lose their labels, and what is picked for them never counts.
         every = np.arange(len(first.times))
         unit = units_of(len(every))
         states = np.stack([decision.fingers[name].states for decision in decisions])

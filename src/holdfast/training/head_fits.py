@@ -12,7 +12,6 @@ from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.contact import CAUSES
 from holdfast.features import FeatureSpec
 from holdfast.model import ANY_FINGER, Head, Model
-from holdfast.sensors.types import Array, Flags
 from holdfast.training.targets import TargetSamples
 
 SLIP_SMOOTHING, SLIP_HOLD_TIME = 0.02, 0.05
@@ -65,7 +64,18 @@ def fit_slip(
     if slides.all() or slides.sum() < MIN_SLIDING_SAMPLES:
         return None
     classes = Samples(samples.features[kept], slides, samples.units[kept])
-    rule = _fitted_rule(classes, "balanced" if is_any else None, squares)
+    recipe = LogisticRegression()
+    parameters = {**recipe.reference, "class_weight": "balanced" if is_any else None}
+    if squares:
+        # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
+        mean, scale, standard = standardise(classes.features)
+        wide = np.hstack([standard, np.minimum(np.abs(standard), MAX_DEVIATION) ** 2])
+        fitted = recipe.fit(classes._replace(features=wide), parameters, 0).linear
+        weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
+        intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
+        rule = Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
+    else:
+        rule = recipe.fit(classes, parameters, 0).linear
     # The odds of sliding fall by the still samples that were left out.
     n_still = samples.n_usable - samples.n_positive
     thinning = np.log(n_still / (len(samples.values) - samples.n_positive))
@@ -74,21 +84,6 @@ def fit_slip(
         name="slip", link="logit", features=features, rule=rule,
         smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD_TIME,
     )  # fmt: skip
-
-
-def _fitted_rule(samples: Samples, class_weight: str | None, squares: bool) -> Linear:
-    """Return a rule fitted to samples, which class 1 of slides."""
-    recipe = LogisticRegression()
-    parameters = {**recipe.reference, "class_weight": class_weight}
-    if not squares:
-        return recipe.fit(samples, parameters, 0).linear
-    # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
-    mean, scale, standard = standardise(samples.features)
-    wide = np.hstack([standard, np.minimum(np.abs(standard), MAX_DEVIATION) ** 2])
-    fitted = recipe.fit(samples._replace(features=wide), parameters, 0).linear
-    weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
-    intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
-    return Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
 
 
 def fit_speed(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:
@@ -108,32 +103,22 @@ def fit_speed(samples: TargetSamples, left_out: Collection[int], features: Featu
     kept = samples.kept(left_out)
     values, speed = samples.features[kept], np.asarray(samples.values[kept], dtype=np.float64)
     slides = speed > 0
-    if np.count_nonzero(slides) < MIN_SPEED_SAMPLES:
+    n_sliding = int(np.count_nonzero(slides))
+    if n_sliding < MIN_SPEED_SAMPLES:
         return None
+    # Standardised by what slides, whose speed is wanted.
     mean, scale, _ = standardise(values[slides])
-    standard = (values - mean) / scale
+    standard, n = (values - mean) / scale, len(mean)
     squares = np.minimum(np.abs(standard), MAX_DEVIATION) ** 2
     columns = np.hstack([np.ones((len(standard), 1)), standard, squares])
-    weights = _solve(columns, np.sqrt(speed), _sample_weights(slides))
-    n = len(mean)
-    rule = Linear.of(mean, scale, weights[1 : n + 1], weights[0], weights[n + 1 :])
-    highest = float(speed.max())
-    return Head(name="slip_speed", link="square", features=features, rule=rule, highest=highest)
-
-
-def _sample_weights(slides: Flags) -> Array:
-    """Return (n,) 1 for samples that slide, and what `STILL_WEIGHT` leaves for each other one."""
-    n_sliding = int(np.count_nonzero(slides))
-    n_still = max(len(slides) - n_sliding, 1)
-    return np.where(slides, 1.0, STILL_WEIGHT * n_sliding / n_still)
-
-
-def _solve(columns: Array, target: Array, weights: Array) -> Array:
-    """Return the coefficients of the columns, of which the first has no penalty."""
-    # (A^T W A + penalty) c = A^T W y.
-    weighted = (columns * weights[:, None]).T
+    still_weight = STILL_WEIGHT * n_sliding / max(len(slides) - n_sliding, 1)
+    # (A^T W A + penalty) c = A^T W y; the first column is the intercept, without a penalty.
+    weighted = (columns * np.where(slides, 1.0, still_weight)[:, None]).T
     penalty = np.diag([0.0, *[SPEED_PENALTY] * (columns.shape[1] - 1)])
-    return np.asarray(np.linalg.solve(weighted @ columns + penalty, weighted @ target))
+    weights = np.linalg.solve(weighted @ columns + penalty, weighted @ np.sqrt(speed))
+    rule = Linear.of(mean, scale, weights[1 : n + 1], weights[0], weights[n + 1 :])
+    highest = float(speed.max())  # beyond it nothing was seen, and squares rise fast
+    return Head(name="slip_speed", link="square", features=features, rule=rule, highest=highest)
 
 
 def fit_cause(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:
@@ -167,12 +152,13 @@ def missing_heads(
         slips: samples of the target of `slip`, by finger.
         causes: of that of `cause`.
     """
+    names = {finger: "all fingers" if finger == ANY_FINGER else finger for finger in model.fingers}
     for finger, samples in causes.items():
         if model.finger(finger).head("cause") is None:
             counts = np.bincount(np.asarray(samples.values), minlength=len(CAUSES) + 1)[1:]
             given = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
             yield (
-                f"{_name(finger)}: unstable samples {', '.join(given)} given, at least "
+                f"{names[finger]}: unstable samples {', '.join(given)} given, at least "
                 f"{MIN_CAUSE_SAMPLES} of each of two causes expected; the model names no cause "
                 "there"
             )
@@ -180,11 +166,7 @@ def missing_heads(
         if model.finger(finger).slip is None:
             n = samples.n_positive
             yield (
-                f"{_name(finger)}: {n} samples that slide and {samples.n_usable - n} that hold "
+                f"{names[finger]}: {n} samples that slide and {samples.n_usable - n} that hold "
                 f"still given, at least {MIN_SLIDING_SAMPLES} and 1 expected; the model gets no "
                 "slip rule there"
             )
-
-
-def _name(finger: str) -> str:
-    return "all fingers" if finger == ANY_FINGER else finger

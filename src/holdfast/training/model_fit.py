@@ -1,6 +1,6 @@
 """Fit of a model to training samples, with or without some units, and its provenance."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Self
@@ -128,8 +128,23 @@ def fit_model(
         stable = Head(
             name="stable", link="logit", features=setting.features, rule=rule, threshold=limit
         )
+        heads = [stable]
+        slips, speeds, causes = (
+            data.samples.of(head).get(finger) for head in ("slip", "slip_speed", "cause")
+        )
+        features, squares = data.slip_features, data.slip_squares
+        if slips and (
+            slip := fit_slip(slips, left_out, features, is_any=setting.relative, squares=squares)
+        ):
+            heads.append(slip)
+            # The speed is a sum of squares too, and an answer only while `slip` reports one.
+            if speeds and squares and (speed := fit_speed(speeds, left_out, features)):
+                heads.append(speed)
+        # No metric out of fold counts causes, so only the final model has them.
+        if causes and not left_out and (cause := fit_cause(causes, left_out, setting.features)):
+            heads.append(cause)
         fingers[finger] = FingerModel(
-            heads=(stable, *_other_heads(data, setting, finger, left_out)),
+            heads=tuple(heads),
             sensor=None if pool.sensor is None else pool.sensor.name,
             contact_threshold=(
                 pool.contact_threshold(recordings) if threshold is None else threshold
@@ -146,29 +161,6 @@ def fit_model(
         tare=str(setting.used_tare),
         debounce=setting.debounce,
     )
-
-
-def _other_heads(
-    data: TrainingData, setting: Setting, finger: str, left_out: Collection[int]
-) -> Iterator[Head]:
-    """Yield the heads of a finger beside `stable` that its samples can train."""
-    slips, speeds, causes = (
-        data.samples.of(head).get(finger) for head in ("slip", "slip_speed", "cause")
-    )
-    slip = slips and fit_slip(
-        slips, left_out, data.slip_features, is_any=setting.relative, squares=data.slip_squares
-    )
-    if slip:
-        yield slip
-        if (
-            speeds
-            and data.slip_squares
-            and (head := fit_speed(speeds, left_out, data.slip_features))
-        ):
-            yield head
-    # No metric out of fold counts causes.
-    if causes and not left_out and (head := fit_cause(causes, left_out, setting.features)):
-        yield head
 
 
 def fit_full_model(

@@ -1,6 +1,6 @@
 """Training: fit a model to all recordings, and cross-validate it with the detector itself."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -134,15 +134,26 @@ def train(
     setting, engine = setting or Setting(), engine or Engine(n_jobs)
     trainer = _Trainer.read(recordings, setting, journal, warn, progress, engine)
     trainer.check()
+    # The first search has all samples, and gives the final model its parameters. The others leave
+    # out the units that their parameters are evaluated on.
     final, *held_out = trainer.search([set(), *trainer.search_units()])
     model = fit_full_model(trainer.data, trainer.setting, final)
     scored = trainer.cross_validate(held_out or [final])
-    _warn_of_undecided(scored.metrics, warn)
+    n_undecided = scored.metrics.pooled.n_undecided
+    fraction = n_undecided / max(scored.metrics.pooled.n + n_undecided, 1)
+    if fraction > MAX_UNDECIDED_FRACTION:
+        warn(
+            f"{100 * fraction:.0f} % of the labelled samples have no decision because of tare, "
+            "warm-up, gaps or faults (see holdfast detect --summary); recordings that begin in "
+            "contact need --tare first"
+        )
+    # An adapted model keeps the other heads of the model that it comes from.
     if setting.init is None:
         samples = trainer.data.samples
         for warning in missing_heads(model, samples.of("slip"), samples.of("cause")):
             warn(warning)
     model, metrics = trainer.choose_slip_threshold(model, scored)
+    # The figures in the file are those after the choice of the threshold: slips are among them.
     provenance = training_record(
         trainer.setting,
         trainer.scan,
@@ -213,10 +224,21 @@ class _Trainer:
         scans = engine.map_ordered(_scan_part, parts, shared=(setting.relative,))
         read = progress(scans, "reading", len(recordings))
         scan = combine_scans(read, setting.rate, relative=setting.relative)
-        if setting.init is None:
+        init = setting.init
+        if init is None:
             features = _that_fit(setting.features, scan.smallest, warn)
             setting = replace(setting, features=features)
-        setting = _with_split(_with_handling(setting, scan), scan, warn)
+        elif any(part.handling for part in init.fingers.values()):
+            # Its classifiers then have the own handling of these sensors inside their weights, so
+            # that they are adapted as they work.
+            setting = replace(setting, init=init.with_handling_of(scan.sensors))
+        if setting.split == "recording" and init is not None and len(scan.recordings) == 1:
+            # To adapt to a single grasp is allowed, though nothing else can be held out.
+            warn(
+                "one recording given: the metrics are by blocks of time within it (--split time), "
+                "and too good; the next grasp is another"
+            )
+            setting = replace(setting, split="time")
         data_split = split_data(scan.recordings, setting.split, setting.seed)
         own = setting.slip_features and _that_fit(setting.slip_features, scan.smallest, warn)
         plan = SamplesPlan(
@@ -227,6 +249,7 @@ class _Trainer:
         if own and not samples.of("slip"):
             warn("no slips are known in the recordings: the model gets no slip rule")
         data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
+        # Machines of a cluster share no file to which all may append.
         journal = journal if engine.scheduler is None else None
         return cls(recordings, setting, data, journal, warn, progress, engine)
 
@@ -278,12 +301,20 @@ class _Trainer:
         Without trials, return the reference parameters. A model to adapt has a few candidates
         instead of a search.
         """
-        setting = self.setting
+        setting, init = self.setting, self.setting.init
         if not setting.trials:
             reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
             return [reference for _ in left_out_units]
-        if setting.init is not None:
-            return [self._adapt(left_out, setting.init) for left_out in left_out_units]
+        found: list[dict[str, Parameters]] = [{} for _ in left_out_units]
+        if init is not None:
+            for left_out, parameters_of in zip(left_out_units, found, strict=True):
+                for finger, pool in self.fingers.items():
+                    prior = linear_prior(init.finger(finger).stable.rule)
+                    adaptation = choose_adaptation(pool, prior, left_out)
+                    parameters_of[finger] = adaptation.parameters
+                    if not left_out:  # the final model: the one that the user gets
+                        self.warn(adaptation.describe(init.name or "the model to adapt", finger))
+            return found
         tasks = (
             (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger, self.journal)
             for left_out in left_out_units
@@ -296,17 +327,6 @@ class _Trainer:
             self.warn(warning)
         parameters = iter(parameters for parameters, _ in searched)
         return [{finger: next(parameters) for finger in self.fingers} for _ in left_out_units]
-
-    def _adapt(self, left_out: Collection[int], init: Model) -> dict[str, Parameters]:
-        """Choose how far every finger is adapted; report it if nothing is held out."""
-        parameters: dict[str, Parameters] = {}
-        for finger, pool in self.fingers.items():
-            prior = linear_prior(init.finger(finger).stable.rule)
-            adaptation = choose_adaptation(pool, prior, left_out)
-            parameters[finger] = adaptation.parameters
-            if not left_out:
-                self.warn(adaptation.describe(init.name or "the model to adapt", finger))
-        return parameters
 
     def cross_validate(self, searched: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
         """Score predictions out of fold.
@@ -325,25 +345,25 @@ class _Trainer:
             self.warn(
                 f"{n_units} {self.data_split.split}s are held out in {n_fits} groups, not alone"
             )
+
+        def calls() -> Iterator[tuple[int, str, Sequence[Recording], list[Model | None]]]:
+            by_samples = self.data_split.split in ("time", "random")
+            for index, scanned in enumerate(self.scan.recordings):
+                # A recording is scored by the one model that was fitted without it; if samples
+                # are held out, by each model on its samples; without labels, by none.
+                used = models if scanned.n_labelled else []
+                if used and not by_samples:
+                    used = [models[self.data_split.group_of[index] % len(models)]]
+                yield index, scanned.name, OneRecording(self.recordings, index), used
+
         context = (self.data_split, len(self.fingers))
-        calls = (self._call(index, models) for index in range(len(self.recordings)))
-        evaluated = self.engine.map_ordered(_score_out_of_fold, calls, shared=context)
+        evaluated = self.engine.map_ordered(_score_out_of_fold, calls(), shared=context)
         total, slip_curves, n_loaded = ResultTotal(), [], 0
         for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
             total.add(results)
             slip_curves.append(results.slip_curves)
             n_loaded += loaded
         return OutOfFold(total.metrics(seed=self.setting.seed), slip_curves, n_loaded)
-
-    def _call(
-        self, index: int, models: Sequence[Model | None]
-    ) -> tuple[int, str, Sequence[Recording], list[Model | None]]:
-        """Return the arguments of `_score_out_of_fold`, without models if there are no labels."""
-        scanned = self.scan.recordings[index]
-        used = list(models) if scanned.n_labelled else []
-        if used and self.data_split.split not in ("time", "random"):
-            used = [models[self.data_split.group_of[index] % len(models)]]
-        return index, scanned.name, OneRecording(self.recordings, index), used
 
     def choose_slip_threshold(self, model: Model, scored: OutOfFold) -> tuple[Model, Metrics]:
         """Return the model with the threshold of its slip rules, and the metrics with slips.
@@ -368,26 +388,6 @@ class _Trainer:
         model = with_slip_threshold(model, chosen)
         slips = chosen.metrics if chosen is not None and model.has_slip_rule else None
         return model, replace_fields(metrics, slips=slips)
-
-
-def _with_handling(setting: Setting, scan: DatasetScan) -> Setting:
-    """Return the setting; own handling of the sensors is in the classifiers to adapt."""
-    init = setting.init
-    if init is None or not any(part.handling for part in init.fingers.values()):
-        return setting
-    return replace(setting, init=init.with_handling_of(scan.sensors))
-
-
-def _with_split(setting: Setting, scan: DatasetScan, warn: Warn) -> Setting:
-    """Return the setting; a model is adapted to one recording with the split by time."""
-    alone = len(scan.recordings) == 1 and setting.init is not None
-    if setting.split != "recording" or not alone:
-        return setting
-    warn(
-        "one recording given: the metrics are by blocks of time within it (--split time), "
-        "and too good; the next grasp is another"
-    )
-    return replace(setting, split="time")
 
 
 def _that_fit(
@@ -439,22 +439,21 @@ def _score_out_of_fold(
     if not used:
         return score_recording(Decisions(name, {})), False
     (recording,) = part
-    judged = [_judge(model, recording) for model in used]
-    by_model = [decisions for decisions, _ in judged]
-    loaded = any(loaded for _, loaded in judged)
+    by_model, loaded = [], False
+    for model in used:
+        decisions = Decisions(name, {})
+        # A model of other fingers cannot decide about this recording, and refuses it.
+        if ANY_FINGER in model.fingers or set(model.fingers) & set(recording.modules):
+            decisions, has_loaded_tare = judge(model, recording)
+            loaded |= has_loaded_tare
+        by_model.append(decisions)
     combined = Decisions(name, {})
     if data_split.split not in ("time", "random"):
         combined = by_model[0]
+    # Samples of a unit without a model have no decision out of fold, so all units need one.
     elif len(used) == len(models) and len({tuple(by.fingers) for by in by_model}) == 1:
         combined = combine_decisions(by_model, lambda n: data_split.units_of(index, n), n_fingers)
     return score_recording(combined, slip_curves=True), loaded
-
-
-def _judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
-    """Return decisions, and whether the tare is loaded; none without the fingers of the model."""
-    if ANY_FINGER not in model.fingers and not set(model.fingers) & set(recording.modules):
-        return Decisions(recording.name, {}), False
-    return judge(model, recording)
 
 
 def _search(
@@ -476,14 +475,3 @@ def _search(
         objective=setting.search_objective,
         journal=journal,
     ), ""
-
-
-def _warn_of_undecided(metrics: Metrics, warn: Warn) -> None:
-    n_labelled = metrics.pooled.n + metrics.pooled.n_undecided
-    fraction = metrics.pooled.n_undecided / max(n_labelled, 1)
-    if fraction > MAX_UNDECIDED_FRACTION:
-        warn(
-            f"{100 * fraction:.0f} % of the labelled samples have no decision because of tare, "
-            "warm-up, gaps or faults (see holdfast detect --summary); recordings that begin in "
-            "contact need --tare first"
-        )

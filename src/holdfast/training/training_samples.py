@@ -6,19 +6,17 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.contact import NO_CONTACT, UNKNOWN
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.force import rest_amplitude
-from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import extract
 from holdfast.features.tables import StreamPlan
 from holdfast.metrics.slip_truth import slip_truth
-from holdfast.model import ANY_FINGER, RATE_TOLERANCE, HeadName
+from holdfast.model import ANY_FINGER, HeadName
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
-from holdfast.resampling import resample, true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.training.dataset_scan import DatasetScan, OneRecording, Progress, show_nothing
@@ -146,6 +144,7 @@ def _read(
     """
     n_seen = Counter[str]()
     parts = [(index, OneRecording(recordings, index)) for index in plan.indices]
+    # In this process the number is known from the recordings before; other processes work ahead.
     counts: Iterator[Mapping[str, int]] | None = None
     if plan.step > 1 and not engine.in_this_process:
         counts = iter(list(engine.map_ordered(_count_usable, parts, shared=(plan,))))
@@ -179,9 +178,7 @@ def _samples_of_part(
         n_seen: usable samples of each finger in all recordings before.
     """
     scan, setting, step = plan.scan, plan.setting, plan.step
-    recording = true_updates(part[0])
-    if not scan.relative:
-        recording = resample_if_needed(recording, scan.rate)
+    recording = at_rate(part[0], None if scan.relative else scan.rate)
     rate, tare = scan.model_rate or recording.rate, setting.used_tare
     sensors = sensors_of(recording, scan)
 
@@ -196,16 +193,23 @@ def _samples_of_part(
     with_others = not plan.only_stable
     is_same = plan.slip_features == setting.features
     slip_rows = stable_rows if is_same or not with_others else extracted(plan.slip_features)
-    loaded, fingers = begins_in_contact(recording.metadata), {}
+    fingers = {}
     recording_step = scan.recordings[index].step
     group = int(plan.data_split.group_of[index])
     for finger, rows in stable_rows.items():
         module = recording.modules[finger]
-        states = _states_to_learn(module, scan.relative)
+        states = label_states(module.labels, module.times)
+        if scan.relative:
+            # The load separates no contact there, so those labels would teach what is known.
+            states = np.where(states == NO_CONTACT, UNKNOWN, states).astype(np.int8)
         units = plan.data_split.units_of(index, module.n_samples)
         usable = usable_rows(rows, states)[::recording_step]
+        # Every step-th of all recordings one after the other: the first one here is due once the
+        # samples before are a multiple of the step.
         kept = usable[-n_seen.get(finger, 0) % step :: step]
-        has_rest = tare.without_contact and not scan.relative and not loaded
+        # F_a at rest says where contact begins. A loaded start shows no rest, and a model for any
+        # unit has a threshold on the load instead.
+        has_rest = tare.without_contact and not scan.relative and not recording.starts_loaded
         stable = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows, states, kept, group),
@@ -238,20 +242,6 @@ def sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
         for finger, module in modules.items()
         if module.n_samples and (scan.relative or module.sensor == scan.sensors[finger])
     }
-
-
-def _states_to_learn(module: Tactile, relative: bool) -> npt.NDArray[np.int8]:
-    """Return (n,) the labels, without those of no contact if the load separates them."""
-    states = label_states(module.labels, module.times)
-    return np.where(states == NO_CONTACT, UNKNOWN, states).astype(np.int8) if relative else states
-
-
-def resample_if_needed(recording: Recording, rate: float) -> Recording:
-    """Return the true updates of a recording, resampled unless their rate [Hz] is within 20 %."""
-    recording = true_updates(recording)
-    if abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
-        return recording
-    return resample(recording, rate)
 
 
 def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:

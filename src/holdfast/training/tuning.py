@@ -63,12 +63,23 @@ def search(
     pairs = [(samples.take(~held_out), samples.take(held_out)) for held_out in folds]
 
     def loss_of(trial: "Trial") -> float:
+        # Each trial is drawn even if its loss is known: the next draws depend on it.
         parameters = recipe.suggest(trial)
         loss = None if known is None else known.find(parameters)
-        if loss is None:
-            loss = _loss(pairs, recipe, parameters, seed, objective)
-            if known is not None:
-                known.add(parameters, loss)
+        if loss is not None:
+            return loss
+        total, n = 0.0, 0
+        for fitted, tested in pairs:
+            classifier = recipe.fit(fitted, parameters, seed)
+            probability = classifier.probability(tested.features)
+            if objective == "error":
+                total += float(((probability >= classifier.threshold) != tested.positive).sum())
+            else:
+                total += float(log_losses(probability, tested.positive).sum())
+            n += len(tested.positive)
+        loss = total / n
+        if known is not None:
+            known.add(parameters, loss)
         return loss
 
     study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
@@ -83,27 +94,6 @@ def log_losses(
     """Return (n,) the log loss of the probability of stability of each sample."""
     bounded = np.clip(probability, 1e-12, 1 - 1e-12)
     return -np.log(np.where(stable, bounded, 1 - bounded))
-
-
-def _loss(
-    pairs: Sequence[tuple[Samples, Samples]],
-    recipe: Recipe,
-    parameters: Parameters,
-    seed: int,
-    objective: Objective,
-) -> float:
-    """Compute the mean loss over the held-out samples; a pair is (to fit, held out)."""
-    total = 0.0
-    n = 0
-    for fitted, tested in pairs:
-        classifier = recipe.fit(fitted, parameters, seed)
-        probability = classifier.probability(tested.features)
-        if objective == "error":
-            total += float(((probability >= classifier.threshold) != tested.positive).sum())
-        else:
-            total += float(log_losses(probability, tested.positive).sum())
-        n += len(tested.positive)
-    return total / n
 
 
 class _Trial(msgspec.Struct, frozen=True):
@@ -128,9 +118,18 @@ class Journal:
     """
 
     def __init__(self, path: Path, search: str) -> None:
-        self._path = path
-        self._search = search
-        self._losses = {_text(t.parameters): t.loss for t in _trials(path) if t.search == search}
+        self._path, self._search = path, search
+        self._losses: dict[str, float] = {}  # by the text of the parameters; `add` adds to them
+        try:
+            lines = path.read_bytes().splitlines() if path.exists() else []
+        except OSError as cause:
+            raise OutputError(f"cannot read {path}: {cause.strerror}") from cause
+        for line in filter(None, lines):
+            # A line may be cut: the search was stopped. msgspec's own errors are ValueErrors.
+            with suppress(ValueError):
+                trial = msgspec.json.decode(line, type=_Trial)
+                if trial.search == search:
+                    self._losses[_text(trial.parameters)] = trial.loss
 
     def find(self, parameters: Mapping[str, Any]) -> float | None:
         """Return the loss of some parameters; None if they have not been tried."""
@@ -161,18 +160,6 @@ def search_key(*parts: object) -> str:
         else:
             state.update(repr(part).encode())
     return state.hexdigest()
-
-
-def _trials(path: Path) -> list[_Trial]:
-    try:
-        lines = path.read_bytes().splitlines() if path.exists() else []
-    except OSError as cause:
-        raise OutputError(f"cannot read {path}: {cause.strerror}") from cause
-    trials = []
-    for line in filter(None, lines):
-        with suppress(ValueError):  # msgspec's own errors are ValueErrors
-            trials.append(msgspec.json.decode(line, type=_Trial))
-    return trials
 
 
 def _text(parameters: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ from holdfast.cli.detect.output import (
 )
 from holdfast.contact import ContactState
 from holdfast.detector import Detector, detect
-from holdfast.live.arrival_detector import StreamEstimate
+from holdfast.live.stream_detector import StreamEstimate
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 

@@ -46,3 +46,28 @@ def test_bad_input_is_one_line(capsys, folder, words, text, monkeypatch):
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert err.startswith(f"holdfast: {text}")
+
+
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        ("--auto signal F --dry-run --json", "auto signal F --dry-run --json"),
+        ("--auto signal F --dry-run --tare first", "auto signal F --dry-run --tare first"),
+        ("--auto magic F", "auto magic F"),
+        ("--compare F signal --json", "compare F signal --json"),
+        ("--compare F gone", "compare F gone"),
+        ("--audit gone --page", "audit gone --page"),
+        ("--export csv O F --force", "export csv O F --force"),
+        ("--import O F --dry-run --author ann", "import O F --dry-run --author ann"),
+        ("--import gone.json F", "import gone.json F"),
+    ],
+)
+def test_commands_do_what_the_options_did(capsys, folder, tmp_path, before, now):
+    places = {"F": folder, "O": tmp_path / "out"}
+    if "import" in now:
+        run(capsys, "export", "csv", places["O"], folder)
+    first, second = (
+        run(capsys, *(places.get(word, word) for word in text.split())) for text in (before, now)
+    )
+    assert first == second
+    assert first[0] == (2 if "gone" in now or "magic" in now else 0)

@@ -6,7 +6,7 @@ from contextlib import redirect_stdout
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.cli.terminal.console import (
@@ -46,7 +46,6 @@ def test_json_has_no_control_characters(capsys):
     assert json.loads(out) == {"name": name}
 
 
-@settings(deadline=None)
 @given(st.text())
 def test_visible_text_is_printable_and_json_keeps_its_value(text):
     assert visible(text).isprintable()
@@ -124,7 +123,6 @@ class TestWidth:
         assert lines[1] == f"{'x' * 12}  123456789.5"
         assert "".join(line.split()[0] for line in lines[1:4]) == "x" * 30
 
-    @settings(deadline=None)
     @given(
         st.lists(st.text("ab-_/. ", max_size=300), min_size=1, max_size=5),
         st.lists(st.integers(0, 10**6), min_size=1, max_size=4),

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from holdfast.devices.sources.anyskin import AnySkinDecoder
@@ -50,7 +50,6 @@ def test_five_magnetometers_are_82_bytes():
     assert len(decoder.feed(data[-1:]).samples) == 1
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.lists(READING, min_size=6, max_size=6), min_size=1, max_size=5),
     st.integers(1, 80),
@@ -65,7 +64,6 @@ def test_pieces_of_any_size_give_the_same(rows, piece, temperature):
     assert n_refused == 0
 
 
-@settings(deadline=None)
 @given(
     st.lists(
         st.one_of(
@@ -88,7 +86,6 @@ def test_garbage_gives_the_same_in_pieces_of_any_size(parts, piece):
     np.testing.assert_array_equal(whole[0][-28:], some(30, 2)[-28:])
 
 
-@settings(deadline=None)
 @given(st.binary(min_size=1, max_size=300))
 def test_garbage_loses_only_the_packet_that_it_joins(garbage):
     given = some(6)

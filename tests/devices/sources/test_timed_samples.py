@@ -54,7 +54,7 @@ def test_a_file_in_pieces_of_any_size_is_the_recording(tmp_path, suffix, n_sampl
     assert_same(timed_samples(read_chunks(path, n_samples)), recording)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.data())
 def test_modules_with_any_times(data):
     modules = {}

@@ -400,9 +400,13 @@ def test_plain_columns_beside_labels(tmp_path):
             None,
             "no taxel columns such as x1, y1, z1, x2 among 'time', 's0', 's1', 's2', 's3', 's4' "
             "and 10 more: give --columns 'taxels=F{axis}{taxel}' or, for consecutive columns, "
-            "taxels=FIRST..LAST, or --sensor alone if all other columns are x, y, z of its taxels",
+            "taxels=FIRST..LAST",
         ),
-        (PLAIN["numbered"], {"*": sensor("gtac")}, "no taxel columns such as x1, y1, z1, x2"),
+        (
+            PLAIN["numbered"],
+            {"*": sensor("gtac")},
+            "15 columns given for 15 taxels; three axes (x, y, z) of each taxel are needed",
+        ),
         (PLAIN["no header"], None, "no column of times among 'column1', 'column2', 'column3',"),
     ],
 )

@@ -71,21 +71,6 @@ def test_kappa_of_cohens_own_kind_of_table():
     assert cohens_kappa([[0, 5], [5, 0]]) == -1.0
 
 
-def test_one_state_on_both_sides_leaves_kappa_undefined():
-    found = of("sss", "sss")
-    assert (found.kappa, found.kappa_stable, found.n) == (None, None, 3)
-
-
-def test_two_states_that_are_both_not_stable_leave_only_the_binary_kappa_undefined():
-    found = of("nnuu", "nuuu")
-    assert found.kappa == pytest.approx(0.5)
-    assert found.kappa_stable is None
-
-
-def test_opposite_states_agree_by_chance_only():
-    assert of("ssss", "uuuu").kappa == 0.0
-
-
 def test_counts_do_not_overflow():
     assert cohens_kappa([[2**33, 0], [0, 2**33]]) == 1.0
 

@@ -49,7 +49,7 @@ def test_labels_have_author_and_evidence():
 
 
 @given(start=st.floats(-1e3, 1e9))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_another_start_of_the_clock_moves_the_labels(start):
     here = drawn(signal.propose(grasp())["thumb"])
     there = drawn(signal.propose(grasp(start))["thumb"])
@@ -59,7 +59,7 @@ def test_another_start_of_the_clock_moves_the_labels(start):
 
 
 @given(power=st.integers(-8, 8))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_another_unit_of_force_changes_nothing(power):
     here = drawn(signal.propose(grasp())["thumb"])
     assert drawn(signal.propose(grasp(scale=2.0**power))["thumb"]) == here

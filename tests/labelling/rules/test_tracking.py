@@ -97,7 +97,7 @@ def test_labels_have_author_and_evidence():
 
 
 @given(rotation=st.integers(0, 2**31), shift=st.floats(-5, 5))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_another_frame_of_the_world_changes_nothing(rotation, shift):
     turn = Rotation.random(rng=rotation)
     times = clock()

@@ -71,6 +71,22 @@ def run(work):
     return asyncio.run(asyncio.wait_for(work, PATIENCE))
 
 
+async def reply(client, method, path, **words):
+    """The status and the JSON of a request."""
+    async with client.request(method, f"/api/v1/{path}", **words) as answer:
+        return answer.status, await answer.json()
+
+
+def replies(*requests, n=10, **options):
+    """The replies to requests: (method, path) or (method, path, JSON)."""
+
+    async def work():
+        async with served(patient(n), **options) as (client, _):
+            return [await reply(client, *words[:2], json=[*words, None][2]) for words in requests]
+
+    return run(work())
+
+
 def test_the_first_document_describes_model_and_source(tmp_path):
     async def work():
         async with served(patient(10), folder=tmp_path) as (client, _):
@@ -174,21 +190,7 @@ def test_the_errors_of_a_tuned_model_are_in_the_first_document():
 
 def test_documents_have_every_sample_once_and_the_newest_values():
     recording = build.grasp()
-
-    async def work():
-        source = build.Script.of(recording)
-        async with served(source, start=False) as (client, session):
-            async with client.ws_connect("/api/v1/live") as socket:
-                await socket.receive_json()
-                session.start()
-                found = []
-                while not found or not found[-1]["ended"]:
-                    found.append(await socket.receive_json())
-                found.append(await socket.receive_json())
-            session.stop()
-            return found
-
-    found = run(work())
+    _, found = documents_of(recording, None)
     for document in found:
         msgspec.convert(document, schema.LiveDocument, strict=False)
     expected = detect(build.model(), recording)
@@ -268,12 +270,10 @@ def test_the_tare(tmp_path):
         source = build.Lasting.of(recording, arrivals[:200], patient=True)
         async with served(source) as (client, session):
             await wait_for(lambda: session.n_packets >= 200)
-            async with client.post("/api/v1/tare") as answer:
-                first = answer.status, await answer.json()
+            first = await reply(client, "POST", "tare")
             source.steps.extend(arrivals[200:600])
             await wait_for(lambda: source.last.time >= arrivals[599].time)
-            async with client.post("/api/v1/tare") as answer:
-                return first, (answer.status, await answer.json())
+            return first, await reply(client, "POST", "tare")
 
     free, touching = run(work())
     assert free == (200, {})
@@ -283,34 +283,29 @@ def test_the_tare(tmp_path):
 
 def test_a_recording_with_a_marker(tmp_path):
     recording = build.grasp()
+    begin = {"method": "POST", "path": "recording", "json": {"name": "mine"}}
+    mark = {"method": "POST", "path": "markers", "json": {"text": "closing"}}
 
     async def work():
         source = patient(100, recording)
         async with served(source, folder=tmp_path) as (client, session):
             await wait_for(lambda: session.n_packets == 100)
-            async with client.post("/api/v1/markers", json={"text": "early"}) as answer:
-                assert answer.status == 409
-            async with client.delete("/api/v1/recording") as answer:
-                assert answer.status == 409
-            async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
-                assert (await answer.json())["path"] == str(tmp_path / "mine.mcap")
-            async with client.post("/api/v1/recording", json={"name": "other"}) as answer:
-                assert answer.status == 409
-                assert "mine.mcap is being recorded already" in (await answer.json())["error"]
+            early = [await reply(client, **mark), await reply(client, "DELETE", "recording")]
+            assert [status for status, _ in early] == [409, 409]
+            assert await reply(client, **begin) == (200, {"path": str(tmp_path / "mine.mcap")})
+            second = await reply(client, **begin)
             source.steps.extend(build.arrivals_of(recording)[100:300])
             await wait_for(lambda: session.n_packets == 300)
-            async with client.post("/api/v1/markers", json={"text": "closing"}) as answer:
-                assert answer.status == 200
-            async with client.get("/api/v1/state") as answer:
-                document = await answer.json()
-            async with client.delete("/api/v1/recording") as answer:
-                ended = await answer.json()
-            async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
-                assert answer.status == 409
-                assert "exists already" in (await answer.json())["error"]
-            return document, ended
+            assert (await reply(client, **mark))[0] == 200
+            _, ended = await reply(client, "DELETE", "recording")
+            return second, ended, await reply(client, **begin)
 
-    _, ended = run(work())
+    second, ended, again = run(work())
+    for (status, answer), text in (
+        (second, "mine.mcap is being recorded already"), (again, "exists already")
+    ):  # fmt: skip
+        assert status == 409
+        assert text in answer["error"]
     assert ended["path"] == str(tmp_path / "mine.mcap")
     found = load_recording(tmp_path / "mine.mcap")
     assert found.complete
@@ -320,49 +315,19 @@ def test_a_recording_with_a_marker(tmp_path):
         np.testing.assert_array_equal(found.modules[name].times, module.times[100:300])
 
 
-def test_a_recording_without_samples_is_not_kept(tmp_path):
-    async def work():
-        async with served(patient(0), folder=tmp_path) as (client, _):
-            async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
-                assert answer.status == 200
-            async with client.delete("/api/v1/recording") as answer:
-                return answer.status, (await answer.json())["error"]
-
-    path = tmp_path / "mine.mcap"
-    assert run(work()) == (409, f"no samples arrived: {path} is removed")
-    assert not path.exists()
-
-
-@pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "x" * 200])
-def test_invalid_recording_names_are_refused(tmp_path, name):
-    async def work():
-        async with (
-            served(patient(10), folder=tmp_path) as (client, _),
-            client.post("/api/v1/recording", json={"name": name}) as answer,
-        ):
-            return answer.status, await answer.json()
-
-    status, answer = run(work())
-    if name:
-        assert status == 409
-        assert "a name of letters" in answer["error"]
-        assert list(tmp_path.iterdir()) == []
-    else:
-        assert status == 200  # the date and time
-
-
-def test_a_folder_that_cannot_be_made(tmp_path):
+def test_recordings_that_cannot_be_made(tmp_path):
     (tmp_path / "file").touch()
-
-    async def work():
-        async with (
-            served(patient(10), folder=tmp_path / "file" / "folder") as (client, _),
-            client.post("/api/v1/recording") as answer,
-        ):
-            return answer.status, (await answer.json())["error"]
-
-    text = f"cannot write to {tmp_path / 'file' / 'folder'}: Not a directory"
-    assert run(work()) == (409, text)
+    inside = tmp_path / "file" / "folder"
+    begin, end = ("POST", "recording", {"name": "mine"}), ("DELETE", "recording")
+    for folder, requests, text in (
+        (None, [begin], "no folder for recordings: start with --record-to FOLDER"),
+        (inside, [begin], f"cannot write to {inside}: Not a directory"),
+        (tmp_path, [begin, end], f"no samples arrived: {tmp_path / 'mine.mcap'} is removed"),
+    ):
+        assert replies(*requests, n=0, folder=folder)[-1] == (409, {"error": text})
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    ((status, _),) = replies(("POST", "recording", {"name": ""}), folder=tmp_path)
+    assert status == 200  # its name is the date and time
 
 
 def test_a_recording_that_cannot_be_written_ends_with_a_notice(tmp_path):
@@ -384,17 +349,6 @@ def test_a_recording_that_cannot_be_written_ends_with_a_notice(tmp_path):
     (notice,) = run(work())
     assert notice.startswith("the recording has ended: cannot write ")
     assert notice.endswith("it was removed while it was recorded")
-
-
-def test_without_a_folder_there_are_no_recordings():
-    async def work():
-        async with (
-            served(patient(10)) as (client, _),
-            client.post("/api/v1/recording") as answer,
-        ):
-            return answer.status, (await answer.json())["error"]
-
-    assert run(work()) == (409, "no folder for recordings: start with --record-to FOLDER")
 
 
 def test_the_threshold_is_changed_and_noticed():
@@ -428,39 +382,46 @@ def test_the_threshold_is_changed_and_noticed():
 
 
 def test_tare_and_thresholds_of_a_locked_session_are_refused():
-    calls = [
-        ("POST", "/api/v1/tare", None),
-        ("POST", "/api/v1/threshold", {"value": 1.0}),
-        ("DELETE", "/api/v1/threshold", None),
-    ]
-
     async def work():
-        found = []
         async with served(patient(10)) as (client, session):
             before = dict(session.stream.thresholds)
             session.lock = "the hand is armed"
-            for method, path, body in calls:
-                async with client.request(method, path, json=body) as answer:
-                    found.append((answer.status, await answer.json()))
+            found = [
+                await reply(client, "POST", "tare"),
+                await reply(client, "POST", "threshold", json={"value": 1.0}),
+                await reply(client, "DELETE", "threshold"),
+            ]
             assert session.stream.thresholds == before
         return found
 
-    assert run(work()) == [(409, {"error": "the hand is armed"})] * len(calls)
+    assert run(work()) == [(409, {"error": "the hand is armed"})] * 3
 
 
-@pytest.mark.parametrize("body", [b"{}", b'{"value": 1.5}', b'{"value": null}', b'{"value": "a"}'])
-def test_an_invalid_threshold_is_refused(body):
+REFUSED = {
+    ("recording", 409, "a name of letters"): [
+        b'{"name": "../up"}', b'{"name": "a/b"}', b'{"name": ".hidden"}',
+        b'{"name": "' + b"x" * 200 + b'"}',
+    ],
+    ("recording", 400, "/api/v1/recording: "): [
+        b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}',
+    ],
+    ("threshold", 400, "/api/v1/threshold: "): [
+        b"{}", b'{"value": 1.5}', b'{"value": null}', b'{"value": "a"}',
+    ],
+}  # fmt: skip
+
+
+def test_invalid_requests_are_refused_and_change_nothing(tmp_path):
     async def work():
-        async with (
-            served(patient(10)) as (client, session),
-            client.post("/api/v1/threshold", data=body) as answer,
-        ):
-            return answer.status, await answer.json(), dict(session.stream.thresholds)
+        async with served(patient(10), folder=tmp_path) as (client, session):
+            for (path, status, text), bodies in REFUSED.items():
+                for body in bodies:
+                    found, answer = await reply(client, "POST", path, data=body)
+                    assert (found, text in answer["error"]) == (status, True), body[:50]
+            return set(session.stream.thresholds.values())
 
-    status, answer, thresholds = run(work())
-    assert status == 400
-    assert answer["error"].startswith("/api/v1/threshold: ")
-    assert set(thresholds.values()) == {build.model().finger("thumb").stable.threshold}
+    assert run(work()) == {build.model().finger("thumb").stable.threshold}
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_fault_that_lasts_is_a_problem_and_a_notice():
@@ -500,45 +461,30 @@ def test_faulty_taxels_are_numbers_from_1():
     assert document["faulty_taxels"] == (4, 8)
 
 
-@pytest.mark.parametrize("body", [b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}'])
-def test_invalid_request_bodies_are_refused(tmp_path, body):
-    async def work():
-        async with (
-            served(patient(10), folder=tmp_path) as (client, _),
-            client.post("/api/v1/recording", data=body) as answer,
-        ):
-            return answer.status, await answer.json()
-
-    status, answer = run(work())
-    assert status == 400
-    assert answer["error"].startswith("/api/v1/recording: ")
+HEADERS = [
+    ({}, 200),
+    ({"Host": "localhost:1"}, 200),
+    ({"Host": "evil.example"}, 403),
+    ({"Origin": "http://evil.example"}, 403),
+    ({"Origin": "null"}, 403),
+]
 
 
-@pytest.mark.parametrize(
-    ("headers", "status"),
-    [
-        ({}, 200),
-        ({"Host": "localhost:1"}, 200),
-        ({"Host": "evil.example"}, 403),
-        ({"Origin": "http://evil.example"}, 403),
-        ({"Origin": "null"}, 403),
-    ],
-)
-def test_other_origins_and_host_names_are_refused(headers, status):
+def test_other_origins_and_host_names_are_refused():
     async def work():
         recording = build.grasp()
         source = build.Lasting.of(recording, build.arrivals_of(recording)[:10], patient=True)
         async with served(source) as (client, _):
-            async with client.post("/api/v1/tare", headers=headers) as answer:
-                first = answer.status
-            try:
-                async with client.ws_connect("/api/v1/live", headers=headers):
-                    second = 200
-            except WSServerHandshakeError as refusal:
-                second = refusal.status
-            return first, second
+            for headers, status in HEADERS:
+                async with client.post("/api/v1/tare", headers=headers) as answer:
+                    assert answer.status == status
+                try:
+                    async with client.ws_connect("/api/v1/live", headers=headers):
+                        assert status == 200
+                except WSServerHandshakeError as refusal:
+                    assert refusal.status == status
 
-    assert run(work()) == (status, status)
+    run(work())
 
 
 def test_the_token_is_needed_and_accepted_in_both_forms():
@@ -596,39 +542,24 @@ def test_one_address_leaves_room_for_others(monkeypatch):
 
 def test_the_page_loads_nothing_from_other_servers():
     async def work():
-        async with served(patient(10)) as (client, _), client.get("/") as answer:
-            return answer.status, dict(answer.headers), await answer.text()
+        found = []
+        async with served(patient(10)) as (client, _):
+            for path in ("/", "/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"):
+                async with client.get(path) as answer:
+                    found.append((answer.status, dict(answer.headers), await answer.text()))
+        return found
 
-    status, headers, text = run(work())
-    assert status == 200
+    files = run(work())
+    assert all(status == 200 and len(text) > 100 for status, _, text in files)
+    _, headers, text = files[0]
     assert "default-src 'self'" in headers["Content-Security-Policy"]
     assert headers["X-Content-Type-Options"] == "nosniff"
     assert "holdfast" in text
     assert "https://" not in text
 
 
-@pytest.mark.parametrize(
-    "path", ["/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"]
-)
-def test_the_files_of_the_page(path):
-    async def work():
-        async with served(patient(10)) as (client, _), client.get(path) as answer:
-            return answer.status, len(await answer.read())
-
-    status, size = run(work())
-    assert status == 200
-    assert size > 100
-
-
 def test_the_schema_is_that_of_the_documents():
-    async def work():
-        async with (
-            served(patient(10)) as (client, _),
-            client.get("/api/v1/schema") as answer,
-        ):
-            return await answer.json()
-
-    document = run(work())
+    ((_, document),) = replies(("GET", "schema"))
     assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(document["$defs"])
     for field in ("slip_probability", "slip_speed"):
         assert field in document["$defs"]["EstimateSeries"]["required"]
@@ -637,13 +568,3 @@ def test_the_schema_is_that_of_the_documents():
     assert {"begin", "end", "distance"} < set(document["$defs"]["SlipDocument"]["required"])
     threshold = document["$defs"]["FingerInfo"]["properties"]["slip_threshold"]
     assert {"type": "null"} in threshold["anyOf"]
-
-
-def test_listening_to_the_network_needs_a_token():
-    with pytest.raises(ValueError, match=r"^--host 0\.0\.0\.0 opens the service to the network"):
-        Guard("0.0.0.0")
-    with pytest.raises(ValueError, match=r"^--token: some text expected, none given$"):
-        Guard("127.0.0.1", " ")
-    Guard("0.0.0.0", "long-secret")
-    Guard("::1")
-    Guard("localhost")

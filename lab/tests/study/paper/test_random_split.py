@@ -185,7 +185,7 @@ def count_one_by_one(features, stable, groups, n):
         st.tuples(st.sampled_from([-1.0, 0.0, 2.0]), st.booleans(), st.integers(0, 3)), max_size=60
     )
 )
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_confusions_are_those_of_a_loop(rows):
     features = np.array([[row[0]] for row in rows]).reshape(-1, 1)
     stable = np.array([row[1] for row in rows], dtype=bool)

@@ -34,7 +34,7 @@ steps = st.lists(
 
 
 class TestAnyInput:
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=60)
     @given(steps, st.sampled_from(sorted(LAWS)), st.sampled_from(["hold", "open"]))
     def test_no_command_is_beyond_the_limits(self, inputs, law, on_fault):
         limits = Limits(min_scale=0.8, max_scale=1.7, rise=5.0, fall=2.0, on_fault=on_fault)
@@ -56,7 +56,7 @@ class TestAnyInput:
             newest, saved = time, allowed if time == newest else 0.0
             time += step
 
-    @settings(max_examples=30, deadline=None)
+    @settings(max_examples=30)
     @given(steps, st.sampled_from(sorted(LAWS)))
     def test_the_same_estimates_give_the_same_commands(self, inputs, law):
         (one, time), (other, _) = holding(law), holding(law)
@@ -68,7 +68,7 @@ class TestAnyInput:
             time += 0.005
         assert list(map(str, one.events())) == list(map(str, other.events()))
 
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=40)
     @given(st.lists(st.floats(0.0, 1.0), min_size=5, max_size=40), st.sampled_from(sorted(LAWS)))
     def test_every_rise_is_logged(self, probabilities, law):
         controller, time = holding(law, rise=3.0)
@@ -198,7 +198,7 @@ class TestFaults:
         assert command.release is (on_fault == "open")
         assert {one.scale for one in command.fingers.values()} == {1.0}
 
-    @settings(max_examples=30, deadline=None)
+    @settings(max_examples=30)
     @given(
         st.sampled_from(FINGERS),
         st.sampled_from(sorted(LAWS)),

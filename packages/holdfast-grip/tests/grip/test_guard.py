@@ -14,7 +14,7 @@ def command(scale, time=0.0, state=LoopState.HOLD):
     return GripCommand(time, state, {"thumb": FingerCommand(scale)})
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.tuples(st.floats(), st.floats(0.0, 0.1) | st.just(math.nan)), max_size=30),
     st.sampled_from(["hold", "open"]),

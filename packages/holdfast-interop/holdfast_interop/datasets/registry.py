@@ -51,7 +51,7 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         size: about, of all files [bytes]; None if it is not known.
         tried: whether recordings of the set went from a server to a decision in the tests.
         address: of the files, ends with a slash.
-        in_contact: whether the object is held at the first sample.
+        starts_loaded: whether the object is held at the first sample.
         files: files to download; empty if holdfast does not download them.
         reason: why it does not.
     """
@@ -68,7 +68,7 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     importer: str | None = None
     size: _Size | None = None
     address: _Address = "https://none/"
-    in_contact: bool = False
+    starts_loaded: bool = False
     files: tuple[PublicFile, ...] = ()
     reason: str = ""
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import ForceOption, JsonOption
+from holdfast.cli.options import RARE, ForceOption, JsonOption
 from holdfast.cli.terminal.console import (
     print_json,
     print_line,
@@ -53,11 +53,12 @@ def datasets(
         typer.Option(help="Only files that fit a pattern, such as '*brush*'. May be repeated."),
     ] = None,
     with_checksum: Annotated[
-        bool, typer.Option("--with-checksum", help="Only files whose sha256 is known.")
+        bool, typer.Option("--with-checksum", help="Only files whose sha256 is known."), RARE
     ] = False,
     mirror: Annotated[
         str | None,
         typer.Option(metavar="URL", help="Address of a copy: its files are at URL/NAME/FILE."),
+        RARE,
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Download gigabytes without a question.")] = (
         False
@@ -65,7 +66,7 @@ def datasets(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """List public recordings, download them and import them.
+    r"""List public recordings, download them and import them.
 
     list NAME shows one set, with its page and licence: read both before you use it. Only get
     opens a connection. It downloads to the folder HOLDFAST_DATASETS (by default the cache of the
@@ -75,7 +76,8 @@ def datasets(
     Example:
       holdfast datasets
       holdfast datasets get uskin-pick-move
-      holdfast detect builtin:any uskin-pick-move/data_sample_2022-02-22-08-10-01.parquet
+      holdfast detect builtin:any \
+        uskin-pick-move/data_sample_2022-02-22-08-10-01.parquet
     """
     if action is DatasetAction.GET:
         public, files = _selected(name, only or [], with_checksum)
@@ -214,7 +216,7 @@ def _print_result(
         )
     print_message(f"licence: {public.licence} ({public.page}); downloads are in {folder}")
     first = result.imported[0].document["path"]
-    option = " --in-contact" if public.in_contact else ""
+    option = " --in-contact" if public.starts_loaded else ""
     print_message(f"next: holdfast detect builtin:any {first}{option}")
 
 

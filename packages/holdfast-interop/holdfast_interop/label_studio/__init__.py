@@ -1,6 +1,6 @@
 """Labels of Label Studio: recordings and labels for it, and labels from its JSON export.
 
-The plug-in `label-studio` of `holdfast label --export` and `--import`.
+The plug-in `label-studio` of `holdfast label export` and `label import`.
 """
 
 from collections.abc import Iterable

@@ -197,7 +197,7 @@ def test_real_recordings_from_a_server_to_a_decision(name, capsys, data_folder, 
     assert len(modules) == public.n_modules
     for module in modules.values():
         assert module["rate"] == pytest.approx(public.rate, rel=0.02)
-    words = ["detect", "builtin:any", str(path), "--json", *["--in-contact"] * public.in_contact]
+    words = ["detect", "builtin:any", str(path), "--json", *["--in-contact"] * public.starts_loaded]
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "STABLE" in {json.loads(line)["state"] for line in lines}

@@ -1,4 +1,4 @@
-"""Label Studio as a plug-in: `holdfast label --export` and `--import`, and `read_labels`."""
+"""Label Studio as a plug-in: `holdfast label export` and `label import`, and `read_labels`."""
 
 import json
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Cause, ContactState
@@ -112,7 +112,6 @@ def labels(draw):
     )
 
 
-@settings(deadline=None)
 @given(labels(), labels(), st.booleans())
 def test_exported_labels_are_read_back(tmp_path_factory, thumb, index, predictions):
     recording = bare().with_labels({"thumb": thumb, "index": index})

@@ -30,7 +30,13 @@ class BagConnection(NamedTuple):
 
 
 class BagStorage(Protocol):
-    """An open file of a bag, or a folder of such files."""
+    """An open file of a bag, or a folder of such files.
+
+    Attributes:
+        complete: whether it has its end; else it is read up to where it was cut.
+    """
+
+    complete: bool
 
     @property
     def connections(self) -> list[BagConnection]:

@@ -44,6 +44,7 @@ class FolderBag:
         self._storages = storages
         self._packed = packed
         self._budget = budget
+        self.complete = all(storage.complete for storage in storages)
         check_number(len(topics))
         inside = [connection for storage in storages for connection in storage.connections]
         definitions = {one.kind: one.definition for one in reversed(inside) if one.definition}

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC as MAGIC
@@ -39,6 +40,7 @@ class McapBag:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._counts: Counter[int] = Counter()
+        self.complete = self._has_end()
         self._scan()
 
     @property
@@ -103,32 +105,41 @@ class McapBag:
         """Yield kind and content of each record that matters, with those in chunks if asked.
 
         Raises:
-            ValueError: the file is damaged.
+            ValueError: the file is damaged; if it is cut, records end where they are damaged.
         """
-        size = self._file.seek(0, 2)
-        place, end = self._start(), size - len(MAGIC)
+        place = len(MAGIC)
+        end = self._file.seek(0, 2) - (len(MAGIC) if self.complete else 0)
         while place < end:
             self._budget.step()
             self._file.seek(place)
-            opcode, length = _RECORD.unpack(self._file.read(_RECORD.size))
+            head = self._file.read(_RECORD.size)
+            if not self.complete and (len(head) < _RECORD.size or not head[0]):
+                return
+            opcode, length = _RECORD.unpack(head)
             place += _RECORD.size + length
+            if place > end and not self.complete:
+                return
             if place > end:
                 raise ValueError(f"a record of {length} bytes ends after the file")
             if opcode == Opcode.CHUNK and in_chunks:
-                yield from records_in(self._unpacked(self._file.read(length)), self._budget)
+                try:
+                    data = self._unpacked(self._file.read(length))
+                except (ValueError, McapError, struct.error):
+                    if self.complete:
+                        raise
+                    return
+                yield from records_in(data, self._budget)
             elif opcode == Opcode.CHUNK:
                 yield opcode, b""
             elif opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
                 yield opcode, self._file.read(length)
 
-    def _start(self) -> int:
-        """Check the ends of the file; return the place of its first record."""
+    def _has_end(self) -> bool:
+        """Return whether the file has its footer; without one it was cut."""
         size = self._file.seek(0, 2)
         self._file.seek(max(0, size - len(MAGIC) - _FOOTER_SIZE))
         tail = self._file.read()
-        if not tail.endswith(MAGIC) or tail[0] != Opcode.FOOTER:
-            raise ValueError("it has no end of an MCAP file")
-        return len(MAGIC)
+        return tail.endswith(MAGIC) and tail[0] == Opcode.FOOTER
 
     def _unpacked(self, data: bytes) -> bytes:
         chunk = Chunk.read(ReadDataStream(BytesIO(data)))
@@ -143,7 +154,7 @@ def open_mcap(path: Path, budget: ReadBudget) -> Iterator[McapBag]:
     """Open a bag in MCAP for reading.
 
     Raises:
-        ValueError: it is cut or damaged.
+        ValueError: it is damaged.
     """
     with path.open("rb") as file:
         yield McapBag(file, budget)

@@ -27,6 +27,8 @@ class Ros1Bag:
     rosbags reads the index. Chunks are unpacked here, because rosbags unpacks whatever they hold.
     """
 
+    complete = True
+
     def __init__(self, reader: "Reader", budget: ReadBudget) -> None:
         self._reader = reader
         self._budget = budget

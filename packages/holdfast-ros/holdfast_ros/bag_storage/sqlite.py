@@ -6,7 +6,7 @@ when they are read, pages that belong to two tables. Only plain tables are read.
 
 import sqlite3
 from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -27,7 +27,8 @@ _EXPRESSION = -2
 class SqliteBag:
     """Reader of a bag in SQLite; see `open_sqlite`."""
 
-    def __init__(self, database: sqlite3.Connection, budget: ReadBudget) -> None:
+    def __init__(self, database: sqlite3.Connection, budget: ReadBudget, *, complete: bool) -> None:
+        self.complete = complete
         self._database = database
         self._budget = budget
         self._refusal: RecordingError | None = None
@@ -39,6 +40,8 @@ class SqliteBag:
         Raises:
             ValueError: there is something else.
         """
+        if not self.complete:  # else SQLite refuses a file with fewer pages than it states
+            self._rows("PRAGMA writable_schema = ON")
         self._rows("PRAGMA trusted_schema = OFF")
         self._rows("PRAGMA ignore_check_constraints = ON")
         items = self._rows("SELECT type, name, rootpage FROM sqlite_master", MAX_TABLES)
@@ -49,7 +52,7 @@ class SqliteBag:
         names = {name for _, name, _ in items}
         if missing := {"topics", "messages"} - names:
             raise ValueError(f"no table {min(missing)!r}; the tables of a ROS 2 bag expected")
-        if (problem := self._rows("PRAGMA quick_check(1)")) != [("ok",)]:
+        if self.complete and (problem := self._rows("PRAGMA quick_check(1)")) != [("ok",)]:
             raise ValueError(f"damaged pages: {str(problem[0][0])[:100]}")
 
     @property
@@ -58,7 +61,8 @@ class SqliteBag:
         topics = self._rows("SELECT id, name, type FROM topics ORDER BY id", MAX_BAG_CONNECTIONS)
         if len({number for number, _, _ in topics}) < len(topics):
             raise ValueError("two topics with the same number")
-        counts = dict(self._rows("SELECT topic_id, count(*) FROM messages GROUP BY topic_id"))
+        query = "SELECT topic_id, count(*) FROM messages GROUP BY topic_id"
+        counts = dict(self._rows(query)) if self.complete else {}
         definitions = self._definitions()
         return [
             BagConnection(
@@ -70,10 +74,18 @@ class SqliteBag:
     def messages(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         """Yield connection, time [ns] and bytes of each message of connections, by time."""
         places = ",".join("?" for _ in numbers)
-        query = (
-            "SELECT topic_id, timestamp, data FROM messages "
-            f"WHERE topic_id IN ({places}) ORDER BY timestamp"
-        )
+        query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({places})"
+        if self.complete:
+            yield from self._messages(f"{query} ORDER BY timestamp", numbers)
+            return
+        found: list[tuple[int, int, bytes]] = []
+        with suppress(sqlite3.DatabaseError):  # the first page that is cut off
+            for message in self._messages(f"{query} ORDER BY id", numbers):
+                self._budget.keep(len(message[2]), 1)
+                found.append(message)
+        yield from sorted(found, key=lambda message: message[1])
+
+    def _messages(self, query: str, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         with self._refusals():
             for number, time, data in self._database.execute(query, tuple(numbers)):
                 if not isinstance(time, int) or not isinstance(data, bytes):
@@ -142,6 +154,14 @@ def open_sqlite(path: Path, budget: ReadBudget) -> Iterator[SqliteBag]:
     address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
         database.text_factory = lambda data: data.decode(errors="replace")
-        bag = SqliteBag(database, budget)
+        bag = SqliteBag(database, budget, complete=_has_all_pages(path))
         bag.check()
         yield bag
+
+
+def _has_all_pages(path: Path) -> bool:
+    """Return whether a file has as many pages as its header states; else it was cut."""
+    with path.open("rb") as file:
+        head = file.read(100)
+    size, n_pages = int.from_bytes(head[16:18]), int.from_bytes(head[28:32])
+    return path.stat().st_size >= n_pages * (65536 if size == 1 else size)

@@ -27,7 +27,7 @@ from holdfast.recordings import shown_origin
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
-    from holdfast.live.arrival_detector import StreamEstimate
+    from holdfast.live.stream_detector import StreamEstimate
 
 HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
 REASON_WORDS = {

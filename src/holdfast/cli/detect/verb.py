@@ -12,12 +12,14 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
+    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
     RatePolicy,
     SecondsOption,
     SourceArgument,
+    StartOptions,
     check_seconds,
     parse_taxels,
     report_blind_features,
@@ -50,7 +52,8 @@ def detect(
     ] = False,
     *,
     options: DetectorOptions,
-    csv: CsvOptions,
+    start: StartOptions,
+    csv: Annotated[CsvOptions, RARE],
     seconds: SecondsOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -86,10 +89,10 @@ def detect(
     is_csv = csv.fits(source)
     loaded = options.load_model(model)
     if live:
-        chunks = _detect_live(loaded, source, options, seconds)
+        chunks = _detect_live(loaded, source, options, start, seconds)
     else:
         recording = _single(csv.read(Path(source)), source) if is_csv else None
-        chunks = _detect_recording(loaded, Path(source), options, recording)
+        chunks = _detect_recording(loaded, Path(source), options, start, recording)
         if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
             chunks = progress(chunks, "detecting")
     if summary:
@@ -155,29 +158,29 @@ def _single(recordings: "list[Recording]", source: str) -> "Recording":
 
 
 def _detect_recording(
-    model: "Model", path: Path, options: DetectorOptions, recording: "Recording | None"
+    model: "Model",
+    path: Path,
+    options: DetectorOptions,
+    start: StartOptions,
+    recording: "Recording | None",
 ) -> Iterator["EstimateChunk"]:
     """Yield the estimates of the recording at a path; None if it is read from there."""
     from holdfast.cli.detect.output import chunk_from_detection
     from holdfast.detector import Detector
-    from holdfast.features.loaded_start import begins_in_contact
     from holdfast.live.readings_monitor import ReadingsMonitor
 
     detector = None
-    for part in _read_parts(model, path, options.rate, recording):
+    for part in map(start.of, _read_parts(model, path, options.rate, recording)):
         if detector is None:
             sensors = {name: module.sensor for name, module in part.modules.items()}
             taxels = parse_taxels(options.ignore, sensors)
-            detector = Detector.for_recording(
-                model, part, ignore=taxels, in_contact=options.in_contact or None
-            )
+            detector = Detector.for_recording(model, part, ignore=taxels)
             report_missing_fingers(model, part.name, part.modules)
             report_missing_slip_rules(model)
             used = model.fingers_of(sensors)
             report_other_handling(model, used)
             report_blind_features(model, used)
-            loaded = begins_in_contact(part.metadata, options.in_contact or None)
-            readings = ReadingsMonitor(used, finds_pull=not loaded)
+            readings = ReadingsMonitor(used, finds_pull=not part.starts_loaded)
         for notice in readings.update_recording(part):
             print_message(notice)
         yield chunk_from_detection(detector.run(part))
@@ -224,14 +227,18 @@ def _read_parts(
 
 
 def _detect_live(
-    model: "Model", uri: str, options: DetectorOptions, seconds: float | None
+    model: "Model",
+    uri: str,
+    options: DetectorOptions,
+    start: StartOptions,
+    seconds: float | None,
 ) -> Iterator["EstimateChunk"]:
     """Yield the estimates of each arrival, until a signal or for `seconds`."""
     from holdfast.cli.detect.output import chunk_from_stream
     from holdfast.devices.sources import open_source
 
     with handle_stop_signals() as stop, open_source(uri) as source:
-        stream = options.create_stream(model, source)
+        stream = options.create_stream(model, source, start)
         report_missing_slip_rules(model)
         stop.graceful = True
         for update in _read_updates(stream, seconds, stop):

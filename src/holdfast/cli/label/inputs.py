@@ -1,7 +1,6 @@
 """Inputs of the modes of `holdfast label`: recordings, and options that modes share."""
 
 import getpass
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -10,11 +9,35 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import FittingTareOption, ForceOption
+from holdfast.cli.options import (
+    LOCALHOST,
+    RARE,
+    FittingTareOption,
+    ForceOption,
+    FpsOption,
+    ServerOptions,
+)
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.labelling.rules.poses import Poses
     from holdfast.recordings import Label, Recording
+
+
+LABEL_ADDRESS = ServerOptions(LOCALHOST, port=8081)
+"""Default address of the labelling page."""
+PathsArgument = Annotated[list[Path], typer.Argument(help="Recordings, or folders of them.")]
+AuthorOption = Annotated[
+    str | None,
+    typer.Option("--author", help="Author of the labels.", show_default="login name, or rule:RULE"),
+]
+AnnotatorOption = Annotated[
+    str | None,
+    typer.Option("--annotator", help="Annotator whose labels are read from Label Studio."),
+]
+PageOption = Annotated[
+    bool, typer.Option("--page", help="Show the contradicted labels on the page.")
+]
 
 
 @dataclass(frozen=True)
@@ -25,17 +48,28 @@ class RuleOptions:
     poses: Annotated[
         Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a ROS bag.")
     ] = None
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            help="Video of stickers for the rule tracking.",
+            show_default="NAME.mp4 beside the recording",
+        ),
+    ] = None
+    fps: FpsOption = None
     tracks: Annotated[
         list[str] | None,
         typer.Option(
             "--track",
             metavar="BODY=NAME",
-            help="Topic or frame of a body in the bag; BODY is object or a finger.",
+            help="Topic or frame of a body in the bag, or number of its sticker; BODY is object or "
+            "a finger.",
         ),
+        RARE,
     ] = None
     parameters: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
+        RARE,
     ] = None
 
     @cached_property
@@ -49,8 +83,11 @@ class RuleOptions:
         from holdfast.labelling.rules.poses import OBJECT, poses_from_bag, poses_from_csv
 
         if self.poses is None or self.poses.suffix == ".csv":
-            if self.tracks:
-                raise ValueError("--track names topics or frames of a bag: give --poses BAG")
+            if self.tracks and (self.poses is not None or self.video is None):
+                raise ValueError(
+                    "--track names topics or frames of a bag: give --poses BAG (or stickers of a "
+                    "video: give --video FILE)"
+                )
             return None if self.poses is None else poses_from_csv(self.poses)
         names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks or ())
         if OBJECT not in names:
@@ -73,11 +110,24 @@ class RuleOptions:
         if self.tracking is not None:
             if rule != "tracking":
                 raise ValueError(f"--poses are for the rule tracking; rule {rule!r} given")
+            if self.video is not None:
+                raise ValueError("--poses and --video given; only one of them expected")
             arguments["tracking"] = self.tracking
+        if self.video is not None:
+            if rule != "tracking":
+                raise ValueError(f"--video is for the rule tracking; rule {rule!r} given")
+            arguments["video"] = self.video
         return arguments
 
-    def propose(self, rule: str, recording: "Recording") -> dict[str, tuple["Label", ...]]:
+    def propose(
+        self, rule: str, recording: "Recording", path: Path | None = None
+    ) -> dict[str, tuple["Label", ...]]:
         """Return the labels that a rule proposes for a recording.
+
+        Args:
+            rule: name of the rule.
+            recording: the recording.
+            path: of the recording. The rule tracking reads the video beside it, if there is one.
 
         Raises:
             RecordingError: the recording lacks the data that the rule needs.
@@ -85,62 +135,33 @@ class RuleOptions:
         """
         from holdfast.labelling.rules import propose
 
-        return propose(rule, recording, **self.arguments(rule))
+        arguments = self.arguments(rule)
+        beside = None if path is None else path.with_suffix(".mp4")
+        if rule == "tracking" and self.poses is None and beside is not None and beside.exists():
+            arguments.setdefault("video", beside)
+        if "video" in arguments:
+            require_extras("video")
+            arguments["fps"], arguments["bodies"] = self.fps, self._stickers()
+        elif self.fps is not None:
+            raise ValueError("--fps is for a video: give --video FILE")
+        return propose(rule, recording, **arguments)
+
+    def _stickers(self) -> dict[str, int] | None:
+        """Return the number of the sticker of each body that is given."""
+        pairs = [_pair(text, "--track BODY=NUMBER") for text in self.tracks or ()]
+        if wrong := [name for _, name in pairs if not name.isdecimal()]:
+            raise ValueError(f"--track BODY=NUMBER expected with a video, {wrong[0]!r} given")
+        return {body: int(number) for body, number in pairs} or None
 
 
 @dataclass(frozen=True)
 class SaveOptions:
     """Group of options: how labels of a rule or of other programs are saved."""
 
-    author: Annotated[
-        str | None,
-        typer.Option(help="Author of the labels.", show_default="login name, or rule:RULE"),
-    ] = None
-    annotator: Annotated[
-        str | None, typer.Option(help="Annotator whose labels are read from Label Studio.")
-    ] = None
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="With --auto or --import: write nothing.")
-    ] = False
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Write no labels; only show them.")] = (
+        False
+    )
     force: ForceOption = False
-
-
-def recordings_at(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings at these paths, without duplicates; of a folder all recordings.
-
-    Raises:
-        RecordingError: a path does not exist or is no recording, or a folder has none.
-    """
-    from holdfast.errors import RecordingError
-    from holdfast.io import load_dataset
-    from holdfast.io.recording_files import SUFFIXES
-
-    files: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            files.extend(load_dataset(path).paths)
-        elif not path.exists():
-            raise RecordingError(f"{path} does not exist; a recording or a folder expected")
-        elif path.suffix not in SUFFIXES:
-            raise RecordingError(
-                f"{path} is not a recording: {' or '.join(SUFFIXES)} expected "
-                "(`holdfast import` reads other formats)"
-            )
-        else:
-            files.append(path)
-    return list(dict.fromkeys(files))
-
-
-def check_rule(rule: str) -> None:
-    """Check that a rule exists.
-
-    Raises:
-        ValueError: the rule is unknown.
-    """
-    from holdfast.labelling.rules import RULES
-
-    if rule not in RULES:
-        raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
 
 
 def login_name() -> str:

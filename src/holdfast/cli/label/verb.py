@@ -6,43 +6,36 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.label.inputs import RuleOptions, SaveOptions
-from holdfast.cli.options import (
-    LOCALHOST,
-    BrowserOption,
-    JobsOption,
-    JsonOption,
-    ServerOptions,
+from holdfast.cli.label.inputs import (
+    LABEL_ADDRESS,
+    AnnotatorOption,
+    AuthorOption,
+    PageOption,
+    PathsArgument,
+    RuleOptions,
+    SaveOptions,
 )
+from holdfast.cli.options import RARE, BrowserOption, JobsOption, JsonOption, ServerOptions
 from holdfast.errors import require_extras
-
-LABEL_ADDRESS = ServerOptions(LOCALHOST, port=8081)
 
 
 @dataclass(frozen=True)
 class ModeOptions:
-    """Group of options: what to do instead of opening the page; at most one of the first five."""
+    """Group of options: the commands of `label` as they were written before; at most one."""
 
-    auto: Annotated[
-        str | None, typer.Option(help="Label by a rule: signal, tracking or command.")
-    ] = None
-    compare: Annotated[
-        bool, typer.Option("--compare", help="Print the agreement of A and B; B may be a rule.")
-    ] = False
-    audit: Annotated[
-        bool, typer.Option("--audit", help="Find labels that a classifier contradicts.")
-    ] = False
+    auto: Annotated[str | None, typer.Option(help="As holdfast label auto RULE.")] = None
+    compare: Annotated[bool, typer.Option("--compare", help="As holdfast label compare A B.")] = (
+        False
+    )
+    audit: Annotated[bool, typer.Option("--audit", help="As holdfast label audit.")] = False
     export: Annotated[
         tuple[str, Path] | None,
-        typer.Option(metavar="FORMAT FOLDER", help="Export labels: label-studio or csv."),
+        typer.Option(metavar="FORMAT FOLDER", help="As holdfast label export FORMAT FOLDER."),
     ] = None
     import_from: Annotated[
-        Path | None,
-        typer.Option("--import", help="Import labels: JSON of Label Studio, or CSV."),
+        Path | None, typer.Option("--import", help="As holdfast label import FILE.")
     ] = None
-    page: Annotated[
-        bool, typer.Option("--page", help="With --audit: show the contradicted labels on the page.")
-    ] = False
+    page: PageOption = False
 
     def check(self) -> None:
         """Check that at most one mode is given, and `--page` only with `--audit`.
@@ -65,71 +58,65 @@ class ModeOptions:
 
 
 def label(
-    paths: Annotated[
-        list[Path], typer.Argument(help="Recordings or folders; for --compare: A and B.")
-    ],
+    paths: PathsArgument,
     *,
-    mode: ModeOptions,
+    mode: Annotated[ModeOptions, RARE],
     options: RuleOptions,
-    saving: SaveOptions,
-    jobs: JobsOption = -1,
-    access: ServerOptions = LABEL_ADDRESS,
+    author: AuthorOption = None,
+    saving: Annotated[SaveOptions, RARE],
+    annotator: Annotated[AnnotatorOption, RARE] = None,
+    jobs: Annotated[JobsOption, RARE] = -1,
+    access: Annotated[ServerOptions, RARE] = LABEL_ADDRESS,
     browser: BrowserOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    r"""Label recordings on a page or by a rule, and check labels.
+    """Label recordings on a page or by a rule, and check labels.
 
-    Without --auto, --compare, --audit, --export and --import, open the labelling page: draw labels
-    with the mouse, set states with keys, undo changes, and accept the proposals of a rule. Every
-    change is saved at once. Labels are stored in NAME.labels.json beside the recording. The
-    recording itself is never changed.
-
-    --auto writes the labels that a rule proposes, and prints those with low confidence. They
-    outrank labels that came with the recording; --dry-run only shows them. Labels of a person are
-    overwritten only with --force. The tare is 0.5 s by default; of a recording that begins in
-    contact it is the first sample. --compare prints Cohen's kappa and onset
-    differences of two sets of labels: files, folders, or a rule. --audit prints labels that a
-    cross-validated classifier contradicts. See docs/labels.md.
+    Without a command, open the labelling page: draw labels with the mouse, set states with keys,
+    undo changes, and accept the proposals of a rule. Every change is saved at once. Labels are
+    stored in NAME.labels.json beside the recording. The recording itself is never changed. Each
+    command has its own help: holdfast label auto --help. See docs/labels.md.
 
     Example:
       holdfast label recordings/
-      holdfast label --auto signal recordings/ --dry-run
-      holdfast label --auto tracking grasp.parquet --poses markers.csv
-      holdfast label --auto tracking grasp.mcap --poses run.bag \
-        --track object=/aruco/pose
-      holdfast label --compare recordings/ labels-of-ann/ --json
-      holdfast label --compare recordings/ signal
-      holdfast label --audit recordings/ --page
-      holdfast label --export label-studio studio/ recordings/
-      holdfast label --import export.json recordings/
+      holdfast label auto signal recordings/ --dry-run
+      holdfast label compare recordings/ labels-of-ann/
+      holdfast label audit recordings/ --page
     """
-    require_extras(*(("label", "train") if mode.audit else ("label",)))
+    require_extras("label", *(("train",) if mode.audit else ()))
     access.find_token()  # a wrong token is refused in every mode
     mode.check()
     if mode.auto is not None:
-        from holdfast.cli.label.auto_mode import label_by_rule
+        from holdfast.cli.label.auto import auto
 
-        label_by_rule(paths, mode.auto, options, saving, as_json=as_json)
+        auto(mode.auto, paths, options=options, author=author, saving=saving, as_json=as_json)
     elif mode.compare:
-        from holdfast.cli.label.check_modes import compare_labels
+        from holdfast.cli.label.compare import compare
 
-        compare_labels(paths, options, saving.annotator, as_json=as_json)
+        if len(paths) != 2:
+            raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
+        compare(*paths, options=options, annotator=annotator, as_json=as_json)
     elif mode.export is not None:
-        from holdfast.cli.label.exchange_mode import export_labels
+        from holdfast.cli.label.export import export
 
-        export_labels(paths, *mode.export, force=saving.force, as_json=as_json)
+        export(*mode.export, paths, force=saving.force, as_json=as_json)
     elif mode.import_from is not None:
-        from holdfast.cli.label.exchange_mode import import_labels
+        from holdfast.cli.label.import_ import import_
 
-        import_labels(paths, mode.import_from, saving, as_json=as_json)
+        import_(
+            mode.import_from, paths,
+            author=author, saving=saving, annotator=annotator, as_json=as_json,
+        )  # fmt: skip
+    elif mode.audit:
+        from holdfast.cli.label.audit import audit
+
+        audit(
+            paths, options=options, page=mode.page, author=author, jobs=jobs,
+            access=access, browser=browser, as_json=as_json,
+        )  # fmt: skip
     else:
-        from holdfast.cli.label.check_modes import audit_labels
-        from holdfast.cli.label.page_mode import show_label_page
+        from holdfast.cli.label.page import show_label_page
 
-        show = mode.page or not mode.audit
-        suspects = audit_labels(paths, jobs, as_json=as_json and not show) if mode.audit else ()
-        if show:
-            show_label_page(
-                paths, options, access, saving.author,
-                browser=browser is not False, as_json=as_json, suspects=suspects,
-            )  # fmt: skip
+        show_label_page(
+            paths, options, access, author, browser=browser is not False, as_json=as_json
+        )

@@ -17,7 +17,7 @@ from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.io.foreign import read_foreign, read_foreign_arrays
 from holdfast.io.importers.csv_columns import Columns
-from holdfast.io.importers.table import SLIPPED, name_prefixes
+from holdfast.io.importers.table import SLIPPED, csv_files, name_prefixes
 from holdfast.io.safe_reading import recording_errors
 from holdfast.plugins import PluginGroup
 from holdfast.recordings import Recording
@@ -27,18 +27,17 @@ from holdfast.sensors.types import Array
 FORMATS = {
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
     "csv": "the generic CSV of docs/importing.md, and CSV of any other logger",
+    "arrays": "arrays of numbers in .npy, .npz, .mat, HDF5, Parquet or lines of JSON",
 }
 """Formats that can be imported, with a description; they are detected in this order, those of
-plug-ins before the last."""
+plug-ins after the first."""
 IN_CONTACT = (
     "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
     "read this, give --in-contact"
 )
 IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
-HINTS = {
-    "xela-log": IF_IN_CONTACT,
-    "csv": f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--",
-}
+IF_Z_FALLS = f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--"
+HINTS = {"xela-log": IF_IN_CONTACT, "csv": IF_Z_FALLS, "arrays": IF_Z_FALLS}
 """Option that helps with the recordings of a format, for the person who imports them."""
 
 
@@ -57,9 +56,11 @@ def import_recordings(
         path: path of the file or folder.
         format: one of `FORMATS`; by default it is detected from the content.
         labels: keep the labels in the data.
-        sensors: sensor by module, or of `"*"` for all modules, of a CSV file of any logger.
+        sensors: sensor by module, or of `"*"` for all modules, of a CSV file of any logger; by
+            array of another file, or by topic of a bag.
         columns: columns of such a file, as `Columns` or as its text; what is not given is
-            guessed from the header. With `sensors` or `columns` the format is `csv`.
+            guessed from the header. With `sensors` or `columns` the format is one of those that
+            take them (`takes_sensors`).
         report: receives a text about columns that were guessed.
 
     Yields:
@@ -70,7 +71,7 @@ def import_recordings(
             format.
         MissingExtra: the format needs a package that is not installed.
         ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
-            `columns` are given for another format than `csv`.
+            `columns` are given for a format that does not take them.
     """
     place, given = Path(path), _columns(columns)
     name = _format_of(place, format, sensors, given)
@@ -82,7 +83,8 @@ def import_recordings(
         if name == "csv":
             recordings = read_foreign(place, name, sensors, given, report)
         else:
-            recordings = _named_apart(source.parts(place), partial(read_foreign, name=name))
+            read = partial(read_foreign, name=name, sensors=sensors, columns=given, report=report)
+            recordings = _named_apart(source.parts(place), read)
     return _guarded(place, recordings, labels=labels)
 
 
@@ -161,15 +163,13 @@ def _format_of(
         ValueError: there is no format of this name, or sensors or columns are given for another
             format than `csv`.
     """
-    if name is None and (sensors or columns):
-        name = "csv"
     if name is not None and name not in FORMATS and name not in IMPORTER_PLUGINS.names():
         raise missing_part("importers", name, f"the format {name}") or ValueError(
             f"unknown format {name!r}; there are {', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
         )
     if name is not None and name not in FORMATS:
         importer(name)
-    if name not in (None, "csv") and (sensors or columns):
+    if name is not None and (sensors or columns) and not takes_sensors(name):
         raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
     if not path.exists():
         raise RecordingError(f"{path} does not exist; a file or folder to import expected")
@@ -177,7 +177,28 @@ def _format_of(
         if not path.is_dir():
             check_regular(path)
         _refuse_pointers(path)
+        if name is None and (sensors or columns):
+            return _format_with_sensors(path)
         return name or _detected_format(path)
+
+
+def takes_sensors(name: str) -> bool:
+    """Return whether the importer of a format takes sensors, columns and a report."""
+    return name == "csv" or getattr(importer(name), "TAKES_SENSORS", False)
+
+
+def _format_with_sensors(path: Path) -> str:
+    """Return the format of a path that is imported with sensors; CSV unless another is certain."""
+    if path.suffix.lower() == ".csv" or (path.is_dir() and csv_files(path)):
+        return "csv"
+    loaded = {name: IMPORTER_PLUGINS.load(name) for name in IMPORTER_PLUGINS.names()}
+    loaded["arrays"] = importer("arrays")
+    fitting = (
+        name
+        for name, source in loaded.items()
+        if source is not None and takes_sensors(name) and source.can_read(path)
+    )
+    return next(fitting, "csv")
 
 
 def _refuse_pointers(path: Path) -> None:
@@ -226,8 +247,8 @@ def importer(name: str) -> ModuleType:
 
 def _detected_format(path: Path) -> str:
     """Return the format of a path: one of holdfast, of a plug-in, CSV, in this order."""
-    own = [name for name in FORMATS if name != "csv"]
-    for name in [*own, *IMPORTER_PLUGINS.names(), "csv"]:
+    first, *others = FORMATS
+    for name in [first, *IMPORTER_PLUGINS.names(), *others]:
         source = importer(name) if name in FORMATS else IMPORTER_PLUGINS.load(name)
         if source is not None and source.can_read(path):
             return name
@@ -235,8 +256,8 @@ def _detected_format(path: Path) -> str:
         return "csv"
     names = f"{', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
     raise RecordingError(
-        f"{path} is of no supported format; supported are {names} "
-        "(choose one with --format; for a CSV file of any other logger give --sensor and --columns)"
+        f"{path} is of no supported format; there are {names} "
+        "(--format); for a table or arrays of any other logger give --sensor"
     )
 
 

@@ -21,8 +21,12 @@ Layout = Mapping[str, Mapping[tuple[int, str], str]]
 
 MAX_PATTERNS = 1 << 18
 """Maximum number of patterns that a guess compares; 368 taxels have some thousand."""
+MAX_FEW_AXES = 4096
+"""Maximum number of columns among which taxels of one or two axes are looked for."""
 MAX_GUESSED_NAME = 200
 """Maximum length of the name of a column that a guess considers [characters]."""
+THREE_AXES = "three axes (x, y, z) of each taxel are needed: normal force and shear"
+"""Answer to data of one or two axes."""
 RUN = ".."
 """Between the first and the last of consecutive columns."""
 
@@ -35,7 +39,7 @@ _OF_ROWS = {
 """Names of columns that say to which module or episode a row belongs."""
 _UNIT = re.compile(r"(?:^|[\W_])(?P<unit>mm|um|µm|m|N|mN|counts?)\W*$")
 _TIME_NAMES = (
-    "time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis",
+    "time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis", "ts", "clock",
     "zeit", "temps", "tiempo", "tempo", "tijd", "czas",
 )  # fmt: skip
 _RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s*hz", re.IGNORECASE)
@@ -135,27 +139,34 @@ class Columns:
         Raises:
             RecordingError: nothing in the header looks like times or taxels.
         """
-        given = None if self.rate is not None else self.time
-        time = named_column(names, given) if given else self.time
-        time = time or _guessed_time(names) or _first_of_run(names, n_taxels)
+        fields = ("label", "cause", "module", "episode", *(() if self.rate else ("time",)))
+        texts = {field: getattr(self, field) for field in fields if getattr(self, field)}
+        given = {field: named_column(names, text) for field, text in texts.items()}
+        if missing := [column for column in given.values() if column not in names]:
+            raise RecordingError(f"column {missing[0]!r} is missing; it has {some_names(names)}")
+        time = given.get("time", self.time)
+        time = time or guessed_time(names) or _first_of_run(names, n_taxels)
         others = [name for name in names if name != time]
         taxels = self.taxels or _guessed_taxels(others, n_taxels, units)
-        taxels = taxels or _guessed_run(others, n_taxels) or _guessed_taxels(others, (), units)
-        label = self.label or ("label" if "label" in names else None)
-        cause = self.cause or ("cause" if "cause" in names else None)
+        taxels = taxels or _few_axes(others) or _guessed_run(others, n_taxels)
+        taxels = taxels or _guessed_taxels(others, (), units)
+        given = {name: name for name in ("label", "cause") if name in names} | given
         if time is None:
             raise RecordingError(
                 f"no column of times among {some_names(names)}: give --columns time=COLUMN, or "
                 "time=100Hz if there is none" + (_RUN_HINT if names[:1] == ("column1",) else "")
             )
+        if taxels is None and any(len(others) in (n, 2 * n) for n in n_taxels if n > 1):
+            raise RecordingError(
+                f"{len(others)} columns given for {' or '.join(map(str, n_taxels))} taxels; "
+                f"{THREE_AXES}"
+            )
         if taxels is None:
             raise RecordingError(
                 f"no taxel columns such as x1, y1, z1, x2 among {some_names(names)}: give "
-                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, "
-                "taxels=FIRST..LAST, or --sensor alone if all other columns are x, y, z of its "
-                "taxels"
+                "--columns 'taxels=F{axis}{taxel}' or, for consecutive columns, taxels=FIRST..LAST"
             )
-        return replace(self, time=time, taxels=taxels, label=label, cause=cause)
+        return replace(self, **{**given, "time": time, "taxels": taxels})
 
     def layout(self, names: Sequence[str], n_taxels: Collection[int] = ()) -> Layout:
         """Return the column of each taxel and axis, by module.
@@ -173,6 +184,9 @@ class Columns:
         layout = _run_layout(pattern, names, n_taxels) if is_run else pattern_layout(pattern, names)
         if not layout:
             raise RecordingError(f"no column is named as {pattern!r}; it has {some_names(names)}")
+        axes = sorted({axis for columns in layout.values() for _, axis in columns})
+        if len(axes) < len("xyz"):
+            raise RecordingError(f"{' and '.join(axes)} alone given, as {pattern!r}; {THREE_AXES}")
         return layout
 
 
@@ -197,7 +211,7 @@ def named_column(names: Sequence[str], text: str) -> str:
     return names[int(text) - 1] if is_number else text
 
 
-def _guessed_time(names: Sequence[str]) -> str | None:
+def guessed_time(names: Sequence[str]) -> str | None:
     """Return the column of times: a usual name, with or without a unit, or one with "time"."""
     bare = {re.sub(r"[\W_]*\b(s|ms|us|ns)\b\W*$", "", _spaced(name)): name for name in names}
     usual = (bare[name] for name in _TIME_NAMES if name in bare)
@@ -254,6 +268,20 @@ def _run_layout(text: str, names: Sequence[str], n_taxels: Collection[int]) -> L
         }
         for k, start in enumerate(starts)
     }
+
+
+def _few_axes(names: Sequence[str]) -> str | None:
+    """Return the pattern of most of the columns if it has taxels of one or two axes only."""
+    found: dict[str, set[tuple[int, str]]] = {}
+    for name in names[:MAX_FEW_AXES]:
+        for pattern, key in _patterns(name):
+            found.setdefault(pattern, set()).add(key)
+    for pattern, keys in found.items():
+        axes = {axis for _, axis in keys}
+        taxels = {taxel for taxel, _ in keys}
+        if len(taxels) > 1 and len(axes) < len("xyz") and 2 * len(keys) > len(names):
+            return pattern if len(keys) == len(taxels) * len(axes) else None
+    return None
 
 
 def _guessed_taxels(

@@ -6,7 +6,7 @@ In the generic CSV the names of the columns are fixed. The columns of any other 
 
 import itertools
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -26,6 +26,7 @@ from holdfast.io.importers.csv_times import (
 )
 from holdfast.io.importers.table import (
     Table,
+    TableHead,
     csv_files,
     errors_named,
     header_line,
@@ -57,6 +58,9 @@ RowIndices = npt.NDArray[np.intp] | slice
 Settings = Mapping[tuple[str, str | None], str]
 """Value by key (sensor or unit) and module; None for all modules."""
 Report = Callable[[str], None]
+ReportOnce = Callable[[str, tuple[str, ...]], None]
+"""Receives what was guessed, and the lines about it; those of an equal guess are left out."""
+TableReader = Callable[[set[str], Columns], tuple[Table, dict[str, list[str]]]]
 
 _TAXEL = re.compile(r"(?:(?P<module>.+)[._])?t(?P<taxel>\d+)[._](?P<axis>[xyz])")
 _TEXT = re.compile(r"(?:(?P<module>.+)\.)?(?P<column>label|cause)")
@@ -152,19 +156,24 @@ def _recordings(
     path: Path,
     sensors: Mapping[str, Sensor],
     columns: Columns | None,
-    report: Callable[[str, tuple[str, ...]], None],
+    report: ReportOnce,
 ) -> list[Recording]:
     with errors_named(path):
-        if columns is None and _is_header(header_line(path)):
-            return [_generic(path, sensors, report)]
-        return _of_any_logger(path, sensors, columns or Columns(), report)
+        head = read_head(path)
+        if columns is None and _is_header(head.names):
+            return [_generic(path, head, sensors, report)]
+
+        def read(used: set[str], chosen: Columns) -> tuple[Table, dict[str, list[str]]]:
+            numbers = used if _has_clock(head, chosen) else {*used, chosen.time}
+            return read_table(path, [name for name in head.names if name not in numbers], head)
+
+        return recordings_of_table(head.names, read, path.name, sensors, columns, report)
 
 
 def _generic(
-    path: Path, sensors: Mapping[str, Sensor], report: Callable[[str, tuple[str, ...]], None]
+    path: Path, head: TableHead, sensors: Mapping[str, Sensor], report: ReportOnce
 ) -> Recording:
-    names = header_line(path)
-    table, cells = read_table(path, [name for name in names if _TEXT.fullmatch(name)])
+    table, cells = read_table(path, [name for name in head.names if _TEXT.fullmatch(name)], head)
     layout, settings = _layout(table), _settings(table)
     times = table.columns([TIME])[:, 0]
     if not settings:  # not the format of docs/importing.md, in which times are in s
@@ -176,17 +185,33 @@ def _generic(
     return _assembled(table, cells, times, layout, settings, sensors)
 
 
-def _of_any_logger(
-    path: Path,
+def recordings_of_table(
+    names: Sequence[str],
+    read: TableReader,
+    what: str,
     sensors: Mapping[str, Sensor],
-    columns: Columns,
-    report: Callable[[str, tuple[str, ...]], None],
+    columns: Columns | None,
+    report: ReportOnce,
+    guess: Columns | None = None,
 ) -> list[Recording]:
-    """Return the recordings in a file with any names of the columns; report a guess."""
-    names = header_line(path) or read_table(path)[0].names  # which reports what is wrong
+    """Return the recordings in a table with any names of the columns; report a guess.
+
+    Args:
+        names: of the columns.
+        read: returns the table and its cells of text, given the columns of the taxels, which are
+            numbers, and all columns.
+        what: the table, for the report.
+        sensors: as in `read`.
+        columns: as in `read`.
+        report: receives the guess and its lines.
+        guess: the columns with what is known besides.
+
+    Raises:
+        RecordingError: columns are missing, or their values contradict each other.
+    """
     n_taxels = _numbers_of_taxels(sensors)
     units = {one.unit for one in sensors.values()}
-    chosen = columns.completed(names, n_taxels, units)
+    chosen = (guess or columns or Columns()).completed(names, n_taxels, units)
     layout = chosen.layout(names, n_taxels)
     layout = {module or DEFAULT_MODULE: own for module, own in layout.items()}
     used = {name for own in layout.values() for name in own.values()}
@@ -195,27 +220,29 @@ def _of_any_logger(
         kind: getattr(chosen, kind) or column_of_rows(kind, [n for n in names if n not in used])
         for kind in ("module", "episode")
     }
-    numbers = used if _has_clock(path, chosen) else used | {chosen.time}
-    table, found = read_table(path, [n for n in names if n not in numbers])
+    table, found = read(used, chosen)
     cells = {name: found[column] for name, column in text.items() if column in found}
     clock = clock_seconds(found[chosen.time]) if chosen.time in found else None
     modules = _modules_of_rows(found.get(of_rows["module"] or "", []), layout, bool(chosen.module))
     first = next(iter(modules.values()), slice(None))
     times, unit = _times(table, chosen, first) if clock is None else (clock, None)
-    episodes = _episodes(times, first, found.get(of_rows["episode"] or "", []))
+    episodes = _episodes(
+        times, first, found.get(of_rows["episode"] or "", []), bool(chosen.episode)
+    )
     known = replace(
         chosen,
         time_unit=None if chosen.rate else unit,
         module=of_rows["module"] if modules else None,
-        episode=of_rows["episode"] if len(episodes) > 1 else None,
+        episode=of_rows["episode"] if len(episodes) > 1 else chosen.episode,
     )
     if known != columns:
-        report(str(known), _guess_text(path, known, times[first], layout, names))
+        report(str(known), _guess_text(what, known, times[first], layout, names))
     recordings = []
     for episode, rows in episodes.items():
         part = _Part(table, cells, times, rows)
         recording = part.recording(chosen, layout, modules, sensors)
-        name = f"{path.stem}-{episode}" if len(episodes) > 1 else path.stem
+        several = len(episodes) > 1 or chosen.episode
+        name = f"{table.path.stem}-{episode}" if several else table.path.stem
         recordings.append(replace(recording, name=name))
     if chosen.signs is None:
         return recordings
@@ -287,22 +314,26 @@ def _number(text: str) -> float | None:
 
 
 def _episodes(
-    times: Array, first: RowIndices, values: list[str]
+    times: Array, first: RowIndices, values: list[str], is_given: bool
 ) -> dict[str, npt.NDArray[np.intp]]:
-    """Return the rows of each episode: where a column of episodes changes, or the times restart."""
+    """Return the rows of each episode: by a column that is given, or from a restart of the times.
+
+    A column of episodes that is not given counts only where times restart.
+    """
     rows = np.arange(len(times))
     of_module = rows[first]
     own = times[of_module]
     back = np.flatnonzero(np.diff(own) < 0) + 1
+    if is_given:
+        found: dict[str, list[int]] = {}
+        for row, value in enumerate(values):
+            found.setdefault(_episode_name(value), []).append(row)
+        return {name: np.array(places) for name, places in found.items()}
     if not len(back):
         return {"1": rows}
     if values:
         starts = [0, *(k for k in range(1, len(values)) if values[k] != values[k - 1])]
-        numbers = [_number(values[start]) for start in starts]
-        names = [
-            values[start] if number is None else f"{number:g}"
-            for start, number in zip(starts, numbers, strict=True)
-        ]
+        names = [_episode_name(values[start]) for start in starts]
     else:
         steps = np.diff(own)
         latest = own[0] + 2 * (float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0)
@@ -317,14 +348,18 @@ def _episodes(
     return {name: rows[start:end] for name, start, end in zip(names, starts, ends, strict=True)}
 
 
-def _has_clock(path: Path, columns: Columns) -> bool:
+def _episode_name(value: str) -> str:
+    number = _number(value)
+    return value if number is None else f"{number:g}"
+
+
+def _has_clock(head: TableHead, columns: Columns) -> bool:
     """Return whether the column of times has wall-clock times."""
-    head = read_head(path)
     if columns.time not in head.names or columns.time_unit is not None:
         return False
-    cells = head.first_row
     place = head.names.index(columns.time)
-    return place < len(cells) and clock_seconds(cells[place : place + 1]) is not None
+    cells = head.first_row[place : place + 1]
+    return bool(cells) and clock_seconds(cells) is not None
 
 
 def _with_signs(recording: Recording, factors: Array) -> Recording:
@@ -347,7 +382,7 @@ def _times(table: Table, columns: Columns, first: RowIndices) -> tuple[Array, st
 
 
 def _guess_text(
-    path: Path, columns: Columns, times: Array, layout: Layout, names: tuple[str, ...]
+    what: str, columns: Columns, times: Array, layout: Layout, names: Sequence[str]
 ) -> tuple[str, str]:
     """Return two lines: what was guessed, and the option that says the same."""
     steps = np.diff(times)
@@ -359,7 +394,7 @@ def _guess_text(
     more = f" and {len(others) - MAX_SHOWN} more" if len(others) > MAX_SHOWN else ""
     unused = (", ".join(others[:MAX_SHOWN]) or "none") + more
     return (
-        f"{path.name}: the columns are a guess: {rate:.4g} Hz, {', '.join(modules)}; "
+        f"{what}: the columns are a guess: {rate:.4g} Hz, {', '.join(modules)}; "
         f"columns that are not used: {unused}",
         f"  the same as --columns '{columns}' (give this option to correct it)",
     )

@@ -25,6 +25,8 @@ MAX_HEAD_SIZE = 1 << 20
 """Maximum size of all lines before the first row [characters]."""
 COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
+MAX_SHOWN_LENGTH = 80
+"""Length from which on names of columns are left out of a message [characters]."""
 SEPARATORS = ",;\t "
 """Characters between the cells of a row, of which a file has one; any number of blanks is one."""
 SLIPPED = "slipped"
@@ -107,7 +109,9 @@ def header_line(path: Path) -> tuple[str, ...]:
         return ()
 
 
-def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, list[str]]]:
+def read_table(
+    path: Path, text: Sequence[str] = (), head: TableHead | None = None
+) -> tuple[Table, dict[str, list[str]]]:
     """Read the numbers of a CSV file, and the cells of its columns of text.
 
     Cells are separated by commas, semicolons, tabs or blanks. A number may have a decimal comma if
@@ -116,12 +120,13 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     Args:
         path: path of the file.
         text: names of the columns of text; they are NaN among the numbers.
+        head: what `read_head` returned, if it is known.
 
     Raises:
         RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
             that is not a number, both decimal commas and points, or a row that is too long.
     """
-    head = read_head(path)
+    head = head or read_head(path)
     names, first_line, separator = head.names, head.first_line, head.separator
     ReadBudget(path).keep(len(names) * COLUMN_SIZE)
     cells: dict[int, list[str]] = {names.index(name): [] for name in text if name in names}
@@ -468,5 +473,8 @@ def _text(problem: Exception) -> str:
 
 def some_names(names: Sequence[str]) -> str:
     """Return the first names of columns, and the starts of long ones, for a message."""
-    shown = ", ".join(map(_start, names[:6]))
-    return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown
+    shown = [_start(name) for name in names[:6]]
+    while len(shown) > 1 and sum(map(len, shown)) > MAX_SHOWN_LENGTH:
+        shown.pop()
+    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    return ", ".join(shown) + more

@@ -38,7 +38,19 @@ def read_labels(path: str | Path, recording: Recording, annotator: str | None = 
     """
     file = Path(path)
     if file.is_dir():
-        file = _find_in_folder(file, recording)
+        # The label file first: it outranks what is inside a recording, as when one is loaded.
+        folder, stem = file, file_stem(recording.name)
+        endings = (SUFFIX, *SUFFIXES, ".labels.csv", ".csv", ".json")
+        candidates = [folder / f"{stem}{ending}" for ending in endings]
+        others = [at for at in sorted(folder.glob("*.json")) if not at.name.endswith(SUFFIX)]
+        # One JSON file of another name is an export of all recordings of a project.
+        found = [at for at in candidates if at.is_file()] or (others if len(others) == 1 else [])
+        if not found:
+            raise RecordingError(
+                f"no labels of {recording.name!r} in {folder}; "
+                f"{stem} with one of {', '.join(endings)} expected"
+            )
+        file = found[0]
     labels = _read(file, recording, annotator)
     try:
         validated = recording.with_labels(labels)
@@ -59,23 +71,16 @@ def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
             labels: Labels = source.read(file, recording, annotator)
             return labels
     if file.suffix == ".json":
-        return _from_label_file(file, recording)
+        found = load_labels(file)
+        _check_digest(file, found.recording, found.name, recording)
+        try:
+            return {name: tuple(map(label_of, own)) for name, own in found.modules.items()}
+        except ValueError as cause:
+            raise RecordingError(f"{file}: {cause}") from cause
     raise RecordingError(
         f"cannot read labels from {file}: {file.suffix or 'no suffix'} given; {SUFFIX}, .json, "
         f".csv, {' or '.join(SUFFIXES)} expected"
     )
-
-
-def _from_label_file(file: Path, recording: Recording) -> Labels:
-    found = load_labels(file)
-    _check_digest(file, found.recording, found.name, recording)
-    try:
-        return {
-            name: tuple(label_of(label) for label in labels)
-            for name, labels in found.modules.items()
-        }
-    except ValueError as cause:
-        raise RecordingError(f"{file}: {cause}") from cause
 
 
 def _check_digest(file: Path, digest: str, name: str, recording: Recording) -> None:
@@ -84,20 +89,6 @@ def _check_digest(file: Path, digest: str, name: str, recording: Recording) -> N
             f"{file} labels another recording ({name!r}, hash {digest[:12]}) than "
             f"{recording.name!r} (hash {recording.digest[:12]})"
         )
-
-
-def _find_in_folder(folder: Path, recording: Recording) -> Path:
-    endings = (SUFFIX, *SUFFIXES, ".labels.csv", ".csv", ".json")
-    for ending in endings:
-        if (file := folder / f"{file_stem(recording.name)}{ending}").is_file():
-            return file
-    others = [file for file in sorted(folder.glob("*.json")) if not file.name.endswith(SUFFIX)]
-    if len(others) == 1:
-        return others[0]
-    raise RecordingError(
-        f"no labels of {recording.name!r} in {folder}; "
-        f"{file_stem(recording.name)} with one of {', '.join(endings)} expected"
-    )
 
 
 def _label_format(name: str, loaded: Any) -> ModuleType:  # noqa: ANN401

@@ -165,9 +165,10 @@ def audit(
     """
     setting = default_setting(recordings) if setting is None else setting
     parts = [
-        _labelled_finger(recording, finger, probabilities)
+        LabelledFinger(recording.name, finger, m.labels, m.times, m.period, probabilities)
         for recording, found in out_of_fold(recordings, setting, n_folds=n_folds, n_jobs=n_jobs)
         for finger, probabilities in found.items()
+        for m in [recording.modules[finger]]
     ]
     duration = sum(part.audited_duration for part in parts)
     if not duration:
@@ -203,13 +204,6 @@ def suspects(parts: Sequence[LabelledFinger]) -> list[Suspect]:
     return sorted(found, key=_rank)
 
 
-def _labelled_finger(recording: Recording, finger: str, probabilities: Array) -> LabelledFinger:
-    module = recording.modules[finger]
-    return LabelledFinger(
-        recording.name, finger, module.labels, module.times, module.period, probabilities
-    )
-
-
 def _suspects_of_finger(parts: Sequence[LabelledFinger]) -> Iterator[Suspect]:
     thresholds = confident_thresholds(
         np.concatenate([part.codes for part in parts]),
@@ -226,9 +220,16 @@ def _suspects_of_finger(parts: Sequence[LabelledFinger]) -> Iterator[Suspect]:
             _shifted_edge(part, edge, unusual_shift(edge, usual[edge.change]), thresholds)
             for edge in own_edges
         ]
-        yield from _without_overlaps(
-            [*_intervals(part, own_spans, thresholds), *(each for each in shifted if each)]
-        )
+        # A shifted edge shows as a contradicted interval beside it, too: one of the two is enough,
+        # so what lies half or more in a suspect of larger weight is left out.
+        kept: list[Suspect] = []
+        found = [*_intervals(part, own_spans, thresholds), *(edge for edge in shifted if edge)]
+        for suspect in sorted(found, key=_rank):
+            half = (suspect.end - suspect.start) / 2
+            overlaps = (min(suspect.end, o.end) - max(suspect.start, o.start) for o in kept)
+            if all(overlap < half for overlap in overlaps):
+                kept.append(suspect)
+        yield from kept
 
 
 def _shifted_edge(
@@ -240,6 +241,7 @@ def _shifted_edge(
     """
     if abs(shift) < MIN_EDGE_SHIFT - TIME_TOLERANCE:
         return None
+    # An edge that comes too late leaves samples of the state after it under the label before.
     given, expected = edge.change if shift < 0 else edge.change[::-1]
     start, end = sorted((edge.likeliest - shift, edge.likeliest))
     confidence = part.confidence(start, end, expected)
@@ -252,12 +254,21 @@ def _shifted_edge(
 def _intervals(part: LabelledFinger, spans: Sequence[Span], thresholds: Array) -> Iterator[Suspect]:
     """Yield contradicted intervals within labels that do not belong to an edge."""
     codes = contradictions(part.codes, part.probabilities, thresholds)
-    for index, span in enumerate(spans):
-        before = spans[index - 1] if index else None
-        after = spans[index + 1] if index + 1 < len(spans) else None
+
+    def is_beyond(neighbour: Span | None, edge: float, code: int) -> bool:
+        return (
+            neighbour is not None
+            and neighbour.code == code
+            and min(abs(neighbour.start - edge), abs(neighbour.end - edge)) <= TIME_TOLERANCE
+        )
+
+    for before, span, after in zip([None, *spans], spans, [*spans[1:], None], strict=False):
         for start, end, expected in _contradicted(part, codes, span):
-            at_start = start - span.start < EDGE_DISTANCE and _meets(before, span.start, expected)
-            at_end = span.end - end < EDGE_DISTANCE and _meets(after, span.end, expected)
+            near_start, near_end = start - span.start, span.end - end
+            at_start = near_start < EDGE_DISTANCE and is_beyond(before, span.start, expected)
+            at_end = near_end < EDGE_DISTANCE and is_beyond(after, span.end, expected)
+            # It continues the state beyond one edge: that edge may be late or early, which
+            # `_shifted_edge` judges. Between two such labels it may be a gap that was overlooked.
             if end - start < MAX_EDGE_SHIFT and at_start != at_end:
                 continue
             confidence = part.confidence(start, end, expected)
@@ -280,26 +291,6 @@ def _contradicted(part: LabelledFinger, codes: Codes, span: Span) -> list[tuple[
         else:
             found.append((start, end, code))
     return [each for each in found if each[1] - each[0] >= MIN_CONTRADICTION - TIME_TOLERANCE]
-
-
-def _meets(neighbour: Span | None, edge: float, code: int) -> bool:
-    """Return whether a neighbouring label has that state and touches the edge."""
-    return (
-        neighbour is not None
-        and neighbour.code == code
-        and min(abs(neighbour.start - edge), abs(neighbour.end - edge)) <= TIME_TOLERANCE
-    )
-
-
-def _without_overlaps(found: Sequence[Suspect]) -> list[Suspect]:
-    """Return the suspects of a finger that do not lie half or more in one of larger weight."""
-    kept: list[Suspect] = []
-    for suspect in sorted(found, key=_rank):
-        half = (suspect.end - suspect.start) / 2
-        overlaps = (min(suspect.end, o.end) - max(suspect.start, o.start) for o in kept)
-        if all(overlap < half for overlap in overlaps):
-            kept.append(suspect)
-    return kept
 
 
 def _rank(suspect: Suspect) -> tuple[float, str, str, float]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TypedDict
 
 import msgspec
 import numpy as np
@@ -183,13 +182,10 @@ def compare(
         raise RecordingError(
             f"labels for {', '.join(unknown)} given; recording {name!r} has {', '.join(times)}"
         )
-    fingers = {
-        finger: _agreement(
-            _in_order(a.get(finger, ())), _in_order(b.get(finger, ())), times[finger]
-        )
-        for finger in times
-        if finger in labelled
-    }
+    fingers = {}
+    for finger in (finger for finger in times if finger in labelled):
+        in_a, in_b = (sorted(of.get(finger, ()), key=lambda label: label.start) for of in (a, b))
+        fingers[finger] = _agreement(in_a, in_b, times[finger])
     return RecordingAgreement(name, fingers)
 
 
@@ -211,23 +207,37 @@ def pool(recordings: Sequence[RecordingAgreement]) -> Agreement:
     )
 
 
-def _in_order(labels: Sequence[Label]) -> list[Label]:
-    return sorted(labels, key=lambda label: label.start)
-
-
 def _agreement(a: Sequence[Label], b: Sequence[Label], times: Array) -> FingerAgreement:
+    from scipy.optimize import linear_sum_assignment
+
     codes_a, codes_b = label_states(a, times), label_states(b, times)
     table = np.bincount(4 * codes_a.astype(np.int64) + codes_b, minlength=16).reshape(4, 4)
     spans_a, spans_b = spans_of(a), spans_of(b)
     n_samples = max(len(times), 1)
+    # As many onsets as possible are matched, with the smallest sum of differences: a pair that is
+    # too far apart costs more than all that are near.
+    onsets_a, onsets_b = _onsets(a), _onsets(b)
+    differences = onsets_b[None, :] - onsets_a[:, None]
+    near = np.abs(differences) <= MAX_ONSET_DIFFERENCE + TIME_TOLERANCE
+    too_far = (len(onsets_a) + len(onsets_b) + 1) * (MAX_ONSET_DIFFERENCE + TIME_TOLERANCE)
+    rows, columns = linear_sum_assignment(np.where(near, np.abs(differences), too_far))
+    kept = near[rows, columns]
+    matched = differences[rows[kept], columns[kept]].tolist()
+    # Causes are compared where both name one: code 0 is none.
+    n_causes = len(CAUSE_BY_CODE)
+    pairs = n_causes * _cause_codes(a, times) + _cause_codes(b, times)
+    causes = np.bincount(pairs, minlength=n_causes**2).reshape(n_causes, n_causes)[1:, 1:]
     return FingerAgreement(
         *_kappas(table[1:, 1:]),
         n_samples=len(times),
         only_a=int(table[1:, 0].sum()) / n_samples,
         only_b=int(table[0, 1:].sum()) / n_samples,
         confusion=table[1:, 1:].tolist(),
-        onset_differences=_match(_onsets(a), _onsets(b)),
-        **_cause_agreement(_cause_counts(a, b, times)),
+        onset_differences=_differences(
+            matched, len(onsets_a) - len(matched), len(onsets_b) - len(matched)
+        ),
+        causes=causes.tolist(),
+        kappa_cause=cohens_kappa(causes),
         missing_in_a=_unmatched(spans_b, spans_a),
         missing_in_b=_unmatched(spans_a, spans_b),
     )
@@ -249,28 +259,11 @@ def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
             sum(onset.only_a for onset in onsets),
             sum(onset.only_b for onset in onsets),
         ),
-        **_cause_agreement(causes),
+        causes=causes.tolist(),
+        kappa_cause=cohens_kappa(causes),
         n_missing_in_a=sum(len(part.missing_in_a) for part in parts),
         n_missing_in_b=sum(len(part.missing_in_b) for part in parts),
     )
-
-
-class _CauseAgreement(TypedDict):
-    """Fields of `AgreementNumbers` about causes."""
-
-    causes: list[list[int]]
-    kappa_cause: float | None
-
-
-def _cause_agreement(counts: Confusion) -> _CauseAgreement:
-    return {"causes": counts.tolist(), "kappa_cause": cohens_kappa(counts)}
-
-
-def _cause_counts(a: Sequence[Label], b: Sequence[Label], times: Array) -> Confusion:
-    """Return the number of samples by the cause in A and in B, where both give one."""
-    codes_a, codes_b = _cause_codes(a, times), _cause_codes(b, times)
-    n = len(CAUSE_BY_CODE)
-    return np.bincount(n * codes_a + codes_b, minlength=n * n).reshape(n, n)[1:, 1:]
 
 
 def _cause_codes(labels: Sequence[Label], times: Array) -> npt.NDArray[np.int64]:
@@ -312,19 +305,6 @@ def _onsets(labels: Sequence[Label]) -> Array:
         ],
         dtype=np.float64,
     )
-
-
-def _match(a: Array, b: Array) -> OnsetDifferences:
-    """Match as many onsets as possible, with the smallest sum of differences."""
-    from scipy.optimize import linear_sum_assignment
-
-    differences = b[None, :] - a[:, None]
-    near = np.abs(differences) <= MAX_ONSET_DIFFERENCE + TIME_TOLERANCE
-    unmatched_cost = (len(a) + len(b) + 1) * (MAX_ONSET_DIFFERENCE + TIME_TOLERANCE)
-    rows, columns = linear_sum_assignment(np.where(near, np.abs(differences), unmatched_cost))
-    kept = near[rows, columns]
-    values = differences[rows[kept], columns[kept]].tolist()
-    return _differences(values, len(a) - len(values), len(b) - len(values))
 
 
 def _unmatched(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:

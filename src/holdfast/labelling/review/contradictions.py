@@ -128,6 +128,7 @@ def edges_of(spans: Sequence[Span], times: Array, probabilities: Array) -> Itera
     Yields:
         An edge for every two adjacent spans.
     """
+    # An unknown sample has a log likelihood of 0 under both states, so that it decides nothing.
     known = np.where(np.isnan(probabilities), 1.0, probabilities)
     likelihood = np.log(np.clip(known, MIN_STATE_PROBABILITY, 1.0))
     for before, after in pairwise(spans):
@@ -164,7 +165,13 @@ def usual_shifts(edges: Sequence[Edge]) -> dict[StateChange, UsualShift]:
     shifts: dict[StateChange, list[float]] = {}
     for edge in edges:
         shifts.setdefault(edge.change, []).append(edge.likeliest - edge.time)
-    return {change: _usual_shift(np.array(found)) for change, found in shifts.items()}
+    usual = {}
+    for change, found in shifts.items():
+        # Medians: the errors that are looked for must not move what is usual.
+        median = float(np.median(found))
+        apart = float(np.median(np.abs(np.array(found) - median)))
+        usual[change] = UsualShift(median, DEVIATIONS_PER_MEDIAN * apart)
+    return usual
 
 
 def unusual_shift(edge: Edge, usual: UsualShift) -> float:
@@ -174,9 +181,3 @@ def unusual_shift(edge: Edge, usual: UsualShift) -> float:
     """
     shift = min(max(edge.likeliest - usual.median, edge.low), edge.high) - edge.time
     return shift if abs(shift) > USUAL_DEVIATIONS * usual.deviation else 0.0
-
-
-def _usual_shift(shifts: Array) -> UsualShift:
-    median = float(np.median(shifts))
-    deviation = DEVIATIONS_PER_MEDIAN * float(np.median(np.abs(shifts - median)))
-    return UsualShift(median, deviation)

@@ -1,6 +1,7 @@
 """Findings about a recording that matter before it is labelled or trained on."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -80,8 +81,10 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         text = f"begins in contact ({reason}): the first samples are load (give --in-contact); or "
         text += "z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
-    if _without_contact(scan.recording):
-        found.append(Finding("", "no_contact", "no finger is in contact in the whole recording"))
+    with suppress(HoldfastError):  # no sample for the tare
+        if not hand_force(scan.recording).n_touching.any():
+            text = "no finger is in contact in the whole recording"
+            found.append(Finding("", "no_contact", text))
     return found
 
 
@@ -130,20 +133,16 @@ def report_hidden_labels(paths: Sequence[Path], report: Callable[[str], None]) -
         paths: of the recordings.
         report: receives the line; it is not called if there are no such recordings.
     """
-    hidden = [path.stem for path in paths if _hides(path)]
+    hidden = []
+    for path in paths:
+        with suppress(HoldfastError):
+            hidden += [path.stem] if hidden_labels(path) is not None else []
     if hidden:
         report(
             f"labels of a rule outrank the labels that came with {len(hidden)} of {len(paths)} "
             f"recordings ({hidden[0]}{', ...' if len(hidden) > 1 else ''}); delete their "
             ".labels.json files to use those"
         )
-
-
-def _hides(path: Path) -> bool:
-    try:
-        return hidden_labels(path) is not None
-    except HoldfastError:
-        return False
 
 
 def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
@@ -159,42 +158,22 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
         return
     if still:
         yield "axes", f"readings along {' and '.join(still)} never change; 3 axes are expected"
-    if text := _constant(module):
-        yield "constant", text
-    if text := _odd_unit(module):
-        yield "unit", text
-
-
-def _constant(module: ModuleScan) -> str:
-    """Return a text about stretches in which no reading changes; empty without any."""
     times = module.force.times
     stretches = [(times[first], times[last]) for first, last in runs(module.repeats)]
     long = [(start, end) for start, end in stretches if end - start >= CONSTANT_SECONDS]
-    if not long:
-        return ""
-    total = sum(end - start for start, end in long)
-    text = f"no reading changes for {total:.2f} s in all, in stretches of {CONSTANT_SECONDS} s "
-    text += f"or more, the first from {long[0][0]:.2f} to {long[0][1]:.2f} s"
-    if long[0][0] > times[0]:
-        return text
-    return f"{text}: the tare shows no noise; give train a --contact-threshold"
-
-
-def _odd_unit(module: ModuleScan) -> str:
-    """Return a text about readings that cannot be counts, or hardly newtons; empty otherwise."""
-    low, high, unit = module.lowest, module.highest, module.sensor.unit
-    if unit == "count" and high - low < 1:
-        return (
-            f"readings between {low:.4g} and {high:.4g} are less than one count apart, and so "
-            "taken for noise: is their unit N? (--unit N of holdfast sensors --template)"
-        )
-    if unit == "N" and max(abs(low), abs(high)) > MAX_TAXEL_FORCE:
-        return f"readings up to {max(abs(low), abs(high)):.4g} N on a taxel: is their unit count?"
-    return ""
-
-
-def _without_contact(recording: Recording) -> bool:
-    try:
-        return not hand_force(recording).n_touching.any()
-    except HoldfastError:  # no sample for the tare
-        return False
+    if long:
+        total = sum(end - start for start, end in long)
+        text = f"no reading changes for {total:.2f} s in all, in stretches of {CONSTANT_SECONDS} s "
+        text += f"or more, the first from {long[0][0]:.2f} to {long[0][1]:.2f} s"
+        if long[0][0] <= times[0]:  # the threshold of contact comes from the noise of the tare
+            text += ": the tare shows no noise; give train a --contact-threshold"
+        yield "constant", text
+    # Readings that cannot be counts, or hardly newtons.
+    least, most, unit = module.lowest, module.highest, module.sensor.unit
+    largest = max(abs(least), abs(most))
+    if unit == "count" and most - least < 1:
+        text = f"readings between {least:.4g} and {most:.4g} are less than one count apart, and so "
+        text += "taken for noise: is their unit N? (--unit N of holdfast sensors --template)"
+        yield "unit", text
+    if unit == "N" and largest > MAX_TAXEL_FORCE:
+        yield "unit", f"readings up to {largest:.4g} N on a taxel: is their unit count?"

@@ -23,10 +23,10 @@ from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording
+from holdfast.resampling import at_rate
 from holdfast.sensors.types import Array
 from holdfast.training.model_fit import TrainingData, fit_model
 from holdfast.training.setting import Setting
-from holdfast.training.training_samples import resample_if_needed
 
 MAX_AUDIT_FOLDS = 10
 """Largest number of groups of recordings that are held out in turn."""
@@ -69,23 +69,54 @@ def out_of_fold(
         ModelError: a finger has different sensors in different recordings.
         ValueError: the split is random, or there are fewer than two folds.
     """
-    _check(recordings, setting, n_folds)
+    if setting.split == "random":
+        raise ValueError(
+            "split recording or object expected for an audit, random given: it trains on "
+            "neighbours of the samples that are audited"
+        )
+    if n_folds < 2:
+        raise ValueError(f"at least 2 folds expected, {n_folds} given")
+    if len(recordings) < 2:
+        raise TrainingError(
+            "an audit compares the labels of a recording with those of others: at least 2 "
+            f"recordings expected, {len(recordings)} given"
+        )
     states = _states(recordings)
     fit = partial(_FoldModels.fit, setting=setting, n_folds=n_folds, n_jobs=n_jobs)
+
+    def as_contact(label: Label) -> Label:
+        touching = label.state is not ContactState.NO_CONTACT
+        return replace(label, state=ContactState.STABLE if touching else ContactState.UNSTABLE)
+
+    def as_stability(label: Label) -> Label | None:
+        return None if label.state is ContactState.NO_CONTACT else label
+
+    def with_both(classes: Classes) -> list[str]:
+        return [finger for finger, own in states.items() if all(own & each for each in classes)]
+
     contact_models = fit(
-        _Relabelled(recordings, _as_contact, _with_both(states, _CONTACT_CLASSES)),
+        _Relabelled(recordings, as_contact, with_both(_CONTACT_CLASSES)),
         dict.fromkeys(states, 1.0),
     )
     stability_models = fit(
-        _Relabelled(recordings, _as_stability, _with_both(states, _STABILITY_CLASSES)),
+        _Relabelled(recordings, as_stability, with_both(_STABILITY_CLASSES)),
         {finger: float(ContactState.STABLE in own) for finger, own in states.items()},
     )
     learnt = contact_models.fingers | stability_models.fingers
     for index, recording in enumerate(recordings):
         contact = contact_models.predict(index, recording)
         stability = stability_models.predict(index, recording)
-        fingers = [finger for finger in recording.modules if finger in learnt]
-        yield recording, {f: _three_states(contact[f], stability[f]) for f in fingers}
+        yield (
+            recording,
+            {
+                f: np.stack(
+                    (1 - contact[f], contact[f] * (1 - stability[f]), contact[f] * stability[f]),
+                    axis=1,
+                )
+                for f in recording.modules
+                if f in learnt
+            },
+        )
 
 
 class _Relabelled(Sequence[Recording]):
@@ -151,7 +182,15 @@ class _FoldModels:
             return cls(frozenset(), constant, [None], [0] * len(recordings))
         data = TrainingData.of(recordings, setting)
         data_split = data.data_split
-        one_class = _one_class_fingers(data, recordings.fingers)
+        # Its samples with features may have one class, though its labels have both: the other
+        # lies in the tare or the first window.
+        shared = data.fingers.get(ANY_FINGER)
+        samples_of = {f: data.fingers.get(f, shared) for f in recordings.fingers}
+        one_class = {
+            f: float(own.samples.positive.any())
+            for f, own in samples_of.items()
+            if own and own.samples.one_class
+        }
         n_units = len(data_split.units)
         unit_folds = deal_folds(n_units, n_folds, shuffled(n_units, setting.seed))
         parameters = {f: setting.recipe_of(f).reference for f in data.fingers}
@@ -174,38 +213,13 @@ class _FoldModels:
         }
         if model is None or not (ANY_FINGER in model.fingers or set(model.fingers) & set(modules)):
             return found
-        given = recording if model.rate is None else resample_if_needed(recording, model.rate)
+        given = recording if model.rate is None else at_rate(recording, model.rate)
         for finger, probability in model.predict_proba(given).items():
             if finger in self.fingers:
                 own_times, times = modules[finger].times, given.modules[finger].times
                 latest = np.maximum(np.searchsorted(times, own_times, side="right") - 1, 0)
                 found[finger] = probability[latest]
         return found
-
-
-def _one_class_fingers(data: TrainingData, fingers: Collection[str]) -> dict[str, float]:
-    """Return the only class of each finger whose samples with features have only one."""
-    shared = data.fingers.get(ANY_FINGER)
-    samples_of = {f: data.fingers.get(f, shared) for f in fingers}
-    return {
-        f: float(own.samples.positive.any())
-        for f, own in samples_of.items()
-        if own and own.samples.one_class
-    }
-
-
-def _as_contact(label: Label) -> Label:
-    touching = label.state is not ContactState.NO_CONTACT
-    return replace(label, state=ContactState.STABLE if touching else ContactState.UNSTABLE)
-
-
-def _as_stability(label: Label) -> Label | None:
-    return None if label.state is ContactState.NO_CONTACT else label
-
-
-def _with_both(states: Mapping[str, set[ContactState]], classes: Classes) -> list[str]:
-    """Return the fingers whose labels have both classes."""
-    return [finger for finger, own in states.items() if all(own & each for each in classes)]
 
 
 def _states(recordings: Sequence[Recording]) -> dict[str, set[ContactState]]:
@@ -224,24 +238,3 @@ def _states(recordings: Sequence[Recording]) -> dict[str, set[ContactState]]:
         known = ", ".join(f"{f} {', '.join(states)}" for f, states in found.items() if states)
         raise TrainingError(f"a finger with at least two labelled states expected, {known} given")
     return found
-
-
-def _check(recordings: Sequence[Recording], setting: Setting, n_folds: int) -> None:
-    if setting.split == "random":
-        raise ValueError(
-            "split recording or object expected for an audit, random given: it trains on "
-            "neighbours of the samples that are audited"
-        )
-    if n_folds < 2:
-        raise ValueError(f"at least 2 folds expected, {n_folds} given")
-    if len(recordings) < 2:
-        raise TrainingError(
-            "an audit compares the labels of a recording with those of others: at least 2 "
-            f"recordings expected, {len(recordings)} given"
-        )
-
-
-def _three_states(contact: Array, stability: Array) -> Array:
-    """Return (n, 3) probabilities of no contact, unstable and stable."""
-    columns = (1 - contact, contact * (1 - stability), contact * stability)
-    return np.stack(columns, axis=1)

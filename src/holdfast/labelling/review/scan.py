@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.features.tare import first_finite
 from holdfast.kernel.batch import fill_fingertip_force
@@ -36,6 +35,8 @@ class ModuleScan:
         self.labels: list[Label] = []
         self.still: Flags = np.ones(3, dtype=np.bool_)
         self.lowest, self.highest = np.inf, -np.inf
+        # Parts of the arrays, which `add` appends to; and what it needs of the part before: the end
+        # of its times, and its last sample. The first finite sample is the zero of all forces.
         self._times, self._end = [np.empty(0)], -np.inf
         self._forces = [np.empty((0, 3))]
         self._repeats = [np.empty(0, dtype=np.bool_)]
@@ -44,12 +45,35 @@ class ModuleScan:
 
     def add(self, module: Tactile) -> None:
         """Add the next samples."""
-        self._add_labels(module)
+        labels = list(module.labels)
+        if labels and self.labels and self._end < self.labels[-1].end:
+            # The label goes on after the last sample of the part before: if it begins anew with
+            # the first sample here, and is the same else, the parts have cut it.
+            before, after = self.labels[-1], labels[0]
+            is_cut = after.start <= float(module.times[0])
+            if is_cut and replace(after, start=before.start, end=before.end) == before:
+                self.labels[-1] = replace(before, end=after.end)
+                del labels[0]
+        self.labels += labels
         if module.n_samples:
             self._times.append(module.times)
             self._end = float(module.times[-1])
         for first in range(0, module.n_samples, SCAN_BLOCK_SAMPLES):
-            self._add_readings(module.readings[first : first + SCAN_BLOCK_SAMPLES])
+            readings = module.readings[first : first + SCAN_BLOCK_SAMPLES]
+            joined = np.concatenate([self._last, readings])
+            self._last = readings[-1:].copy()
+            differs, finite = joined[1:] != joined[:-1], np.isfinite(joined)
+            self._repeats.append(~differs.any(axis=(1, 2)))
+            # NaN differs from itself, but is no sign of life.
+            self.still &= ~(differs & finite[1:] & finite[:-1]).any(axis=(0, 1))
+            self.lowest = float(np.fmin(self.lowest, np.fmin.reduce(readings, axis=None)))
+            self.highest = float(np.fmax(self.highest, np.fmax.reduce(readings, axis=None)))
+            values = np.ascontiguousarray(readings, dtype=np.float64)
+            if self._zero is None:  # so that readings that never change have no rounding errors
+                self._zero = np.nan_to_num(values[first_finite(values)], posinf=0.0, neginf=0.0)
+            force = np.empty((len(values), 3))
+            fill_fingertip_force(values, self._zero, self.sensor.rotations, force)
+            self._forces.append(force)
 
     @cached_property
     def repeats(self) -> Flags:
@@ -73,31 +97,6 @@ class ModuleScan:
         for time, value in zip(force.times[::stride], force.readings[::stride, 0], strict=True):
             drift.update(value, float(time))
         return drift
-
-    def _add_readings(self, readings: npt.NDArray[np.generic]) -> None:
-        joined = np.concatenate([self._last, readings])
-        self._last = readings[-1:].copy()
-        differs, finite = joined[1:] != joined[:-1], np.isfinite(joined)
-        self._repeats.append(~differs.any(axis=(1, 2)))
-        self.still &= ~(differs & finite[1:] & finite[:-1]).any(axis=(0, 1))
-        self.lowest = float(np.fmin(self.lowest, np.fmin.reduce(readings, axis=None)))
-        self.highest = float(np.fmax(self.highest, np.fmax.reduce(readings, axis=None)))
-        values = np.ascontiguousarray(readings, dtype=np.float64)
-        if self._zero is None:  # so that readings that never change have no rounding errors
-            self._zero = np.nan_to_num(values[first_finite(values)], posinf=0.0, neginf=0.0)
-        force = np.empty((len(values), 3))
-        fill_fingertip_force(values, self._zero, self.sensor.rotations, force)
-        self._forces.append(force)
-
-    def _add_labels(self, module: Tactile) -> None:
-        labels = list(module.labels)
-        if labels and self.labels and self._end < self.labels[-1].end:
-            before, after = self.labels[-1], labels[0]
-            is_cut = after.start <= float(module.times[0])
-            if is_cut and replace(after, start=before.start, end=before.end) == before:
-                self.labels[-1] = replace(before, end=after.end)
-                del labels[0]
-        self.labels += labels
 
 
 class FindingsScan:

@@ -85,9 +85,6 @@ def doubtful(labels: Mapping[str, Sequence[Label]], below: float = 0.8) -> list[
         for label in intervals
         if label.confidence < below
     ]
-    return sorted(found, key=_review_order)
-
-
-def _review_order(found: tuple[str, Label]) -> tuple[float, float, float, str]:
-    finger, label = found
-    return label.confidence, label.start - label.end, label.start, finger
+    return sorted(
+        found, key=lambda at: (at[1].confidence, at[1].start - at[1].end, at[1].start, at[0])
+    )

@@ -90,16 +90,18 @@ class LabelWriter:
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             start, end = max(float(times[first]), span[0]), min(float(ends[last]), span[1])
             if timeline.codes[first] != UNKNOWN and start < end:
-                labels.append(self._label(timeline, slice(first, last), start, end))
+                state = STATE_BY_CODE[timeline.codes[first]]
+                cause = CAUSE_BY_CODE[timeline.causes[first]]
+                # A label is as sure as its weaker parts, but single samples do not count: noise
+                # takes some of them to the threshold. Margins lie below it, and are not denied.
+                weak = float(np.quantile(timeline.ratio[first:last], EVIDENCE_QUANTILE))
+                ratio = max(weak, 1.0)
+                confidence = self.trust * label_confidence(ratio, end - start)
+                text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")
+                author = self.author
+                label = Label(start, end, state, cause, text, round(confidence, 3), author)
+                labels.append(label)
         return tuple(labels)
-
-    def _label(self, timeline: StateTimeline, part: slice, start: float, end: float) -> Label:
-        state = STATE_BY_CODE[timeline.codes[part.start]]
-        cause = CAUSE_BY_CODE[timeline.causes[part.start]]
-        ratio = max(float(np.quantile(timeline.ratio[part], EVIDENCE_QUANTILE)), 1.0)
-        confidence = self.trust * label_confidence(ratio, end - start)
-        text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")
-        return Label(start, end, state, cause, text, round(confidence, 3), self.author)
 
 
 def evidence_ratio(quantity: npt.ArrayLike, threshold: npt.ArrayLike) -> Array:

@@ -19,7 +19,6 @@ are. If no contact threshold is known (tare `first` or `none`), only the markers
 """
 
 import re
-from collections.abc import Iterator
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
@@ -31,7 +30,6 @@ from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.labelling.rules.base import LabelWriter, StateTimeline
 from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force
-from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label, Recording
 
 COMMAND_RULE = "rule:command"
@@ -95,14 +93,15 @@ def propose(
         RecordingError: no marker has a known word, or no sample for the tare.
         ValueError: the tare is unknown.
     """
-    commands = [
-        ProtocolMarker(protocol_marker.time - delay, protocol_marker.word)
-        for protocol_marker in protocol_markers(recording)
-    ]
+    words = ((time, command_word(text)) for time, text in sorted(recording.markers))
+    commands = [ProtocolMarker(time - delay, word) for time, word in words if word]
     if not commands:
+        texts = list(dict.fromkeys(text for _, text in recording.markers))
+        shown = ", ".join(repr(text[:40]) for text in texts[:6])
+        shown += f" and {len(texts) - 6} more" if len(texts) > 6 else ""
         raise RecordingError(
             f"recording {recording.name!r} has no marker of the protocol: one of "
-            f"{', '.join(WORDS)} expected, it has {_shown(recording)}"
+            f"{', '.join(WORDS)} expected, it has {shown or 'none'}"
         )
     hand = hand_force(recording, tare)
     writer = LabelWriter(COMMAND_RULE, _evidence)
@@ -110,12 +109,6 @@ def propose(
         name: writer.labels(_timeline(finger, hand, commands, opening), finger.span)
         for name, finger in hand.fingers.items()
     }
-
-
-def protocol_markers(recording: Recording) -> list[ProtocolMarker]:
-    """Return the markers with a known word in order of time; others are ignored."""
-    words = ((time, command_word(text)) for time, text in sorted(recording.markers))
-    return [ProtocolMarker(time, word) for time, word in words if word]
 
 
 def command_word(text: str) -> str | None:
@@ -128,7 +121,7 @@ def command_word(text: str) -> str | None:
         True
     """
     words = re.findall(r"[a-z]+", text.lower())
-    if "contact" in words and "no" in words:
+    if "contact" in words and "no" in words:  # two words, of which neither is a synonym alone
         return "free"
     known = {synonym: word for word, synonyms in WORDS.items() for synonym in synonyms}
     word = next((known[text_word] for text_word in words if text_word in known), None)
@@ -144,40 +137,30 @@ def _timeline(
     times, known = hand.times, finger.known
     if commands[0].word == "closing":
         timeline.set_state(known & (times < commands[0].time), NO_CONTACT, None, CLEAR_RATIO)
-    for command, end, ratio in _spans(commands):
+    groups = [list(group) for _, group in groupby(commands, key=lambda command: command.word)]
+    for group, following in pairwise([*groups, [ProtocolMarker(np.inf, "")]]):
+        # A repeated marker changes nothing, but a person who begins a push twice has forgotten to
+        # end one: what lies between is less certain.
+        command, end = group[0], following[0].time
+        ended = len(group) == 1 and following[0].word in ("locked", "lost")
+        open_ended = command.word == "disturbance" and not ended
+        ratio = OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
         state, cause = _STATE_OF_WORD[command.word]
         inside = known & (times >= command.time) & (times < end)
         timeline.set_state(inside, state, cause, ratio)
         if command.word == "released":
             timeline.set_state(inside & (times >= command.time + opening), NO_CONTACT, None, ratio)
     if finger.threshold is not None:
-        _correct_by_force(timeline, finger, times >= commands[0].time)
+        # Not every finger takes part in every grasp: its force outranks the marker where it shows
+        # no contact. Where it shows contact against the marker, the label is only in doubt: a
+        # baseline may have drifted.
+        held = np.isin(timeline.codes, (STABLE, UNSTABLE))
+        free = (times >= commands[0].time) & ~finger.contact & held
+        timeline.set_state(free, NO_CONTACT, None, CLEAR_RATIO)
+        timeline.ratio[finger.contact & (timeline.codes == NO_CONTACT)] = 1.0
     return timeline
-
-
-def _spans(commands: list[ProtocolMarker]) -> Iterator[tuple[ProtocolMarker, float, float]]:
-    """Yield each command that is not a repetition, its end [s], and its evidence ratio."""
-    groups = [list(group) for _, group in groupby(commands, key=lambda command: command.word)]
-    for group, following in pairwise([*groups, [ProtocolMarker(np.inf, "")]]):
-        ended = len(group) == 1 and following[0].word in ("locked", "lost")
-        open_ended = group[0].word == "disturbance" and not ended
-        yield group[0], following[0].time, OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
-
-
-def _correct_by_force(timeline: StateTimeline, finger: FingerForce, commanded: Mask) -> None:
-    """Label no contact where the force shows none; lower the confidence where it shows contact."""
-    held = np.isin(timeline.codes, (STABLE, UNSTABLE))
-    timeline.set_state(commanded & ~finger.contact & held, NO_CONTACT, None, CLEAR_RATIO)
-    timeline.ratio[finger.contact & (timeline.codes == NO_CONTACT)] = 1.0
 
 
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
     word = cause or ("locked" if state is ContactState.STABLE else "free, or no force")
     return f"marker: {word}" if ratio > 1 else f"marker: {word}; the force contradicts it"
-
-
-def _shown(recording: Recording) -> str:
-    """Return the first distinct marker texts."""
-    texts = list(dict.fromkeys(text for _, text in recording.markers))
-    shown = ", ".join(repr(text[:40]) for text in texts[:6])
-    return (shown + (f" and {len(texts) - 6} more" if len(texts) > 6 else "")) or "none"

@@ -67,9 +67,15 @@ class FingerForce:
         """(n,) where the finger is in contact; without a threshold, where it has samples."""
         if self.threshold is None:
             return self.known
-        touching = self.known & (self.amplitude > max(self.threshold, VISIBLE_SHARE * self._grip))
         n = self._n(MIN_CONTACT_DURATION)
-        return drop_short_runs(fill_short_gaps(touching & ~self._creep(), n), n)
+        touching = self.known & (self.amplitude > max(self.threshold, VISIBLE_SHARE * self._grip))
+        # A released elastomer keeps a load for seconds, far over the noise: a finger that was
+        # loaded, and whose small force hardly changes, touches nothing any more.
+        loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
+        rate = np.abs(np.gradient(self.amplitude, self.period))
+        slow = _moving_mean(rate, n) < CREEP_RATE * self._grip
+        creep = loaded & slow & (self.amplitude < CREEP_LEVEL * self._grip)
+        return drop_short_runs(fill_short_gaps(touching & ~creep, n), n)
 
     @cached_property
     def evidence_threshold(self) -> float | None:
@@ -88,13 +94,6 @@ class FingerForce:
 
     def _n(self, duration: float) -> int:
         return n_samples_of(duration, self.period)
-
-    def _creep(self) -> Mask:
-        """Return where a finger that was loaded only shows the creep of its elastomer."""
-        loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
-        rate = np.abs(np.gradient(self.amplitude, self.period))
-        slow = _moving_mean(rate, self._n(MIN_CONTACT_DURATION)) < CREEP_RATE * self._grip
-        return np.asarray(loaded & slow & (self.amplitude < CREEP_LEVEL * self._grip))
 
     def change(self, window: float) -> Array:
         """Return (n,) how much the force changes within a window [s] around each instant."""
@@ -168,22 +167,19 @@ def _finger(module: Tactile, tare: Tare, grid: Array, period: float) -> FingerFo
     times = module.times[finite]
     columns = [np.interp(grid, times, column) for column in force[finite].T]
     smooth = _moving_mean(np.stack(columns, axis=1), n_samples_of(FORCE_SMOOTHING_TIME, period))
+    threshold = None
+    if tare.without_contact:
+        threshold = contact_threshold(np.array([rest_moments(module, tare, module.rate)]))
     resting = (grid >= times[0]) & (grid < times[0] + tare.seconds)
     return FingerForce(
         force=smooth,
         known=covered(grid, times, GAP_PERIODS * module.period),
-        threshold=_threshold(module, tare),
+        threshold=threshold,
         noise=float(np.sqrt(smooth[resting].var(axis=0).mean())) if resting.any() else 0.0,
         normal=module.sensor.normal,
         period=period,
         span=(float(module.times[0]), float(module.times[-1]) + module.period),
     )
-
-
-def _threshold(module: Tactile, tare: Tare) -> float | None:
-    if not tare.without_contact:
-        return None
-    return contact_threshold(np.array([rest_moments(module, tare, module.rate)]))
 
 
 def centre_of_pressure(module: Tactile, tare: TareArgument | Tare, hand: HandForce) -> Array:
@@ -231,8 +227,11 @@ def final_drop(hand: HandForce, duration: float = 0.2, factor: float = 5.0) -> i
         return None
     fall = normal[:-n] - normal[n:]
     start = int(np.argmax(fall))
+    # Before a drop the load is known for as long as the drop lasts. Its range is that between the
+    # 5 % and 95 % quantiles, so that a short push does not hide the drop.
     if start < n or fall[start] <= factor * np.ptp(np.quantile(normal[:start], (0.05, 0.95))):
         return None
+    # For good: the force never again rises over the middle of the fall, where the drop is placed.
     stays = normal[start + n :].max() < normal[start] - fall[start] / 2
     middle = start + int(np.argmax(normal[start:] < normal[start] - fall[start] / 2))
     return middle if stays else None

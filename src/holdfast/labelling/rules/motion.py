@@ -165,9 +165,14 @@ def clock_offset(seen: Array, felt: Array, known: Mask, period: float) -> ClockO
     """
     reach = min(round(MAX_CLOCK_OFFSET / period), len(seen) // 2)
     a, b = _ranks(seen, known), _ranks(felt, np.ones_like(known))
-    correlations = [
-        (_correlation(a, b, known, shift), -abs(shift), shift) for shift in range(-reach, reach + 1)
-    ]
+    correlations = []
+    for shift in range(-reach, reach + 1):  # b against a, which is delayed by `shift`
+        first, last = max(0, -shift), min(len(a), len(a) - shift)
+        mask = known[first:last]
+        x, y = a[first:last][mask], b[first + shift : last + shift][mask]
+        is_constant = len(x) < 3 or x.std() == 0 or y.std() == 0
+        correlation = 0.0 if is_constant else float(np.corrcoef(x, y)[0, 1])
+        correlations.append((correlation, -abs(shift), shift))  # of equals, the smaller shift
     correlation, _, shift = max(correlations)
     return ClockOffset(shift * period if correlation >= MIN_CORRELATION else 0.0, correlation)
 
@@ -180,6 +185,7 @@ def _slope_noise(values: Array, step: float) -> Array:
     if len(values) < 3:
         return np.zeros(values.shape[1])
     second = values[2:] - 2 * values[1:-1] + values[:-2]
+    # 0.6745: the median of |z| of a normal z. A second difference has the variance 1 + 4 + 1.
     noise = np.median(np.abs(second), axis=0) / (0.6745 * np.sqrt(6))
     half = max(n_samples_of(SPEED_WINDOW, step) // 2, 1)
     return np.asarray(noise / (step * np.sqrt((np.arange(-half, half + 1) ** 2).sum())))
@@ -192,19 +198,16 @@ def _interpolated(track: PoseTrack, times: Array) -> PoseTrack:
     positions, quaternions = np.full((len(times), 3), np.nan), np.full((len(times), 4), np.nan)
     if known.any():
         seen_times = track.times[seen]
-        values = np.concatenate([track.positions[seen], _continuous(track.quaternions[seen])], 1)
+        turns = track.quaternions[seen]
+        # q and -q are one rotation: between neighbours of opposite signs the mean would be any.
+        flips = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
+        signs = np.concatenate([[1.0], np.cumprod(np.where(flips == 0, 1.0, flips))])
+        values = np.concatenate([track.positions[seen], turns * signs[:, None]], axis=1)
         between = np.stack([np.interp(times, seen_times, column) for column in values.T], axis=1)
         positions[known] = between[known, :3]
         turns = between[known, 3:]
         quaternions[known] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
     return PoseTrack(times, positions, quaternions)
-
-
-def _continuous(quaternions: Array) -> Array:
-    """Return the same rotations with signs such that neighbours are close to each other."""
-    flips = np.sign((quaternions[1:] * quaternions[:-1]).sum(axis=1))
-    signs = np.concatenate([[1.0], np.cumprod(np.where(flips == 0, 1.0, flips))])
-    return np.asarray(quaternions * signs[:, None])
 
 
 def _rotation(quaternions: Array) -> "Rotation":
@@ -220,14 +223,3 @@ def _ranks(values: Array, known: Mask) -> Array:
     order = np.argsort(np.argsort(inside, kind="stable"), kind="stable")
     ranks[known] = order / max(len(inside) - 1, 1)
     return ranks
-
-
-def _correlation(a: Array, b: Array, known: Mask, shift: int) -> float:
-    """Return the correlation of b with a delayed by `shift` samples."""
-    n = len(a)
-    first, last = max(0, -shift), min(n, n - shift)
-    mask = known[first:last]
-    x, y = a[first:last][mask], b[first + shift : last + shift][mask]
-    if len(x) < 3 or x.std() == 0 or y.std() == 0:
-        return 0.0
-    return float(np.corrcoef(x, y)[0, 1])

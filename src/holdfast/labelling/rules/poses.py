@@ -1,6 +1,6 @@
 """Poses of the object and of the fingertips: from a recording's truth, CSV files and ROS bags."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from holdfast.errors import RecordingError
 from holdfast.io.importers.table import read_table
 from holdfast.metrics.masks import Mask, runs
-from holdfast.recordings import Recording, Truth
+from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 
 OBJECT = "object"
@@ -113,7 +113,11 @@ def poses_from_truth(recording: Recording) -> Poses:
             return Poses("truth", _track(truth.times, truth.hand["object_pose"]), tracks)
     if truth is not None and "marker_pose" in truth.hand:
         return Poses("marker_pose", in_sight(_track(truth.times, truth.hand["marker_pose"])))
-    raise RecordingError(f"no poses in {recording.name!r}: it has {_contents(truth)}; {EXPECTED}")
+    contents = "no truth"
+    if truth is not None:
+        names = sorted({*truth.hand, *chain(*truth.fingers.values())})
+        contents = f"{', '.join(names) or 'nothing'} in its truth"
+    raise RecordingError(f"no poses in {recording.name!r}: it has {contents}; {EXPECTED}")
 
 
 def poses_from_csv(path: str | Path) -> Poses:
@@ -164,7 +168,7 @@ def in_sight(track: PoseTrack) -> PoseTrack:
     length = np.linalg.norm(track.quaternions, axis=1)
     bad = (track.positions == LOST_COORDINATE).all(axis=1) | ~(np.abs(length - 1) < 0.1)
     repeats = np.concatenate([[False], (pose[1:] == pose[:-1]).all(axis=1)])
-    for start, end in runs(repeats):
+    for start, end in runs(repeats):  # the sample before a run is the first of the equal ones
         if track.times[end - 1] - track.times[start - 1] > MAX_REPEAT_TIME:
             bad[start - 1 : end] = True
     keep = ~bad[:, None]
@@ -204,26 +208,15 @@ def _track(times: Array, pose: npt.NDArray[np.generic]) -> PoseTrack:
 
 def _measured(rows: Mapping[str, Array], path: Path) -> Poses:
     """Return poses from rows of time and pose by body, on a clock of their own."""
-    tracks = {body: _measured_track(body_rows, path) for body, body_rows in rows.items()}
+    tracks = {}
+    for body, body_rows in rows.items():
+        timed = body_rows[np.isfinite(body_rows[:, 0])]
+        _, first = np.unique(timed[:, 0], return_index=True)  # of equal times the first is kept
+        tracks[body] = in_sight(_track(timed[first, 0], timed[first, 1:]))
+        if not tracks[body].seen.any():
+            raise RecordingError(
+                f"{path}: no valid pose in {len(body_rows)} rows; positions [m] and unit "
+                "quaternions qw, qx, qy, qz expected"
+            )
     object_track = tracks.pop(OBJECT)
     return Poses(path.name, object_track, tracks, same_clock=False)
-
-
-def _measured_track(rows: Array, path: Path) -> PoseTrack:
-    """Return a track from rows of time and pose; of equal times the first is kept."""
-    timed = rows[np.isfinite(rows[:, 0])]
-    _, first = np.unique(timed[:, 0], return_index=True)
-    track = in_sight(_track(timed[first, 0], timed[first, 1:]))
-    if not track.seen.any():
-        raise RecordingError(
-            f"{path}: no valid pose in {len(rows)} rows; positions [m] and unit quaternions "
-            "qw, qx, qy, qz expected"
-        )
-    return track
-
-
-def _contents(truth: Truth | None) -> str:
-    if truth is None:
-        return "no truth"
-    names: Iterator[str] = chain(truth.hand, *truth.fingers.values())
-    return f"{', '.join(sorted(set(names))) or 'nothing'} in its truth"

@@ -99,13 +99,31 @@ def propose(
     rule = rule or SignalRule()
     hand = hand_force(recording, tare)
     change = {name: _change_ratio(finger, rule) for name, finger in hand.fingers.items()}
-    changing = _changing(hand, change, rule)
-    timelines = {name: _no_contact(hand, finger) for name, finger in hand.fingers.items()}
-    for start, end in _grasps(hand, rule):
+    # A change of two fingers is one of the object, and so of every finger that touches it.
+    shared = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
+    gap = n_samples_of(rule.merge - rule.window, hand.period)  # the window fills the rest
+    changing, timelines = {}, {}
+    for name, finger in hand.fingers.items():
+        changes = ((change[name] > 1) | shared) & finger.contact
+        changing[name] = fill_short_gaps(changes, gap) & finger.contact
+        timelines[name] = StateTimeline.unknown(hand.times)
+        ratio: Array | float = UNMEASURED_RATIO
+        if finger.evidence_threshold is not None:
+            ratio = evidence_ratio(finger.evidence_threshold, finger.amplitude)
+        timelines[name].set_state(~finger.contact & finger.known, NO_CONTACT, None, ratio)
+    # A grasp lasts from the first touch of any finger to the last, over short losses.
+    touched = fill_short_gaps(hand.n_touching > 0, n_samples_of(rule.settle, hand.period))
+    for start, end in runs(touched).tolist():
         grasp = _GraspLabeller(hand, change, changing, slice(start, end), rule)
         for name in hand.fingers:
             grasp.label(name, timelines[name])
-    _label_loss(hand, timelines)
+    # Where it begins in contact no threshold says when contact ends: only a final drop does.
+    loaded = all(finger.threshold is None for finger in hand.fingers.values())
+    if loaded and (drop := final_drop(hand)) is not None:
+        after = np.arange(len(hand.times)) >= drop
+        for name, finger in hand.fingers.items():
+            lost = after & finger.known
+            timelines[name].set_state(lost, NO_CONTACT, Cause.LOST, UNMEASURED_RATIO)
     writer = LabelWriter(SIGNAL_RULE, _evidence)
     return {
         name: writer.labels(timelines[name], finger.span) for name, finger in hand.fingers.items()
@@ -126,32 +144,6 @@ def _change_ratio(finger: FingerForce, rule: SignalRule) -> Array:
     return np.where(touching, evidence_ratio(change, least), 0.0)
 
 
-def _changing(hand: HandForce, change: Mapping[str, Array], rule: SignalRule) -> dict[str, Mask]:
-    """Return (n,) by finger, where the finger or two others show a change in contact."""
-    shared = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
-    gap = n_samples_of(rule.merge - rule.window, hand.period)  # the window fills the rest
-    return {
-        name: fill_short_gaps(((change[name] > 1) | shared) & finger.contact, gap) & finger.contact
-        for name, finger in hand.fingers.items()
-    }
-
-
-def _grasps(hand: HandForce, rule: SignalRule) -> list[tuple[int, int]]:
-    """Return the first sample of each grasp of the hand, and the first after it."""
-    touched = fill_short_gaps(hand.n_touching > 0, n_samples_of(rule.settle, hand.period))
-    return [(int(start), int(end)) for start, end in runs(touched)]
-
-
-def _no_contact(hand: HandForce, finger: FingerForce) -> StateTimeline:
-    """Return a timeline with the intervals without contact."""
-    timeline = StateTimeline.unknown(hand.times)
-    ratio: Array | float = UNMEASURED_RATIO
-    if finger.evidence_threshold is not None:
-        ratio = evidence_ratio(finger.evidence_threshold, finger.amplitude)
-    timeline.set_state(~finger.contact & finger.known, NO_CONTACT, None, ratio)
-    return timeline
-
-
 class _GraspLabeller:
     """Labels of one grasp: closing, held, released."""
 
@@ -167,19 +159,18 @@ class _GraspLabeller:
         self._rule = rule
         self._inside = np.zeros(len(hand.times), dtype=bool)
         self._inside[span] = True
-        self._begins_in_contact = all(finger.threshold is None for finger in hand.fingers.values())
-        self._end = span.stop
-        self._locked = span.start if self._begins_in_contact else self._lock()
-
-    def _lock(self) -> int:
-        """Return the sample from which no finger in contact changes for long enough."""
-        hand = self._hand
-        n_grasping = sum((finger.contact & self._inside).any() for finger in hand.fingers.values())
-        calm = self._inside & (hand.n_touching >= min(2, n_grasping))
-        for mask in self._changing.values():
-            calm &= ~mask
-        rests = runs(drop_short_runs(calm, self._n(self._rule.settle)))
-        return int(rests[0][0]) if len(rests) else self._end
+        self._starts_loaded = all(finger.threshold is None for finger in hand.fingers.values())
+        self._locked = span.start
+        if not self._starts_loaded:
+            # Locked is the hand once no finger changes for long enough, at least two of them
+            # touching if two ever do: one finger that waits for the other does not hold.
+            fingers = hand.fingers.values()
+            n_grasping = sum((finger.contact & self._inside).any() for finger in fingers)
+            calm = self._inside & (hand.n_touching >= min(2, n_grasping))
+            for mask in changing.values():
+                calm &= ~mask
+            rests = runs(drop_short_runs(calm, self._n(rule.settle)))
+            self._locked = int(rests[0][0]) if len(rests) else span.stop
 
     def label(self, name: str, timeline: StateTimeline) -> None:
         """Set the states of a finger during the grasp."""
@@ -190,8 +181,11 @@ class _GraspLabeller:
         timeline.set_state(touching, STABLE, None, evidence_ratio(1.0, ratio))
         timeline.set_state(touching & self._changing[name], UNSTABLE, Cause.DISTURBANCE, ratio)
         before = np.arange(len(touching)) < self._locked
-        timeline.set_state(touching & before, UNSTABLE, Cause.CLOSING, _contact_ratio(finger))
-        if not self._begins_in_contact:
+        ratio_of_contact: Array | float = UNMEASURED_RATIO
+        if finger.evidence_threshold is not None:
+            ratio_of_contact = evidence_ratio(finger.amplitude, finger.evidence_threshold)
+        timeline.set_state(touching & before, UNSTABLE, Cause.CLOSING, ratio_of_contact)
+        if not self._starts_loaded:
             self._label_end(name, touching, timeline)
 
     def _label_end(self, name: str, touching: Mask, timeline: StateTimeline) -> None:
@@ -202,39 +196,20 @@ class _GraspLabeller:
         strong = np.flatnonzero(
             held & (finger.amplitude >= RELEASE_SHARE * grip_force(finger, held))
         )
+        # The recording may end, or lose the module, before the fall does: nothing is known then.
         if not len(strong) or last + 1 >= len(touching) or not finger.known[last + 1]:
             return
         onset = int(strong[-1])
         cause = Cause.LOST if last - onset < self._n(MAX_FALL_TIME) else Cause.RELEASED
-        start = self._start_of_end(self._changing[name] & held, onset)
-        timeline.set_state(touching & (samples >= start), UNSTABLE, cause, self._change[name])
-
-    def _start_of_end(self, changing: Mask, onset: int) -> int:
-        """Return where the changes that lead to the fall begin; the fall if they are separate."""
-        calm = np.flatnonzero(~changing[: onset + 1])
+        # The end begins with the changes that lead to the fall, unless they are an event of their
+        # own: a longer disturbance after which the hand opened.
+        calm = np.flatnonzero(~(self._changing[name] & held)[: onset + 1])
         start = int(calm[-1]) + 1 if len(calm) else 0
-        return start if onset - start < self._n(self._rule.merge) else onset + 1
+        start = start if onset - start < self._n(self._rule.merge) else onset + 1
+        timeline.set_state(touching & (samples >= start), UNSTABLE, cause, self._change[name])
 
     def _n(self, duration: float) -> int:
         return n_samples_of(duration, self._hand.period)
-
-
-def _contact_ratio(finger: FingerForce) -> Array | float:
-    if finger.evidence_threshold is None:
-        return UNMEASURED_RATIO
-    return evidence_ratio(finger.amplitude, finger.evidence_threshold)
-
-
-def _label_loss(hand: HandForce, timelines: Mapping[str, StateTimeline]) -> None:
-    """Label no contact after the final drop of the force in a recording that begins in contact."""
-    if any(finger.threshold is not None for finger in hand.fingers.values()):
-        return
-    drop = final_drop(hand)
-    if drop is None:
-        return
-    after = np.arange(len(hand.times)) >= drop
-    for name, finger in hand.fingers.items():
-        timelines[name].set_state(after & finger.known, NO_CONTACT, Cause.LOST, UNMEASURED_RATIO)
 
 
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:

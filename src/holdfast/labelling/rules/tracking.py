@@ -146,9 +146,24 @@ def propose(
     tips = tip_tracks_of(poses, list(hand.fingers))
     tracks = {name: relative_track(poses.object_track, tip) for name, tip in tips.items()}
     clock = ClockOffset(offset, 1.0) if offset is not None else _clock_offset(poses, tracks, hand)
-    _check_overlap(recording, poses, clock.seconds)
+    times = poses.object_track.times[poses.object_track.seen] + clock.seconds
+    if len(times) < 2:
+        raise RecordingError(
+            f"{poses.source}: at least 2 poses of the object in sight expected, {len(times)} found"
+        )
+    if times[-1] < recording.start or times[0] > recording.end:
+        raise RecordingError(
+            f"{poses.source} has poses from {times[0]:.10g} to {times[-1]:.10g} s; recording "
+            f"{recording.name!r} runs from {recording.start:.10g} to {recording.end:.10g} s"
+        )
     drop = final_drop(hand)
-    writer = _label_writer(poses, clock, rule)
+    note = f"poses: {poses.source}"
+    if clock.seconds:
+        note += f", later by {clock.seconds:.3f} s"
+    if not clock.reliable:
+        note += ", clocks not aligned: motion seen and felt are not alike"
+    trust = 1.0 if clock.reliable else 0.5  # then every time may be wrong
+    writer = LabelWriter(TRACKING_RULE, _evidence_text(rule), trust, note)
     labels = {}
     for name, track in tracks.items():
         finger, module = hand.fingers[name], recording.modules[name]
@@ -170,19 +185,6 @@ def _clock_offset(poses: Poses, tracks: Mapping[str, PoseTrack], hand: HandForce
     return clock_offset(seen, felt, known, hand.period)
 
 
-def _check_overlap(recording: Recording, poses: Poses, offset: float) -> None:
-    times = poses.object_track.times[poses.object_track.seen] + offset
-    if len(times) < 2:
-        raise RecordingError(
-            f"{poses.source}: at least 2 poses of the object in sight expected, {len(times)} found"
-        )
-    if times[-1] < recording.start or times[0] > recording.end:
-        raise RecordingError(
-            f"{poses.source} has poses from {times[0]:.10g} to {times[-1]:.10g} s; recording "
-            f"{recording.name!r} runs from {recording.start:.10g} to {recording.end:.10g} s"
-        )
-
-
 class _FingerLabeller:
     """States of one finger from its force and the motion of the object."""
 
@@ -198,26 +200,28 @@ class _FingerLabeller:
     def timeline(self, motion: RelativeMotion, point: Array | None) -> StateTimeline:
         """Return states by motion in contact, and no contact; unknown elsewhere."""
         timeline = StateTimeline.unknown(self._times)
-        ratio = self._motion_ratio(motion, point)
+        ratio = speed_ratio = self._speed_ratio(motion)
+        if self._rule.measure == "displacement":
+            ratio = np.where(motion.known, self._displacement_ratio(motion, point), 0.0)
         moving = self._moving(ratio)
+        # What is set later replaces what was set before: first what holds still, then what moves,
+        # then what slides within it; no contact, and the ends of contacts, last.
         held = self._contact & motion.known
         timeline.set_state(held, STABLE, None, evidence_ratio(1.0, ratio))
         around = Cause.DISTURBANCE if self._rule.measure == "speed" else None
         timeline.set_state(held & moving, UNSTABLE, around, ratio)
-        speed_ratio = self._speed_ratio(motion)
         sliding = held & moving & self._sliding(speed_ratio)
         timeline.set_state(sliding, UNSTABLE, Cause.SLIP, speed_ratio)
-        self._label_no_contact(timeline)
+        free = ~self._contact & self._finger.known
+        if self._drop is not None:
+            timeline.set_state(free, NO_CONTACT, Cause.LOST, LOSS_RATIO)
+        elif (threshold := self._finger.evidence_threshold) is not None:
+            clear = evidence_ratio(threshold, self._finger.amplitude)
+            timeline.set_state(free, NO_CONTACT, None, clear)
         for start, end in runs(self._contact):
             self._label_ends(timeline, start, end)
             self._label_loss(timeline, motion.known, start, end)
         return timeline
-
-    def _motion_ratio(self, motion: RelativeMotion, point: Array | None) -> Array:
-        """Return (n,) the motion over its threshold; 0 while the object is out of sight."""
-        if self._rule.measure == "speed":
-            return self._speed_ratio(motion)
-        return np.where(motion.known, self._displacement_ratio(motion, point), 0.0)
 
     def _speed_ratio(self, motion: RelativeMotion) -> Array:
         """Return (n,) the speed or spin over its threshold; 0 while the object is out of sight."""
@@ -294,25 +298,6 @@ class _FingerLabeller:
         unseen[:] = False
         unseen[end : end + int(np.argmax(after)) if after.any() else len(known)] = True
         timeline.set_cause(unseen, Cause.LOST)
-
-    def _label_no_contact(self, timeline: StateTimeline) -> None:
-        finger = self._finger
-        free = ~self._contact & finger.known
-        if self._drop is not None:
-            timeline.set_state(free, NO_CONTACT, Cause.LOST, LOSS_RATIO)
-        elif finger.evidence_threshold is not None:
-            ratio = evidence_ratio(finger.evidence_threshold, finger.amplitude)
-            timeline.set_state(free, NO_CONTACT, None, ratio)
-
-
-def _label_writer(poses: Poses, clock: ClockOffset, rule: TrackingRule) -> LabelWriter:
-    """Return the writer of labels; unreliable clocks halve every confidence."""
-    note = f"poses: {poses.source}"
-    if clock.seconds:
-        note += f", later by {clock.seconds:.3f} s"
-    if not clock.reliable:
-        note += ", clocks not aligned: motion seen and felt are not alike"
-    return LabelWriter(TRACKING_RULE, _evidence_text(rule), 1.0 if clock.reliable else 0.5, note)
 
 
 def _evidence_text(rule: TrackingRule) -> EvidenceText:

@@ -1,6 +1,5 @@
 """JSON documents that the labelling page and its server exchange, and how they are made."""
 
-from collections.abc import Sequence
 from typing import Any, Literal
 
 import msgspec
@@ -11,7 +10,7 @@ from holdfast.io.label_files import labels_for
 from holdfast.labelling.review.spans import State, doubtful, state_name
 from holdfast.labelling.server.store import LabelInput, ModuleLabels, Origin, is_read_only
 from holdfast.labelling.server.workspace import Workspace, beside
-from holdfast.recordings import Label, Recording
+from holdfast.recordings import Label
 
 LABEL_SCHEMA = "holdfast.label/1"
 
@@ -177,28 +176,28 @@ class ChangePoints(msgspec.Struct, frozen=True):
 
 def list_recordings(workspace: Workspace) -> RecordingList:
     """Return all recordings of a workspace, with the numbers of labels and proposals."""
-    entries = [_entry(workspace, index) for index in range(len(workspace.paths))]
+    entries = []
+    for index, path in enumerate(workspace.paths):
+        try:
+            summary = workspace.summary(index)
+            labels = labels_for(path, summary.digest)
+        except (HoldfastError, OSError) as cause:  # the others can be labelled all the same
+            error = " ".join(str(cause).split())
+            entries.append(RecordingEntry(index, path.stem, error=error))
+            continue
+        proposals = open_proposals(workspace.proposals(index), labels or {})
+        entry = RecordingEntry(
+            id=index,
+            name=summary.name,
+            duration=summary.duration,
+            fingers=list(summary.fingers),
+            labelled=labels is not None,
+            n_labels=summary.n_inside if labels is None else sum(map(len, labels.values())),
+            n_proposals=sum(map(len, proposals.values())),
+            n_doubtful=len(doubtful(labels or {})) + len(doubtful(proposals)),
+        )
+        entries.append(entry)
     return RecordingList(workspace.author, entries)
-
-
-def _entry(workspace: Workspace, index: int) -> RecordingEntry:
-    path = workspace.paths[index]
-    try:
-        summary = workspace.summary(index)
-        labels = labels_for(path, summary.digest)
-    except (HoldfastError, OSError) as cause:
-        return RecordingEntry(index, path.stem, error=" ".join(str(cause).split()))
-    proposals = open_proposals(workspace.proposals(index), labels or {})
-    return RecordingEntry(
-        id=index,
-        name=summary.name,
-        duration=summary.duration,
-        fingers=list(summary.fingers),
-        labelled=labels is not None,
-        n_labels=summary.n_inside if labels is None else sum(map(len, labels.values())),
-        n_proposals=sum(map(len, proposals.values())),
-        n_doubtful=len(doubtful(labels or {})) + len(doubtful(proposals)),
-    )
 
 
 def describe_recording(workspace: Workspace, index: int) -> RecordingDetails:
@@ -219,7 +218,10 @@ def describe_recording(workspace: Workspace, index: int) -> RecordingDetails:
         rate=recording.rate,
         labels=labels_data(stored.labels),
         proposals=labels_data(proposals),
-        suspects=_suspects(workspace, recording),
+        suspects=[
+            SuspectLabel(s.finger, s.start, s.end, s.given, s.expected, s.confidence, s.kind)
+            for s in workspace.suspects(recording.name)
+        ],
         doubtful=doubtful_labels(stored.labels, proposals),
         markers=list(recording.markers),
         media=[
@@ -246,24 +248,17 @@ def doubtful_labels(labels: ModuleLabels, proposals: ModuleLabels) -> list[Doubt
 
 def open_proposals(proposals: ModuleLabels, labels: ModuleLabels) -> dict[str, list[Label]]:
     """Return the proposals whose middle has no label yet."""
-    return {
-        finger: [label for label in proposed if not _is_labelled(labels.get(finger, ()), label)]
-        for finger, proposed in proposals.items()
-    }
+    still_open: dict[str, list[Label]] = {}
+    for finger, proposed in proposals.items():
+        still_open[finger] = []
+        for label in proposed:
+            # By the middle: a label that was taken over and then moved a little still answers it.
+            middle = (label.start + label.end) / 2
+            if not any(done.start <= middle < done.end for done in labels.get(finger, ())):
+                still_open[finger].append(label)
+    return still_open
 
 
 def labels_data(labels: ModuleLabels) -> dict[str, list[LabelData]]:
     """Return labels by finger as they are written to JSON."""
     return {name: [label_data(label) for label in finger] for name, finger in labels.items()}
-
-
-def _is_labelled(labels: Sequence[Label], proposal: Label) -> bool:
-    middle = (proposal.start + proposal.end) / 2
-    return any(label.start <= middle < label.end for label in labels)
-
-
-def _suspects(workspace: Workspace, recording: Recording) -> list[SuspectLabel]:
-    return [
-        SuspectLabel(s.finger, s.start, s.end, s.given, s.expected, s.confidence, s.kind)
-        for s in workspace.suspects(recording.name)
-    ]

@@ -5,7 +5,7 @@ in the fingertip frame is kept, as the reading of a sensor with one taxel: 24 by
 instead of 180. The tare is linear, so everything that follows gives the same force.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -43,10 +43,21 @@ def load_for_labelling(path: Path) -> tuple[Recording, bool]:
         return load_recording(path, labels=False), True
     with recording_errors(path):
         header, groups = format_module(path.suffix).read_columns(path)
-        if not _is_long(header):
+        counts = [
+            (module.n_samples or 0) * 3 * len(module.sensor["positions"])
+            for module in header.modules.values()
+        ]
+        if sum(counts) <= MAX_READINGS:
             return load_recording(path, labels=False), True
-        forces = _forces(header, groups)
-        recording = recording_from(_header_of_forces(header), forces, path)
+        # The header of a recording with one taxel in each module, without a truth.
+        modules = {
+            name: msgspec.structs.replace(
+                header.modules[name], sensor=force_sensor(sensor).to_dict(), number="float64"
+            )
+            for name, sensor in header_sensors(header).items()
+        }
+        reduced = msgspec.structs.replace(header, modules=modules, truth=None)
+        recording = recording_from(reduced, _forces(header, groups), path)
         return _with_digest(recording, header.digest), False
 
 
@@ -74,23 +85,6 @@ def read_header(path: Path) -> tuple[Header | None, bool]:
     header, groups, complete = format_module(path.suffix).read_groups(path)
     getattr(groups, "close", lambda: None)()
     return header, complete
-
-
-def _is_long(header: Header) -> bool:
-    modules = header.modules.values()
-    n = sum((module.n_samples or 0) * 3 * len(module.sensor["positions"]) for module in modules)
-    return n > MAX_READINGS
-
-
-def _header_of_forces(header: Header) -> Header:
-    """Return the header of the recording with one taxel in each module, without truth."""
-    modules = {
-        name: msgspec.structs.replace(
-            header.modules[name], sensor=force_sensor(sensor).to_dict(), number="float64"
-        )
-        for name, sensor in header_sensors(header).items()
-    }
-    return msgspec.structs.replace(header, modules=modules, truth=None)
 
 
 def force_sensor(sensor: Sensor) -> Sensor:
@@ -122,15 +116,11 @@ def _forces(header: Header, groups: Iterable[TimedArrays]) -> dict[str, TimedArr
             _sum_taxels(columns, sensors[topic].rotations, filled[topic][1][part, 0])
     if ends != n_samples:
         raise RecordingError(f"{header.name}: {ends} samples, its header names {n_samples}")
-    return _with_shared_times(filled)
-
-
-def _with_shared_times(arrays: Mapping[str, TimedArray]) -> dict[str, TimedArray]:
-    """Return the arrays; modules with the same times, as of one driver, have them once."""
-    first, _ = next(iter(arrays.values()))
+    # Modules of one driver have the same times: they share one array.
+    first, _ = next(iter(filled.values()))
     return {
         topic: (first if np.array_equal(times, first) else times, values)
-        for topic, (times, values) in arrays.items()
+        for topic, (times, values) in filled.items()
     }
 
 

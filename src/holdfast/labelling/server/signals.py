@@ -116,9 +116,17 @@ class FingerSignals:
 
     def __init__(self, module: Tactile, tare: TareArgument | Tare = 0.5) -> None:
         values = signal_values(module, tare, number=PLOTTED_NUMBER)
-        self.times, self.values = _with_gaps(module, values)
+        # A row of NaN in every gap interrupts the line of a plot.
+        self.times, self.values = module.times, values
+        gaps = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
+        if len(gaps):
+            middles = (module.times[gaps - 1] + module.times[gaps]) / 2
+            self.times = np.insert(module.times, gaps, middles)
+            self.values = np.insert(values, gaps, np.nan, axis=0)
         self._levels: dict[int, _Level] = {}  # by depth, of blocks of 2^depth samples
-        depth, level = FIRST_DEPTH, self._first_level()
+        starts = range(0, max(len(self.times), 1), PART_SAMPLES)
+        depth = FIRST_DEPTH
+        level = _joined([self._reduced(start, start + PART_SAMPLES, depth) for start in starts])
         self._levels[depth] = level
         while level.n_blocks > 2:
             depth, level = depth + 1, _halved(level)
@@ -140,21 +148,19 @@ class FingerSignals:
         if n <= 2 * points:
             return True, _series(self.times[first:last], self.values[first:last])
         depth = max(int(np.ceil(np.log2(n / max(points - 2, 1)))), 1)
-        level = self._blocks(first, last, min(depth, max(self._levels)))
-        return False, _series(level.times.T.ravel(), _in_order(level))
-
-    def _blocks(self, first: int, last: int, depth: int) -> _Level:
-        """Return the blocks of 2^depth samples that contain samples `first` up to `last`."""
+        depth = min(depth, max(self._levels))
+        # The blocks of 2^depth samples that contain the part: kept ones, or of few samples.
         blocks = slice(first >> depth, ((last - 1) >> depth) + 1)
         if depth in self._levels:
-            return self._levels[depth].part(blocks)
-        return self._reduced(blocks.start << depth, blocks.stop << depth, depth)
-
-    def _first_level(self) -> _Level:
-        """Return the blocks of the first depth that is kept, from parts of the samples."""
-        starts = range(0, max(len(self.times), 1), PART_SAMPLES)
-        parts = [self._reduced(start, start + PART_SAMPLES, FIRST_DEPTH) for start in starts]
-        return _joined(parts)
+            level = self._levels[depth].part(blocks)
+        else:
+            level = self._reduced(blocks.start << depth, blocks.stop << depth, depth)
+        # (2 n, n_series) minimum and maximum of each block, the earlier one first: a line through
+        # them goes the way that the samples go.
+        earlier = np.where(level.falls, level.high, level.low)
+        later = np.where(level.falls, level.low, level.high)
+        values = np.stack([earlier, later], axis=2).reshape(len(SERIES), -1).T
+        return False, _series(level.times.T.ravel(), values)
 
     def _reduced(self, start: int, stop: int, depth: int) -> _Level:
         """Return the blocks of samples `start` up to `stop`, which is a whole number of blocks."""
@@ -225,7 +231,13 @@ def signal_values(
         ValueError: the tare is unknown, or no finite sample lies in its time.
     """
     values = np.empty((module.n_samples, len(SERIES)), number)
-    force = _force(module, tare)
+    try:
+        force = tared_force(module, tare, offline=True).force
+    except ValueError:
+        # A module without any finite sample has no tare, and is plotted as unknown.
+        if np.isfinite(module.readings).all(axis=(1, 2)).any():
+            raise
+        force = np.full((module.n_samples, 3), np.nan)
     for start in range(0, module.n_samples, PART_SAMPLES):
         part = values[start : start + PART_SAMPLES]
         end, history = start + len(part), min(start, window - 1)
@@ -233,28 +245,6 @@ def signal_values(
         part[:, 1:4] = force[start:end]
         part[:, 4] = haar_features(force[start - history : end], window)[history:, 5]
     return values
-
-
-def _force(module: Tactile, tare: TareArgument | Tare) -> Array:
-    """Return (n, 3) force with one baseline for all samples; NaN without any finite sample."""
-    try:
-        return tared_force(module, tare, offline=True).force
-    except ValueError:
-        if np.isfinite(module.readings).all(axis=(1, 2)).any():
-            raise
-        return np.full((module.n_samples, 3), np.nan)
-
-
-def _with_gaps(
-    module: Tactile, values: npt.NDArray[np.floating]
-) -> tuple[Array, npt.NDArray[np.floating]]:
-    """Return times and values with a row of NaN in every gap, so that lines are interrupted."""
-    times = module.times
-    gaps = np.flatnonzero(np.diff(times) > GAP_PERIODS * module.period) + 1
-    if not len(gaps):
-        return times, values
-    middles = (times[gaps - 1] + times[gaps]) / 2
-    return np.insert(times, gaps, middles), np.insert(values, gaps, np.nan, axis=0)
 
 
 def _halved(level: _Level) -> _Level:
@@ -278,13 +268,6 @@ def _halved(level: _Level) -> _Level:
 def _joined(levels: Sequence[_Level]) -> _Level:
     """Return the blocks of several levels, one after the other."""
     return _Level(*(np.concatenate(arrays, axis=1) for arrays in zip(*levels, strict=True)))
-
-
-def _in_order(level: _Level) -> npt.NDArray[np.floating]:
-    """Return (2 n, n_series) minimum and maximum of each block, the earlier one first."""
-    first = np.where(level.falls, level.high, level.low)
-    second = np.where(level.falls, level.low, level.high)
-    return np.stack([first, second], axis=2).reshape(len(SERIES), -1).T
 
 
 def _series(times: Array, values: npt.NDArray[np.floating]) -> Series:

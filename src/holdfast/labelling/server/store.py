@@ -26,7 +26,7 @@ from holdfast.io.label_files import (
     labels_path,
     load_labels,
 )
-from holdfast.recordings import Label, Recording, Tactile
+from holdfast.recordings import Label, Recording
 
 NO_REVISION = "none"
 """Revision of a label file that does not exist."""
@@ -156,6 +156,8 @@ def save_stored(
     target = labels_path(path)
     if is_read_only(path):
         raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
+    # The revision is compared and the file replaced under one lock, so that two saves of the same
+    # revision never both succeed.
     with _locked(target.parent):
         current = revision_of(path)
         if current != revision:
@@ -209,7 +211,13 @@ def validated(recording: Recording, labels: ModuleLabels) -> dict[str, tuple[Lab
             f"has {', '.join(recording.modules)}"
         )
     for finger, finger_labels in labels.items():
-        _validate(finger, recording, finger_labels)
+        for earlier, later in pairwise(sorted(finger_labels, key=lambda label: label.start)):
+            if later.start < earlier.end - TIME_TOLERANCE:
+                raise ValueError(f"{finger}: {_span_text(earlier)} and {_span_text(later)} overlap")
+        try:  # a module checks all else
+            replace(recording.modules[finger], labels=tuple(finger_labels))
+        except RecordingError as cause:
+            raise ValueError(f"{finger}: {cause}") from cause
     return {
         finger: tuple(sorted(labels.get(finger, ()), key=lambda label: label.start))
         for finger in recording.modules
@@ -243,11 +251,22 @@ def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tupl
         recording: the recording.
         labels: by finger.
     """
+    start = recording.start - TIME_TOLERANCE
     end = recording.end + max(module.period for module in recording.modules.values())
-    return {
-        finger: tuple(_cut(uncut, recording.modules.get(finger), recording.start, end))
-        for finger, uncut in labels.items()
-    }
+    cut: dict[str, tuple[Label, ...]] = {}
+    for finger, uncut in labels.items():
+        module, kept = recording.modules.get(finger), []
+        for label in uncut:
+            if module is None or not module.n_samples:
+                kept.append(label)
+            elif start <= label.start and label.end <= end + TIME_TOLERANCE:
+                begins = max(label.start, float(module.times[0]))
+                ends = min(label.end, float(module.times[-1]) + module.period)
+                kept += [replace(label, start=begins, end=ends)] if begins < ends else []
+            else:
+                kept.append(label)
+        cut[finger] = tuple(kept)
+    return cut
 
 
 def _parse(finger: str, label: LabelInput) -> Label:
@@ -266,33 +285,8 @@ def _parse(finger: str, label: LabelInput) -> Label:
         raise ValueError(f"{finger}: {problem}") from problem
 
 
-def _validate(finger: str, recording: Recording, labels: Sequence[Label]) -> None:
-    for earlier, later in pairwise(sorted(labels, key=lambda label: label.start)):
-        if later.start < earlier.end - TIME_TOLERANCE:
-            raise ValueError(f"{finger}: {_span_text(earlier)} and {_span_text(later)} overlap")
-    try:
-        replace(recording.modules[finger], labels=tuple(labels))
-    except RecordingError as cause:
-        raise ValueError(f"{finger}: {cause}") from cause
-
-
 def _span_text(label: Label) -> str:
     return f"{label.state.value.lower()} [{label.start:.10g}, {label.end:.10g}) s"
-
-
-def _cut(labels: Sequence[Label], module: Tactile | None, start: float, end: float) -> list[Label]:
-    """Cut the labels within [start, end] to the time of the module; keep the others."""
-    if module is None or not module.n_samples:
-        return list(labels)
-    first, last = float(module.times[0]), float(module.times[-1])
-    cut = []
-    for label in labels:
-        if start - TIME_TOLERANCE <= label.start and label.end <= end + TIME_TOLERANCE:
-            begins, ends = max(label.start, first), min(label.end, last + module.period)
-            cut += [replace(label, start=begins, end=ends)] if begins < ends else []
-        else:
-            cut.append(label)
-    return cut
 
 
 def _writable(path: Path) -> bool:

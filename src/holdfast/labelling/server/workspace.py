@@ -12,7 +12,6 @@ from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io import load_recording
-from holdfast.io.header import Header
 from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.forces import fitting_tare
@@ -137,11 +136,13 @@ class Workspace:
         self._tare = None if tare is None else Tare.parse(tare)
         self._poses = poses
         self._suspects = tuple(suspects)
+        # The latest proposals by index, which `propose` replaces; summaries and open recordings by
+        # version of the file, so that a file that changes is read again.
         self._proposals: dict[int, Proposals] = {}
         self._summaries: dict[tuple[Path, int, int], RecordingSummary] = {}
         self._open: OrderedDict[tuple[Path, int, int], OpenRecording] = OrderedDict()
-        self._read_lock = RLock()
-        self._save_lock = RLock()
+        self._read_lock = RLock()  # of `_open`: a recording is in memory once
+        self._save_lock = RLock()  # a revision is not read while it is being written
         self._compute_lock = RLock()  # two requests do not compute the signals of one recording
         self._changes_lock = RLock()  # separate: zooming does not wait for change points
 
@@ -302,32 +303,23 @@ def summary_of(path: Path) -> RecordingSummary:
     with recording_errors(path):
         header, complete = read_header(path)
     if header is None or not (complete and header.digest):
-        return _summary_of_samples(load_recording(path, labels=False))
-    return RecordingSummary(
-        header.name if path.stem == header.file else path.stem,
-        max(_durations(header), default=0.0),
-        tuple(header.modules),
-        header.digest,
-        sum(len(module.labels) for module in header.modules.values()),
-    )
-
-
-def _durations(header: Header) -> list[float]:
-    """Return the approximate duration of each module [s]."""
-    return [
+        # No header, or one of a recording that was cut off: only the samples say how long it is.
+        recording = load_recording(path, labels=False)
+        modules = recording.modules
+        n_inside = sum(len(module.labels) for module in modules.values())
+        return RecordingSummary(
+            recording.name, recording.duration, tuple(modules), recording.digest, n_inside
+        )
+    durations = [
         max((module.n_samples or 0) - 1, 0) / float(module.sensor["rate"])
         for module in header.modules.values()
     ]
-
-
-def _summary_of_samples(recording: Recording) -> RecordingSummary:
-    modules = recording.modules
     return RecordingSummary(
-        recording.name,
-        recording.duration,
-        tuple(modules),
-        recording.digest,
-        sum(len(module.labels) for module in modules.values()),
+        header.name if path.stem == header.file else path.stem,  # a renamed file is another
+        max(durations, default=0.0),
+        tuple(header.modules),
+        header.digest,
+        sum(len(module.labels) for module in header.modules.values()),
     )
 
 

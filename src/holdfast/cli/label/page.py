@@ -11,7 +11,6 @@ from holdfast.cli.label.inputs import (
     RuleOptions,
     current_time,
     login_name,
-    recordings_at,
 )
 from holdfast.cli.options import ServerOptions
 from holdfast.cli.serve import open_browser, page_url
@@ -51,6 +50,7 @@ def show_label_page(
         ValueError: other hosts may connect, but there is no token.
         OutputError: the address is not available.
     """
+    from holdfast.labelling.labelled_files import recordings_at
     from holdfast.labelling.server.service import LabellingService
     from holdfast.labelling.server.workspace import Workspace
     from holdfast.web.guard import Guard

@@ -1,10 +1,13 @@
-"""`holdfast label --compare` and `--audit`: check labels against others, or a classifier."""
+"""`holdfast label compare`: the agreement of two sets of labels."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from holdfast.cli.label.inputs import RuleOptions, recordings_at
+import typer
+
+from holdfast.cli.label.inputs import AnnotatorOption, RuleOptions
+from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import (
     format_number,
     print_json,
@@ -14,9 +17,9 @@ from holdfast.cli.terminal.console import (
     print_table,
 )
 from holdfast.cli.terminal.progress import progress
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
-    from holdfast.labelling.review.audit import Audit, Suspect
     from holdfast.labelling.review.compare import (
         Agreement,
         FingerAgreement,
@@ -28,30 +31,28 @@ if TYPE_CHECKING:
 LabelsOf = Callable[["Recording"], "dict[str, tuple[Label, ...]]"]
 
 
-def compare_labels(
-    paths: Sequence[Path], options: RuleOptions, annotator: str | None, *, as_json: bool
+def compare(
+    a: Annotated[Path, typer.Argument(help="A: recordings, labels of them, or a rule.")],
+    b: Annotated[Path, typer.Argument(help="B: likewise; one of both is no rule.")],
+    *,
+    options: RuleOptions,
+    annotator: AnnotatorOption = None,
+    as_json: JsonOption = False,
 ) -> None:
-    """Print the agreement of A and B for each recording and finger.
+    """Compare two sets of labels: kappa and differences of onsets.
 
-    Recordings without labels in A or B are left out, and named.
+    A and B are files, folders, or a rule: signal, tracking or command. Print Cohen's kappa, the
+    differences of the onsets, and how many intervals only one of them has. See docs/labels.md.
 
-    Args:
-        paths: A and B: each a file or folder of labels or labelled recordings, or a rule.
-        options: options of a rule.
-        annotator: annotator whose labels are read from an export of Label Studio.
-        as_json: print JSON.
-
-    Raises:
-        ValueError: the number of paths is not two, or both are rules.
-        RecordingError: no recording has labels in both.
+    Example:
+      holdfast label compare recordings/ labels-of-ann/ --json
+      holdfast label compare recordings/ signal
     """
+    require_extras("label")
     from msgspec import to_builtins
 
     from holdfast.labelling.review.compare import pool
 
-    if len(paths) != 2:
-        raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
-    a, b = paths
     files = _recordings_to_compare(a, b)
     both = (_labels_of(a, options, annotator), _labels_of(b, options, annotator))
     results = dict(_compare_each(files, both))
@@ -121,6 +122,7 @@ def _recordings_to_compare(a: Path, b: Path) -> list[Path]:
         ValueError: both are rules.
     """
     from holdfast.errors import RecordingError
+    from holdfast.labelling.labelled_files import recordings_beside
 
     if _is_rule(a) and _is_rule(b):
         raise ValueError(f"rules {a} and {b} given; A or B must be recordings or labels")
@@ -128,32 +130,11 @@ def _recordings_to_compare(a: Path, b: Path) -> list[Path]:
         if not _is_rule(place) and not place.exists():
             raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
     for place in (a, b):
-        if not _is_rule(place) and (files := _recordings_beside(place)):
+        if not _is_rule(place) and (files := recordings_beside(place)):
             return files
     raise RecordingError(
         f"no recordings beside the labels in {a} or {b}; recordings give the sample times"
     )
-
-
-def _recordings_beside(place: Path) -> list[Path]:
-    """Return the recordings in a folder, at a path, or beside a label file."""
-    from holdfast.errors import RecordingError
-    from holdfast.io import load_dataset
-    from holdfast.io.label_files import SUFFIX, load_labels
-    from holdfast.io.recording_files import SUFFIXES
-
-    if place.is_dir():
-        try:
-            return list(load_dataset(place).paths)
-        except RecordingError:
-            return []
-    if place.suffix in SUFFIXES:
-        return [place]
-    stems = [place.stem]
-    if place.name.endswith(SUFFIX):
-        stems = [place.name.removesuffix(SUFFIX), load_labels(place).name]
-    beside = [place.with_name(stem + suffix) for stem in stems for suffix in SUFFIXES]
-    return [path for path in beside if path.is_file()][:1]
 
 
 def _print(agreement: "Agreement") -> None:
@@ -219,53 +200,3 @@ def _row(labels: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:
 
 def _milliseconds(seconds: float | None) -> str:
     return format_number(None if seconds is None else 1e3 * seconds, 0)
-
-
-def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequence[Suspect]":
-    """Print the labels that a classifier contradicts, and return them.
-
-    Args:
-        paths: recordings, or folders of recordings.
-        jobs: number of parallel fits; -1: one per processor.
-        as_json: print JSON.
-
-    Raises:
-        TrainingError: there are too few labels to train a classifier.
-        RecordingError: a recording cannot be read.
-    """
-    from msgspec import to_builtins
-
-    from holdfast.io import Dataset
-    from holdfast.labelling.review.audit import audit
-
-    files = recordings_at(paths)
-    print_message(f"cross-validating the labels of {len(files)} recordings")
-    result = audit(Dataset(files), n_jobs=jobs)
-    if as_json:
-        print_json(to_builtins(result))
-    else:
-        _print_suspects(result)
-    return result.suspects
-
-
-def _print_suspects(result: "Audit") -> None:
-    rows = [
-        (
-            suspect.recording, suspect.finger, suspect.kind,
-            f"{suspect.start:.2f}", f"{suspect.end:.2f}",
-            suspect.given, suspect.expected, f"{suspect.confidence:.2f}",
-            "-" if suspect.shift is None else f"{suspect.shift:+.2f}",
-        )
-        for suspect in result.suspects
-    ]  # fmt: skip
-    if rows:
-        header = (
-            "recording", "finger", "kind", "start [s]", "end [s]",
-            "label", "expected", "confidence", "shift [s]",
-        )  # fmt: skip
-        print_table(header, rows)
-        print_line()
-    print_line(
-        f"{len(rows)} suspects in {result.judged:.1f} s of labels of "
-        f"{result.n_recordings} recordings"
-    )

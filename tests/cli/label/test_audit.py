@@ -1,6 +1,6 @@
 import pytest
 
-from holdfast.cli.label import page_mode
+from holdfast.cli.label import page
 from holdfast.io import load_recording, save_recording
 from holdfast.labelling.review.audit import Audit, Suspect
 
@@ -40,7 +40,7 @@ def test_an_audit_is_printed(capsys, folder, audited):
 def test_an_audit_is_shown_on_the_page(capsys, folder, audited, monkeypatch):
     shown = []
     monkeypatch.setattr(
-        page_mode,
+        page,
         "show_label_page",
         lambda paths, *_, suspects, **__: shown.append((paths, suspects)),
     )

@@ -1,0 +1,346 @@
+"""The format `arrays`: arrays of numbers in files of NumPy, MATLAB, HDF5, Parquet and JSON.
+
+Nothing is unpickled, and nothing outside of the file is read.
+"""
+
+import json
+import re
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import RecordingError, require_extras
+from holdfast.io.importers.array_tables import (
+    StoredArray,
+    StoredArrays,
+    arrays_of_records,
+    in_memory,
+    recordings_of_arrays,
+)
+from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.table import csv_files, natural_order
+from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+
+TAKES_SENSORS = True
+"""Whether `read` has the sensors, the columns and the report of `generic_csv.read`."""
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+MAX_GROUP_DEPTH = 16
+"""Maximum depth of groups inside groups."""
+MAX_ARRAYS = 10_000
+"""Maximum number of arrays of a file."""
+TEXT_SUFFIXES = (".txt", ".log", "")
+HEAD_SIZE = 4096
+"""Size of the start of a text in which the first line of JSON must be [bytes]."""
+
+_JSON_LINE = re.compile(rb'^(?:\xef\xbb\xbf)?\{\s*"', re.MULTILINE)
+
+
+def can_read(path: Path) -> bool:
+    """Return whether `path` is a file with arrays, or a folder with one."""
+    return any(map(_has_arrays, _files(path)))
+
+
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the files with arrays of a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    if not (files := _files(path)):
+        raise RecordingError(
+            f"no file with arrays in {path}; {', '.join(sorted(_READERS))} expected"
+        )
+    return files
+
+
+def read(
+    path: Path,
+    sensors: Mapping[str, Sensor] | None = None,
+    columns: Columns | None = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> Iterator[Recording]:
+    """Yield the recordings in a file with arrays; see `recordings_of_arrays`.
+
+    Raises:
+        RecordingError: it cannot be read, or has no such array.
+    """
+    if not path.stat().st_size:
+        raise RecordingError(f"{path} is empty; arrays of numbers expected")
+    try:
+        arrays = _READERS.get(path.suffix.lower(), _of_json)(path)
+    except ValueError as cause:
+        if "allow_pickle" in str(cause):  # NumPy stores objects as pickles
+            arrays = _of_pickle(path)
+        raise
+    if len(arrays) > MAX_ARRAYS:
+        raise RecordingError(f"{path}: at most {MAX_ARRAYS} arrays expected, {len(arrays)} given")
+    return recordings_of_arrays(path, arrays, sensors or {}, columns, report)
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the file, or the files with arrays in a folder that has no CSV files."""
+    if path.is_file():
+        return [path]
+    files = path.glob("*") if not csv_files(path) else ()
+    return sorted((one for one in files if one.is_file() and _has_arrays(one)), key=natural_order)
+
+
+def _has_arrays(file: Path) -> bool:
+    """Return whether a file has arrays, by its suffix; other text has lines that are JSON."""
+    if file.suffix.lower() in _READERS:
+        return True
+    if file.suffix.lower() not in TEXT_SUFFIXES:
+        return False
+    with file.open("rb") as content:
+        return _JSON_LINE.search(content.read(HEAD_SIZE)) is not None
+
+
+def _of_npy(path: Path) -> StoredArrays:
+    values = np.load(path, allow_pickle=False)
+    fields = values.dtype.names
+    return _flat({name: values[name] for name in fields} if fields else {path.stem: values})
+
+
+def _of_npz(path: Path) -> StoredArrays:
+    with zipfile.ZipFile(path) as file:
+        ReadBudget(path).keep(sum(one.file_size for one in file.infolist()))
+    with np.load(path, allow_pickle=False) as content:
+        return _flat(dict(content))
+
+
+def _of_matlab(path: Path) -> StoredArrays:
+    with path.open("rb") as file:
+        head = file.read(128)
+    if head.startswith(b"MATLAB 7.3") or head.startswith(HDF5_MAGIC):
+        return arrays_of_hdf5(path, is_transposed=head.startswith(b"MATLAB 7.3"))
+    require_extras("label")  # scipy
+    from scipy.io import loadmat
+
+    content = loadmat(path, simplify_cells=True)
+    return _flat({name: one for name, one in content.items() if not name.startswith("__")})
+
+
+def _of_hdf5(path: Path) -> StoredArrays:
+    return arrays_of_hdf5(path)
+
+
+def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, StoredArray]:
+    """Return the arrays of numbers in an HDF5 file, and the numbers in attributes, by path.
+
+    Only what is inside of the file itself is read: HDF5 can also store the names of other files
+    (external links, external storage, virtual arrays), and would read any file of the user.
+
+    Args:
+        path: path of the file.
+        is_transposed: whether axes are in reverse order, as MATLAB writes them.
+
+    Raises:
+        RecordingError: groups are nested too deep, or there are too many arrays.
+    """
+    require_extras("hdf5")
+    import h5py
+
+    file = h5py.File(path, "r")  # open until the process has read what it needs
+    budget = ReadBudget(path)
+    found: dict[str, StoredArray] = {}
+    seen: set[int] = set()
+    waiting: list[tuple[str, Any]] = [("", file["/"])]
+    while waiting:
+        name, group = waiting.pop()
+        budget.step()
+        address = h5py.h5o.get_info(group.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        if name.count("/") >= MAX_GROUP_DEPTH or len(found) > MAX_ARRAYS:
+            raise RecordingError(
+                f"{path}: at most {MAX_ARRAYS} arrays, nested {MAX_GROUP_DEPTH} deep, expected"
+            )
+        for key, value in group.attrs.items():
+            if np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf":
+                found[f"{name}/{key}"] = in_memory(np.asarray(value))
+        if isinstance(group, h5py.Dataset):
+            found |= _of_dataset(path, name, group, budget, is_transposed=is_transposed)
+            continue
+        for key in group:
+            inside = f"{name}/{key}".lstrip("/")
+            if isinstance(group.get(key, getlink=True), h5py.HardLink) and not key.startswith("#"):
+                waiting.append((inside, group[key]))
+    return found
+
+
+def _of_dataset(
+    path: Path,
+    name: str,
+    dataset: Any,  # noqa: ANN401 (h5py.Dataset)
+    budget: ReadBudget,
+    *,
+    is_transposed: bool,
+) -> dict[str, StoredArray]:
+    """Return the array of a dataset, or those of its fields; none of other values."""
+    import h5py
+
+    shape = tuple(reversed(dataset.shape or ())) if is_transposed else dataset.shape
+
+    def values(field: str | None) -> npt.NDArray[Any]:
+        if dataset.is_virtual or dataset.external:
+            raise RecordingError(f"{path}: {name} is stored in another file, which is not read")
+        check_filters(path, name, dataset)
+        budget.keep(dataset.size * dataset.dtype.itemsize)
+        array = np.asarray(dataset[()] if field is None else dataset[()][field])
+        if array.dtype.kind == "O":
+            array = np.array([text.decode(errors="replace") for text in array.ravel()])
+        return array.transpose() if is_transposed else array
+
+    if dataset.dtype.names:
+        return {
+            f"{name}/{field}": StoredArray(
+                shape + dataset.dtype[field].shape, dataset.dtype[field].base.kind,
+                lambda field=field: values(field),  # type: ignore[misc]
+            )
+            for field in dataset.dtype.names
+        }  # fmt: skip
+    is_text = h5py.check_string_dtype(dataset.dtype) is not None and len(shape or ()) == 1
+    if shape is None or not (is_text or dataset.dtype.kind in "biuf"):
+        return {}
+    kind = "U" if is_text else dataset.dtype.kind
+    return {name: StoredArray(shape, kind, lambda: values(None))}
+
+
+def check_filters(path: Path, name: str, dataset: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
+    """Check that an array is packed by deflate only; other filters are loaded as plug-ins.
+
+    Raises:
+        RecordingError: it is packed in another way.
+    """
+    from h5py import h5z
+
+    filters = dataset.id.get_create_plist()
+    kinds = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
+    known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
+    if not known.issuperset(kinds) or len(set(kinds)) < len(kinds):
+        raise RecordingError(
+            f"{path}: {name} is packed by the filters {kinds}; gzip, shuffle and "
+            "fletcher32 expected, each once"
+        )
+
+
+def _of_parquet(path: Path) -> StoredArrays:
+    require_extras("parquet")
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(path)
+    return arrays_of_columns(path, file, file.schema_arrow.names)
+
+
+def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, StoredArray]:  # noqa: ANN401
+    """Return columns of numbers, of texts, and of lists of numbers, in a Parquet file.
+
+    Args:
+        path: path of the file.
+        file: `pyarrow.parquet.ParquetFile`.
+        names: of the columns.
+
+    Raises:
+        RecordingError: they take too much memory.
+    """
+    import pyarrow as pa
+
+    def is_number(kind: Any) -> bool:  # noqa: ANN401 (pyarrow.DataType)
+        while pa.types.is_nested(kind) and hasattr(kind, "value_type"):
+            kind = kind.value_type
+        return bool(pa.types.is_primitive(kind) or pa.types.is_boolean(kind))
+
+    schema, budget = file.schema_arrow, ReadBudget(path)
+    wanted = [
+        name
+        for name in names
+        if is_number(schema.field(name).type) or pa.types.is_string(schema.field(name).type)
+    ]
+    groups = (file.metadata.row_group(k) for k in range(file.num_row_groups))
+    chunks = (group.column(k) for group in groups for k in range(group.num_columns))
+    budget.keep(
+        sum(
+            chunk.total_uncompressed_size
+            for chunk in chunks
+            if chunk.path_in_schema.split(".")[0] in wanted
+        )
+    )
+    found: dict[str, StoredArray] = {}
+    table = file.read(columns=wanted, use_threads=False)
+    for name in wanted:
+        column = table[name].combine_chunks()
+        lengths = [len(column)]
+        while hasattr(column.type, "value_type"):
+            n_before = len(column)
+            column = column.flatten()
+            if column.null_count or len(column) % max(n_before, 1):
+                break
+            lengths.append(len(column) // max(n_before, 1))
+        else:
+            values = column.to_numpy(zero_copy_only=False)
+            values = values.astype(str) if values.dtype.kind == "O" else values
+            found[name] = in_memory(values.reshape(lengths))
+    return found
+
+
+def _of_json(path: Path) -> StoredArrays:
+    """Return the arrays in lines of JSON, or in one document: a record, or a list of records."""
+    ReadBudget(path).keep(path.stat().st_size * JSON_EXPANSION // 4)
+    text = path.read_text(encoding="utf-8-sig")
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError:
+        lines = [line for line in text.splitlines() if line.startswith("{")]
+        return arrays_of_records(json.loads(line) for line in lines)
+    if isinstance(document, list):
+        return arrays_of_records(one for one in document if isinstance(one, dict))
+    return _flat(document)
+
+
+def _of_pickle(path: Path) -> StoredArrays:
+    raise RecordingError(
+        f"{path} is a pickle, which can run code and is not read: load it in Python and save its "
+        f"arrays with numpy.savez({path.stem + '.npz'!r}, **arrays), then import {path.stem}.npz"
+    )
+
+
+def _flat(content: Any, path: str = "") -> dict[str, StoredArray]:  # noqa: ANN401 (any content)
+    """Return the arrays in records and lists, by path."""
+    if isinstance(content, Mapping):
+        pairs = [(str(key), one) for key, one in content.items()]
+    else:
+        values = np.asarray(content) if not isinstance(content, list) else _as_array(content)
+        if values is not None and values.dtype.kind in "biufUM":
+            return {path: in_memory(values)}
+        pairs = [(str(k), one) for k, one in enumerate(content)] if np.ndim(content) else []
+    return {
+        name: array
+        for key, one in pairs
+        for name, array in _flat(one, f"{path}/{key}" if path else key).items()
+    }
+
+
+def _as_array(content: list[Any]) -> npt.NDArray[Any] | None:
+    """Return a list as an array; None if its values are of several shapes, or records."""
+    try:
+        return np.asarray(content)
+    except ValueError:
+        return None
+
+
+_READERS: dict[str, Callable[[Path], StoredArrays]] = {
+    ".npy": _of_npy,
+    ".npz": _of_npz,
+    ".mat": _of_matlab,
+    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), _of_hdf5),
+    **dict.fromkeys((".parquet", ".pq"), _of_parquet),
+    **dict.fromkeys((".jsonl", ".ndjson", ".json"), _of_json),
+    **dict.fromkeys((".pkl", ".pickle", ".joblib"), _of_pickle),
+}

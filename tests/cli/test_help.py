@@ -1,0 +1,64 @@
+"""What the help of each verb shows, and what only `--help-all` shows."""
+
+import re
+
+import pytest
+
+from holdfast.cli import app, main
+
+SHOWN = {
+    "detect": "--summary --in-contact --seconds --json",
+    "serve": "--host --port --token-file --record-to --speed --once --in-contact --ros1 --ros2 "
+    "--json",
+    "record": "--seconds --object --case --note --force --json",
+    "play": "--host --port --speed --once --json",
+    "import": "--format --sensor --columns --no-labels --suffix --force --json",
+    "info": "--plot --force --tare --json",
+    "label": "--tare --poses --author --browser --json",
+    "train": "--output --classifier --features --split --trials --own-slip-features --init "
+    "--force --in-contact --json",
+    "evaluate": "--plot --force --in-contact --json",
+    "calibrate": "--output --false-alarms --seconds --in-contact --force --json",
+    "demo": "--speed --browser --force --json",
+    "simulate": "--objects --cases --repeats --force --json",
+    "hold": "--hand --law --armed --confirm --max-scale --max-force --on-fault --record --seconds "
+    "--speed --in-contact --json",
+    "export": "--like --sensor --fingers --float --format --model --fps --force --json",
+    "datasets": "--only --yes --force --json",
+    "trial": "--out --laws --model --quick --force --json",
+    "study": "--out --twin --quick --force --json",
+    "label auto": "--tare --poses --author --dry-run --force --json",
+    "label compare": "--tare --poses --annotator --json",
+    "label audit": "--page --author --json",
+}
+"""Options that the help of a verb shows; that of all other verbs shows all."""
+
+
+def flags(capsys, verb, option):
+    assert main([*verb.split(), option]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert all(len(line) <= 80 for line in out.splitlines())
+    _, options = out.split("\nOptions:\n")
+    return re.findall(r"^  (?:-\w, )?(--[\w-]+)", options, re.MULTILINE)
+
+
+@pytest.mark.parametrize("verb", [*app.VERBS, *app.SUB_VERBS])
+def test_help_shows_what_most_need_and_help_all_the_rest(verb, capsys):
+    *shown, last = flags(capsys, verb, "--help")
+    assert last == "--help"
+    *everything, help_all, _ = flags(capsys, verb, "--help-all")
+    assert help_all == "--help-all"
+    if verb in SHOWN:
+        assert shown == [*SHOWN[verb].split(), "--help-all"]
+        assert set(shown[:-1]) < set(everything)
+    else:
+        assert shown == everything
+    command = app.get_command(app._app(verb.split())).commands[verb]
+    long = [option.opts[0] for option in command.params if option.opts[0].startswith("--")]
+    assert everything == [flag for flag in long if flag != "--help-all"]
+
+
+def test_a_rare_option_works_as_before(capsys):
+    assert main(["detect", "builtin:any", "a.csv", "--raw", "--debounce", "1"]) == 2
+    assert "--raw decides without debouncing" in capsys.readouterr().err
