@@ -60,7 +60,10 @@ CASES = {
     ),
     "the clock of a bag": (
         replace(UNLABELLED, metadata={"clock_drift": 0.002}),
-        [("", "clock_drift", "the bag's clock gains +120 ms a minute"), ("", "no_labels", "no labels")],
+        [
+            ("", "clock_drift", "the bag's clock gains +120 ms a minute"),
+            ("", "no_labels", "no labels"),
+        ],
     ),
 }  # fmt: skip
 
