@@ -37,8 +37,7 @@ MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
 factor."""
 MAX_ACTIVITY = 2.0
 """Own handling is refused as slip above this `activity`. None of 450 grasps of randomized hands has
-more in the held samples in which it does not slide; over half of them have more while they slide
-(`benchmarks/handling_activity.py`)."""
+more in the held samples in which it does not slide; over half have more while they slide."""
 CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
 

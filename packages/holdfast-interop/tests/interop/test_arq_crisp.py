@@ -9,6 +9,8 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Cause
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
 
+pytestmark = pytest.mark.slow
+
 SHAPE = (18, 3, 4)
 GROUP = "GGCNN2/Solder/Pose1/Exp1"
 

@@ -10,6 +10,8 @@ from holdfast.synthetic import synthetic_recording
 from holdfast_interop.datasets import PublicFile, PublicSet, find_set, public_sets, verb
 from loopback import serving
 
+pytestmark = pytest.mark.slow
+
 FOLDERS = {
     "uskin-pick-move": "uskin_pick_move", "eflesh-tugs": "eflesh_slip", "gtac-grasps": "gtac_v2",
     "gtac-manipulation": "gtac",

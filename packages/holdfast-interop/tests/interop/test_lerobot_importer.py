@@ -16,6 +16,8 @@ from holdfast.io import import_recordings
 from holdfast_interop.lerobot import importer as lerobot
 from holdfast_interop.lerobot.exporter import export
 
+pytestmark = pytest.mark.slow
+
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 
