@@ -15,8 +15,7 @@ import msgspec
 
 from attack.result import Result
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.live.arrival_detector import StreamEstimate
-from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast_grip import GripCommand, GripController, GripReason, Limits, LoopState
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands import HandDevice, open_hand

@@ -9,11 +9,12 @@ import numpy as np
 
 from attack.result import Result
 from holdfast.contact import ContactState
+from holdfast.devices.sources import Source
 from holdfast.devices.sources.anyskin import AnySkinDecoder
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.io.cdr import MessageDecoder, MessageEncoder
-from holdfast.live.stream_detector import ArrivalDetector
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.sensors import hand, sensor
@@ -198,12 +199,30 @@ def attack_clocks() -> list[Result]:
     return [_attack_clock(*pair, one, grasp) for one in versions for pair in CLOCKS.items()]
 
 
+class Decoded(Source):
+    """Device whose packets are decoded by hand."""
+
+    is_device = True
+
+    def __init__(self, decoder: XelaDecoder) -> None:
+        self.sensors = decoder.sensors
+
+    def open(self) -> None:
+        """Open nothing."""
+
+    def read(self, timeout: float) -> None:
+        """Read nothing."""
+
+    def close(self) -> None:
+        """Close nothing."""
+
+
 def _attack_clock(name: str, clock: Clock, version: str, recording: Recording) -> Result:
     result = Result(f"clock, XELA {version}: {name}")
     sensors = {name: module.sensor for name, module in recording.modules.items()}
     encoder = XelaEncoder(sensors, version=version)
     modules, decoder = list(recording.modules.values()), XelaDecoder()
-    detector: ArrivalDetector | None = None
+    detector: StreamDetector | None = None
     for k in range(modules[0].n_samples):
         t = k / 150
         pair = clock(t)
@@ -216,9 +235,9 @@ def _attack_clock(name: str, clock: Clock, version: str, recording: Recording) -
             names = dict(zip(decoder.sensors, ("thumb", "index", "middle"), strict=True))
             decoder = XelaDecoder({int(n.removeprefix("finger")): m for n, m in names.items()})
             decoder.identify(packet)
-            detector = ArrivalDetector(Model.load("builtin:twin"), decoder.sensors, watch_rate=True)
+            detector = StreamDetector(Model.load("builtin:twin"), Decoded(decoder))
         for arrival in decoder.decode(packet, 50.0 + pair[1]):
-            for one in detector.update(arrival):
+            for one in detector.update(arrival).estimates:
                 result.n_tried += 1
                 stable = one.estimate.state is ContactState.STABLE
                 result.n_wrong += stable and t > 3.0

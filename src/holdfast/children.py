@@ -28,6 +28,7 @@ def python_command(program: str, *arguments: str) -> list[str]:
         >>> python_command("print(1)", "can")[1:3]
         ['-P', '-c']
     """
+    # `-P` leaves out the working folder; the path of this process may have been changed since.
     path = [folder for folder in sys.path if isinstance(folder, str)]
     with_path = f"import sys; sys.path[:] = {path!r}; {program}"
     return [sys.executable, "-P", "-c", with_path, *arguments]
@@ -72,6 +73,7 @@ class _SafePath:
 
     def __enter__(self) -> None:
         with self._lock:
+            # Only the first one: for the others the value is already ours.
             if not self._n_entered:
                 self._before = os.environ.get(SAFE_PATH_VARIABLE)
                 os.environ[SAFE_PATH_VARIABLE] = "1"

@@ -62,7 +62,10 @@ def call_on_cluster(
             copies = _watched(
                 client, lambda: client.scatter(list(shared), broadcast=True, hash=False)
             )
+        # The digest goes with each call: a worker may join while the calls run.
         common = (package_digest(), function, *copies)
+        # Calls that were on a worker that died: one of them may have killed it, which shows when
+        # each is made alone.
         suspects: list[Call[K]] = []
         yield from _submit(client, common, calls, suspects)
         for call in suspects:
@@ -123,6 +126,7 @@ def _submit(
     """Make calls on a cluster; append to `suspects` those whose workers died."""
     from distributed import KilledWorker
 
+    # A queue, as calls are added while others run, and a wait must end if there is no worker.
     done: SimpleQueue[Future] = SimpleQueue()
     waiting: dict[str, tuple[Call[K], Future]] = {}
     rest = iter(calls)
@@ -134,7 +138,12 @@ def _submit(
             future.add_done_callback(done.put)
         if not waiting:
             return
-        call, future = waiting.pop(_next_done(done, client).key)
+        while True:  # wait for the next that is done, while there is a worker
+            with suppress(Empty):
+                call, future = waiting.pop(done.get(timeout=NO_WORKER_TIMEOUT).key)
+                break
+            if not _n_threads(client):
+                raise _without_workers(client)
         try:
             result = _watched(client, partial(_result, future))
         except KilledWorker:
@@ -231,15 +240,6 @@ def _check_workers(client: "Client") -> None:
             raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from digest
         if not isinstance(digest, OSError) and digest != expected:  # OSError: it died meanwhile
             raise EngineError(_OTHER_VERSION.format(f"the worker at {address}"))
-
-
-def _next_done(done: "SimpleQueue[Future]", client: "Client") -> "Future":
-    """Wait for the next future that is done."""
-    while True:
-        with suppress(Empty):
-            return done.get(timeout=NO_WORKER_TIMEOUT)
-        if not _n_threads(client):
-            raise _without_workers(client)
 
 
 def _without_workers(client: "Client") -> EngineError:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self, TypeVar, cast
 
 from holdfast.children import SAFE_PATH_VARIABLE, safe_path
 from holdfast.cluster import Arguments, Call, call_on_cluster
-from holdfast.errors import EngineError, MissingExtra, is_installed
+from holdfast.errors import EngineError, MissingExtra, OutputError, is_installed
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
@@ -76,6 +76,18 @@ class Engine(NamedTuple):
         A worker has another working folder. Its machine must have the file at the same path.
         """
         return path if self.scheduler is None else path.absolute()
+
+    def check_written(self, path: Path) -> None:
+        """Check that a file that a call has written is there.
+
+        Raises:
+            OutputError: a worker of a cluster wrote it to a disk of its own.
+        """
+        if self.scheduler is not None and not path.exists():
+            raise OutputError(
+                f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
+                "that all machines have at the same path"
+            )
 
     def check(self) -> None:
         """Make one call, so that an engine that cannot be reached is found before the work.
@@ -154,9 +166,12 @@ def _in_processes(
     from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+    # `started` has the calls that joblib took and whose result has not come: `_record` adds, the
+    # loop removes. What is left in it when the pool breaks may have killed a process.
     rest, started = iter(calls), dict[K, Arguments]()
     ended = False
     while started or not ended:
+        # Alone first, then the rest: a call that kills its process ends the run at once.
         for name in list(started):
             yield name, _call_alone(function, name, started.pop(name))
         call_named = delayed(_call_in_worker)
@@ -202,6 +217,7 @@ def _start(n_jobs: int, tasks: Iterable[object]) -> Iterator[Any]:
     """Start the processes and the first tasks; return the iterator over the results."""
     from joblib import Parallel
 
+    # The processes start with the first tasks, which the call of the generator sends.
     with safe_path:
         results: Iterator[Any] = Parallel(
             n_jobs, backend=_backend_type()(), return_as="generator_unordered"
@@ -243,6 +259,7 @@ def _end_with(parent: int) -> None:
     """End this process when its parent has died; no other process would end it."""
 
     def wait() -> None:
+        # An orphan gets another parent.
         while os.getppid() == parent:
             time.sleep(PARENT_CHECK_INTERVAL)
         os._exit(1)
@@ -258,6 +275,7 @@ def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) 
 
     for _ in range(MAX_RETRIES):
         with suppress(TerminatedWorkerError):
+            # Two jobs, as joblib makes one job in this process.
             call = delayed(_call_in_worker)(os.getpid(), function, None, arguments)
             ((_, result),) = _start(2, [call])
             return cast(T, result)

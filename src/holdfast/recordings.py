@@ -346,6 +346,17 @@ class Recording:
                     "of different sensors expected"
                 )
 
+    @property
+    def starts_loaded(self) -> bool:
+        """Whether the metadata declare that the first samples are load, and not an open hand."""
+        return self.metadata.get(STARTS_LOADED) is True
+
+    def with_start(self, *, loaded: bool | None) -> Self:
+        """Return it with the declaration whether its first samples are load; None for its own."""
+        if loaded is None:
+            return self
+        return replace(self, metadata={**self.metadata, STARTS_LOADED: loaded})
+
     def with_labels(self, labels: Mapping[str, Sequence[Label]]) -> Self:
         """Return the same recording with these labels in place of its own.
 

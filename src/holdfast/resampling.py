@@ -16,6 +16,8 @@ TOLERANCE_PERIODS = 1e-3
 """Tolerance of times in periods of the new rate. The rounding of times, 1e-7 s since 1970, then
 moves no sample."""
 
+RATE_TOLERANCE = 0.2
+"""A rate that differs by at most this share from that of a model is taken as it is."""
 MIN_ROWS_PER_UPDATE = 1.5
 """Least number of rows from one change of the readings to the next of a sample-and-hold sensor."""
 EVEN_SHARE = 0.95
@@ -102,7 +104,13 @@ def true_updates(recording: Recording) -> Recording:
         return recording
     if min(module.rate / held[name] for name, module in modules.items()) < MIN_UPDATE_RATE:
         return recording
-    updates = {name: _update_rows(module, held[name]) for name, module in modules.items()}
+    updates = {}
+    for name, module in modules.items():
+        repeats = UpdateFilter(1 / (held[name] * module.period))
+        rows = zip(module.times.tolist(), module.readings, strict=True)
+        kept = [repeats.is_update(time, reading) for time, reading in rows]
+        times, readings = module.times[kept], module.readings[kept]
+        updates[name] = replace(module, times=times, readings=readings)
     return replace(recording, modules={**recording.modules, **updates})
 
 
@@ -114,11 +122,18 @@ def _changed_rows(module: Tactile) -> Flags:
     return np.append(True, differ.any(axis=(1, 2)))
 
 
-def _update_rows(module: Tactile, n_rows: float) -> Tactile:
-    repeats = UpdateFilter(1 / (n_rows * module.period))
-    rows = zip(module.times.tolist(), module.readings, strict=True)
-    kept = [repeats.is_update(time, reading) for time, reading in rows]
-    return replace(module, times=module.times[kept], readings=module.readings[kept])
+def at_rate(recording: Recording, rate: float | None) -> Recording:
+    """Return the true updates of a recording, resampled unless their rate is near another.
+
+    Args:
+        recording: at any rate.
+        rate: of a model [Hz]; None for one of any rate. Within 20 % of it nothing is resampled.
+    """
+    # The true updates first: the rows of a sensor that holds its samples are no rate of its own.
+    recording = true_updates(recording)
+    if rate is None or abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
+        return recording
+    return resample(recording, rate)
 
 
 def resample(recording: Recording, rate: float) -> Recording:
@@ -147,22 +162,19 @@ def _resample(module: Tactile, rate: float) -> Tactile:
         return module
     cuts = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
     bounds = [0, *cuts.tolist(), module.n_samples]
-    pieces = [_resample_stretch(module, first, last, rate) for first, last in pairwise(bounds)]
+    pieces = []
+    for first, last in pairwise(bounds):
+        own = module.times[first:last]
+        values = np.asarray(module.readings[first:last], dtype=np.float64)
+        reached = ((own - own[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
+        change = _interpolated if rate * module.period >= 1 else _averaged
+        pieces.append(change(own, values, reached, rate))
     times = np.concatenate([times for times, _ in pieces])
     readings = np.concatenate([readings for _, readings in pieces])
     bare = replace(module, times=times, readings=readings, labels=())
     end = float(times[-1]) + bare.period  # labels may reach past what the new samples reach
     labels = [replace(x, end=min(x.end, end)) for x in module.labels if x.start < end]
     return replace(bare, labels=tuple(labels))
-
-
-def _resample_stretch(module: Tactile, first: int, last: int, rate: float) -> tuple[Array, Array]:
-    times = module.times[first:last]
-    readings = np.asarray(module.readings[first:last], dtype=np.float64)
-    reached = ((times - times[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
-    if rate * module.period >= 1:
-        return _interpolated(times, readings, reached, rate)
-    return _averaged(times, readings, reached, rate)
 
 
 def _interpolated(

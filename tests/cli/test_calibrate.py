@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.cli import main
+from command_line import Verb
 from holdfast.devices import sources
 from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import Source
@@ -33,10 +33,7 @@ def folder(tmp_path_factory):
     return place
 
 
-def run(capsys, *words):
-    code = main([*map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+run = Verb().run
 
 
 def calibrated(capsys, folder, out, *words, data="data"):

@@ -3,17 +3,14 @@ import shutil
 
 import pytest
 
-from holdfast.cli import main
+from command_line import Verb
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
 pytestmark = pytest.mark.slow
 
 
-def run(capsys, *words):
-    code = main(["export", *map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+run = Verb("export").run
 
 
 def test_the_sizes_are_printed(capsys, tmp_path):

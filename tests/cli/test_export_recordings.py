@@ -1,7 +1,6 @@
-import json
-
 import pytest
 
+from command_line import Verb
 from holdfast.cli import main
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
@@ -16,17 +15,8 @@ def grasps(tmp_path_factory):
     return folder
 
 
-def exported(capsys, *words):
-    assert main(["export", *map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def refusal(capsys, *words):
-    assert main(["export", *map(str, words)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    return err.removeprefix("holdfast: ").rstrip("\n")
+VERB = Verb("export")
+refusal, exported = VERB.refusal, VERB.document
 
 
 def test_tables_say_what_they_leave_out(capsys, grasps, tmp_path):

@@ -6,10 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from command_line import Verb
 from holdfast.cli import main
 from holdfast.io import load_recording, save_recording
 from holdfast.io.importers import FORMATS, HINTS, IMPORTER_PLUGINS, import_hint
 from holdfast.synthetic import synthetic_recording
+
+pytestmark = pytest.mark.slow
 
 HEADER = "# sensor: anyskin\ntime," + ",".join(
     f"t{taxel:02d}_{axis}" for taxel in range(1, 6) for axis in "xyz"
@@ -38,17 +41,8 @@ def table(tmp_path):
     return write
 
 
-def refusal(capsys, *words):
-    assert main(["import", *map(str, words)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    return err.removeprefix("holdfast: ").rstrip("\n")
-
-
-def imported(capsys, *words):
-    assert main(["import", *map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
+VERB = Verb("import")
+refusal, imported = VERB.refusal, VERB.document
 
 
 def test_imports_a_file(capsys, table, tmp_path):
@@ -74,15 +68,6 @@ def test_imports_a_file(capsys, table, tmp_path):
     }
     assert list(path.parent.iterdir()) == [path]
     assert load_recording(path).modules["finger1"].n_samples == 40
-
-
-def test_a_folder_of_folders(capsys, table, tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / "in" / name).mkdir(parents=True)
-        table(f"{name}/press.csv")
-    document = imported(capsys, tmp_path / "in", tmp_path / "out")
-    assert [one["name"] for one in document["recordings"]] == ["a_press", "b_press"]
-    assert load_recording(tmp_path / "out" / "b_press.parquet").name == "b_press"
 
 
 def test_every_format_has_a_hint():

@@ -213,18 +213,6 @@ class TestRefusals:
             "--speed is for recordings and the twin; xela://127.0.0.1:1 is a device"
         )
 
-    def test_an_unknown_version(self, capsys, path):
-        message = refusal(capsys, path, "--version", "2.0", "--port", 0)
-        assert message == "version 1.7 or 1.8 expected, '2.0' given"
-
-    def test_a_port_that_is_taken(self, capsys, path):
-        with socket.create_server(("127.0.0.1", 0)) as other:
-            port = other.getsockname()[1]
-            message = refusal(capsys, path, "--port", port)
-        assert message == (
-            f"cannot listen at 127.0.0.1:{port} (it is in use); --port 0 finds a free port"
-        )
-
     def test_modules_that_are_not_of_the_hand(self, capsys, tmp_path):
         one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.zeros((3, 16, 3)))
         save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")

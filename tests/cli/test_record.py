@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holdfast.cli import main
+from command_line import Verb
 from holdfast.cli import record as verb
 from holdfast.contact import Fault
 from holdfast.devices import sources
@@ -23,7 +23,6 @@ from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
-from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
@@ -98,10 +97,7 @@ def arrival(k, **fields):
     return Arrival(k / 100, {"thumb": values, "thumb/1": values}, k / 100, **fields)
 
 
-def run(capsys, *words):
-    code = main(["record", *map(str, words)])
-    printed, err = capsys.readouterr()
-    return code, printed, err
+run = Verb("record").run
 
 
 def refusal(capsys, *words):
@@ -286,21 +282,6 @@ def test_in_a_folder_a_name_is_chosen(source, words, pattern, capsys, device, tm
     path = Path(json.loads(printed)["path"])
     assert [path] == list((tmp_path / "new" / "folder").iterdir())
     assert re.fullmatch(pattern, path.name)
-
-
-def test_a_removed_file_is_reported(capsys, device, tmp_path, monkeypatch):
-    out = tmp_path / "a.mcap"
-    put = Recorder.put
-
-    def take_away(self, *given, **named):
-        put(self, *given, **named)
-        out.unlink(missing_ok=True)
-
-    monkeypatch.setattr(Recorder, "put", take_away)
-    device(arrival(0), ends=False)
-    assert refusal(capsys, "xela://fake", out) == (
-        f"cannot write {out}: it was removed while it was recorded"
-    )
 
 
 class Child:

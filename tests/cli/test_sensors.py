@@ -5,6 +5,7 @@ import re
 import pytest
 from matplotlib.axes import Axes
 
+from command_line import Verb
 from holdfast.cli import main
 from holdfast.cli.sensors import _ranges
 from holdfast.plots.sensors import plot_hand, plot_sensor
@@ -16,12 +17,7 @@ URDF = """<robot name="finger"><link name="tip"/>
 <joint name="taxel_1" type="fixed"><parent link="tip"/><child link="t"/></joint></robot>"""
 
 
-def refusal(capsys, *words):
-    assert main(["sensors", *map(str, words)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    return err.removeprefix("holdfast: ").rstrip("\n")
+refusal = Verb("sensors").refusal
 
 
 def shown(capsys, *words):
@@ -78,10 +74,11 @@ def test_own_sensor_from_urdf(capsys, tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", ["uskin-curved", "papillarray", "allegro-uskin"])
 @pytest.mark.parametrize(
-    ("suffix", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")]
-)
+    ("name", "suffix", "magic"),
+    [("uskin-curved", ".png", b"\x89PNG"), ("papillarray", ".svg", b"<?xml"),
+     ("allegro-uskin", ".pdf", b"%PDF")],
+)  # fmt: skip
 def test_plots(name, suffix, magic, capsys, tmp_path):
     plot = tmp_path / f"plot{suffix}"
     shown(capsys, name, "--plot", plot)
@@ -124,17 +121,6 @@ def test_plots_a_sensor_of_one_oblique_taxel(capsys, tmp_path):
         )
     )
     shown(capsys, path, "--plot", tmp_path / "one.png")
-
-
-def test_a_plot_is_not_overwritten(capsys, tmp_path):
-    plot = tmp_path / "a.svg"
-    plot.write_text("mine")
-    assert refusal(capsys, "gtac", "--plot", plot) == (
-        f"{plot} exists already: choose another name, or give --force"
-    )
-    assert plot.read_text() == "mine"
-    shown(capsys, "gtac", "--plot", plot, "--force")
-    assert plot.read_text() != "mine"
 
 
 def test_refusals(capsys, tmp_path):

@@ -8,6 +8,7 @@ import urllib.request
 
 import pytest
 
+from command_line import Verb
 from holdfast.cli import main
 from holdfast.cli import serve as verb
 from holdfast.cli.serve import open_browser
@@ -52,10 +53,7 @@ def when_served(monkeypatch):
     return arrange
 
 
-def run(capsys, *words):
-    code = main(["serve", *map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+run = Verb("serve").run
 
 
 def refusal(capsys, *words):

@@ -3,9 +3,9 @@ import re
 
 import pytest
 
-from holdfast.cli import main
+from command_line import Verb
 from holdfast.features import parse_features
-from holdfast.io import load_dataset, save_recording
+from holdfast.io import save_recording
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
@@ -29,10 +29,7 @@ def folder(tmp_path_factory):
     return place
 
 
-def run(capsys, *words):
-    code = main([*map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+run = Verb().run
 
 
 def tune(capsys, folder, out, *words):
@@ -82,18 +79,6 @@ def test_the_verdict_is_in_sample(capsys, folder, tmp_path):
     assert " (in sample): " in found
     _, printed, _ = run(capsys, "evaluate", out, folder / "data", "--json")
     assert json.loads(printed)["verdict"] == found
-
-
-def test_no_verdict_on_training_recordings(capsys, folder, tmp_path):
-    model, data = tmp_path / "model.json", folder / "data"
-    train(load_dataset(data), Setting(trials=0)).model.save(model)
-    words = ["tune", model, data, "--false-alarms", 30, "-o"]
-    assert json.loads(run(capsys, *words, tmp_path / "a.json", "--json")[1])["verdict"] is None
-    _, out, err = run(capsys, *words, tmp_path / "b.json")
-    assert out.startswith(
-        "No verdict: in sample, the model was trained on 2 of these 2 recordings."
-    )
-    assert "their metrics are optimistic" in err
 
 
 def test_what_exists_is_kept(capsys, folder, tmp_path):

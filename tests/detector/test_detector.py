@@ -417,14 +417,6 @@ class TestConstruction:
             "their sensors expected"
         )
 
-    def test_another_sensor(self):
-        with pytest.raises(ModelError) as raised:
-            Detector(model(), {"thumb": sensor(3)})
-        assert str(raised.value) == (
-            "thumb: 3 taxels (tiny) given, the model expects 2 (tiny); "
-            "builtin:any fits every 3-axis sensor"
-        )
-
 
 class TestNoiseFloor:
     def noisy(self, level, n=1000):

@@ -8,10 +8,11 @@ import pytest
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Reason
 from holdfast.detector import Detector, detect
 from holdfast.devices.sources import Arrival
-from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
+from live import build
 
 RATE = 100.0
 SHARE = np.array([0.05, -0.03, 0.2])
@@ -131,16 +132,15 @@ def test_a_reset_keeps_the_declaration_unless_told():
 @pytest.mark.parametrize("name", MODELS)
 def test_live_equals_offline(name, by_metadata):
     model, recording = Model.load(name), held(released(2.0))
-    metadata = {"starts_loaded": True} if by_metadata else {}
-    live = ArrivalDetector(
-        model, {"a": sensor("uskin-4x4")}, in_contact=not by_metadata, metadata=metadata
-    )
+    source = build.Script({"a": sensor("uskin-4x4")})
+    source.metadata = {"starts_loaded": True} if by_metadata else {}
+    live = StreamDetector(model, source, in_contact=not by_metadata)
     module, found = recording.modules["a"], []
     for k, time in enumerate(module.times.tolist()):
-        found += live.update(Arrival(time, {"a": module.readings[k]}, time))
+        found += live.update(Arrival(time, {"a": module.readings[k]}, time)).estimates
     trace = detect(model, recording, in_contact=True).fingers["a"]
     assert [each.estimate.fingers["a"].state.code for each in found] == trace.state.tolist()
     live.restart_tare()  # of an open hand
-    (estimate,) = live.update(Arrival(9.0, {"a": module.readings[-1]}, 9.0))
+    (estimate,) = live.update(Arrival(9.0, {"a": module.readings[-1]}, 9.0)).estimates
     expected = Reason.TARE if name == "builtin:noise-floor" else Reason.WARM_UP
     assert estimate.estimate.fingers["a"].reason is expected

@@ -1,22 +1,20 @@
 import dataclasses
-import json
 import re
 
 import pytest
 from msgspec.structs import replace
 
+from holdfast import twin_recordings
 from holdfast.cli import demo
-from holdfast.cli import simulate as simulate_verb
 from holdfast.io import save_recording
+from holdfast.parallel import Engine
 from holdfast.recordings import Tactile
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
-from holdfast_lab.study.summary import STRONGEST
 
 from . import blocks
 
-STUDY = json.loads((blocks.ROOT / "docs" / "study" / "study.json").read_text("utf-8"))
 README = blocks.ROOT / "README.md"
 DEMO, RECORDINGS = ("", "Look at what the demo made"), ("Your own recordings",)
 HAND = ("Your own hand", "Python")
@@ -26,13 +24,13 @@ SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 @pytest.fixture
 def short_demo(monkeypatch):
     """The demo with short grasps, in this process."""
-    whole = simulate_verb.simulate_grasps
+    whole = twin_recordings.simulate_grasps
     monkeypatch.setattr(demo, "DEMO_OBJECTS", "mug")
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
-        simulate_verb,
+        twin_recordings,
         "simulate_grasps",
-        lambda *given, **named: whole(*given, **{**named, "jobs": 1}),
+        lambda *given, **named: whole(*given, **{**named, "engine": Engine(1)}),
     )
 
 
@@ -77,27 +75,6 @@ def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
 def test_every_section_is_run():
     sections = {block.section for block in blocks.blocks_of(README)}
     assert sections == {*DEMO, *RECORDINGS, *HAND}
-
-
-def figure(table, **keys):
-    (row,) = [row for row in STUDY["tables"][table] if keys.items() <= row.items()]
-    return f"{row['ours']:.1f}", f"{row.get('paper', 0):.1f}", row
-
-
-def test_the_figures_are_those_of_the_published_study():
-    accuracy = {"on": "held out", "figure": "accuracy"}
-    logreg, svm = (figure("confusion", classifier=name, **accuracy) for name in ("LogReg", "SVM"))
-    ours = figure("strongest", figure="holdfast [%]", **STRONGEST)
-    baseline = figure("strongest", figure="baseline [%]", **STRONGEST)
-    assert baseline[2]["baseline"] == "LogReg of log F_a, log sigma and the hand's largest"
-    text = " ".join(README.read_text("utf-8").split())
-    for sentence in (
-        f"the paper's two classifiers are correct in {logreg[0]} and {svm[0]} % of the held-out "
-        f"samples (the paper reports {logreg[1]} and {svm[1]} %)",
-        f"the strongest rival has {baseline[0]} % errors by hands, our own method {ours[0]} %",
-    ):
-        assert sentence in text, f"README.md should say: {sentence}"
-    assert ("figures of the quick study" in text) == STUDY["quick"]
 
 
 def test_the_links_exist():

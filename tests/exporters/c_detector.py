@@ -15,6 +15,7 @@ from holdfast.contact import ContactState, Reason, faults_of, taxels_of
 from holdfast.detector import Detector
 from holdfast.errors import StreamError
 from holdfast.exporters.c_header import header_of
+from holdfast.features.start import Start
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 STATES, REASONS, CAUSES = tuple(ContactState), tuple(Reason), (None, *KNOWN_CAUSES)
@@ -82,11 +83,15 @@ class CDetector:
         return code, self.estimate
 
 
-def both(model, sensors, rate, *, single=False, options=(), **stream):
+def both(
+    model, sensors, rate, *, single=False, options=(), in_contact=False, baselines=None, ignore=None
+):
     """Return the detector of Python and that of C of a model."""
-    header = header_of(model, sensors, rate, single=single, **stream)
+    start = Start(in_contact, baselines or {})
+    header = header_of(model, sensors, rate, single=single, start=start, ignore=ignore)
     c = CDetector(header, sensors, single=single, options=options)
-    return Detector(model, sensors, rate, **stream), c
+    given = {"in_contact": in_contact, "baselines": baselines, "ignore": ignore}
+    return Detector(model, sensors, rate, **given), c
 
 
 def compare(python, c, samples, time):

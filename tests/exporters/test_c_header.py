@@ -98,7 +98,7 @@ def test_every_compiler_accepts_it_and_gives_the_same(name, compiler, tmp_path):
                                                        rel=0.0, nan_ok=True)  # fmt: skip
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang", "g++", "clang++"])
+@pytest.mark.parametrize("compiler", ["gcc", "clang++"])
 def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
     if shutil.which(COMPILERS[compiler][0]) is None:
         pytest.skip(f"{COMPILERS[compiler][0]} is not installed")
@@ -118,15 +118,13 @@ def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
     assert subprocess.run([tmp_path / "run"], check=False).returncode == 0
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_single_precision_compiles(compiler, tmp_path):
-    compiled(compiler, tmp_path, header_of(*made("rich"), single=True))
-
-
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("name", [name for name in MODELS if name != "rich"])
-def test_single_precision_has_no_hidden_conversion(name, compiler, tmp_path):
-    compiled(compiler, tmp_path, header_of(*made(name), single=True), "-O0")
+@pytest.mark.parametrize(
+    ("name", "compiler", "level"),
+    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"),
+     *((name, ("gcc", "clang")[k % 2], "-O0") for k, name in enumerate(MODELS) if name != "rich")],
+)  # fmt: skip
+def test_single_precision_has_no_hidden_conversion(name, compiler, level, tmp_path):
+    compiled(compiler, tmp_path, header_of(*made(name), single=True), level)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -135,7 +133,9 @@ def test_random_samples_give_the_same(name):
     counts = next(iter(sensors.values())).unit == "count"
     python, c = both(model, sensors, rate)
     seen = Counter()
-    for samples, time in random_samples(np.random.default_rng(2), sensors, rate, 2500, counts):
+    # All that goes wrong in a random stream begins before sample 1000, but a taxel that stops.
+    n = 2500 if name == "rich" else 1000
+    for samples, time in random_samples(np.random.default_rng(2), sensors, rate, n, counts):
         hand = compare(python, c, samples, time)
         if hand is not None:
             seen.update(x.state for x in hand.fingers.values())
@@ -191,11 +191,11 @@ def test_every_tare_gives_the_same(tare):
         compare(python, c, samples, time)
 
 
-def test_a_long_stream_of_large_times_gives_the_same():
+def test_a_stream_of_large_times_gives_the_same():
     model, sensors, rate = made("any-newton")
     python, c = both(model, sensors, rate)
     for k, (samples, _) in enumerate(
-        random_samples(np.random.default_rng(6), sensors, rate, 4000, counts=False)
+        random_samples(np.random.default_rng(6), sensors, rate, 1000, counts=False)
     ):
         compare(python, c, samples, 1.7e9 + k / rate)
 
@@ -210,7 +210,7 @@ def test_real_recordings_give_the_same(format_, data_folder):
     model = built_in("any")
     sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
     python, c = both(model, sensors, recording.rate)
-    modules = {name: m.slice(0, 2500) for name, m in
+    modules = {name: m.slice(0, 1000) for name, m in
                recording.modules.items() if name in sensors}  # fmt: skip
     run_recording(python, c, type(recording)(recording.name, modules))
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from holdfast.features import Tare
 from holdfast.features.specs import KINDS, RELATIVE_KINDS, FeatureSpec, kinds_of
+from holdfast.features.start import Start
 from holdfast.features.tables import StreamPlan
 from holdfast.sensors import Sensor
 
@@ -74,7 +75,7 @@ def random_plan(rng):
         tare=Tare.parse(str(tare)),
         rate=float(rng.choice(RATES)),
         ignore=ignore,
-        in_contact=bool(rng.random() < 0.2),
+        start=Start(bool(rng.random() < 0.2)),
     )
 
 

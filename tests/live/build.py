@@ -49,7 +49,7 @@ class Script(Source):
 
     paced = False
 
-    def __init__(self, sensors, steps, name="script", patient=False):
+    def __init__(self, sensors, steps=(), name="script", patient=False):
         self.name = name
         self.sensors = dict(sensors)
         self.metadata = {"source": name}

@@ -52,7 +52,7 @@ FINGERS = ("thumb", "index", "middle", "ring")
 def test_estimates_over_the_network_are_those_of_the_recording(tmp_path, monkeypatch, words):
     for name in ("MIN_LATE_DELAY", "MIN_CLOCK_JUMP"):  # a busy machine is late
         monkeypatch.setattr(f"holdfast.devices.sources.timeline.{name}", math.inf)
-    monkeypatch.setattr("holdfast.live.arrival_detector.MIN_SILENCE_TIMEOUT", PATIENCE)
+    monkeypatch.setattr("holdfast.live.stream_detector.MIN_SILENCE_TIMEOUT", PATIENCE)
     path, recording = build.grasp_file(tmp_path, fingers=FINGERS)
     model = build.model()
     with (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from holdfast.detector import Detector, detect
-from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording
 
@@ -22,10 +22,10 @@ MODELS = ("builtin:any", "builtin:twin", "builtin:noise-floor")
 
 def live(model, recording):
     """All estimates of a stream of the samples, by finger."""
-    sensors = {name: module.sensor for name, module in recording.modules.items()}
-    detector = ArrivalDetector(model, sensors)
-    found = [one for arrival in build.arrivals_of(recording) for one in detector.update(arrival)]
-    return {name: [one.estimate.fingers[name] for one in found] for name in sensors}
+    source = build.Script.of(recording)
+    stream = StreamDetector(model, source)
+    found = [one for arrival in source for one in stream.update(arrival).estimates]
+    return {name: [one.estimate.fingers[name] for one in found] for name in recording.modules}
 
 
 def batch(model, recording, bounds):

@@ -5,11 +5,13 @@ import pytest
 
 from holdfast import Model
 from holdfast.devices.sources import Arrival
-from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.readings_monitor import MISSING_AXES, NO_CHANGE, PULLED, ReadingsMonitor
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
+
+from . import build
 
 PATCH = sensor("uskin-4x4")
 TIMES = np.arange(0, 12, 0.01)
@@ -47,6 +49,30 @@ def test_a_grip_at_the_start_that_ends():
     assert text == f"index: {PULLED}"
     assert 9 < time < 10
     assert notices(grasp()[400:], TIMES[400:], finds_pull=False) == []
+
+
+def test_a_long_hold_that_drifts():
+    times = np.arange(0, 80, 0.05)
+    force = np.interp(times, [2, 3], [0, 300]) + 0.5 * times
+    readings = force[:, None, None] * [0, 0, 1] + np.random.default_rng(0).normal(
+        0, 2, (len(times), 16, 3)
+    )
+    ((text, time),) = notices(readings, times)
+    assert text.startswith("index: the force of this hold drifts by ")
+    assert "count a minute, by warming or creep: take a new tare" in text
+    assert time > 60
+
+
+def test_two_modules_with_the_same_readings_are_a_notice():
+    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
+    found = [
+        notice
+        for sample, time in zip(grasp(), TIMES, strict=True)
+        for name in ("index", "thumb")  # samples may come one by one
+        for notice in monitor.update({name: sample}, time)
+    ]
+    text = "has the same readings as index: one sensor is read twice, or written to both"
+    assert found == [f"thumb {text}; check the channels"]
 
 
 def test_axes_that_never_change():
@@ -89,7 +115,9 @@ def test_the_live_detector_passes_notices_on(name, expected):
     recording = synthetic_recording("grasp", seed=0)
     thumb = recording.modules["thumb"]
     turned = replace(thumb, readings=-thumb.readings)
-    detector = ArrivalDetector(Model.load(name), {"thumb": thumb.sensor})
+    detector = StreamDetector(Model.load(name), build.Script({"thumb": thumb.sensor}))
+    passed = []
     for time, sample in zip(turned.times.tolist(), turned.readings, strict=True):
-        detector.update(Arrival(time=time, samples={"thumb": sample}, received=time))
-    assert detector.notices == [f"thumb: {PULLED}"] * expected
+        arrival = Arrival(time=time, samples={"thumb": sample}, received=time)
+        passed += detector.update(arrival).arrival.notices
+    assert passed == [f"thumb: {PULLED}"] * expected

@@ -3,6 +3,7 @@ import itertools
 import sys
 import threading
 import time
+from functools import partial
 
 import pytest
 
@@ -95,6 +96,15 @@ def test_the_module_with_most_samples_gives_the_number_of_packets(start):
     assert session.n_packets == 60
 
 
+def retare(session):
+    session.change(session.stream.restart_tare, "no tare can be taken")
+
+
+def set_threshold(session, value):
+    change = partial(session.stream.set_threshold, value)
+    session.change(change, "the threshold was not changed")
+
+
 def test_a_tare_that_timed_out_is_not_taken_later(monkeypatch):
     monkeypatch.setattr("holdfast.live.session.REQUEST_TIMEOUT", 0.01)
     recording = build.grasp()
@@ -102,7 +112,7 @@ def test_a_tare_that_timed_out_is_not_taken_later(monkeypatch):
     taken = []
     monkeypatch.setattr(session.stream, "restart_tare", lambda: taken.append(1))
     with pytest.raises(SourceError, match=r"^the source does not answer: no tare can be taken$"):
-        session.restart_tare()
+        retare(session)
     session.start()
     wait_for(lambda: session.ended)
     session.stop()
@@ -115,25 +125,25 @@ def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
     source = build.Lasting.of(recording, arrivals[:200], patient=True)
     session = start(source)
     wait_for(lambda: session.n_packets >= 200)
-    session.restart_tare()
+    retare(session)
     source.steps.extend(arrivals[200:600])
     wait_for(lambda: source.last.time >= arrivals[599].time)
     with pytest.raises(StreamError, match="in contact"):
-        session.restart_tare()
+        retare(session)
 
 
 def test_the_threshold_is_changed_in_the_session(start):
     recording = build.grasp()
     source = build.Lasting.of(recording, build.arrivals_of(recording)[:200], patient=True)
     session = start(source)
-    session.set_threshold(0.9)  # also before the rate is known
+    set_threshold(session, 0.9)  # also before the rate is known
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, 0.9)
     wait_for(lambda: session.n_packets >= 200)
-    session.set_threshold(None)
+    set_threshold(session, None)
     own = build.model().finger("thumb").stable.threshold
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
     with pytest.raises(ValueError, match=r"^a threshold from 0 to 1 expected, 2 given$"):
-        session.set_threshold(2)
+        set_threshold(session, 2)
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
 
 
@@ -142,7 +152,7 @@ def test_no_threshold_after_the_end(start):
     wait_for(lambda: session.ended)
     message = r"^the source has ended: the threshold was not changed$"
     with pytest.raises(SourceError, match=message):
-        session.set_threshold(0.5)
+        set_threshold(session, 0.5)
 
 
 def test_no_tare_while_no_samples_arrive(start):
@@ -151,14 +161,14 @@ def test_no_tare_while_no_samples_arrive(start):
     session = start(build.Script.of(recording, steps, patient=True))
     wait_for(lambda: session.stream.silent)
     with pytest.raises(SourceError, match=r"^no samples arrive: no tare can be taken$"):
-        session.restart_tare()
+        retare(session)
 
 
 def test_no_tare_after_the_end(start):
     session = start(build.Script.of(build.grasp(), []))
     wait_for(lambda: session.ended)
     with pytest.raises(SourceError, match=r"^the source has ended: no tare can be taken$"):
-        session.restart_tare()
+        retare(session)
 
 
 def test_a_failure_is_kept_and_ends_the_session(start):

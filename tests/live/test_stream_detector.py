@@ -9,7 +9,7 @@ import pytest
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
-from holdfast.live.arrival_detector import MAX_BUFFERED_ARRIVALS, ArrivalDetector
+from holdfast.live.source_filter import MAX_BUFFERED_ARRIVALS
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
@@ -21,9 +21,9 @@ pytestmark = pytest.mark.slow
 
 def detected(recording, model=None, steps=None, **options):
     source = build.Script.of(recording, steps)
-    detector = ArrivalDetector(model or build.model(), source.sensors, **options)
-    estimates = [one for arrival in source for one in detector.update(arrival)]
-    return detector, estimates + detector.finish()
+    detector = StreamDetector(model or build.model(), source, **options)
+    estimates = [one for arrival in source for one in detector.update(arrival).estimates]
+    return detector, estimates + detector.finish().estimates
 
 
 def check_equal(estimates, expected):
@@ -71,8 +71,8 @@ def test_strict_refuses_a_source_of_another_rate():
 
 def test_arrivals_are_buffered_until_the_rate_is_known():
     arrivals = build.arrivals_of(build.grasp())
-    detector = ArrivalDetector(build.model(), build.Script.of(build.grasp()).sensors)
-    found = [detector.update(arrival) for arrival in arrivals[:80]]
+    detector = StreamDetector(build.model(), build.Script.of(build.grasp()))
+    found = [detector.update(arrival).estimates for arrival in arrivals[:80]]
     first = next(k for k, estimates in enumerate(found) if estimates)
     assert 70 <= first <= 76
     assert len(found[first]) == first + 1
@@ -108,11 +108,11 @@ def test_a_fault_of_the_transport_makes_its_finger_unknown_until_the_next_sample
 
 def test_in_silence_every_finger_is_unknown():
     recording = build.grasp()
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
-    assert detector.mark_silent() == []
+    detector = StreamDetector(build.model(), build.Script.of(recording))
+    assert detector.update(None, silent=True).estimates == []
     for arrival in build.arrivals_of(recording)[:500]:
         detector.update(arrival)
-    (one,) = detector.mark_silent()
+    (one,) = detector.update(None, silent=True).estimates
     assert one.updated_fingers == build.FINGERS
     assert one.estimate.state is ContactState.UNKNOWN
     for finger in one.estimate.fingers.values():
@@ -123,24 +123,24 @@ def test_in_silence_every_finger_is_unknown():
 def test_a_notice_does_not_end_the_silence():
     recording = build.grasp()
     arrivals = build.arrivals_of(recording)
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(recording))
     for arrival in arrivals[:500]:
         detector.update(arrival)
-    detector.mark_silent()
-    (one,) = detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT]))
+    detector.update(None, silent=True)
+    (one,) = detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT])).estimates
     assert {finger.state for finger in one.estimate.fingers.values()} == {ContactState.UNKNOWN}
     assert one.estimate.state is ContactState.UNKNOWN
-    (back,) = detector.update(arrivals[500])
+    (back,) = detector.update(arrivals[500]).estimates
     assert all(finger.faults == () for finger in back.estimate.fingers.values())
 
 
 def test_a_missing_finger_becomes_unknown_once_while_the_others_go_on():
     recording = build.grasp()
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(recording))
     estimates = []
     for k, arrival in enumerate(build.arrivals_of(recording)[:600]):
         there = {n: s for n, s in arrival.samples.items() if k < 500 or n != "thumb"}
-        estimates += detector.update(arrival._replace(samples=there))
+        estimates += detector.update(arrival._replace(samples=there)).estimates
     lost = [d for d in estimates[500:] if "thumb" in d.updated_fingers]
     assert len(lost) == 1
     thumb = lost[0].estimate.fingers["thumb"]
@@ -149,23 +149,24 @@ def test_a_missing_finger_becomes_unknown_once_while_the_others_go_on():
 
 def test_the_buffer_before_the_rate_is_known_is_bounded():
     recording = build.grasp()
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(recording))
     first, *_ = build.arrivals_of(recording)
     for k in range(3):
         for _ in range(MAX_BUFFERED_ARRIVALS):
-            assert detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT])) == []
+            odd = build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT])
+            assert detector.update(odd).estimates == []
         detector.update(first._replace(time=0.01 * k))
-    assert len(detector._buffer) == 6
+    assert len(detector._filter._buffer) == 6
     stuck = build.arrivals_of(recording)[: MAX_BUFFERED_ARRIVALS // 8]
     for one in stuck:  # the clock of the device hardly moves
         detector.update(one._replace(time=0.03 + one.time * 1e-6))
-    assert len(detector._buffer) == 6 + len(stuck)
-    assert detector._buffer.maxlen == MAX_BUFFERED_ARRIVALS
+    assert len(detector._filter._buffer) == 6 + len(stuck)
+    assert detector._filter._buffer.maxlen == MAX_BUFFERED_ARRIVALS
 
 
 def test_silence_is_longer_for_slow_sources():
     recording = build.grasp()
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(recording))
     assert detector.silence_timeout == 0.1
     for arrival in build.arrivals_of(recording)[:200]:
         detector.update(arrival._replace(time=20 * arrival.time))
@@ -174,13 +175,13 @@ def test_silence_is_longer_for_slow_sources():
 
 def test_a_tare_in_contact_is_refused_and_one_without_contact_restarts():
     recording = build.grasp()
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(recording))
     detector.restart_tare()
     arrivals = build.arrivals_of(recording)
     for arrival in arrivals[:200]:
         detector.update(arrival)
     detector.restart_tare()
-    thumb = detector.update(arrivals[200])[-1].estimate.fingers["thumb"]
+    thumb = detector.update(arrivals[200]).estimates[-1].estimate.fingers["thumb"]
     assert (thumb.state, thumb.reason) == (ContactState.UNKNOWN, Reason.TARE)
     for arrival in arrivals[201:600]:
         detector.update(arrival)
@@ -190,7 +191,7 @@ def test_a_tare_in_contact_is_refused_and_one_without_contact_restarts():
 
 def test_tared_readings_begin_at_zero():
     recording = build.grasp()
-    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(recording))
     arrivals = build.arrivals_of(recording)
     assert detector.subtract_tare(arrivals[0].samples) == {}
     for arrival in arrivals[:120]:
@@ -212,7 +213,7 @@ def test_modules_that_the_model_does_not_use_are_ignored():
 def test_a_tare_by_interval_is_refused():
     model = msgspec.structs.replace(build.model(), tare="0:1")
     with pytest.raises(ModelError, match=r"^the model's tare is the interval 0:1 s of a recordin"):
-        ArrivalDetector(model, build.Script.of(build.grasp()).sensors)
+        StreamDetector(model, build.Script.of(build.grasp()))
 
 
 def test_ignored_taxels_cause_no_fault():
@@ -295,9 +296,7 @@ def test_in_slow_motion_silence_is_longer():
             return super().read(0.0)
 
     read_times(Slow.of(recording), 1)
-    assert asked == [
-        10 * ArrivalDetector(build.model(), Slow.of(recording).sensors).silence_timeout
-    ]
+    assert asked == [10 * StreamDetector(build.model(), Slow.of(recording)).silence_timeout]
 
 
 def with_palm(recording):

@@ -22,9 +22,10 @@ from detector.build import (
 from holdfast.classifiers import Onnx
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError
-from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import ANY_FINGER, Handling, Model
 from holdfast.model.files import encode
+from live import build
 
 replace = msgspec.structs.replace
 RNG = np.random.default_rng(3)
@@ -154,7 +155,8 @@ def test_every_way_to_detect_uses_it():
 def test_the_live_threshold_is_that_of_the_sensor():
     sensors = {"thumb": sensor(), "index": sensor(name="other")}
     usual = PART.stable.threshold
-    assert ArrivalDetector(model(), sensors).thresholds == {"thumb": 0.31, "index": usual}
+    stream = StreamDetector(model(), build.Script(sensors))
+    assert stream.thresholds == {"thumb": 0.31, "index": usual}
 
 
 def test_two_sensors_of_one_hand():

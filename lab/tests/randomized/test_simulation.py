@@ -55,7 +55,7 @@ def test_a_stable_object_does_not_slide(hands):
             assert stable.sum() == 0 or np.quantile(slip[stable], 0.99) < 0.0015
 
 
-def test_a_recording_that_begins_in_contact_has_the_truth_of_its_part(monkeypatch):
+def test_a_recording_that_starts_loaded_has_the_truth_of_its_part(monkeypatch):
     """The truth of the cut recording is that of the whole, from its first sample on."""
     seeds = range(20)
     cut = next(

@@ -4,8 +4,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
+from command_line import Verb
 from holdfast import cluster
-from holdfast.cli import main
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
@@ -41,16 +41,8 @@ def written(folder, recordings):
     return folder
 
 
-def run(capsys, *words):
-    code = main(["study", *map(str, words)])
-    printed, err = capsys.readouterr()
-    return code, printed, err
-
-
-def refusal(capsys, *words):
-    code, printed, err = run(capsys, *words)
-    assert (code, printed, err.count("\n")) == (2, "", 1)
-    return err.removeprefix("holdfast: ").rstrip("\n")
+VERB = Verb("study")
+run, refusal = VERB.run, VERB.refusal
 
 
 def test_own_recordings(capsys, data, tmp_path):
@@ -186,12 +178,6 @@ class TestBadInput:
         assert err.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
         assert not (tmp_path / "out").exists()
 
-    def test_out(self, capsys, data, tmp_path):
-        file = data / "grasp-0.parquet"
-        assert "is a file; a study is written to a folder" in refusal(capsys, data, "-o", file)
-        assert "holds other files" in refusal(capsys, data, "-o", data)
-        assert "does not exist" in refusal(capsys, data, "-o", tmp_path / "no" / "out")
-
 
 def stable(recording):
     labels = {
@@ -237,7 +223,9 @@ def test_corpora_of_three_rates_of_glitches():
 
 def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
     given = []
-    monkeypatch.setattr(verb, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps))
+    monkeypatch.setattr(
+        "holdfast.twin_recordings.simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
+    )
     verb._simulate(tmp_path / "one", verb.TWIN_CORPORA["glitch-1"], 5, 1, 1)
     assert {grasp.glitch_rate for grasp in given} == {1 / 60}
     assert {grasp.seed for grasp in given} == {7}

@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,12 +11,12 @@ import typer
 from holdfast.cli.options import (
     DetectorOptions,
     IgnoreOption,
-    InContactOption,
     JsonOption,
     ModelArgument,
     SecondsOption,
     SourceArgument,
     SpeedOption,
+    StartOptions,
     check_seconds,
 )
 from holdfast.cli.terminal.console import print_line, print_message
@@ -34,23 +33,23 @@ if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.live.recorder import Recorder
     from holdfast.live.session import Session
-    from holdfast.live.stream_detector import StreamDetector, StreamUpdate
+    from holdfast.live.stream_detector import StreamUpdate
     from holdfast_grip import GripCommand
     from holdfast_grip.loop.grip_loop import GripLoop
-    from holdfast_grip.loop.runner import LoopRunner
 
 
 def hold(
     model: ModelArgument,
     source: SourceArgument,
     settings: GripSettings,
+    *,
     record: Annotated[
         Path | None, typer.Option("--record", help="Record samples and the log to NAME.mcap.")
     ] = None,
     seconds: SecondsOption = None,
     speed: SpeedOption = 1.0,
     ignore: IgnoreOption = "",
-    in_contact: InContactOption = False,
+    start: StartOptions,
     as_json: JsonOption = False,
 ) -> None:
     r"""Control the grip force of a hand by the estimates of a source.
@@ -80,7 +79,7 @@ def hold(
 
     settings.check()
     check_seconds(seconds)
-    options = DetectorOptions(ignore=ignore, in_contact=in_contact)
+    options = DetectorOptions(ignore=ignore)
     loaded = options.load_model(model)
     opened, commanded = find_source_and_hand(source, settings.hand, speed=speed)
     check_armed(settings)
@@ -88,7 +87,7 @@ def hold(
         stop = stack.enter_context(handle_stop_signals())
         watchdog = connect_hand(stack, settings, commanded)
         stack.enter_context(opened)
-        stream = options.create_stream(loaded, opened)
+        stream = options.create_stream(loaded, opened, start)
         log = _new_log(stack, record, opened, as_json=as_json)
         session = stack.enter_context(Session(stream))  # ends after the loop, which reads it
         loop = stack.enter_context(open_loop(settings, commanded, stream, watchdog, log.event))
@@ -156,7 +155,14 @@ def _run(
         return stop.requested or time.monotonic() >= end
 
     if not source.paced:
-        _run_directly(runner, session.stream, log, is_over)
+        # Read the source and step the loop in turn, so that the same seed gives the same
+        # commands.
+        stream = session.stream
+        while not (is_over() or stream.source.ended):
+            update = stream.read()
+            log.update(update, wait=True)
+            runner.process(update)
+        runner.process(stream.finish())
         return
     # Reads of the source may block for longer than the loop may wait.
     session.add_listener(log.update)
@@ -165,17 +171,6 @@ def _run(
     runner.run(lambda: session.ended or is_over())
     if session.failure is not None:
         raise session.failure
-
-
-def _run_directly(
-    runner: "LoopRunner", stream: "StreamDetector", log: _Log, is_over: Callable[[], bool]
-) -> None:
-    """Read the source and step the loop in turn, so that the same seed gives the same commands."""
-    while not (is_over() or stream.source.ended):
-        update = stream.read()
-        log.update(update, wait=True)
-        runner.process(update)
-    runner.process(stream.finish())
 
 
 def _report(loop: "GripLoop", settings: GripSettings) -> None:

@@ -65,6 +65,7 @@ SUB_VERBS = {
     "label audit": "Find labels that a classifier contradicts.",
     "label export": "Export labels to Label Studio, or as CSV.",
     "label import": "Import labels from Label Studio, or CSV.",
+    "label markers": "Print stickers by which a camera sees slips.",
 }
 """Commands of verbs, with the first line of their docstrings; for `label auto`,
 `cli/label/auto.py` has the function `auto`."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from holdfast.devices.sources import Source
+    from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.parallel import Engine
@@ -76,6 +77,11 @@ SourceArgument = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what exists already.")]
+FpsOption = Annotated[
+    float | None,
+    typer.Option("--fps", help="Pictures per second of a video.", show_default="60, or its stamps"),
+    RARE,
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers."), RARE]
 JobsOption = Annotated[
     int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor."), RARE
@@ -138,6 +144,38 @@ ModelOutput = Annotated[
 
 
 @dataclass(frozen=True)
+class StartOptions:
+    """Group of options: how the recordings or the source of a verb begin."""
+
+    in_contact: InContactOption = False
+
+    def load_dataset(self, folder: Path | str, *, labels: bool = True) -> "Dataset":
+        """Return the recordings of a folder with this start.
+
+        Raises:
+            RecordingError: the folder does not exist, or has no recording.
+        """
+        from holdfast.io import load_dataset
+
+        return load_dataset(folder, labels=labels, in_contact=self.in_contact)
+
+    def of(self, recording: "Recording") -> "Recording":
+        """Return a recording with this start."""
+        return recording.with_start(loaded=self.in_contact or None)
+
+    def create_stream(
+        self,
+        model: "Model",
+        source: "Source",
+        **options: Any,  # noqa: ANN401 (of the class)
+    ) -> "StreamDetector":
+        """Return the detector of an open source with this start."""
+        from holdfast.live.stream_detector import StreamDetector
+
+        return StreamDetector(model, source, in_contact=self.in_contact, **options)
+
+
+@dataclass(frozen=True)
 class DetectorOptions:
     """Group of options: how a model detects."""
 
@@ -165,7 +203,6 @@ class DetectorOptions:
         RARE,
     ] = False
     ignore: IgnoreOption = ""
-    in_contact: InContactOption = False
 
     def load_model(self, name: str) -> "Model":
         """Load a model, and apply `--debounce`, `--hysteresis` and `--raw`.
@@ -201,15 +238,13 @@ class DetectorOptions:
         )
         return replace(model, name=model.name or name, debounce=debounce)
 
-    def create_stream(self, model: "Model", source: "Source") -> "StreamDetector":
+    def create_stream(
+        self, model: "Model", source: "Source", start: StartOptions
+    ) -> "StreamDetector":
         """Create the detector of an open source, and report what the source lacks."""
-        from holdfast.live.stream_detector import StreamDetector
-
         taxels = parse_taxels(self.ignore, source.sensors)
         strict = self.rate is RatePolicy.STRICT
-        stream = StreamDetector(
-            model, source, strict=strict, ignore=taxels, in_contact=self.in_contact
-        )
+        stream = start.create_stream(model, source, strict=strict, ignore=taxels)
         report_missing_fingers(model, source.name, source.sensors)
         report_other_handling(model, stream.fingers)
         report_blind_features(model, stream.fingers)
@@ -310,21 +345,6 @@ def start_engine(engine: str, jobs: int) -> "Engine":
     started = Engine.parse(engine, jobs)
     started.check()
     return started
-
-
-def check_shared(path: Path, engine: "Engine") -> None:
-    """Check that a file that an engine has written is there.
-
-    Raises:
-        OutputError: a worker of a cluster wrote it to a disk of its own.
-    """
-    from holdfast.errors import OutputError
-
-    if engine.scheduler is not None and not path.exists():
-        raise OutputError(
-            f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
-            "that all machines have at the same path"
-        )
 
 
 def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, object]) -> None:

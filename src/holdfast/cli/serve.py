@@ -22,6 +22,7 @@ from holdfast.cli.options import (
     ServerOptions,
     SourceArgument,
     SpeedOption,
+    StartOptions,
     awaited,
     check_speed,
     report_missing_slip_rules,
@@ -49,6 +50,7 @@ def serve(
     speed: SpeedOption = 1.0,
     once: OnceOption = False,
     options: DetectorOptions,
+    start: StartOptions,
     panels: Annotated[PanelOptions, RARE],
     publishers: PublisherOptions,
     as_json: JsonOption = False,
@@ -92,7 +94,7 @@ def serve(
 
     opened = _find(source, openers, speed=speed, loop=not once)
     with (
-        _open_session(options, loaded, opened, openers) as (session, shown),
+        _open_session(options, start, loaded, opened, openers) as (session, shown),
         _publish(session, shown, publishers),
     ):
         run_page(
@@ -119,7 +121,11 @@ def _find(source: str, openers: "Sequence[PanelOpener]", *, speed: float, loop: 
 
 @contextmanager
 def _open_session(
-    options: DetectorOptions, model: "Model", source: "Source", openers: "Sequence[PanelOpener]"
+    options: DetectorOptions,
+    start: StartOptions,
+    model: "Model",
+    source: "Source",
+    openers: "Sequence[PanelOpener]",
 ) -> "Iterator[tuple[Session, Sequence[Panel]]]":
     """Yield the session of a source, and the panels that run beside it."""
     from holdfast.live.session import Session
@@ -129,7 +135,7 @@ def _open_session(
             opener.connect(stack)
         with message_if_slow(awaited(source.name)):
             stack.enter_context(source)
-        session = stack.enter_context(Session(options.create_stream(model, source)))
+        session = stack.enter_context(Session(options.create_stream(model, source, start)))
         yield session, [stack.enter_context(opener.open(session)) for opener in openers]
 
 

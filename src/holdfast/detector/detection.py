@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -99,6 +99,7 @@ class FingerTrace(NamedTuple):
 
     def estimates(self, rows: slice = slice(None)) -> list[ContactEstimate]:
         """Return the estimates of these samples."""
+        # None instead of a column: the model has no such head.
         given = (self.slip_probability, self.slip_speed, self.slip_distance)
         slips = (repeat(None) if column is None else column[rows].tolist() for column in given)
         columns = (column[rows].tolist() for column in self[:-3])
@@ -169,13 +170,21 @@ def detection_of(
         parts: models of the fingers.
         chunks: at least one, in order of time.
     """
+    # The traces are allocated once, as the number of samples of each finger is known.
     times, hand = list[Array](), list[npt.NDArray[np.int8]]()
-    found = {
-        finger: _empty_trace(recording.modules[finger].times, n_slips)
-        for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True)
-        if finger in recording.modules and recording.modules[finger].n_samples
-    }
-    ends = dict.fromkeys(found, 0)
+    found = {}
+    for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True):
+        if finger in recording.modules and recording.modules[finger].n_samples:
+            n = recording.modules[finger].n_samples
+            # Missing are slip, speed and distance without a head of slips, the last two without
+            # `slip_speed`.
+            n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
+            columns: list[npt.NDArray[Any]] = [
+                np.empty((n, 3) if field == "force" else n, number)
+                for field, number in TRACE_COLUMNS[:n_columns]
+            ]
+            found[finger] = FingerTrace(recording.modules[finger].times, *columns)
+    ends = dict.fromkeys(found, 0)  # rows of each finger that are filled
     for chunk in chunks:
         times.append(chunk.times)
         hand.append(chunk.hand.astype(np.int8))
@@ -189,13 +198,3 @@ def detection_of(
                 if column is not None:
                     column[part] = rows[field]
     return Detection(recording.name, found, np.concatenate(times), np.concatenate(hand))
-
-
-def _empty_trace(times: Array, n_slips: int) -> FingerTrace:
-    """Return a trace to be filled, with 0, 1 or 2 heads of slips; see `_slip_heads`."""
-    n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
-    shapes = [(len(times), 3) if field == "force" else len(times) for field, _ in TRACE_COLUMNS]
-    columns = [
-        np.empty(shape, number) for shape, (_, number) in zip(shapes, TRACE_COLUMNS, strict=True)
-    ]
-    return FingerTrace(times, *columns[:n_columns])

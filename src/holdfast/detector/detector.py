@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy import ndarray
 
-from holdfast.classifiers import Linear
+from holdfast.classifiers import Linear, Onnx
 from holdfast.contact import (
     ContactEvent,
     HandEstimate,
@@ -28,17 +28,16 @@ from holdfast.detector.detection import (
     detection_of,
     makers,
 )
-from holdfast.detector.onnx_feeder import OnnxFeeder
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.loaded_start import declared_baselines
+from holdfast.features.start import Start, declared_baselines
 from holdfast.features.stream import FeatureStream
 from holdfast.features.tables import StreamPlan
 from holdfast.kernel import _extension
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import BASELINES, Recording
-from holdfast.resampling import resample, true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Flags
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
 HAND = "hand"
@@ -84,11 +83,20 @@ class Detector:
         in_contact: bool = False,
         baselines: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
-        sensors = model.fingers_of(fingers) if fingers is not None else _sensors_of(model)
+        if fingers is not None:
+            sensors = model.fingers_of(fingers)
+        elif any(f == "*" or part.sensor is None for f, part in model.fingers.items()):
+            raise ModelError(
+                f"the model {model.name or 'given'} is for any finger: the fingers of the hand and "
+                "their sensors expected"
+            )
+        else:
+            sensors = {f: model.sensors[str(part.sensor)] for f, part in model.fingers.items()}
         first = next(iter(sensors.values()))
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
         known = declared_baselines({BASELINES: baselines}, sensors)
-        plan = replace(plan, in_contact=in_contact, baselines=known)
+        plan = replace(plan, start=Start(in_contact, known))
+        # Last, so that a wrong finger or taxel is reported first, as by `for_recording`.
         if plan.tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
@@ -103,7 +111,6 @@ class Detector:
         recording: Recording,
         *,
         ignore: IgnoredTaxels | None = None,
-        in_contact: bool | None = None,
     ) -> Self:
         """Return a detector for a recording, whose tare may be an interval of it.
 
@@ -112,22 +119,23 @@ class Detector:
             recording: the recording; or its first part, if `run` receives it in parts. A tare by
                 interval then needs that interval in the first part.
             ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
-            in_contact: the first samples are load; None if the metadata say it (`starts_loaded`).
 
         Raises:
             ModelError: the recording has none of the model's fingers, or another sensor.
             ValueError: a tare by interval finds no samples, or `ignore` names a finger or a
                 taxel that does not exist.
         """
+        # Past `__init__`, which refuses the tare by interval that a recording may have.
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
         plan = _ignoring(model.plan(sensors, recording.rate), ignore)
-        plan = replace(plan, in_contact=in_contact)
         detector._start(model, FeatureStream.for_recording(plan, recording))
         return detector
 
     def _start(self, model: Model, stream: FeatureStream) -> None:
         plan = stream.plan
+        # What holds for the life of the detector; only `set_model` and `set_thresholds` replace
+        # parts and rules. `_readings` and `_present` are memory for samples of other types.
         self._names = (*plan.fingers, HAND)
         self._settings = tables.model_table(model, plan)
         self._parts = [model.finger(*finger) for finger in plan.sensors.items()]
@@ -143,6 +151,8 @@ class Detector:
     def _use(self, stream: FeatureStream) -> None:
         """Set a new feature stream, and an empty decision memory."""
         self._stream = stream
+        # The kernel appends to `_transitions` at each change; `events` and `run` turn them into
+        # events, so that an update makes no Python objects for them.
         self._changes = StateChanges(self._names)
         self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
         self._transitions: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
@@ -177,8 +187,8 @@ class Detector:
             in_contact: whether the next samples are load; None for as before.
         """
         plan = self._stream.plan
-        loaded = plan.in_contact if in_contact is None else in_contact
-        self._use(FeatureStream(replace(plan, in_contact=loaded)))
+        loaded = plan.start.loaded if in_contact is None else in_contact
+        self._use(FeatureStream(replace(plan, start=replace(plan.start, loaded=loaded))))
 
     def set_thresholds(self, thresholds: Mapping[str, float]) -> None:
         """Change the probability from which a contact is stable, from the next sample on.
@@ -199,6 +209,7 @@ class Detector:
                 f"threshold of {', '.join(sorted(unknown))} given; "
                 f"the detector has {', '.join(self._slots)}"
             )
+        # A copy, so that nothing has changed if the kernel refuses it.
         limits, heads, weights = self._rules
         rules = limits, [dict(head) for head in heads], weights
         for finger, threshold in thresholds.items():
@@ -225,6 +236,7 @@ class Detector:
                 is not linear; nothing has changed then.
         """
         plan = self._stream.plan
+        # The features first: rules over other features cannot be compared.
         features = {name: model.finger(name).features for name in plan.sensors}
         parts = [model.finger(*finger) for finger in plan.sensors.items()]
         if self._feeder is not None or not _are_linear(parts) or features != dict(plan.features):
@@ -261,6 +273,7 @@ class Detector:
             estimate = self._kernel.update(samples, time)
             if estimate is not None:
                 return estimate
+        # The time first: `_store` changes the memory for samples, which a wrong time must not.
         time = float(time)
         self._check_time(time)
         self._store(samples)
@@ -289,7 +302,16 @@ class Detector:
             StreamError: the recording has no sample of the fingers, another number of taxels,
                 or begins before the last sample.
         """
-        self._check_recording(recording)
+        # All is checked before the first sample: a recording is processed as a whole or not.
+        modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
+        if not any(module.n_samples for module in modules.values()):
+            raise StreamError(
+                f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
+                f"the model is for {', '.join(self._slots)}"
+            )
+        for finger, module in modules.items():
+            self._check_shape(finger, module.readings.shape[1:])
+        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
         self._settle_transitions()
         fingers, chunks = self._stream.plan.fingers, self._estimates(recording)
         return detection_of(recording, fingers, self._parts, chunks)
@@ -302,6 +324,7 @@ class Detector:
             if self._feeder is None:
                 self._kernel.run(readings, present, times, numbers, hand)
             else:
+                # One by one: the log odds of a sample depend on the features up to it.
                 for k, time in enumerate(times.tolist()):
                     self._kernel.give(self._feeder.log_odds(readings[k], present[k], time))
                     row = slice(k, k + 1)
@@ -317,17 +340,6 @@ class Detector:
         if not last < time < inf:
             after = "" if last == -inf else f" after {last:.15g} s"
             raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
-
-    def _check_recording(self, recording: Recording) -> None:
-        modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
-        if not any(module.n_samples for module in modules.values()):
-            raise StreamError(
-                f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
-                f"the model is for {', '.join(self._slots)}"
-            )
-        for finger, module in modules.items():
-            self._check_shape(finger, module.readings.shape[1:])
-        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
 
     def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
         expected = self._slots[finger][2]
@@ -390,10 +402,8 @@ def detect(model: Model, recording: Recording, *, in_contact: bool | None = None
         >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
         (['index', 'middle', 'thumb'], 1725, (1725,))
     """
-    recording = true_updates(recording)
-    if model.rate is not None and not model.rate_fits(recording.rate):
-        recording = resample(recording, model.rate)
-    return Detector.for_recording(model, recording, in_contact=in_contact).run(recording)
+    recording = at_rate(recording.with_start(loaded=in_contact), model.rate)
+    return Detector.for_recording(model, recording).run(recording)
 
 
 def check_thresholds(thresholds: Mapping[str, float]) -> None:
@@ -406,16 +416,6 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
 def _are_linear(parts: Sequence[FingerModel]) -> bool:
     """Return whether no finger has an ONNX file as its classifier."""
     return all(isinstance(part.stable.rule, Linear) for part in parts)
-
-
-def _sensors_of(model: Model) -> dict[str, Sensor]:
-    """Return the sensors of all fingers that a model names."""
-    if any(finger == "*" or part.sensor is None for finger, part in model.fingers.items()):
-        raise ModelError(
-            f"the model {model.name or 'given'} is for any finger: the fingers of the hand and "
-            "their sensors expected"
-        )
-    return {name: model.sensors[str(part.sensor)] for name, part in model.fingers.items()}
 
 
 def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
@@ -433,3 +433,40 @@ def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
                     f"it has the indices 0 to {n_taxels - 1}"
                 )
     return replace(plan, ignore=ignore or {})
+
+
+class OnnxFeeder:
+    """Feeder of a kernel with the log odds of ONNX files, which Python computes for each sample.
+
+    It computes the features once more, in a stream of its own: an update takes as long as the
+    classifier.
+
+    Args:
+        parts: models of the fingers of the stream, in its order.
+        stream: of the detector.
+    """
+
+    def __init__(self, parts: Sequence[FingerModel], stream: FeatureStream) -> None:
+        self._kernel = stream.start()
+        self._features = np.empty((1, len(parts), stream.plan.width))
+        self._amplitude = np.empty((1, len(parts)))
+        self._log_odds = np.zeros(len(parts))  # of the latest sample of each finger
+        self._rules = {
+            place: (part.indices(part.stable), part.stable.rule)
+            for place, part in enumerate(parts)
+            if isinstance(part.stable.rule, Onnx)
+        }
+
+    def log_odds(self, readings: Array, present: Flags, time: float) -> Array:
+        """Return (n_fingers,) the log odds of stability of a sample; see `Detector.update`."""
+        self._kernel.advance(
+            readings[None], present[None], np.array([time]), self._features, self._amplitude
+        )
+        for place, (columns, onnx) in self._rules.items():
+            features = self._features[:, place, columns]
+            if present[place] and not np.isnan(features).any():  # NaN: the finger has none
+                probability = onnx.probability(features)[0]
+                # A probability of 0 or 1 is an infinite logit, which the kernel accepts.
+                with np.errstate(divide="ignore"):
+                    self._log_odds[place] = np.log(probability / (1.0 - probability))
+        return self._log_odds

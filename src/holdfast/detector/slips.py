@@ -65,6 +65,7 @@ class SlipWatch:
         """Yield each slip when it begins, without an end, and again when it has ended."""
         for estimate in estimates:
             probability = estimate.slip_probability
+            # One finger with a rule is enough: the others may have none.
             self.has_rule |= probability is not None
             slip = self._running.get(finger)
             if probability is not None and slides(estimate):
@@ -72,6 +73,7 @@ class SlipWatch:
                 if slip is None:
                     slip = DetectedSlip(finger, estimate.time, None, probability)
                 largest = max(probability, slip.max_probability)
+                # Kept up to date while it runs: a page shows it before it has ended.
                 slip = slip._replace(max_probability=largest, distance=estimate.slip_distance)
                 self._running[finger] = slip
                 if begins:

@@ -46,10 +46,15 @@ def rules_of(model: Model, plan: StreamPlan) -> Rules:
     numbers = [np.empty(0)]
     for part in parts:
         for name in HEAD_NAMES:
-            rows, squares, causes = _numbers(part, part.head(name))
+            head = part.head(name)
+            rows, squares, causes = _numbers(part, head)
             heads.append(
-                _head(part.head(name), plan.rate)
-                | {
+                {
+                    # Without the head they are not read.
+                    "threshold": 0.0 if head is None else head.threshold,
+                    "gain": 1.0 if head is None else head.gain(plan.rate),
+                    "hold": 0.0 if head is None else head.hold,
+                    "highest": 0.0 if head is None else head.highest or 0.0,
                     "n_outputs": len(rows),
                     "n_features": rows.shape[1] - 1,
                     "first": sum(map(len, numbers)),
@@ -72,6 +77,8 @@ def shapes(rules: Rules) -> list[tuple[object, ...]]:
 
 
 def _contact(part: FingerModel) -> Struct:
+    # In this order: a model of relative features has a limit by load; and a limit in the unit of
+    # the readings, which was measured, is better than a multiple of the noise.
     for kind, limit in (
         (BY_LOAD, part.contact_load),
         (BY_FORCE, part.contact_threshold),
@@ -80,18 +87,6 @@ def _contact(part: FingerModel) -> Struct:
         if limit is not None:
             return {"contact": kind, "contact_limit": limit}
     return {"contact": ALWAYS_CONTACT, "contact_limit": 0.0}
-
-
-def _head(head: Head | None, rate: float) -> Struct:
-    """Return the settings of a head; without it they are not read."""
-    if head is None:
-        return {"threshold": 0.0, "gain": 1.0, "hold": 0.0, "highest": 0.0}
-    return {
-        "threshold": head.threshold,
-        "gain": head.gain(rate),
-        "hold": head.hold,
-        "highest": head.highest or 0.0,
-    }
 
 
 def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[int]]:
@@ -107,10 +102,12 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     # A head reads the features up to the last that it uses; those of slips read all.
     is_slip = head.name in ("slip", "slip_speed")
     n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
+    # A row is the intercept, then a weight for each feature: 0 for those that it does not use.
     rows = np.zeros((head.rule.n_outputs, n + 1))
     rows[:, np.append(0, columns + 1)] = head.rule.raw_weights()
     squares = np.zeros((3 if head.rule.squares else 0, n))
     squares[:, columns] = head.rule.raw_squares()[: len(squares)]
+    # The kernel goes through the causes in the order of their codes, whatever that of the model.
     codes = [CAUSES.index(cause) + 1 for cause in head.classes]
     order = np.argsort(codes)
     kept = [k for k in order if part.slip is None or codes[k] != SLIP_CODE]

@@ -99,6 +99,7 @@ class Address:
         given = self.parameters.get("sensor")
         if given is None:
             return None
+        # The names are checked here, so that the message has the URI and all of them.
         if not given.endswith(".json") and given not in (names := sensor_names()):
             raise ValueError(
                 f"{self.text}: sensor=FILE.json or one of {', '.join(names)} "
@@ -125,6 +126,7 @@ def parse(text: str) -> tuple[str, Address]:
     """
     match = _SCHEME.match(text)
     scheme = match["scheme"] if match else ""
+    # Plug-ins are looked up only for other schemes: reading their names takes time.
     if scheme not in SCHEMES and scheme not in (others := SOURCE_PLUGINS.names()):
         raise missing_part("sources", scheme, f"the source {scheme}:") or ValueError(
             f"{text!r} is neither the path of a recording nor the URI of a source; there are "
@@ -141,8 +143,9 @@ def parse(text: str) -> tuple[str, Address]:
 
 def _parameters(text: str, query: str) -> dict[str, str]:
     for part in filter(None, query.split("&")):
-        if "=" not in part:
+        if "=" not in part:  # `parse_qsl` would leave it out without a word
             raise ValueError(f"{text}: name=value expected, {part!r} given")
+    # Blank values stay: `sensor=` is refused by its reader, and not ignored.
     pairs = parse_qsl(query, keep_blank_values=True)
     if len(dict(pairs)) < len(pairs):
         raise ValueError(f"{text}: a parameter is given twice")
@@ -151,6 +154,7 @@ def _parameters(text: str, query: str) -> dict[str, str]:
 
 def is_uri(text: str) -> bool:
     """Return whether the text has the form of a URI and is not the name of a file."""
+    # A file may be called `twin:can`; then it is meant.
     return bool(_SCHEME.match(text)) and not Path(text).exists()
 
 

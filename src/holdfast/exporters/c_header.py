@@ -10,15 +10,13 @@ from importlib.metadata import version
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.classifiers import Linear
 from holdfast.contact import Fault, Reason
 from holdfast.errors import ModelError
 from holdfast.exporters.c_tables import Tables, kernel_text
-from holdfast.features.loaded_start import declared_baselines
+from holdfast.features.start import OPEN_HAND, Start
 from holdfast.model import Model
-from holdfast.recordings import BASELINES
 from holdfast.sensors import Sensor
 
 HEADER_FIELDS = 16
@@ -47,8 +45,7 @@ def header_of(
     rate: float,
     *,
     single: bool = False,
-    in_contact: bool = False,
-    baselines: Mapping[str, npt.ArrayLike] | None = None,
+    start: Start = OPEN_HAND,
     ignore: Mapping[str, Sequence[int]] | None = None,
 ) -> CHeader:
     """Return the header of a model for the fingers of a hand; it does what a `Detector` does.
@@ -58,8 +55,7 @@ def header_of(
         fingers: sensor of each finger, in the order of the readings.
         rate: samples per second of the source [Hz], for a model of any rate.
         single: numbers are of single precision; times stay double.
-        in_contact: the first samples are load, and not an open hand.
-        baselines: (n_taxels, 3) readings without contact by finger, if `in_contact`.
+        start: of the samples, with an open hand or in contact.
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
 
     Raises:
@@ -72,9 +68,7 @@ def header_of(
                 f"the classifier of {name} is an ONNX file, which has no form as C; a header "
                 "holds linear classifiers (logistic regression, linear SVM) with all the rest"
             )
-    declared = declared_baselines({BASELINES: baselines}, sensors)
-    plan = replace(model.plan(sensors, rate), in_contact=in_contact, baselines=declared)
-    plan = replace(plan, ignore=ignore or {})
+    plan = replace(model.plan(sensors, rate), start=start, ignore=ignore or {})
     if plan.tare.kind == "interval":
         raise ModelError(
             f"the model's tare is the interval {model.tare} s of a recording; a header holds a "

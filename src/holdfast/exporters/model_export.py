@@ -7,7 +7,7 @@ from typing import NamedTuple
 from holdfast.errors import ModelError
 from holdfast.exporters.c_header import CHeader, header_of
 from holdfast.exporters.onnx_head import onnx_of
-from holdfast.features.loaded_start import begins_in_contact, declared_baselines
+from holdfast.features.start import Start
 from holdfast.files import refuse_overwrite, write_whole
 from holdfast.model import ANY_FINGER, Model
 from holdfast.recordings import Recording
@@ -73,18 +73,15 @@ def export(
     if target.suffix != HEADER_SUFFIX:
         raise ValueError(f"{target}: a model is exported as {HEADER_SUFFIX} (C99) or {ONNX_SUFFIX}")
     if like is None:
-        sensors = dict(fingers) if fingers is not None else named_fingers(model)
-        rate = next(iter(model.fingers_of(sensors).values())).rate
-        loaded, baselines = in_contact is True, None
+        sensors = named_fingers(model) if fingers is None else dict(fingers)
+        rate, start = next(iter(model.fingers_of(sensors).values())).rate, Start(in_contact is True)
     else:
         sensors, rate = _fingers_like(model, like), like.rate
-        loaded = begins_in_contact(like.metadata, in_contact)
-        baselines = declared_baselines(like.metadata, sensors)
-    header = header_of(model, sensors, rate, single=single, in_contact=loaded, baselines=baselines)
-    names = tuple(model.fingers_of(sensors))
+        start = Start.of(like.with_start(loaded=in_contact).metadata, sensors)
+    header = header_of(model, sensors, rate, single=single, start=start)
     data = header.text.encode()
     write_whole(target, data, force=force)
-    return ExportedModel(target, names, len(data), header)
+    return ExportedModel(target, tuple(model.fingers_of(sensors)), len(data), header)
 
 
 def named_fingers(model: Model) -> dict[str, Sensor]:

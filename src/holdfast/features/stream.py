@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.features.loaded_start import begins_in_contact, declared_baselines
+from holdfast.features.start import Start
 from holdfast.features.tables import StreamPlan, StreamTables, stream_tables
 from holdfast.features.tare import baseline_of
 from holdfast.kernel import _extension
@@ -66,25 +66,22 @@ class FeatureStream:
             finger: slice(*bounds)
             for finger, bounds in zip(plan.fingers, pairwise(ends), strict=True)
         }
-        if plan.in_contact and plan.used_tare.kind == "none":
-            for finger, baseline in plan.baselines.items():
+        if plan.start.loaded and plan.used_tare.kind == "none":
+            for finger, baseline in plan.start.baselines.items():
                 self.baseline[self.slices[finger]] = baseline
 
     @classmethod
     def for_recording(cls, plan: StreamPlan, recording: Recording) -> Self:
         """Return the stream for a recording, from which a tare by interval is taken.
 
-        A finger that the recording lacks has no baseline then. The metadata of the recording say
-        whether it begins in contact, unless the plan does.
+        A finger that the recording lacks has no baseline then. The start is that of the recording,
+        whatever the plan has.
 
         Raises:
             ValueError: a finger has no finite sample in the interval, or the metadata declare a
                 baseline of another shape.
         """
-        if begins_in_contact(recording.metadata, plan.in_contact):
-            baselines = dict(plan.baselines) or declared_baselines(recording.metadata, plan.sensors)
-            plan = replace(plan, in_contact=True, baselines=baselines)
-        stream = cls(plan)
+        stream = cls(replace(plan, start=Start.of(recording.metadata, plan.sensors)))
         if plan.tare.kind != "interval":
             return stream
         for finger, taxels in stream.slices.items():

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from holdfast.features.haar import n_levels
-from holdfast.features.loaded_start import loaded_tare
 from holdfast.features.specs import (
     KINDS,
     SCOPES,
     TRANSFORMS,
     FeatureSpec,
 )
+from holdfast.features.start import OPEN_HAND, Start
 from holdfast.features.tare import Tare
 from holdfast.kernel import _extension
 from holdfast.sensors import Sensor
@@ -67,9 +67,7 @@ class StreamPlan:
         tare: how the baseline is found.
         rate: samples per second [Hz].
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
-        in_contact: whether the first samples are load; None for a recording whose metadata say it.
-        baselines: (n_taxels, 3) readings without contact, by finger, for a stream that begins in
-            contact [unit of the readings].
+        start: with an open hand, or in contact.
     """
 
     sensors: Mapping[str, Sensor]
@@ -78,15 +76,12 @@ class StreamPlan:
     tare: Tare
     rate: float
     ignore: Mapping[str, Sequence[int]] = field(default_factory=dict)
-    in_contact: bool | None = None
-    baselines: Mapping[str, Array] = field(default_factory=dict)
+    start: Start = OPEN_HAND
 
     @property
     def used_tare(self) -> Tare:
         """The tare, or what takes its place in a stream that begins in contact."""
-        if not self.in_contact:
-            return self.tare
-        return loaded_tare(self.tare, self.sensors, tuple(self.baselines))
+        return self.start.used_tare(self.tare, self.sensors)
 
     @property
     def fingers(self) -> tuple[str, ...]:
@@ -96,7 +91,7 @@ class StreamPlan:
     @property
     def zero_unknown(self) -> bool:
         """Whether the stream begins in contact, and no readings without contact are known."""
-        return self.in_contact is True and self.used_tare.kind == "first"
+        return self.start.loaded and self.used_tare.kind == "first"
 
     @property
     def width(self) -> int:
@@ -148,7 +143,7 @@ def _hand(
     # The stretch of the tare shows the noise too, as nothing touches; where the tare takes no
     # time, the first samples after it do. Under load the hand may move soon, so less is taken.
     noise_seconds = plan.tare.seconds if plan.tare.kind == "seconds" else NOISE_SECONDS
-    if plan.in_contact:
+    if plan.start.loaded:
         noise_seconds = LOADED_NOISE_SECONDS
     # A second difference looks back by two lags.
     reach = max([lag["samples"] * (1 + lag["has_seconds"]) for lag in lags], default=0)

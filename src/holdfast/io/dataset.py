@@ -1,13 +1,12 @@
 """Datasets: folders of recordings, loaded one at a time."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import overload
 
 from holdfast.errors import RecordingError
 from holdfast.io.recording_files import SUFFIXES, is_recording, load_recording
-from holdfast.recordings import STARTS_LOADED, Recording
+from holdfast.recordings import Recording
 
 
 class Dataset(Sequence[Recording]):
@@ -51,9 +50,7 @@ class Dataset(Sequence[Recording]):
         if isinstance(index, slice):
             return Dataset(self._paths[index], labels=self._labels, in_contact=self._in_contact)
         recording = load_recording(self._paths[index], labels=self._labels)
-        if not self._in_contact:
-            return recording
-        return replace(recording, metadata={**recording.metadata, STARTS_LOADED: True})
+        return recording.with_start(loaded=self._in_contact or None)
 
 
 def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = False) -> Dataset:

@@ -136,6 +136,33 @@ def read_foreign_arrays(
     return dict(zip(msgspec.json.decode(document, type=list[str]), arrays, strict=True))
 
 
+def read_stickers(
+    path: Path, fps: float | None = None
+) -> tuple[npt.NDArray[np.float64], dict[int, npt.NDArray[np.float64]]]:
+    """Return the times (n,) of the pictures of a video, and the places (n, 2, 3) of its stickers.
+
+    They are as `holdfast.io.stickers.sticker_places` yields them, in a child process.
+
+    Raises:
+        RecordingError: as `read_foreign`.
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path} does not exist; a video expected")
+    times: list[npt.NDArray[np.float64]] = []
+    parts: list[dict[int, npt.NDArray[np.float64]]] = []
+    for document, (part_times, *places) in _values("stickers", path, {"fps": fps}):
+        numbers = msgspec.json.decode(document, type=list[int])
+        times.append(part_times)
+        parts.append(dict(zip(numbers, places, strict=True)))
+    unseen = [np.full((len(part), 2, 3), np.nan) for part in times]
+    return np.concatenate([np.zeros(0), *times]), {
+        number: np.concatenate(
+            [part.get(number, gap) for part, gap in zip(parts, unseen, strict=True)]
+        )
+        for number in sorted({number for part in parts for number in part})
+    }
+
+
 def limits() -> dict[str, bool]:
     """Return which limits hold on this system, by name; that of memory is tried."""
     with suppress(RecordingError):
@@ -374,6 +401,15 @@ def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     yield msgspec.json.encode(list(poses)), list(poses.values())
 
 
+def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    from holdfast.io.stickers import sticker_places
+
+    import_module("cv2")
+    _limit_memory(request)
+    for times, places in sticker_places(path, request.options["fps"]):
+        yield msgspec.json.encode(list(places)), [times, *places.values()]
+
+
 def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     _limit_memory(request)
     try:
@@ -388,6 +424,7 @@ def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
     "import": _import,
     "poses": _poses,
+    "stickers": _stickers,
     "limits": _try_limits,
 }
 

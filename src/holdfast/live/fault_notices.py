@@ -1,5 +1,6 @@
 """Faults that last, as notices for people: which fingers have them, and what to do."""
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -126,6 +127,7 @@ class FaultWatch:
 
     def __init__(self) -> None:
         self.current: list[Problem] = []
+        # When each fault began, of those that last now; and when each was last seen to last.
         self._since: dict[tuple[Fault, str], float] = {}
         self._reported: dict[tuple[Fault, str], float] = {}
 
@@ -137,14 +139,10 @@ class FaultWatch:
         ]
         self._since = {key: min(now, self._since.get(key, now)) for key in faults}
         lasting = [key for key in faults if now - self._since[key] >= MIN_FAULT_DURATION]
-        new = [key for key in lasting if not self._is_recent(key, now)]
+        new = [k for k in lasting if now - self._reported.get(k, -math.inf) >= REPEAT_INTERVAL]
         self._reported.update(dict.fromkeys(lasting, now))
         self.current = _problems(lasting)
         return _problems(new)
-
-    def _is_recent(self, key: tuple[Fault, str], now: float) -> bool:
-        """Return whether a fault was reported and lasted until a short time ago."""
-        return key in self._reported and now - self._reported[key] < REPEAT_INTERVAL
 
 
 def _problems(faults: list[tuple[Fault, str]]) -> list[Problem]:

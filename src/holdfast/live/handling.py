@@ -3,17 +3,16 @@
 import math
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-from holdfast.contact import ContactState
 from holdfast.errors import HoldfastError, SourceError, StreamError
-from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.recorder import output_path
 from holdfast.live.recording_buffer import ModuleBuffer
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamDetector, StreamUpdate
+from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamUpdate
 from holdfast.live.web.schema import CalibrationDocument, CalibrationState
 from holdfast.model import Model
 from holdfast.model.files import encode
@@ -38,7 +37,6 @@ LONGEST_STEP = 0.1
 SAFETY_SECONDS = 0.5
 """Held time beyond the least that is wanted before it may end [s]: the calibration leaves out
 samples at the edges of gaps."""
-HELD_STATES = (ContactState.STABLE, ContactState.UNSTABLE)
 
 
 class HandlingBuffer:
@@ -51,7 +49,8 @@ class HandlingBuffer:
     def __init__(self, stream: StreamDetector) -> None:
         self._stream = stream
         self._modules = {name: ModuleBuffer(one) for name, one in stream.fingers.items()}
-        self._metadata: Mapping[str, Any] | None = None
+        self._metadata: Mapping[str, Any] | None = None  # of the start: the zero of the stream
+        # Held time of each finger, and the time of its last estimate; `put` changes both.
         self._held = dict.fromkeys(stream.fingers, 0.0)
         self._last = dict.fromkeys(stream.fingers, math.nan)
         self._start = self._end = math.nan
@@ -91,8 +90,14 @@ class HandlingBuffer:
                 if name in arrival.samples:
                     buffer.append(arrival.time, arrival.samples[name])
                     self._n_bytes += arrival.samples[name].nbytes
-        for estimate in update.estimates:
-            self._count(estimate)
+        for estimate, updated in update.estimates:
+            now = estimate.time
+            self._start = now if math.isnan(self._start) else self._start
+            self._end = now
+            for name in updated:
+                step, self._last[name] = now - self._last[name], now
+                if estimate.fingers[name].state in TOUCHING and step <= LONGEST_STEP:
+                    self._held[name] += step
 
     def recording(self) -> Recording:
         """Return the samples as a recording that begins as the stream was then.
@@ -108,16 +113,6 @@ class HandlingBuffer:
                 modules[name] = Tactile(self._stream.fingers[name], times, kept)
         name = time.strftime("handling-%Y%m%d-%H%M%S")
         return Recording(name, modules, metadata=dict(self._metadata or {}))
-
-    def _count(self, estimate: StreamEstimate) -> None:
-        now = estimate.estimate.time
-        self._start = now if math.isnan(self._start) else self._start
-        self._end = now
-        for name in estimate.updated_fingers:
-            step, self._last[name] = now - self._last[name], now
-            holds = estimate.estimate.fingers[name].state in HELD_STATES
-            if holds and step <= LONGEST_STEP:
-                self._held[name] += step
 
 
 class SessionCalibration:
@@ -136,7 +131,9 @@ class SessionCalibration:
 
     def __init__(self, session: Session, folder: Path | None) -> None:
         self._session, self._folder = session, folder
-        self._original = session.stream.model
+        self._original = session.stream.model  # each calibration begins with it, none with another
+        # Requests of several clients, and the end of the handling in the session's thread, change
+        # `_buffer` and `_fitting`: exactly one of them may end it.
         self._lock = Lock()
         self._buffer: HandlingBuffer | None = None
         self._fitting = False
@@ -146,7 +143,10 @@ class SessionCalibration:
     def document(self) -> CalibrationDocument:
         """Return the progress and the result as a document."""
         if self._session.ended:
-            self._end_with_source()
+            with self._lock:
+                if self._buffer is not None:
+                    self._end()
+                    self._refuse("the source has ended during the calibration")
         buffer, result = self._buffer, self._result
         state: CalibrationState = "idle" if buffer is None else "recording"
         if self._fitting:
@@ -188,7 +188,9 @@ class SessionCalibration:
         Raises:
             StreamError: no calibration is running, or too little was held so far.
         """
-        buffer = self._running()
+        buffer = self._buffer
+        if buffer is None:
+            raise StreamError("no calibration is running: start one, and hold an object")
         least = MIN_HANDLING + SAFETY_SECONDS
         if buffer.seconds < least:
             raise StreamError(
@@ -208,12 +210,13 @@ class SessionCalibration:
         with self._lock:
             if self._fitting:
                 raise StreamError("the model is being fitted: undo it when that is done")
+            # One button for both: what runs is ended first, the result before stays.
             if self._buffer is not None:
                 self._end()
                 return
             if self._result is None:
                 raise StreamError("there is no calibration to undo")
-            self._session.set_model(self._original)
+            self._set_model(self._original)
             self._result, self.text, self._refused = None, "calibration undone", False
 
     def encoded_model(self) -> bytes:
@@ -246,10 +249,9 @@ class SessionCalibration:
             raise StreamError("there is no calibrated model: calibrate first")
         return self._result
 
-    def _running(self) -> HandlingBuffer:
-        if self._buffer is None:
-            raise StreamError("no calibration is running: start one, and hold an object")
-        return self._buffer
+    def _set_model(self, model: Model) -> None:
+        work = partial(self._session.stream.set_model, model)
+        self._session.change(work, "the model was not changed")
 
     def _put(self, update: StreamUpdate) -> None:
         buffer = self._buffer
@@ -263,18 +265,12 @@ class SessionCalibration:
         self._session.remove_listener(self._put)
         self._buffer = None
 
-    def _end_with_source(self) -> None:
-        with self._lock:
-            if self._buffer is not None:
-                self._end()
-                self._refuse("the source has ended during the calibration")
-
     def _refuse(self, reason: str) -> None:
         self.text, self._refused = f"not calibrated: {reason}; nothing has changed", True
 
     def _fit_soon(self, buffer: HandlingBuffer) -> None:
         with self._lock:
-            if self._buffer is not buffer:
+            if self._buffer is not buffer:  # cancelled, or ended by another thread
                 return
             self._end()
             self._fitting = True
@@ -282,35 +278,23 @@ class SessionCalibration:
 
     def _fit(self, buffer: HandlingBuffer) -> None:
         try:
-            self._use(_fitted(self._original, buffer))
+            if buffer.seconds < MIN_HANDLING:
+                raise StreamError(
+                    f"{buffer.seconds:.1f} s held in {MAX_WAITING:.0f} s, at least "
+                    f"{MIN_HANDLING:g} s expected"
+                )
+            calibrated = calibrate_with_report(self._original, [buffer.recording()])
+            calibrated.check()
+            self._set_model(calibrated.model)
+            # Only now: if the session refuses the model, nothing has changed.
+            self._result, self._refused = calibrated, False
+            self.text = " ".join(described(summary) for summary in calibrated.sensors)
         except HoldfastError as refusal:
             self._refuse(str(refusal))
         except Exception as failure:  # the user gets it, and the session goes on
             self._refuse(f"{type(failure).__name__}: {failure}")
         finally:
             self._fitting = False
-
-    def _use(self, calibrated: CalibratedModel) -> None:
-        self._session.set_model(calibrated.model)
-        self._result, self._refused = calibrated, False
-        self.text = " ".join(described(summary) for summary in calibrated.sensors)
-
-
-def _fitted(model: Model, buffer: HandlingBuffer) -> CalibratedModel:
-    """Return the model with the own handling of a buffer.
-
-    Raises:
-        HoldfastError: nothing is held for long enough, the handling is refused, or the model got
-            worse.
-    """
-    if buffer.seconds < MIN_HANDLING:
-        raise StreamError(
-            f"{buffer.seconds:.1f} s held in {MAX_WAITING:.0f} s, at least {MIN_HANDLING:g} s "
-            "expected"
-        )
-    calibrated = calibrate_with_report(model, [buffer.recording()])
-    calibrated.check()
-    return calibrated
 
 
 def described(summary: HandlingSummary) -> str:

@@ -134,11 +134,13 @@ class Recorder(Closable):
         )
         self._fsync = fsync
         self._synced_at = time.monotonic()
-        self._file_id = _file_id(self.path)
+        self._file_id = _file_id(self.path)  # a file of the same name is another file
         self._buffer = RecordingBuffer(sensors)
+        # `put` and `add_marker` append, the thread of the recorder takes out.
         self._queue: deque[Arrival | _QueuedMarker] = deque()
         self._newest_time = math.nan
         self._n_dropped = self._n_dropped_reported = self._n_markers = 0
+        # What `status` returns is set by the thread of the recorder, after each write.
         self._n_bytes = self._writer.n_bytes
         self._rate = 0.0
         self._counts = deque([(time.monotonic(), 0)])
@@ -186,7 +188,7 @@ class Recorder(Closable):
             self._wake.set()
             time.sleep(_YIELD_TIME)
         if len(self._queue) >= MAX_QUEUED_ARRIVALS or self._closing or self._failure:
-            self._n_dropped += bool(arrival.samples)
+            self._n_dropped += bool(arrival.samples)  # a notice alone is no loss of data
             return
         if arrival.samples:
             self._newest_time = arrival.time
@@ -199,6 +201,7 @@ class Recorder(Closable):
             text: what happened.
             time: of the marker [s]; by default that of the newest sample.
         """
+        # Markers are few and of people: they have room beyond a queue that is full of samples.
         if len(self._queue) < MAX_QUEUED_ARRIVALS + _MAX_QUEUED_MARKERS:
             self._queue.append(_QueuedMarker(self._newest_time if time is None else time, text))
 
@@ -210,6 +213,7 @@ class Recorder(Closable):
         """
         if self._closing:
             return
+        # From now on `put` drops; the thread writes what is in the queue, and ends.
         self._closing = True
         self._wake.set()
         self._thread.join()
@@ -236,51 +240,35 @@ class Recorder(Closable):
 
     def _write_queue(self) -> None:
         """Write what is in the queue now, but not what is put into it meanwhile."""
+        # In chunks with pauses, or a long queue would keep the interpreter from the detector.
         left = len(self._queue)
         while left:
             n = min(left, _CHUNK_SIZE)
-            self._write_chunk([self._queue.popleft() for _ in range(n)])
             left -= n
-        self._report_dropped()
+            for _ in range(n):
+                item = self._queue.popleft()
+                if isinstance(item, _QueuedMarker):
+                    self._buffer.add_marker(*item)
+                else:
+                    self._buffer.add(item)
+            for name, module in self._buffer.modules.items():
+                times, readings = module.pop_samples()
+                if len(times):
+                    self._writer.append(name, times, readings)
+                    time.sleep(_YIELD_TIME)
+            self._write_markers()
+        # `put` drops in another thread: what it has dropped since is reported here.
+        n_new = self._n_dropped - self._n_dropped_reported
+        if n_new:
+            self._n_dropped_reported += n_new
+            text = f"note: {n_new} samples dropped: the disk is too slow"
+            self._buffer.add_marker(self._newest_time, text)
         self._write_markers()
         self._writer.flush()
         if self._fsync and time.monotonic() - self._synced_at >= SYNC_INTERVAL:
             self._synced_at = time.monotonic()
             self._writer.sync()
         self._check_file()
-        self._measure_rate()
-
-    def _write_chunk(self, chunk: list[Arrival | _QueuedMarker]) -> None:
-        for one in chunk:
-            if isinstance(one, _QueuedMarker):
-                self._buffer.add_marker(*one)
-            else:
-                self._buffer.add(one)
-        for name, module in self._buffer.modules.items():
-            times, readings = module.pop_samples()
-            if len(times):
-                self._writer.append(name, times, readings)
-                time.sleep(_YIELD_TIME)
-        self._write_markers()
-
-    def _write_markers(self) -> None:
-        for when, text in self._buffer.pop_markers():
-            self._writer.mark(when, text, at_once=False)
-            self._n_markers += 1
-
-    def _report_dropped(self) -> None:
-        """Add a marker where samples were dropped because the disk was too slow."""
-        n = self._n_dropped - self._n_dropped_reported
-        if n:
-            self._n_dropped_reported += n
-            text = f"note: {n} samples dropped: the disk is too slow"
-            self._buffer.add_marker(self._newest_time, text)
-
-    def _check_file(self) -> None:
-        if _file_id(self.path) != self._file_id:
-            raise OutputError(f"cannot write {self.path}: it was removed while it was recorded")
-
-    def _measure_rate(self) -> None:
         self._n_bytes = self._writer.n_bytes
         counts = self._counts
         counts.append((time.monotonic(), self._buffer.n_samples))
@@ -288,6 +276,15 @@ class Recorder(Closable):
             counts.popleft()
         (begin, before), (end, after) = counts[0], counts[-1]
         self._rate = (after - before) / (end - begin) if end > begin else 0.0
+
+    def _write_markers(self) -> None:
+        for when, text in self._buffer.pop_markers():
+            self._writer.mark(when, text, at_once=False)
+            self._n_markers += 1
+
+    def _check_file(self) -> None:
+        if _file_id(self.path) != self._file_id:
+            raise OutputError(f"cannot write {self.path}: it was removed while it was recorded")
 
 
 def output_path(folder: Path | None, stem: str, suffix: str) -> Path:
@@ -340,7 +337,11 @@ class SessionRecorder:
                 valid file name, or the file cannot be written.
         """
         with self._lock:
-            recorder = self._new_recorder(name or time.strftime("%Y%m%d-%H%M%S"))
+            if self.current is not None:
+                raise OutputError(f"{self.current.path} is being recorded already")
+            source = self._session.source
+            path = output_path(self._folder, name or time.strftime("%Y%m%d-%H%M%S"), ".mcap")
+            recorder = Recorder(path, source.sensors, metadata=dict(source.metadata))
             self.current = recorder
             self._session.add_listener(self._put)
             return recorder.path
@@ -362,6 +363,7 @@ class SessionRecorder:
         """
         with self._lock:
             recorder = self._running("there is nothing to stop")
+            # In this order: nothing is put into a recorder that is closing.
             self.current = None
             self._session.remove_listener(self._put)
             recorder.close()
@@ -379,13 +381,6 @@ class SessionRecorder:
         recorder = self.current
         if recorder is not None and update.arrival is not None:
             recorder.put(update.arrival)
-
-    def _new_recorder(self, name: str) -> Recorder:
-        if self.current is not None:
-            raise OutputError(f"{self.current.path} is being recorded already")
-        source = self._session.source
-        path = output_path(self._folder, name, ".mcap")
-        return Recorder(path, source.sensors, metadata=dict(source.metadata))
 
 
 def _file_id(path: Path) -> tuple[int, int] | None:

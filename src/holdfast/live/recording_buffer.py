@@ -48,8 +48,10 @@ class ModuleBuffer:
     def __init__(self, sensor: Sensor) -> None:
         self.n_samples = self.n_gaps = 0
         self._sensor = sensor
-        self._dtype: np.dtype[Any] | None = None
+        self._dtype: np.dtype[Any] | None = None  # of the first sample: a file has one
         self._last_time = -math.inf
+        # Gaps are counted when samples are written: the step from the last chunk, and the newest
+        # steps, whose median is the period.
         self._last_popped_time = math.nan
         self._steps: Array = np.empty(0)
         self._times: list[float] = []
@@ -76,16 +78,14 @@ class ModuleBuffer:
         self._times.clear()
         self._readings.clear()
         if len(times):
-            self._count_gaps(np.diff(times, prepend=self._last_popped_time))
+            steps = np.diff(times, prepend=self._last_popped_time)
+            steps = steps[~np.isnan(steps)]  # there is no step before the first sample
+            self._steps = np.concatenate([self._steps, steps])[-_N_STEPS:]
+            known = len(self._steps) >= _MIN_STEPS
+            period = float(np.median(self._steps)) if known else 1 / self._sensor.rate
+            self.n_gaps += int((steps > GAP_PERIODS * period).sum())
             self._last_popped_time = self._last_time
         return times, readings
-
-    def _count_gaps(self, steps: Array) -> None:
-        steps = steps[~np.isnan(steps)]  # there is no step before the first sample
-        self._steps = np.concatenate([self._steps, steps])[-_N_STEPS:]
-        known = len(self._steps) >= _MIN_STEPS
-        period = float(np.median(self._steps)) if known else 1 / self._sensor.rate
-        self.n_gaps += int((steps > GAP_PERIODS * period).sum())
 
 
 class RecordingBuffer:
@@ -113,8 +113,10 @@ class RecordingBuffer:
         self.first_time = self.newest_time = math.nan
         self.n_samples = self.n_lost = self.n_refused = self.n_rejected = 0
         self.faults: Counter[Fault] = Counter()
+        # By module: the faults that last, so that a marker is set where one begins only.
         self._active_faults: dict[str, tuple[Fault, ...]] = {}
         self._fault_times: dict[tuple[str, Fault], float] = {}
+        # When each text became a marker last: a notice that repeats fills no file.
         self._notice_times: dict[str, float] = {}
         self._markers: list[tuple[float, str]] = []
 

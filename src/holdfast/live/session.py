@@ -13,10 +13,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.devices.sources import Arrival
 from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
-from holdfast.model import Model
 
 Work = Callable[[], None]
 MAX_LATENCIES = 8192
@@ -54,6 +52,7 @@ class RequestQueue:
             cancellable: whether the caller may cancel it while it waits, as after a time-out.
         """
         future: Future[None] = Future()
+        # A future that runs cannot be cancelled any more.
         if not cancellable:
             future.set_running_or_notify_cancel()
         self._requests.append((work, future))
@@ -65,6 +64,7 @@ class RequestQueue:
         A request that fails has its exception as its result. If `follow_up` fails, the other
         requests have that exception, and it is raised.
         """
+        # Those that wait now: one that a request appends comes in the next round.
         waiting = [self._requests.popleft() for _ in range(len(self._requests))]
         done = [future for work, future in waiting if _run(work, future)]
         try:
@@ -108,6 +108,7 @@ class InterpreterSettings:
         with self._lock:
             if not self._n_users:
                 self._before = sys.getswitchinterval()
+                # What the program froze itself would be thawed by `end`: then nothing is frozen.
                 self._freezes = gc.get_freeze_count() <= MAX_FROZEN_BY_PYTHON
                 sys.setswitchinterval(SWITCH_INTERVAL)
             self._n_users += 1
@@ -120,6 +121,7 @@ class InterpreterSettings:
             self._n_users -= 1
             if self._n_users:
                 return
+            # Python stores whole microseconds, so the value is only close to what was set.
             if isclose(sys.getswitchinterval(), SWITCH_INTERVAL):
                 sys.setswitchinterval(self._before)
             if self._freezes:
@@ -170,12 +172,15 @@ class Session:
         self.ended = False
         self.failure: Exception | None = None
         self.lock = ""
+        # By module, counted by the session's thread; `n_packets` is the largest.
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
+        # A new list for each change: the session's thread may be going through the old one.
         self._listeners: list[Listener] = []
         self._requests = RequestQueue()
-        self._started = False
+        self._started = False  # whether `stop` has settings of Python to set back
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
+        # A ring that the session's thread writes: a copy of it may mix two laps, which are alike.
         self._latencies = np.full(MAX_LATENCIES, np.nan)
         self._n_latencies = 0
 
@@ -214,48 +219,27 @@ class Session:
     ) -> None:
         self.stop()
 
-    def restart_tare(self) -> None:
-        """Discard the tare, and take a new one from the next samples.
-
-        Raises:
-            StreamError: a finger is in contact, or the session is locked.
-            SourceError: the source has ended or is silent.
-        """
-        self.check_lock()
-        if self.ended:
-            raise SourceError("the source has ended: no tare can be taken")
-        self._request(self._restart_tare, "no tare can be taken")
-
-    def set_threshold(self, threshold: float | None) -> None:
-        """Change the probability from which a contact is stable, for all fingers.
+    def change(self, work: Work, consequence: str) -> None:
+        """Change the tare, the thresholds or the model of the detector, in its thread.
 
         Args:
-            threshold: from 0 to 1; None for the thresholds of the model.
+            work: the change, such as `session.stream.restart_tare`.
+            consequence: what is not done if the source does not answer, for the message.
 
         Raises:
-            StreamError: the session is locked.
+            StreamError: the session is locked, or the detector refuses the change.
             SourceError: the source has ended or is silent.
-            ValueError: the threshold is not from 0 to 1.
+            ValueError, ModelError: the detector refuses the change.
         """
         self.check_lock()
-        consequence = "the threshold was not changed"
         if self.ended:
             raise SourceError(f"the source has ended: {consequence}")
-        self._request(lambda: self.stream.set_threshold(threshold), consequence)
-
-    def set_model(self, model: Model) -> None:
-        """Change the model to one of the same features; states continue.
-
-        Raises:
-            StreamError: the session is locked.
-            SourceError: the source has ended or is silent.
-            ModelError: the model has other features or another debouncing.
-        """
-        self.check_lock()
-        consequence = "the model was not changed"
-        if self.ended:
-            raise SourceError(f"the source has ended: {consequence}")
-        self._request(lambda: self.stream.set_model(model), consequence)
+        request = self._requests.append(work)
+        try:
+            request.result(REQUEST_TIMEOUT)
+        except TimeoutError as cause:
+            request.cancel()  # or it would be carried out long after its caller was refused
+            raise SourceError(f"the source does not answer: {consequence}") from cause
 
     def check_lock(self) -> None:
         """Check that tare, thresholds and model may be changed.
@@ -283,39 +267,24 @@ class Session:
         self.ended = True
 
     def _step(self) -> None:
+        # Before the read, so that a change does not wait for the next sample.
         self._requests.carry_out()
         update = self.stream.read()
-        if update.arrival is not None:
-            self._count(update.arrival, has_estimates=bool(update.estimates))
-        if update.arrival is not None or update.estimates:
+        arrival = update.arrival
+        if arrival is not None:
+            if arrival.samples and update.estimates:
+                latency = time.monotonic() - arrival.received
+                self._latencies[self._n_latencies % MAX_LATENCIES] = latency
+                self._n_latencies += 1
+            if arrival.samples:
+                self.delay = arrival.delay
+            for module in arrival.samples:
+                self._n_samples[module] += 1
+            self.n_packets = max(self._n_samples.values(), default=0)
+            self.n_lost += arrival.n_lost
+            self.n_refused += arrival.n_refused
+        if arrival is not None or update.estimates:
             self._notify(update)
-
-    def _count(self, arrival: Arrival, *, has_estimates: bool) -> None:
-        if arrival.samples and has_estimates:
-            latency = time.monotonic() - arrival.received
-            self._latencies[self._n_latencies % MAX_LATENCIES] = latency
-            self._n_latencies += 1
-        if arrival.samples:
-            self.delay = arrival.delay
-        for module in arrival.samples:
-            self._n_samples[module] += 1
-        self.n_packets = max(self._n_samples.values(), default=0)
-        self.n_lost += arrival.n_lost
-        self.n_refused += arrival.n_refused
-
-    def _restart_tare(self) -> None:
-        if self.stream.silent:
-            raise SourceError("no samples arrive: no tare can be taken")
-        self.stream.restart_tare()
-
-    def _request(self, work: Callable[[], None], consequence: str) -> None:
-        """Run `work` in the detector's thread, and wait for its end."""
-        request = self._requests.append(work)
-        try:
-            request.result(REQUEST_TIMEOUT)
-        except TimeoutError as cause:
-            request.cancel()
-            raise SourceError(f"the source does not answer: {consequence}") from cause
 
     def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:

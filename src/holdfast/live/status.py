@@ -9,14 +9,13 @@ import numpy as np
 from holdfast.contact import ContactState, Fault, HandEstimate
 from holdfast.detector.slips import SlipWatch
 from holdfast.errors import ModelError
-from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch, Problem
 from holdfast.live.handling import SessionCalibration
 from holdfast.live.panels import Panel
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor
@@ -56,12 +55,14 @@ class StatusPublisher:
         self._session = session
         self._panels, self._document_type = panels, document_type
         self._calibration = calibration
-        self._told = ""
+        self._told = ""  # the newest text of the calibration that became a notice
         self._report = report
         self._faults = FaultWatch()
         self._slips = SlipWatch()
         self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
+        # The next three are kept from document to document, by the service's thread alone: the
+        # newest estimate and readings for documents without any, and the counts of the rate.
         self._newest: HandEstimate | None = None
         self._taxels: dict[str, list[Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
@@ -77,10 +78,16 @@ class StatusPublisher:
 
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
-        self._watch_calibration()
+        text = "" if self._calibration is None else self._calibration.text
+        if text and text != self._told:
+            self.add_notice(text)
+        self._told = text
+        # The session's thread goes on appending: only what is there now belongs to this document.
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
         estimates = [estimate for _, update in updates for estimate in update.estimates]
-        self._watch_faults(estimates)
+        for estimate, _ in estimates:
+            for problem in self._faults.update(estimate):
+                self.add_notice(problem.text)
         own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
         if estimates:
             self._newest = estimates[-1].estimate
@@ -94,9 +101,20 @@ class StatusPublisher:
                 name: finger_document(finger, self._taxels.get(name))
                 for name, finger in fingers.items()
             },
-            series=_hand_series(estimates, list(self._session.stream.fingers)),
+            series=schema.HandSeries(
+                times=[estimate.time for estimate, _ in estimates],
+                fingers={n: _finger_series(estimates, n) for n in self._session.stream.fingers},
+            ),
             events=[schema.EventDocument(*event) for _, one in updates for event in one.events],
-            notices=own + _source_notices(updates),
+            notices=[
+                *own,
+                *(
+                    schema.Notice(when, text)
+                    for when, update in updates
+                    if update.arrival is not None
+                    for text in update.arrival.notices
+                ),
+            ],
             health=self._health(recorder),
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
@@ -116,18 +134,6 @@ class StatusPublisher:
             **{panel.name: panel.document() for panel in self._panels},
         )
 
-    def _watch_calibration(self) -> None:
-        """Add a notice when a calibration has a result."""
-        text = "" if self._calibration is None else self._calibration.text
-        if text and text != self._told:
-            self.add_notice(text)
-        self._told = text
-
-    def _watch_faults(self, estimates: list[StreamEstimate]) -> None:
-        for estimate, _ in estimates:
-            for problem in self._faults.update(estimate):
-                self.add_notice(problem.text)
-
     def _problem_text(self, problem: Problem) -> str:
         if problem.fault is not Fault.LATE:
             return problem.text
@@ -136,6 +142,7 @@ class StatusPublisher:
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
         """Keep the newest readings of every finger, minus the tare."""
         stream = self._session.stream
+        # One update may have the samples of one finger only: the last ones have those of all.
         newest: dict[str, Array] = {}
         for update in updates[-len(stream.fingers) :]:
             if update.arrival is not None:
@@ -145,8 +152,14 @@ class StatusPublisher:
 
     def _health(self, recorder: Recorder | None) -> schema.Health:
         session, latency = self._session, self._session.latency()
+        # Two counts stay at least: the newest, and the last one that is a period old.
+        counts = self._counts
+        counts.append((time.monotonic(), session.n_packets))
+        while len(counts) > 2 and counts[-1][0] - counts[1][0] >= RATE_PERIOD:
+            counts.popleft()
+        (begin, before), (end, after) = counts[0], counts[-1]
         return schema.Health(
-            rate=self._packet_rate(),
+            rate=(after - before) / (end - begin) if end > begin else np.nan,
             n_packets=session.n_packets,
             n_lost=session.n_lost,
             n_refused=session.n_refused,
@@ -155,14 +168,6 @@ class StatusPublisher:
             latency=schema.LatencyInfo(latency.p50, latency.p99, latency.largest),
             delay=session.delay,
         )
-
-    def _packet_rate(self) -> float:
-        """Return the number of packets per second, over the last second."""
-        self._counts.append((time.monotonic(), self._session.n_packets))
-        while len(self._counts) > 2 and self._counts[-1][0] - self._counts[1][0] >= RATE_PERIOD:
-            self._counts.popleft()
-        (begin, before), (end, after) = self._counts[0], self._counts[-1]
-        return (after - before) / (end - begin) if end > begin else np.nan
 
 
 def hello_document(session: Session, started: float, can_record: bool) -> schema.HelloDocument:
@@ -228,15 +233,6 @@ def recording_info(recorder: Recorder) -> schema.RecordingInfo:
     )
 
 
-def _source_notices(updates: list[tuple[float, StreamUpdate]]) -> list[schema.Notice]:
-    return [
-        schema.Notice(when, text)
-        for when, update in updates
-        if update.arrival is not None
-        for text in update.arrival.notices
-    ]
-
-
 def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
     part = model.finger(name, sensor)
     return schema.FingerInfo(
@@ -249,13 +245,6 @@ def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
         contact_threshold=part.contact_threshold,
         probability_threshold=part.stable.threshold,
         slip_threshold=None if part.slip is None else part.slip.threshold,
-    )
-
-
-def _hand_series(estimates: list[StreamEstimate], fingers: list[str]) -> schema.HandSeries:
-    return schema.HandSeries(
-        times=[estimate.time for estimate, _ in estimates],
-        fingers={name: _finger_series(estimates, name) for name in fingers},
     )
 
 

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,19 +14,43 @@ from holdfast.contact import (
     ContactState,
     HandEstimate,
     StateChanges,
+    with_faults,
 )
-from holdfast.detector import HAND
+from holdfast.detector import HAND, Detector
+from holdfast.detector.detector import check_thresholds
 from holdfast.devices.sources import Arrival, Source
-from holdfast.devices.sources.base import DeviceSource, ModuleSamples
-from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
+from holdfast.devices.sources.base import ModuleSamples
+from holdfast.errors import ModelError, SourceError, StreamError
+from holdfast.features import Tare
+from holdfast.features.start import Start
+from holdfast.live.source_filter import FilteredSamples, SourceFilter
 from holdfast.model import Model
+from holdfast.recordings import BASELINES, GAP_PERIODS, STARTS_LOADED
+
+MIN_SILENCE_TIMEOUT = 0.1
+"""Minimum time without samples after which a source counts as silent [s]."""
+TOUCHING = (ContactState.STABLE, ContactState.UNSTABLE)
+"""States of a finger that touches something."""
+
+
+class StreamEstimate(NamedTuple):
+    """Estimate of the hand after an arrival.
+
+    Attributes:
+        estimate: of the hand and all its fingers.
+        updated_fingers: fingers whose estimate is new: they have a sample, or their fault
+            was reported, or their samples have been missing for too long.
+    """
+
+    estimate: HandEstimate
+    updated_fingers: tuple[str, ...]
 
 
 class StreamUpdate(NamedTuple):
     """Result of one reading of a source.
 
     Attributes:
-        arrival: the arrival; None if nothing arrived in time.
+        arrival: the arrival, with the notices of the detector; None if nothing arrived in time.
         estimates: the new estimates, oldest first.
         events: the changes of contact state.
     """
@@ -40,9 +64,11 @@ class StreamDetector:
     """Detect the contact states of a hand from a source, while its samples arrive.
 
     It merges the modules by time, resamples the source to the model's rate, adds the faults of
-    the transport, and ignores modules that the model does not use. A source without samples of
-    any used finger is silent: every finger is then UNKNOWN, also while the source reports
-    faults or notices.
+    the transport, and ignores modules that the model does not use (`SourceFilter`). A source
+    without samples of any used finger is silent: every finger is then UNKNOWN, also while the
+    source reports faults or notices. All other samples give the same estimates as in a recording
+    of the same rate: a recording has the rate of all its samples, a stream that of its first half
+    second.
 
     Iterate over it to get every `HandEstimate`, use `changes` to get the changes of state that
     lasted, or call `read` in a loop of your own.
@@ -57,7 +83,11 @@ class StreamDetector:
 
     Attributes:
         source: the source.
+        model: the model that decides now; change it by `set_model`.
         fingers: sensor of each finger that the model uses.
+        thresholds: probability from which each finger is stable; change it by `set_threshold`.
+        rate: measured rate of the source [Hz]; NaN during the first half second.
+        resampled: True if the source is resampled to the model's rate.
         silent: True while no samples arrive.
         start: time of the first estimate [s]; NaN before it. Clocks of devices count from 1970,
             so that a person can read `change.time - detector.start` rather than `change.time`.
@@ -97,15 +127,30 @@ class StreamDetector:
         ignore: Mapping[str, tuple[int, ...]] | None = None,
         in_contact: bool = False,
     ) -> None:
-        self.source = source
-        self.silent = False
-        self.start = math.nan
-        self._detector = ArrivalDetector(
-            model, source.sensors, strict=strict, ignore=ignore,
-            watch_rate=isinstance(source, DeviceSource),
-            in_contact=in_contact, metadata=source.metadata,
-        )  # fmt: skip
-        self.fingers = self._detector.fingers
+        tare = Tare.parse(model.tare)
+        if tare.kind == "interval":
+            raise ModelError(
+                f"the model's tare is the interval {model.tare} s of a recording, which a live "
+                "source does not have; train with --tare 0.5, first or none"
+            )
+        self.source, self.model = source, model
+        self.fingers = dict(model.fingers_of(source.sensors))
+        self.rate, self.resampled = math.nan, False
+        self.silent, self.start = False, math.nan
+        metadata = {**source.metadata, STARTS_LOADED: True} if in_contact else source.metadata
+        self._begin = Start.of(metadata, self.fingers)
+        self._ignore = ignore or {}
+        self._filter = SourceFilter(
+            self.fingers,
+            strict=strict,
+            watch_rate=source.is_device,
+            # A tare of seconds finds a load at the start itself, as the fault `tare_loaded`.
+            finds_pull=tare.kind != "seconds" and not self._begin.loaded,
+        )
+        self._detector: Detector | None = None  # made when the rate is known
+        self._new_detector(100.0)  # at any rate: it raises for wrong arguments
+        self.set_threshold(None)
+        self._last: HandEstimate | None = None  # from the readings alone, without `hidden`
         self._changes = StateChanges((*self.fingers, HAND))
         self._slowdown = 1 / min(source.speed or 1.0, 1.0)
         self._last_sample_at = time.monotonic()
@@ -135,53 +180,10 @@ class StreamDetector:
             yield from lasting.update(_states(estimate), estimate.time)
 
     @property
-    def rate(self) -> float:
-        """Measured rate of the source [Hz]; NaN during the first half second."""
-        return self._detector.rate
-
-    @property
-    def resampled(self) -> bool:
-        """True if the source is resampled to the model's rate."""
-        return self._detector.resampled
-
-    @property
-    def thresholds(self) -> Mapping[str, float]:
-        """Probability from which each finger is stable."""
-        return self._detector.thresholds
-
-    def set_threshold(self, threshold: float | None) -> None:
-        """Change the probability from which a contact is stable, for all fingers.
-
-        Args:
-            threshold: from 0 to 1; None for the thresholds of the model.
-
-        Raises:
-            ValueError: the threshold is not from 0 to 1.
-        """
-        self._detector.set_threshold(threshold)
-
-    @property
-    def model(self) -> Model:
-        """The model that decides now."""
-        return self._detector.model
-
-    def set_model(self, model: Model) -> None:
-        """Change the model to one of the same features, such as the model with own handling.
-
-        States and filters continue: nothing warms up again. The thresholds are those of the model.
-
-        Raises:
-            ModelError: it has other features or another debouncing; nothing has changed then.
-        """
-        self._detector.set_model(model)
-
-    def start_metadata(self) -> dict[str, Any]:
-        """Return the metadata of a recording that begins now, which has the zero of this stream."""
-        return self._detector.start_metadata()
-
-    def without_ignored(self, name: str, readings: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return (n, n_taxels, 3) readings of a finger, 0 in the taxels that are ignored."""
-        return self._detector.without_ignored(name, readings)
+    def silence_timeout(self) -> float:
+        """Time without samples after which the source counts as silent [s]."""
+        # The rate is NaN at first: `max` then returns its first argument.
+        return max(MIN_SILENCE_TIMEOUT, GAP_PERIODS / self.rate)
 
     def read(self) -> StreamUpdate:
         """Read the source once, and process what arrived.
@@ -192,51 +194,172 @@ class StreamDetector:
         Raises:
             ModelError: the rate is not the model's, and `strict`.
         """
-        timeout = self._detector.silence_timeout * self._slowdown
+        timeout = self.silence_timeout * self._slowdown
         arrival = self.source.read(timeout)
-        estimates = [] if arrival is None else self._detector.update(arrival)
         if arrival is not None and not self.fingers.keys().isdisjoint(arrival.samples):
             self.silent = False
             self._last_sample_at = time.monotonic()
-        elif not (self.silent or self.source.ended) and self._timed_out(arrival, timeout):
+            return self.update(arrival)
+        # A source that is not paced does not keep real time: only a read in vain is silence.
+        timed_out = arrival is None or (
+            self.source.paced and time.monotonic() - self._last_sample_at >= timeout
+        )
+        return self.update(arrival, silent=timed_out and not (self.silent or self.source.ended))
+
+    def update(self, arrival: Arrival | None, *, silent: bool = False) -> StreamUpdate:
+        """Process an arrival, without a look at the clock.
+
+        Args:
+            arrival: of the source; None if nothing arrived.
+            silent: make every finger UNKNOWN, with the reason `gap`, until its next sample.
+
+        Returns:
+            No estimates while the rate is not known.
+
+        Raises:
+            ModelError: the rate is not the model's, and `strict`.
+        """
+        estimates: list[StreamEstimate] = []
+        if arrival is not None:
+            estimates = self._detect(self._filter.update(arrival, self.model))
+        if silent:
             self.silent = True
-            estimates += self._detector.mark_silent()
-        if arrival is not None and self._detector.notices:
-            arrival = arrival._replace(notices=(*arrival.notices, *self._detector.notices))
-            self._detector.notices.clear()
-        return self._update(arrival, estimates)
+            if self._last is not None:
+                gap = FilteredSamples(math.nan, {}, tuple(self.fingers), self._filter.mark_silent())
+                estimates += self._detect([gap])
+        if arrival is not None and self._filter.notices:
+            arrival = arrival._replace(notices=(*arrival.notices, *self._filter.notices))
+            self._filter.notices.clear()
+        return self._update_of(arrival, estimates)
 
     def finish(self) -> StreamUpdate:
         """Return the estimates of a source that ended before its rate was known."""
-        return self._update(None, self._detector.finish())
+        return self._update_of(None, self._detect(self._filter.finish(self.model)))
+
+    def set_threshold(self, threshold: float | None) -> None:
+        """Change the probability from which a contact is stable, for all fingers.
+
+        Args:
+            threshold: from 0 to 1; None for the thresholds of the model.
+
+        Raises:
+            ValueError: the threshold is not from 0 to 1.
+        """
+        own = {
+            name: self.model.finger(name, s).stable.threshold for name, s in self.fingers.items()
+        }
+        thresholds = own if threshold is None else dict.fromkeys(own, threshold)
+        check_thresholds(thresholds)
+        if self._detector is not None:
+            self._detector.set_thresholds(thresholds)
+        self.thresholds = thresholds
+
+    def set_model(self, model: Model) -> None:
+        """Change the model to one of the same features, such as the model with own handling.
+
+        States and filters continue: nothing warms up again. The thresholds are those of the model.
+
+        Raises:
+            ModelError: it has other features or another debouncing; nothing has changed then.
+        """
+        if self._detector is not None:
+            self._detector.set_model(model)
+        self.model = model
+        self.set_threshold(None)
 
     def restart_tare(self) -> None:
         """Discard the tare, and take a new one from the next samples.
 
         Raises:
+            SourceError: the source is silent.
             StreamError: a finger is in contact.
         """
-        self._detector.restart_tare()
+        if self.silent:
+            raise SourceError("no samples arrive: no tare can be taken")
+        if self._detector is None or self._last is None:
+            return
+        touching = [name for name, x in self._last.fingers.items() if x.state in TOUCHING]
+        if touching:
+            raise StreamError(
+                f"{', '.join(touching)} in contact: open the hand, then take the tare"
+            )
+        self._detector.reset(in_contact=False)
+        self._filter.compare_from_now()
+
+    def start_metadata(self) -> dict[str, Any]:
+        """Return the metadata of a recording that begins now, which has the zero of this stream.
+
+        Without it, the tare of the recording would be what the hand holds now.
+        """
+        detector = self._detector
+        if detector is not None and not detector.knows_zero:
+            fingers = () if self._last is None else self._last.fingers.values()
+            return {STARTS_LOADED: True} if any(x.state in TOUCHING for x in fingers) else {}
+        known = self._begin.baselines if detector is None else detector.baselines()
+        if not (known or (detector is None and self._begin.loaded)):
+            return {}
+        baselines = {name: values.copy() for name, values in known.items()}
+        for name, values in baselines.items():
+            values[list(self._ignore.get(name, ()))] = 0.0
+        stated = {name: values.tolist() for name, values in baselines.items()}
+        return {STARTS_LOADED: True, **({BASELINES: stated} if stated else {})}
+
+    def without_ignored(self, name: str, readings: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return (n, n_taxels, 3) readings of a finger, 0 in the taxels that are ignored."""
+        taxels = list(self._ignore.get(name, ()))
+        if taxels:
+            readings = readings.copy()
+            readings[:, taxels] = 0
+        return readings
 
     def subtract_tare(self, samples: ModuleSamples) -> dict[str, npt.NDArray[np.float64]]:
         """Return (n_taxels, 3) minus the tare, for the fingers whose tare is complete."""
-        return self._detector.subtract_tare(samples)
+        baselines = {} if self._detector is None else self._detector.baselines()
+        return {name: samples[name] - zero for name, zero in baselines.items() if name in samples}
 
-    def _timed_out(self, arrival: Arrival | None, timeout: float) -> bool:
-        """Return whether samples of the fingers have been missing for `timeout` [s]."""
-        if arrival is None:
-            return True
-        # A source that is not paced does not keep real time.
-        return self.source.paced and time.monotonic() - self._last_sample_at >= timeout
+    def _new_detector(self, rate: float) -> Detector:
+        return Detector(
+            self.model, self.fingers, rate,
+            ignore=self._ignore, in_contact=self._begin.loaded, baselines=self._begin.baselines,
+        )  # fmt: skip
 
-    def _update(self, arrival: Arrival | None, estimates: list[StreamEstimate]) -> StreamUpdate:
+    def _detect(self, filtered: Iterable[FilteredSamples]) -> list[StreamEstimate]:
+        estimates = []
+        for instant, samples, reported, hidden in filtered:
+            if self._detector is None:
+                self.rate, self.resampled = self._filter.rate, self._filter.resampled
+                self._detector = self._new_detector(self.rate)
+                self._detector.set_thresholds(self.thresholds)
+            before, updated = self._last, reported
+            if samples:
+                self._last = self._detector.update(samples, instant)
+                updated = tuple(samples)
+                # A finger without a sample may have become UNKNOWN, because its gap is too long.
+                if before is not None and len(samples) < len(self.fingers):
+                    updated += tuple(
+                        name
+                        for name, finger in self._last.fingers.items()
+                        if name not in samples
+                        and finger.state is ContactState.UNKNOWN
+                        and before.fingers[name].state is not ContactState.UNKNOWN
+                    )
+            if self._last is None:
+                continue
+            estimate = self._last
+            for faults, reason in hidden:
+                estimate = with_faults(estimate, faults, self._detector.n_fingers, reason)
+            estimates.append(StreamEstimate(estimate, updated))
+        return estimates
+
+    def _update_of(self, arrival: Arrival | None, estimates: list[StreamEstimate]) -> StreamUpdate:
         if estimates and math.isnan(self.start):
             self.start = estimates[0].estimate.time
-        events = [event for estimate, _ in estimates for event in self._events(estimate)]
+        events = [
+            event
+            for estimate, _ in estimates
+            for event in self._changes.update(_states(estimate), estimate.time)
+        ]
         return StreamUpdate(arrival, estimates, events)
-
-    def _events(self, estimate: HandEstimate) -> list[ContactEvent]:
-        return self._changes.update(_states(estimate), estimate.time)
 
 
 def _states(estimate: HandEstimate) -> list[ContactState]:

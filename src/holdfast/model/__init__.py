@@ -1,13 +1,12 @@
 """Models: heads, rule of contact and debouncing of a hand, as plain validated data."""
 
 from holdfast.model.heads import Choice, Head, HeadName, ThresholdPoint
-from holdfast.model.model import ANY_FINGER, EXACT_RATE, RATE_TOLERANCE, RELATIVE_RATES, Model
+from holdfast.model.model import ANY_FINGER, EXACT_RATE, RELATIVE_RATES, Model
 from holdfast.model.parts import Debounce, FingerModel, Handling, Training
 
 __all__ = [
     "ANY_FINGER",
     "EXACT_RATE",
-    "RATE_TOLERANCE",
     "RELATIVE_RATES",
     "Choice",
     "Debounce",

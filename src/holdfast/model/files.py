@@ -115,6 +115,7 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
     """
     if str(path).startswith("builtin:"):
         raise OutputError(f"{path} is the name of a built-in model; a file expected")
+    # Read before the file is replaced: its ONNX files are deleted afterwards.
     replaced = _onnx_names(Path(path))
     written: list[Path] = []
     try:
@@ -127,7 +128,7 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
                     write_whole(file, rule.content, force=force)
                 if is_new:
                     written.append(file)
-    except BaseException:
+    except BaseException:  # also Ctrl-C: all files or none
         for file in written:
             file.unlink(missing_ok=True)
         raise

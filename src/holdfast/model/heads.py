@@ -108,6 +108,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     def __post_init__(self) -> None:
         if self.name not in LINKS:
             raise ModelError(f"a head of {', '.join(LINKS)} expected, {self.name} given")
+        # It follows from the name: a file that says otherwise was made for something else.
         if self.link != LINKS[self.name]:
             raise ModelError(
                 f"{self.name}: the link {LINKS[self.name]} expected, {self.link} given"
@@ -132,6 +133,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
                 )
         elif self.classes:
             raise ModelError(f"{self.name}: no classes expected, {n_classes} given")
+        # The kernel takes z of one head from outside: that of stability.
         if isinstance(self.rule, Onnx):
             if self.name != "stable":
                 raise ModelError(f"{self.name}: a linear rule expected, an ONNX file given")
@@ -159,6 +161,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             )
         for field in ("smoothing", "hold"):
             seconds = getattr(self, field)
+            # Only slips have them: stability has its own filter and debouncing.
             most = MAX_HEAD_DURATION if self.name == "slip" else 0.0
             if not 0 <= seconds <= most:
                 raise ModelError(

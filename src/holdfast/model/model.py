@@ -29,6 +29,7 @@ from holdfast.model.parts import (
     check_limit,
 )
 from holdfast.recordings import Recording
+from holdfast.resampling import RATE_TOLERANCE
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE
 
@@ -38,8 +39,6 @@ EXACT_RATE = 0.05
 """Tolerance of a measured rate beside a nominal one, as a share of it."""
 RELATIVE_RATES = (30.0, 1000.0)
 """Rates for which relative features are made [Hz]."""
-RATE_TOLERANCE = 0.2
-"""A source whose rate differs less from the model's, as a share of it, is not resampled."""
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -84,6 +83,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise ModelError(f"a model for any finger ('*') has no others; {list(self.fingers)}")
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
             raise ModelError(f"a rate above 0 Hz expected, {self.rate} given")
+        # A model file is untrusted: each limit bounds the memory that a detector would allocate.
         check_limit("samples in a second", self.rate or 0, MAX_RATE)
         check_limit("fingers", max(len(self.fingers), len(self.sensors)), MAX_FINGERS)
         check_limit("samples in a window", self.window, MAX_WINDOW)
@@ -95,6 +95,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                     f"finger {name!r} names the sensor {finger.sensor!r}; "
                     f"the model holds {list(self.sensors)}"
                 )
+        # Both raise for what cannot be used.
         Tare.parse(self.tare)
         FeatureSpec("sigma", self.window)
 
@@ -241,7 +242,18 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             ModelError: the hand has none of the fingers, or a finger has another sensor.
         """
         if ANY_FINGER in self.fingers:
-            return self._any_fingers(modules)
+            wanted = self.fingers[ANY_FINGER].sensor
+            # Pads and the palm have a slash: a model of any finger was trained on fingertips.
+            tips = {name: s for name, s in modules.items() if "/" not in name} or dict(modules)
+            fitting = {n: s for n, s in tips.items() if wanted is None or s.name == wanted}
+            if wanted is not None and not fitting:
+                raise _other_sensor(
+                    f"the model is for fingers with the sensor {wanted!r}; given are "
+                    + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
+                )
+            for name, sensor in fitting.items():
+                self._check_sensor(name, sensor)
+            return fitting
         for name in set(self.fingers) & set(modules):
             self._check_sensor(name, modules[name])
         if not set(self.fingers) & set(modules):
@@ -308,21 +320,6 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             probabilities[name] = part.stable.rule.probability(features)
         return probabilities
 
-    def _any_fingers(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
-        wanted = self.fingers[ANY_FINGER].sensor
-        tips = {name: sensor for name, sensor in modules.items() if "/" not in name} or modules
-        if wanted is None:
-            return dict(tips)
-        fitting = {name: sensor for name, sensor in tips.items() if sensor.name == wanted}
-        if not fitting:
-            raise _other_sensor(
-                f"the model is for fingers with the sensor {wanted!r}; given are "
-                + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
-            )
-        for name, sensor in fitting.items():
-            self._check_sensor(name, sensor)
-        return fitting
-
     def _check_sensor(self, name: str, sensor: Sensor) -> None:
         wanted = self.finger(name).sensor
         if wanted is None:
@@ -333,6 +330,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
                 f"{known.n_taxels} ({known.name})"
             )
+        # The unit after the kind: another sensor has often another unit as well.
         if sensor.unit != known.unit:
             raise _other_sensor(
                 f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"

@@ -48,6 +48,7 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                 f"{len(self.location)} locations and {len(self.scale)} scales of own handling "
                 "given; the same number of both expected"
             )
+        # Finite first: a comparison with NaN is False, so that the next check would pass it.
         if not all(math.isfinite(x) for x in (*self.location, *self.scale, self.seconds)):
             raise ModelError("a number of the own handling is not finite")
         if min((*self.scale, self.seconds)) <= 0:
@@ -95,6 +96,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         features = self.features
         check_limit("features of a finger", len(features), MAX_FEATURES)
         check_limit("samples in a window", max((x.window for x in features), default=0), MAX_WINDOW)
+        # The load is that of relative features, which the six of the paper do not have.
         if self.contact_load is not None and not any(x.seconds for x in self.stable.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
         for value in (self.contact_threshold, self.contact_noise, self.contact_load):
@@ -103,6 +105,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         self._check_handling()
 
     def _check_handling(self) -> None:
+        # Own handling replaces means and scales, which an ONNX file hides.
         if self.normalised and not isinstance(self.stable.rule, Linear):
             raise ModelError("a linear classifier expected where features are normalised")
         if self.handling and not self.normalised:
@@ -228,6 +231,7 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     switching: float | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
+        # Finite and not below 0: NaN passes no comparison.
         rate = self.switching_rate
         if not (math.isfinite(rate) and rate >= 0):
             raise ModelError(f"a switching of at least 0 per second expected, {rate} given")

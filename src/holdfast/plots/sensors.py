@@ -1,6 +1,9 @@
 """Figures of sensors and hands: positions and normals of the taxels."""
 
+from collections.abc import Mapping
+
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -51,6 +54,25 @@ def plot_sensor(sensor: Sensor) -> Figure:
         bar = figure.colorbar(scale, ax=front, shrink=0.6, aspect=25)
         bar.set_label(f"{_axis_name(sensor.normal)} [mm]", fontsize=7)
         bar.ax.tick_params(labelsize=6)
+    return figure
+
+
+def plot_noise(noise: Mapping[str, npt.ArrayLike]) -> Figure:
+    """Draw the noise of each taxel and axis, (n_taxels, 3) by module, one panel a module."""
+    figure = PageFigure(figsize=(7.2, 0.4 + 1.4 * len(noise)), dpi=160, layout="constrained")
+    panels = figure.subplots(len(noise), 1, squeeze=False)[:, 0]
+    for axes, (name, values) in zip(panels, noise.items(), strict=True):
+        levels = np.asarray(values, dtype=np.float64)
+        numbers = np.arange(len(levels))
+        for axis, colour in enumerate(AXIS_COLOURS):
+            place = numbers + 0.27 * (axis - 1)
+            axes.bar(place, levels[:, axis], 0.25, color=colour, label="xyz"[axis])
+        axes.set_title(literal(name), fontsize=8, loc="left")
+        axes.set_xticks(numbers, [str(taxel_number(i)) for i in numbers.tolist()], fontsize=6)
+        axes.tick_params(axis="y", labelsize=6)
+        axes.set_ylabel("noise", fontsize=7)
+    panels[0].legend(fontsize=6, ncols=3, frameon=False)
+    panels[-1].set_xlabel("taxel", fontsize=7)
     return figure
 
 

@@ -29,6 +29,7 @@ from holdfast.training.own_handling import (
 )
 from holdfast.training.replay import ThresholdReplay
 
+MAX_FINGERS_SHOWN = 5
 STILL_CHANGE = 0.03
 """Median change of the load below which the arm hardly moved, as a share of it."""
 MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
@@ -36,8 +37,7 @@ MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
 factor."""
 MAX_ACTIVITY = 2.0
 """Own handling is refused as slip above this `activity`. None of 450 grasps of randomized hands has
-more in the held samples in which it does not slide; over half of them have more while they slide
-(`benchmarks/handling_activity.py`)."""
+more in the held samples in which it does not slide; over half have more while they slide."""
 CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
 
@@ -73,6 +73,22 @@ class HandlingSummary(msgspec.Struct, frozen=True):
     still: bool
     before: HandlingFigures
     after: HandlingFigures
+
+    def text(self) -> str:
+        """Return what was seen of the sensor: held time, motion, and features that differ."""
+        held = [f"{name} {seconds:.0f} s" for name, seconds in self.fingers.items()]
+        more = ", ..." if len(held) > MAX_FINGERS_SHOWN else ""
+        motion = "how much the force changed is not known, as the hand was never seen open"
+        if not math.isnan(self.load_change):
+            share = 100 * self.load_change
+            motion = (
+                f"while it was held, the force changed by {share:.0f} % in half a second (median)"
+            )
+        return (
+            f"{self.sensor}: held {self.seconds:.0f} s ({', '.join(held[:MAX_FINGERS_SHOWN])}"
+            f"{more}); {motion}. {self.n_changed} of {self.n_features} features differ "
+            "from those of the default."
+        )
 
     @property
     def change(self) -> str:

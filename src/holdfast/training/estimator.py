@@ -11,10 +11,10 @@ from sklearn.utils.validation import check_is_fitted
 from holdfast.contact import STABLE
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
 from holdfast.recordings import Recording
+from holdfast.resampling import at_rate
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.model_fit import fit_recordings
 from holdfast.training.setting import Setting
-from holdfast.training.training_samples import resample_if_needed
 
 
 class StabilityClassifier(ClassifierMixin, BaseEstimator):
@@ -84,9 +84,7 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         check_is_fitted(self)
         rate = self.model_.rate
         return [
-            self.model_.predict_proba(
-                recording if rate is None else resample_if_needed(recording, rate)
-            )
+            self.model_.predict_proba(recording if rate is None else at_rate(recording, rate))
             for recording in X
         ]
 

@@ -13,17 +13,15 @@ import numpy as np
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
 from holdfast.detector import FingerTrace, detect
 from holdfast.errors import TrainingError
-from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import extract
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import BASELINES, Recording
-from holdfast.resampling import true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
-from holdfast.training.training_samples import resample_if_needed
 
 MIN_HANDLING = 5.0
 """Least held time of own handling [s]."""
@@ -122,15 +120,13 @@ class OwnHandling:
             self.n_left_out += 1
             return
         self.digests[recording.name] = recording.digest
-        recording = true_updates(recording)
-        if self.model.rate is not None:
-            recording = resample_if_needed(recording, self.model.rate)
+        recording = at_rate(recording, self.model.rate)
         # Without debouncing: hold and hysteresis would stretch or shorten what is held.
         raw = msgspec.structs.replace(self.model, debounce=Debounce())
         traces = detect(raw, recording).fingers
         sensors = {name: recording.modules[name].sensor for name in traces}
         rows = extract(self.model.plan(sensors, recording.rate), recording)
-        loaded = begins_in_contact(recording.metadata) and BASELINES not in recording.metadata
+        loaded = recording.starts_loaded and BASELINES not in recording.metadata
         for name, trace in traces.items():
             before = self._faults.get(name, _Faults(0, 0, 0))
             faulty = trace.reason == FAULT_CODE

@@ -10,14 +10,13 @@ import numpy as np
 from holdfast.contact import NO_CONTACT, UNKNOWN
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.force import rest_amplitude
-from holdfast.features.loaded_start import begins_in_contact
 from holdfast.features.stream import extract
 from holdfast.features.tables import StreamPlan
 from holdfast.metrics.slip_truth import slip_truth
-from holdfast.model import ANY_FINGER, RATE_TOLERANCE, HeadName
+from holdfast.model import ANY_FINGER, HeadName
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
-from holdfast.resampling import resample, true_updates
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.training.dataset_scan import DatasetScan, OneRecording, Progress, show_nothing
@@ -179,9 +178,7 @@ def _samples_of_part(
         n_seen: usable samples of each finger in all recordings before.
     """
     scan, setting, step = plan.scan, plan.setting, plan.step
-    recording = true_updates(part[0])
-    if not scan.relative:
-        recording = resample_if_needed(recording, scan.rate)
+    recording = at_rate(part[0], None if scan.relative else scan.rate)
     rate, tare = scan.model_rate or recording.rate, setting.used_tare
     sensors = sensors_of(recording, scan)
 
@@ -196,7 +193,7 @@ def _samples_of_part(
     with_others = not plan.only_stable
     is_same = plan.slip_features == setting.features
     slip_rows = stable_rows if is_same or not with_others else extracted(plan.slip_features)
-    loaded, fingers = begins_in_contact(recording.metadata), {}
+    fingers = {}
     recording_step = scan.recordings[index].step
     group = int(plan.data_split.group_of[index])
     for finger, rows in stable_rows.items():
@@ -212,7 +209,7 @@ def _samples_of_part(
         kept = usable[-n_seen.get(finger, 0) % step :: step]
         # F_a at rest says where contact begins. A loaded start shows no rest, and a model for any
         # unit has a threshold on the load instead.
-        has_rest = tare.without_contact and not scan.relative and not loaded
+        has_rest = tare.without_contact and not scan.relative and not recording.starts_loaded
         stable = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows, states, kept, group),
@@ -245,14 +242,6 @@ def sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
         for finger, module in modules.items()
         if module.n_samples and (scan.relative or module.sensor == scan.sensors[finger])
     }
-
-
-def resample_if_needed(recording: Recording, rate: float) -> Recording:
-    """Return the true updates of a recording, resampled unless their rate [Hz] is within 20 %."""
-    recording = true_updates(recording)
-    if abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
-        return recording
-    return resample(recording, rate)
 
 
 def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:

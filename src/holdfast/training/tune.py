@@ -7,7 +7,7 @@ and events without an alarm in time.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import msgspec
 import numpy as np
@@ -177,6 +177,27 @@ class Tuned:
     chosen: CurvePoint
     before: CurvePoint
     points: tuple[CurvePoint, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return the chosen threshold, with the errors before it and around it, for JSON."""
+        if self.chosen.slips is not None:
+            return {
+                "for": "slip",
+                "threshold": self.chosen.threshold,
+                "chosen": self.chosen.slips,
+                "before": self.before.slips,
+                "around": [
+                    {"threshold": point.threshold, **msgspec.to_builtins(point.slips)}
+                    for point in self.points
+                ],
+            }
+        points = (
+            {"threshold": point.threshold, "stable": point.stable, "events": point.events}
+            for point in (self.chosen, self.before, *self.points)
+        )
+        chosen, before, *around = points
+        threshold = self.chosen.threshold
+        return {"threshold": threshold, "chosen": chosen, "before": before, "around": around}
 
 
 def tune(

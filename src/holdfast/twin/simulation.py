@@ -3,7 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.loads import Load, LoadState, load_state
+from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.plant import MILD, plant_named
@@ -118,6 +119,7 @@ class Simulation:
     Args:
         grasp: the grasp.
         parameters: parameters of the skin; by default `UskinParameters()`.
+        faults: troubles of the skins; by default none.
         plan: plan of the grasp; by default the one that is drawn for it.
         loads: loads on the held object, in addition to the disturbances of the plan.
 
@@ -137,6 +139,7 @@ class Simulation:
         self,
         grasp: Grasp,
         parameters: UskinParameters | None = None,
+        faults: MagneticFaults | None = None,
         *,
         plan: Plan | None = None,
         loads: Sequence[Load] = (),
@@ -151,6 +154,7 @@ class Simulation:
         self.plan = plan or _draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
+        self._faults = faults or MagneticFaults()
         if grasp.noise is not None:
             skin = replace(skin, noise_counts=grasp.noise)
         self.uskins = {finger: _skin(grasp.seed, finger, skin) for finger in FINGERS}
@@ -265,8 +269,16 @@ class Simulation:
         ):
             if finger not in self._readouts:
                 self._readouts[finger] = uskin.readout(self.grasp.generator(f"skin {finger}"))
-            counts[finger] = self._readouts[finger].counts(forces[None], time)[0]
-        return counts
+            counts[finger] = self._readouts[finger].counts(forces[None], time)
+        return {finger: own[0] for finger, own in self._with_faults(counts, time).items()}
+
+    def _with_faults(self, counts: dict[str, Counts], times: Array) -> dict[str, Counts]:
+        """Return the counts (n, n_taxels, 3) of each finger with the troubles of the skins."""
+        if self._faults.changes_nothing:
+            return counts
+        sensors = {finger: uskin.sensor for finger, uskin in self.uskins.items()}
+        rest = {finger: uskin.taxels.baseline for finger, uskin in self.uskins.items()}
+        return self._faults.apply(sensors, counts, times, rest, self.grasp.seed)
 
     def recording(self) -> Recording:
         """Return the recording so far, with truth and labels."""
@@ -276,10 +288,13 @@ class Simulation:
         glitch = LabelRule.glitch if self._profile.label_glitches else None
         rule = LabelRule(margin=self._profile.label_margin, glitch=glitch)
         modules = {}
-        for place, (finger, uskin) in enumerate(self.uskins.items()):
-            generator = grasp.generator(f"skin {finger}")
-            counts = uskin.counts(taxel_forces[:, place], times, generator)
-            stamps = times
+        read = {
+            finger: uskin.counts(taxel_forces[:, place], times, grasp.generator(f"skin {finger}"))
+            for place, (finger, uskin) in enumerate(self.uskins.items())
+        }
+        read = self._with_faults(read, times)
+        for finger, uskin in self.uskins.items():
+            counts, stamps = read[finger], times
             if grasp.server:
                 server = grasp.generator(f"server {finger}")
                 stamps, counts = with_server_effects(times, counts, server)
@@ -293,6 +308,8 @@ class Simulation:
                 {**record, **{key: lock + record[key] for key in ("start", "end")}}
                 for record in self._slip_events.records
             ]
+        if not self._faults.changes_nothing:
+            metadata["magnetic_faults"] = asdict(self._faults)
         return Recording(name, modules, metadata, truth)
 
     def _truth(self, times: Array) -> Truth:
@@ -317,6 +334,7 @@ def simulate(
     grasp: Grasp,
     parameters: UskinParameters | None = None,
     on_sample: SampleCallback | None = None,
+    faults: MagneticFaults | None = None,
 ) -> Recording:
     """Simulate one grasp and return its recording with truth and labels.
 
@@ -324,6 +342,7 @@ def simulate(
         grasp: the grasp.
         parameters: parameters of the skin; by default `UskinParameters()`.
         on_sample: function that is called after each sample, for instance to draw a picture.
+        faults: troubles of the skins; by default none.
 
     Returns:
         Recording of four fingertips in counts at 150 Hz. The metadata of a grasp that was never
@@ -332,7 +351,7 @@ def simulate(
     Raises:
         ValueError: object, profile or case is unknown, or the object cannot be grasped.
     """
-    simulation = Simulation(grasp, parameters)
+    simulation = Simulation(grasp, parameters, faults)
     while not simulation.is_over:
         simulation.step()
         if on_sample is not None and simulation.command is not None:

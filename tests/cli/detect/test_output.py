@@ -2,16 +2,11 @@ import tracemalloc
 
 import pytest
 
-from holdfast.cli.detect.output import (
-    DetectionSummary,
-    EstimateChunk,
-    chunk_from_detection,
-    chunk_from_stream,
-    json_lines,
-)
+from holdfast.cli.detect.estimates import EstimateChunk, chunk_from_detection, chunk_from_stream
+from holdfast.cli.detect.output import DetectionSummary, json_lines
 from holdfast.contact import ContactState
 from holdfast.detector import Detector, detect
-from holdfast.live.arrival_detector import StreamEstimate
+from holdfast.live.stream_detector import StreamEstimate
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 

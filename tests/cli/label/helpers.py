@@ -3,16 +3,14 @@
 import json
 from dataclasses import replace
 
-from holdfast.cli import main
+from command_line import Verb
 from holdfast.io import load_recording, save_labels
 
 FINGERS = ("thumb", "index")
 
 
-def run(capsys, *words):
-    code = main(["label", *map(str, words)])
-    out, err = capsys.readouterr()
-    return code, out, err
+VERB = Verb("label")
+run, refusal = VERB.run, VERB.refusal
 
 
 def run_json(capsys, *words):
@@ -20,13 +18,6 @@ def run_json(capsys, *words):
     code, out, err = run(capsys, *words, "--json")
     assert code == 0, err
     return json.loads(out)
-
-
-def refusal(capsys, *words):
-    """Return the error message of a run that fails."""
-    code, out, err = run(capsys, *words)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    return err.removeprefix("holdfast: ").rstrip("\n")
 
 
 def save_manual_labels(path, author="ada", notes="careful"):

@@ -231,23 +231,6 @@ def test_an_unplugged_board_is_connected_again(board, impatient):
     assert after[0].time > before
 
 
-def test_attempts_become_less_frequent(board, monkeypatch):
-    slept = []
-    with started(board) as source:
-        board.unplug()
-        wait_for(source, lambda a: a.notices)
-        clock = [time.monotonic()]
-        fake = _Clock(clock)
-        fake.sleep = lambda seconds: (
-            slept.append(seconds),
-            clock.__setitem__(0, clock[0] + seconds),
-        )
-        monkeypatch.setattr(base, "time", fake)
-        assert source.read(10.0) is None
-    assert slept[:5] == pytest.approx([0.5, 1.0, 2.0, 2.0, 2.0], abs=0.05)
-    assert sum(slept) == pytest.approx(10.0, abs=0.05)
-
-
 def test_a_port_that_is_missing_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "comports", lambda: [_Port("/dev/ttyS1"), _Port("/dev/ttyACM7")])
     source = open_source(f"serial://{tmp_path}/none")

@@ -139,7 +139,7 @@ def _hand_probability(fingers: Sequence[FingerDecisions]) -> Array:
     """
     probability = np.array([finger.stable_probability for finger in fingers])
     states = np.array([finger.states for finger in fingers])
-    in_contact = (states == STABLE) | (states == UNSTABLE)
-    grasped = enough_contacts(in_contact.sum(axis=0), len(fingers))
-    counted = np.where(grasped, in_contact, states != UNKNOWN)
+    touching = (states == STABLE) | (states == UNSTABLE)
+    grasped = enough_contacts(touching.sum(axis=0), len(fingers))
+    counted = np.where(grasped, touching, states != UNKNOWN)
     return np.asarray(np.where(counted, probability, 1.0).min(axis=0))

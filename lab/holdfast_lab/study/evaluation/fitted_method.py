@@ -139,18 +139,18 @@ class Scores:
     probability: Array
 
     @classmethod
-    def of_finger(cls, times: Array, margin: Array, threshold: float, in_contact: Mask) -> "Scores":
+    def of_finger(cls, times: Array, margin: Array, threshold: float, touching: Mask) -> "Scores":
         """Return the scores of a finger.
 
         Args:
             times: (n,) [s].
             margin: (n,) NaN where it is not known.
             threshold: of its classifier [log odds].
-            in_contact: (n,).
+            touching: (n,).
         """
         known = ~np.isnan(margin)
-        probability = np.where(known & ~in_contact, 0.0, probability_of(margin + threshold))
-        return cls(times, np.where(known & in_contact, margin, np.inf), known, in_contact,
+        probability = np.where(known & ~touching, 0.0, probability_of(margin + threshold))
+        return cls(times, np.where(known & touching, margin, np.inf), known, touching,
                    probability)  # fmt: skip
 
     @classmethod
@@ -265,12 +265,12 @@ class FittedMethod:
         margins = {unit: self._margins(unit, rows) for unit, rows in recording.features.items()}
         first = next(iter(recording.times.values()))
 
-        def score(unit: str, times: Array, in_contact: Mask) -> Scores:
+        def score(unit: str, times: Array, touching: Mask) -> Scores:
             margin, threshold = margins[unit if unit in margins else HAND]
             if unit not in margins or unit == HAND:
                 at = np.searchsorted(first, times, side="right") - 1
                 margin = np.where(at >= 0, margin[at], np.nan)
-            return Scores.of_finger(times, margin, threshold, in_contact)
+            return Scores.of_finger(times, margin, threshold, touching)
 
         fingers = {}
         for name, times in recording.times.items():

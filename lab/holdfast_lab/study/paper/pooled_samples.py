@@ -17,9 +17,9 @@ from holdfast.classifiers import Samples
 from holdfast.classifiers.folds import random_folds
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.recordings import Recording
+from holdfast.resampling import at_rate
 from holdfast.sensors.types import Array, Integers
 from holdfast.training.finger_samples import concatenate, labelled_samples, usable_rows
-from holdfast.training.training_samples import resample_if_needed
 from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import FingerSignal, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy
@@ -123,7 +123,7 @@ def _corpus_forces(
 
 def _read_forces(corpus: Corpus, rate: float, treatment: Treatment) -> Iterator[_RecordingForces]:
     for original in corpus.load():
-        recording = resample_if_needed(treatment.apply(original, corpus.tare), rate)
+        recording = at_rate(treatment.apply(original, corpus.tare), rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
         fingers = {
             name: (_without_readings(signal), recording.modules[name].label_states)

@@ -135,7 +135,7 @@ class TestHand:
     def finger(self, states, probability):
         return FingerDecisions(self.TIMES, np.zeros(4), states, probability)
 
-    def test_the_score_is_the_smallest_of_the_fingers_in_contact(self):
+    def test_the_score_is_the_smallest_of_the_touching_fingers(self):
         fingers = [
             self.finger([STABLE, STABLE, NO_CONTACT, UNKNOWN], [0.9, 0.8, 0.2, np.nan]),
             self.finger([STABLE, UNSTABLE, STABLE, STABLE], [0.7, 0.1, 0.6, 0.5]),

@@ -19,10 +19,10 @@ def recording_at(times):
     return RecordingFeatures("one", None, None, times, {}, *[empty] * 4, {}, {}, {})
 
 
-def state_of_finger(margin, in_contact, shift):
+def state_of_finger(margin, touching, shift):
     if np.isnan(margin):
         return UNKNOWN
-    if not in_contact:
+    if not touching:
         return NO_CONTACT
     return STABLE if margin >= shift else UNSTABLE
 
@@ -34,14 +34,14 @@ def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
     margins = {f: np.round(generator.normal(size=60), 1) for f in times}
     for each in margins.values():
         each[generator.random(60) < 0.1] = np.nan
-    in_contact = {f: generator.random(60) < 0.7 for f in times}
+    touching = {f: generator.random(60) < 0.7 for f in times}
     score = Scores.of_hand(
-        [Scores.of_finger(own, margins[f], 0.3, in_contact[f]) for f, own in times.items()]
+        [Scores.of_finger(own, margins[f], 0.3, touching[f]) for f, own in times.items()]
     )
     for shift in (-np.inf, -1.0, 0.0, 0.4, np.inf):
         fingers = {}
         for f, own in times.items():
-            pairs = zip(margins[f], in_contact[f], strict=True)
+            pairs = zip(margins[f], touching[f], strict=True)
             states = [state_of_finger(m, t, shift) for m, t in pairs]
             fingers[f] = FingerDecisions(own, states, states, np.full(60, np.nan))
         expected = hand_decisions(fingers, len(fingers))
@@ -50,13 +50,13 @@ def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
         assert not np.isnan(score.probability[score.states(shift) != UNKNOWN]).any()
 
 
-def test_the_probability_of_a_hand_is_the_smallest_of_the_fingers_in_contact():
+def test_the_probability_of_a_hand_is_the_smallest_of_the_touching_fingers():
     times = np.array([0.0, 1.0, 2.0])
     margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
                "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
-    in_contact = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
+    touching = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
     thresholds = {"a": 2.0, "b": 0.0, "c": 0.0}
-    fingers = [Scores.of_finger(times, margins[f], thresholds[f], in_contact[f]) for f in margins]
+    fingers = [Scores.of_finger(times, margins[f], thresholds[f], touching[f]) for f in margins]
     found = Scores.of_hand(fingers).probability
     odds = np.exp([1.0, 1.0, 2.0])
     assert found == pytest.approx(odds / (1 + odds))

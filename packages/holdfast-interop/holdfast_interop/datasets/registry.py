@@ -51,7 +51,8 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         size: about, of all files [bytes]; None if it is not known.
         tried: whether recordings of the set went from a server to a decision in the tests.
         address: of the files, ends with a slash.
-        in_contact: whether the object is held at the first sample.
+        starts_loaded: whether the object is held at the first sample.
+        test: names of the recordings that the published split tests on; empty without one.
         files: files to download; empty if holdfast does not download them.
         reason: why it does not.
     """
@@ -68,7 +69,8 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     importer: str | None = None
     size: _Size | None = None
     address: _Address = "https://none/"
-    in_contact: bool = False
+    starts_loaded: bool = False
+    test: tuple[str, ...] = ()
     files: tuple[PublicFile, ...] = ()
     reason: str = ""
 

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.features.loaded_start import declared_baselines
+from holdfast.features.start import declared_baselines
 from holdfast.features.tare import Tare, baseline_of, offline_tare
-from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
+from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array, Integers
 
 BASELINE_SECONDS = 0.5
@@ -97,7 +97,7 @@ def _baseline(recording: Recording, name: str, module: Tactile) -> Array:
     declared = declared_baselines(recording.metadata, {name: module.sensor})
     if name in declared:
         return declared[name]
-    is_known = module.unit == "N" and recording.metadata.get(STARTS_LOADED) is True
+    is_known = module.unit == "N" and recording.starts_loaded
     how = Tare("none") if is_known else offline_tare(BASELINE_SECONDS, module)
     try:
         return baseline_of(module.readings, module.times, how, module.period)[0]

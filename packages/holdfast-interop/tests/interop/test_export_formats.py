@@ -1,9 +1,8 @@
 """The formats of `holdfast export` that this package has."""
 
-import json
-
 import pytest
 
+from command_line import Verb
 from holdfast.cli import main
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
@@ -18,17 +17,8 @@ def grasps(tmp_path_factory):
     return folder
 
 
-def exported(capsys, *words):
-    assert main(["export", *map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def refusal(capsys, *words):
-    assert main(["export", *map(str, words)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    return err.removeprefix("holdfast: ").rstrip("\n")
+VERB = Verb("export")
+refusal, exported = VERB.refusal, VERB.document
 
 
 def test_a_data_set_goes_and_comes_back(capsys, grasps, tmp_path):

@@ -194,7 +194,7 @@ def test_a_gap_has_no_arrows_and_no_value(tmp_path):
     assert values == [pytest.approx(50.0), None]
 
 
-def test_declared_baselines_and_newtons_in_contact_keep_the_load(tmp_path):
+def test_declared_baselines_and_newtons_under_load_keep_the_load(tmp_path):
     module = pressed([0, 0, 0]).modules["finger1"]
     base = np.full((5, 3), 990.0).tolist()
     declared = Recording("a", {"finger1": module}, {"baselines": {"finger1": base}})

@@ -8,8 +8,7 @@ import pytest
 from grip.fakes import FakeGrip
 from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.io.cdr import MessageEncoder
-from holdfast.live.arrival_detector import StreamEstimate
-from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast_ros import publisher as module
 from holdfast_ros.link import Link, Publisher
 from holdfast_ros.publisher import (

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.label.auto import label_all, print_labelled
 from holdfast.cli.label.inputs import (
     AnnotatorOption,
     AuthorOption,
@@ -13,6 +12,7 @@ from holdfast.cli.label.inputs import (
     SaveOptions,
     login_name,
 )
+from holdfast.cli.label.output import label_all, print_labelled
 from holdfast.cli.options import JsonOption
 from holdfast.errors import require_extras
 
@@ -52,7 +52,7 @@ def import_(
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
         raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
 
-    def labels_of(recording: "Recording") -> "ModuleLabels":
+    def labels_of(recording: "Recording", _: Path) -> "ModuleLabels":
         return read_labels(source, recording, annotator)
 
     documents = label_all(files, labels_of, author or annotator or login_name(), saving)

@@ -14,8 +14,10 @@ from holdfast.cli.options import (
     RARE,
     FittingTareOption,
     ForceOption,
+    FpsOption,
     ServerOptions,
 )
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.labelling.rules.poses import Poses
@@ -51,7 +53,8 @@ class RuleOptions:
         typer.Option(
             "--track",
             metavar="BODY=NAME",
-            help="Topic or frame of a body in the bag; BODY is object or a finger.",
+            help="Topic or frame of a body in the bag, or number of its sticker; BODY is object or "
+            "a finger.",
         ),
         RARE,
     ] = None
@@ -60,6 +63,14 @@ class RuleOptions:
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
         RARE,
     ] = None
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            help="Video of stickers for the rule tracking.",
+            show_default="NAME.mp4 beside the recording",
+        ),
+    ] = None
+    fps: FpsOption = None
 
     @cached_property
     def tracking(self) -> "Poses | None":
@@ -72,8 +83,11 @@ class RuleOptions:
         from holdfast.labelling.rules.poses import OBJECT, poses_from_bag, poses_from_csv
 
         if self.poses is None or self.poses.suffix == ".csv":
-            if self.tracks:
-                raise ValueError("--track names topics or frames of a bag: give --poses BAG")
+            if self.tracks and (self.poses is not None or self.video is None):
+                raise ValueError(
+                    "--track names topics or frames of a bag: give --poses BAG (or stickers of a "
+                    "video: give --video FILE)"
+                )
             return None if self.poses is None else poses_from_csv(self.poses)
         names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks or ())
         if OBJECT not in names:
@@ -96,11 +110,24 @@ class RuleOptions:
         if self.tracking is not None:
             if rule != "tracking":
                 raise ValueError(f"--poses are for the rule tracking; rule {rule!r} given")
+            if self.video is not None:
+                raise ValueError("--poses and --video given; only one of them expected")
             arguments["tracking"] = self.tracking
+        if self.video is not None:
+            if rule != "tracking":
+                raise ValueError(f"--video is for the rule tracking; rule {rule!r} given")
+            arguments["video"] = self.video
         return arguments
 
-    def propose(self, rule: str, recording: "Recording") -> dict[str, tuple["Label", ...]]:
+    def propose(
+        self, rule: str, recording: "Recording", path: Path | None = None
+    ) -> dict[str, tuple["Label", ...]]:
         """Return the labels that a rule proposes for a recording.
+
+        Args:
+            rule: name of the rule.
+            recording: the recording.
+            path: of the recording. The rule tracking reads the video beside it, if there is one.
 
         Raises:
             RecordingError: the recording lacks the data that the rule needs.
@@ -108,7 +135,23 @@ class RuleOptions:
         """
         from holdfast.labelling.rules import propose
 
-        return propose(rule, recording, **self.arguments(rule))
+        arguments = self.arguments(rule)
+        beside = None if path is None else path.with_suffix(".mp4")
+        if rule == "tracking" and self.poses is None and beside is not None and beside.exists():
+            arguments.setdefault("video", beside)
+        if "video" in arguments:
+            require_extras("video")
+            arguments["fps"], arguments["bodies"] = self.fps, self._stickers()
+        elif self.fps is not None:
+            raise ValueError("--fps is for a video: give --video FILE")
+        return propose(rule, recording, **arguments)
+
+    def _stickers(self) -> dict[str, int] | None:
+        """Return the number of the sticker of each body that is given."""
+        pairs = [_pair(text, "--track BODY=NUMBER") for text in self.tracks or ()]
+        if wrong := [name for _, name in pairs if not name.isdecimal()]:
+            raise ValueError(f"--track BODY=NUMBER expected with a video, {wrong[0]!r} given")
+        return {body: int(number) for body, number in pairs} or None
 
 
 @dataclass(frozen=True)

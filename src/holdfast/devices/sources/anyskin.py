@@ -70,10 +70,14 @@ class AnySkinDecoder:
 
     def reset(self) -> None:
         """Drop all bytes, because the board was connected again."""
+        # Bytes that are not decoded yet, and whether a packet may begin with them.
         self._buffer = b""
         self._after_line = False
+        # The newest bytes, in which packets of another length are looked for.
         self._recent = b""
         self._other_n_mags = 0
+        # Bytes skipped since the last sample. It begins one packet below 0: half a packet at the
+        # beginning is normal, and is not counted.
         self._n_skipped = -self._length
         self._n_refused = 0
 
@@ -89,6 +93,7 @@ class AnySkinDecoder:
         if at:
             self._after_line = self._buffer[at - 1 : at] == b"\n"
             self._buffer = self._buffer[at:]
+        # Looked for only where nothing else fits: it is slow, and may find a packet by chance.
         if self._n_refused > before and not samples:
             self._other_n_mags = _other_n_mags(self._recent, self._n_mags) or self._other_n_mags
         return DecodedBytes(samples, self._n_refused - before, self._other_n_mags)
@@ -96,46 +101,39 @@ class AnySkinDecoder:
     def _step(self, at: int, samples: list[Sample]) -> int | None:
         """Decode or skip the bytes at a place; return where they end, None if more are needed."""
         begins = self._buffer[at - 1 : at] == b"\n" if at else self._after_line
+        # Text before binary: hardly any binary packet has digits and blanks only.
         if begins and (line := _LINE.match(self._buffer, at)):
             numbers = _numbers(line[0])
             if numbers is not None:
-                self._take_line(numbers, samples)
+                if len(numbers) == self._n_mags and _is_plausible(numbers[:, 3], numbers[:, :3]):
+                    self._take(numbers[:, :3].copy(), samples)
+                else:
+                    if len(numbers) != self._n_mags:
+                        self._other_n_mags = len(numbers)
+                    self._n_refused += 1
                 return line.end()
         n_left = len(self._buffer) - at
-        if not n_left or (begins and (n_left < self._length or self._is_half_line(at))):
+        if begins and n_left >= self._length:
+            match = _IN_LINE.match(self._buffer, at)
+            line_end = match.end() if match else at
+            if line_end == len(self._buffer) and n_left <= MAX_LINE_LENGTH:
+                return None  # half a line
+        elif begins or not n_left:
             return None
         sample = _packet(self._buffer, at, self._n_mags) if begins else None
         if sample is not None:
             self._take(sample, samples)
             return at + self._length
         end = self._buffer.find(b"\n", at) + 1 or len(self._buffer)
-        self._skip(end - at)
+        # A packet counts as refused for each length of a packet that begins in these bytes.
+        counted = math.ceil(max(self._n_skipped, 0) / self._length)
+        self._n_skipped += end - at
+        self._n_refused += math.ceil(max(self._n_skipped, 0) / self._length) - counted
         return end
 
     def _take(self, sample: Sample, samples: list[Sample]) -> None:
         samples.append(sample)
         self._n_skipped = self._other_n_mags = 0
-
-    def _take_line(self, numbers: Sample, samples: list[Sample]) -> None:
-        """Take (n_mags, 4) x, y, z and temperature of a line."""
-        if len(numbers) != self._n_mags:
-            self._other_n_mags = len(numbers)
-            self._n_refused += 1
-        elif _is_plausible(numbers[:, 3], numbers[:, :3]):
-            self._take(numbers[:, :3].copy(), samples)
-        else:
-            self._n_refused += 1
-
-    def _is_half_line(self, at: int) -> bool:
-        match = _IN_LINE.match(self._buffer, at)
-        end = match.end() if match else at
-        return end == len(self._buffer) and end - at <= MAX_LINE_LENGTH
-
-    def _skip(self, n_bytes: int) -> None:
-        """Count a packet as refused for each length of a packet that begins in these bytes."""
-        counted = math.ceil(max(self._n_skipped, 0) / self._length)
-        self._n_skipped += n_bytes
-        self._n_refused += math.ceil(max(self._n_skipped, 0) / self._length) - counted
 
 
 def _length(n_mags: int) -> int:
@@ -176,6 +174,7 @@ def _is_plausible(temperatures: npt.NDArray[np.float32], readings: Sample) -> bo
 def _other_n_mags(data: bytes, n_mags: int) -> int:
     """Return the unexpected number of magnetometers of two successive packets, 0 for none."""
     for count in range(1, MAX_OTHER_MAGS + 1):
+        # Two in a row: one would be found by chance in other packets.
         place = data.find(END)
         while count != n_mags and place >= 0:
             at = place + len(END)

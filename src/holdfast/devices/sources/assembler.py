@@ -85,16 +85,20 @@ class Assembler:
         self.devices: Mapping[int, Device] = {}
         self.n_lost = self.n_refused = 0
         self._timeline = Timeline()
-        self._is_fast = False
-        self._packet = _PacketTime(math.nan, Stamp(math.nan), math.nan)
+        self._is_fast = False  # whether the notice about a fast clock was given
+        self._packet = _PacketTime(math.nan, Stamp(math.nan), math.nan)  # set by `stamp`
+        # By the number of the device: delays of stamps of its own, the identity of its newest
+        # sample, and its sequence counter (None: one counter for all).
         self._delays: dict[int, TransportDelay] = {}
         self._newest: dict[int, Hashable] = {}
         self._sequences: dict[int | None, int | None] = {}
-        self._time = -math.inf
+        self._time = -math.inf  # of the newest arrival with samples
+        # Of the packet that is assembled: `add`, `report_taxel_count` and `notify` fill them,
+        # `finish` empties them.
         self._instants: dict[float, _Instant] = {}
         self._faults: dict[str, Faults] = {}
         self._notices: list[str] = []
-        self._noticed_at: dict[str, float] = {}
+        self._noticed_at: dict[str, float] = {}  # by topic; older ones are forgotten
 
     @property
     def sensors(self) -> dict[str, Sensor]:
@@ -183,7 +187,11 @@ class Assembler:
         """
         stamp = self._timeline.stamp(time, received)
         self._packet = _PacketTime(time, stamp, received)
-        self._note_pace(received)
+        pace = self._timeline.clock.pace
+        if pace > 1.0 and not self._is_fast:
+            text = f"the clock of the device runs {pace:.2g} times as fast as that of this machine"
+            self.notify("clock", text, received)
+        self._is_fast = pace > 1.0
         if self._packet.jumped:
             for delay in self._delays.values():
                 delay.reset()
@@ -196,7 +204,14 @@ class Assembler:
             readings: (n_taxels, 3) in the order of the packet.
             stamp: the device's own stamp [s]; None to use the packet's.
         """
-        time, faults = self._time_of(number, stamp)
+        packet = self._packet
+        if stamp is None or stamp > packet.time + MAX_STAMP_LEAD:
+            time, faults = packet.stamp  # a stamp from the future is of before a jump of the clock
+        else:
+            time = packet.stamp.time if stamp == packet.time else stamp + self._timeline.offset
+            # Each device has its usual delay: one may be measured long before the packet is sent.
+            late = self._delays.setdefault(number, TransportDelay()).is_late(time, packet.received)
+            faults = (Fault.CLOCK_JUMP,) * packet.jumped + (Fault.LATE,) * late
         samples = self.devices[number].split(readings)
         instant = self._instants.setdefault(time, _Instant({}, {}))
         instant.samples.update(samples)
@@ -204,11 +219,18 @@ class Assembler:
 
     def finish(self, received: float) -> list[Arrival]:
         """Return the arrivals of a packet in order of time, none if there is nothing to report."""
-        arrivals = [self._arrival(time, received) for time in sorted(self._instants)]
+        arrivals = []
+        for time, (samples, faults) in sorted(self._instants.items()):
+            # Equal or older than another device's: just after it, as times must increase.
+            self._time = max(time, math.nextafter(self._time, math.inf))
+            known = {name: these for name, these in faults.items() if these}
+            arrivals.append(Arrival(self._time, samples, received, known))
+        # A flood of refused packets would be a flood of arrivals without samples.
         refused = self.n_refused and not self._hold_refusals
         if not arrivals and (self._notices or self._faults or refused):
             arrivals = [notice_arrival(received)]
         if arrivals:
+            # On the first one: what is missing was missing before it.
             arrivals[0] = arrivals[0]._replace(
                 faults={**self._faults, **arrivals[0].faults},
                 n_lost=self.n_lost,
@@ -219,31 +241,6 @@ class Assembler:
             self.n_lost = self.n_refused = 0
         self._instants, self._faults, self._notices = {}, {}, []
         return arrivals
-
-    def _note_pace(self, received: float) -> None:
-        """Give a notice when the clock begins to run too fast."""
-        pace = self._timeline.clock.pace
-        if pace > 1.0 and not self._is_fast:
-            text = f"the clock of the device runs {pace:.2g} times as fast as that of this machine"
-            self.notify("clock", text, received)
-        self._is_fast = pace > 1.0
-
-    def _time_of(self, number: int, stamp: float | None) -> Stamp:
-        """Return the time of a device's sample, and the faults of its time."""
-        packet = self._packet
-        if stamp is None or stamp > packet.time + MAX_STAMP_LEAD:
-            return packet.stamp
-        same = stamp == packet.time
-        time = packet.stamp.time if same else stamp + self._timeline.offset
-        late = self._delays.setdefault(number, TransportDelay()).is_late(time, packet.received)
-        return Stamp(time, (Fault.CLOCK_JUMP,) * packet.jumped + (Fault.LATE,) * late)
-
-    def _arrival(self, time: float, received: float) -> Arrival:
-        self._time = max(time, math.nextafter(self._time, math.inf))
-        samples, faults = self._instants[time]
-        return Arrival(
-            self._time, samples, received, {name: these for name, these in faults.items() if these}
-        )
 
 
 class _Instant(NamedTuple):
@@ -273,5 +270,6 @@ def n_missing(last: int, sequence: int) -> int:
         >>> n_missing(2**32 - 2, 1), n_missing(5000, 0)
         (2, 0)
     """
+    # Modulo the period, so that a counter that overflows goes on by one.
     step = (sequence - last) % SEQUENCE_PERIOD
     return step - 1 if 0 < step < MIN_COUNTER_RESTART else 0

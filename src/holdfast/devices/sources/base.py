@@ -79,6 +79,7 @@ class Source(Openable):
             JSON.
         paced: whether samples arrive in the course of time, instead of as fast as they are read.
         speed: ratio of the source's time to real time; 0 is as fast as samples are read.
+        is_device: whether the samples come from a device, whose rate may change.
 
     Example:
         To detect contact states, use `holdfast.StreamDetector`: it also resamples, and handles
@@ -96,6 +97,7 @@ class Source(Openable):
     metadata: Mapping[str, Any] = {}
     paced: bool = True
     speed: float = 1.0
+    is_device: bool = False
 
     @abstractmethod
     def open(self) -> None:
@@ -140,6 +142,7 @@ class DeviceSource(Source):
         silence_timeout: time without a new sample after which a notice reports silence [s].
     """
 
+    is_device = True
     silence_timeout: float = math.inf
 
     def __init__(self) -> None:
@@ -150,11 +153,14 @@ class DeviceSource(Source):
         deadline = time.monotonic() + timeout
         while self._is_open and not self._pending:
             left = max(deadline - time.monotonic(), 0.0)
-            if self._lost_at is None:
-                self._listen(left)
-            else:
+            if self._lost_at is not None:
                 self._retry(left)
-            if not left:
+            else:
+                # Wake up when the device counts as silent, so that the notice comes in time.
+                until_silent = self._last_sample_at + self.silence_timeout - time.monotonic()
+                if not self._receive(left if self._silent else min(left, max(until_silent, 0.0))):
+                    self._check_silence(time.monotonic())
+            if not left:  # after a read: a timeout of 0 reads what is there
                 break
         return self._pending.popleft() if self._pending else None
 
@@ -195,7 +201,7 @@ class DeviceSource(Source):
     def _queue(self, arrivals: Sequence[Arrival], received: float) -> None:
         """Queue arrivals for `read`."""
         if not any(arrival.samples for arrival in arrivals):
-            self._check_silence(received)
+            self._check_silence(received)  # faults and notices do not end a silence
         else:
             if self._silent:
                 silence = received - self._last_sample_at
@@ -216,14 +222,8 @@ class DeviceSource(Source):
     def _notify(self, received: float, *notices: str) -> None:
         self._pending.append(notice_arrival(received, *notices))
 
-    def _listen(self, timeout: float) -> None:
-        until_silent = self._last_sample_at + self.silence_timeout - time.monotonic()
-        wait = timeout if self._silent else min(timeout, max(until_silent, 0.0))
-        if not self._receive(wait):
-            self._check_silence(time.monotonic())
-
     def _check_silence(self, now: float) -> None:
-        if self._silent or self._lost_at is not None:
+        if self._silent or self._lost_at is not None:  # it was reported already
             return
         if now - self._last_sample_at >= self.silence_timeout:
             self._silent = True
@@ -241,7 +241,7 @@ class DeviceSource(Source):
         wait = self._retry_at - time.monotonic()
         if wait > 0:
             self._pause(min(wait, timeout))
-        if wait > timeout or self._lost_at is None:
+        if wait > timeout or self._lost_at is None:  # `_pause` may have found it again
             return
         if self._reconnect():
             self._resume()

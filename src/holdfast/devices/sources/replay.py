@@ -58,6 +58,7 @@ def timed_samples(chunks: Iterable[Recording]) -> Iterator[TimedSamples]:
         OSError: as `chunks` does, after all content before that.
     """
     first, last = math.inf, -math.inf
+    # Markers after the samples so far: a chunk may bring those of later times.
     markers: list[tuple[float, str]] = []
     n_refused = 0
     try:
@@ -74,7 +75,7 @@ def timed_samples(chunks: Iterable[Recording]) -> Iterator[TimedSamples]:
                 yield from heapq.merge(instants, due, key=attrgetter("time"))
     except (RecordingError, OSError):
         yield from _rest(markers, last, n_refused)
-        raise
+        raise  # after the markers of what could be read
     yield from _rest(markers, last, n_refused)
 
 
@@ -132,6 +133,20 @@ class Player(Source):
         self._notices: list[str] = []
         self._reset()
 
+    def _reset(self) -> None:
+        self._content = iter(())
+        self._notices.clear()
+        self._next: TimedSamples | None = None  # the item that `_peek` has read
+        self._continues = False
+        self._number = 0
+        # From the times of the recording to those of the source, which go on from one recording to
+        # the next; and the time of the last samples of the source.
+        self._shift = 0.0
+        self._last = math.nan
+        # When the recording began, by the host's clock and by the source's; set with the first
+        # item that is due, and by each new recording.
+        self._start: tuple[float, float] | None = None
+
     def open(self) -> None:
         """Read the beginning of the first recording.
 
@@ -160,15 +175,34 @@ class Player(Source):
 
     def read(self, timeout: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout` [s] or at the end."""
+        # Before the next item is read from disk: that time counts as waiting.
         now = time.monotonic()
-        item = self._peek() or self._next_recording(timeout)
+        item = self._peek()
+        if item is None and self._continues and self._is_ready(self._number + 1, timeout):
+            self._number += 1
+            item = self._begin(self._late_chunks(self._number))
         if item is None:
             return None
         due = self._due(item.time, now)
         wait = min(due, now + timeout) - time.monotonic()
         if wait > 0:
             time.sleep(wait)
-        return None if due > now + timeout else self._arrival(item)
+        if due > now + timeout:  # the item stays for the next read
+            return None
+        received = time.monotonic()
+        if item.n_refused:
+            self._notices.append(f"{item.n_refused} samples are out of order and were left out")
+        if item.notice:
+            self._notices.append(item.notice)
+        notices = tuple(self._notices)
+        self._notices.clear()
+        self._next = None
+        if not item.samples:
+            return notice_arrival(received, *notices, n_refused=item.n_refused)
+        self._last = item.time + self._shift
+        return Arrival(
+            self._last, item.samples, received, n_refused=item.n_refused, notices=notices
+        )
 
     def restart(self) -> None:
         """Play the next recording; time continues after a pause.
@@ -177,6 +211,7 @@ class Player(Source):
         """
         if math.isnan(self._last):
             return
+        # Two clients that connect together get the same recording, not its successor.
         only_begun = self._start is None or self._last <= self._start[1]
         if only_begun or not (self._continues and self._is_ready(self._number + 1, RESTART_WAIT)):
             self._begin(self._same_chunks())
@@ -200,16 +235,6 @@ class Player(Source):
         """Return whether recording `number` can begin within `timeout` [s]."""
         return True
 
-    def _reset(self) -> None:
-        self._content = iter(())
-        self._notices.clear()
-        self._next: TimedSamples | None = None
-        self._continues = False
-        self._number = 0
-        self._shift = 0.0
-        self._last = math.nan
-        self._start: tuple[float, float] | None = None
-
     def _peek(self) -> TimedSamples | None:
         """Return the next item of this recording."""
         if self._next is None:
@@ -221,13 +246,6 @@ class Player(Source):
                     self._last - self._shift, {}, f"the rest is lost: {cause}"
                 )
         return self._next
-
-    def _next_recording(self, timeout: float) -> TimedSamples | None:
-        """Return the first item of the next recording, if it is ready within `timeout` [s]."""
-        if not (self._continues and self._is_ready(self._number + 1, timeout)):
-            return None
-        self._number += 1
-        return self._begin(self._late_chunks(self._number))
 
     def _begin(self, chunks: Iterable[Recording]) -> TimedSamples | None:
         """Continue with a recording from its beginning, after a pause. Return its first item."""
@@ -258,22 +276,6 @@ class Player(Source):
             self._start = now, at
         began, start = self._start
         return began + (at + self._shift - start) / self.speed
-
-    def _arrival(self, item: TimedSamples) -> Arrival:
-        received = time.monotonic()
-        if item.n_refused:
-            self._notices.append(f"{item.n_refused} samples are out of order and were left out")
-        if item.notice:
-            self._notices.append(item.notice)
-        notices = tuple(self._notices)
-        self._notices.clear()
-        self._next = None
-        if not item.samples:
-            return notice_arrival(received, *notices, n_refused=item.n_refused)
-        self._last = item.time + self._shift
-        return Arrival(
-            self._last, item.samples, received, n_refused=item.n_refused, notices=notices
-        )
 
 
 class ReplaySource(Player):

@@ -71,7 +71,17 @@ class SerialSource(DeviceSource):
         self._newest = -math.inf
         try:
             self._connect()
-            self._wait_for_sample()
+            deadline, n_refused = time.monotonic() + SERIAL_OPEN_TIMEOUT, 0
+            while not (decoded := self._read_port(max(deadline - time.monotonic(), 0.0))).samples:
+                if decoded.other_n_mags:  # waiting longer would not change it
+                    raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
+                n_refused += decoded.n_refused
+                if time.monotonic() >= deadline:
+                    came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
+                    raise SourceError(
+                        f"{self.name}: {came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of "
+                        f"{self._n_mags} magnetometers at {self._baud} baud expected"
+                    )
         except (OSError, ValueError) as cause:  # ValueError: the port does not support the speed
             ports = ", ".join(sorted(port.device for port in comports())) or "none"
             raise SourceError(f"{self.name}: {_reason(cause)}; serial ports: {ports}") from cause
@@ -86,23 +96,8 @@ class SerialSource(DeviceSource):
 
     def _connect(self) -> None:
         self._decoder.reset()
+        # Exclusive: two programs would each get half of the bytes.
         self._port = Serial(self._path, self._baud, exclusive=True)
-
-    def _wait_for_sample(self) -> None:
-        deadline = time.monotonic() + SERIAL_OPEN_TIMEOUT
-        n_refused = 0
-        while (left := deadline - time.monotonic()) > 0:
-            decoded = self._read_port(left)
-            if decoded.samples:
-                return
-            if decoded.other_n_mags:
-                raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
-            n_refused += decoded.n_refused
-        came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
-        raise SourceError(
-            f"{self.name}: {came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of {self._n_mags} "
-            f"magnetometers at {self._baud} baud expected"
-        )
 
     def _receive(self, timeout: float) -> bool:
         try:
@@ -134,18 +129,21 @@ class SerialSource(DeviceSource):
         if self._port is None:
             return DecodedBytes([], 0, 0)
         self._port.timeout = timeout
+        # One byte waits for the board; then what is there already, without another wait.
         data = self._port.read(1)
         if data:
             data += self._port.read(min(self._port.in_waiting, MAX_READ_SIZE))
-        decoded = self._decoder.feed(data)
-        self._assemble(decoded, time.monotonic())
-        return decoded
-
-    def _assemble(self, decoded: DecodedBytes, received: float) -> None:
+        decoded, received = self._decoder.feed(data), time.monotonic()
         if decoded.n_refused:
-            self._refuse(decoded, received)
+            self._assembler.n_refused += decoded.n_refused
+            if decoded.other_n_mags:
+                self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
+            else:
+                self._assembler.notify("packet", "invalid packets are dropped", received)
+            self._queue(self._assembler.finish(received), received)
         n = len(decoded.samples)
         period = 1 / self._sensor.rate
+        # Spread over their period, but not back beyond the newest sample.
         step = min(period, (received - self._newest) / max(n, 1))
         for k, sample in enumerate(decoded.samples):
             self._assembler.stamp(received - (n - 1 - k) * step, received)
@@ -153,15 +151,7 @@ class SerialSource(DeviceSource):
             arrivals = self._assembler.finish(received)
             self._newest = arrivals[-1].time
             self._queue(arrivals, received)
-
-    def _refuse(self, decoded: DecodedBytes, received: float) -> None:
-        """Report dropped packets, and a wrong number of magnetometers as a fault."""
-        self._assembler.n_refused += decoded.n_refused
-        if decoded.other_n_mags:
-            self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
-        else:
-            self._assembler.notify("packet", "invalid packets are dropped", received)
-        self._queue(self._assembler.finish(received), received)
+        return decoded
 
     def _wrong_count(self, decoded: DecodedBytes) -> str:
         return (
@@ -197,6 +187,7 @@ def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
     Raises:
         ValueError: the magnetometers are no whole number of sensors, or a name does not fit.
     """
+    # A board carries several sensors of one kind, one after the other.
     n_modules, left = divmod(n_mags, kind.n_taxels)
     if left:
         raise ValueError(

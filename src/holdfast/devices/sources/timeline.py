@@ -74,9 +74,13 @@ class TransportDelay:
 
     def reset(self) -> None:
         """Start again, because the device's clock changed."""
+        # The shortest age of a sample ever, and the age that is usual: the shortest, or one that
+        # was constant for long. Both grow by the drift of the clocks; `update` changes them.
         self._least = self._usual = math.inf
+        # When the last sample came, and when the interval began over which an age is constant.
         self._received = self._begun = math.nan
         self.delay = 0.0
+        # The shortest age in this interval and in the one before.
         self._shortest = self._shortest_before = math.inf
 
     def update(self, time: float, received: float) -> float:
@@ -85,8 +89,17 @@ class TransportDelay:
         self._least = min(self._least + drift, age)
         self._usual = min(self._usual + drift, age)
         self._received = received
-        self._follow_constant(age, received)
         self.delay = age - self._least
+        # A delay is usual as well if it was constant over the last two intervals.
+        self._shortest = min(self._shortest, age)
+        if math.isnan(self._begun):
+            self._begun = received
+        if received - self._begun >= DELAY_INTERVAL:
+            # A delay that falls is not constant either: a link that stalled catches up.
+            if abs(self._shortest - self._shortest_before) <= MAX_CONSTANT_CHANGE:
+                self._usual = max(self._usual, min(self._shortest, self._shortest_before))
+            self._shortest_before, self._shortest = self._shortest, math.inf
+            self._begun = received
         return self.delay
 
     def is_late(self, time: float, received: float) -> bool:
@@ -97,18 +110,6 @@ class TransportDelay:
     def lead(self, time: float, received: float) -> float:
         """Return by how much a sample is quicker than the quickest; mostly below 0 [s]."""
         return self._least - (received - time) - self._drift(received)
-
-    def _follow_constant(self, age: float, received: float) -> None:
-        """Take the delay as usual if it was constant over the last two intervals."""
-        self._shortest = min(self._shortest, age)
-        if math.isnan(self._begun):
-            self._begun = received
-        if received - self._begun < DELAY_INTERVAL:
-            return
-        # A delay that falls is not constant either: a link that stalled catches up.
-        if abs(self._shortest - self._shortest_before) <= MAX_CONSTANT_CHANGE:
-            self._usual = max(self._usual, min(self._shortest, self._shortest_before))
-        self._shortest_before, self._shortest, self._begun = self._shortest, math.inf, received
 
     def _drift(self, received: float) -> float:
         """Return the largest drift of the clocks since the last sample [s]."""
@@ -138,6 +139,7 @@ class ClockPace:
 
     def __init__(self) -> None:
         self.pace, self.unsteady = 1.0, False
+        # Of this interval: how far the clock got ahead, how long it is, how often the clock jumped.
         self._lead = self._passed = 0.0
         self._n_jumps = self._n_jumps_before = 0
         self._paces = [1.0] * N_FAST_INTERVALS
@@ -150,18 +152,18 @@ class ClockPace:
             passed: time since the last sample, on the host's clock [s].
             jumped: whether the clock jumped before this sample.
         """
+        # A jump is counted apart: as a lead it would look like a fast clock.
         self._lead += 0.0 if jumped else max(lead, 0.0)
         self._passed += passed
         self._n_jumps += jumped
-        if self._passed >= PACE_INTERVAL:
-            self._finish()
-
-    def _finish(self) -> None:
-        """End an interval."""
+        if self._passed < PACE_INTERVAL:
+            return
         fast = self._lead > FAST_SHARE * MIN_CLOCK_JUMP * self._passed / PACE_INTERVAL
         self._paces = [*self._paces[1:], 1 + self._lead / self._passed if fast else 1.0]
         slowest, fastest = min(self._paces), max(self._paces)
         self.pace = self._paces[-1] if slowest > 1.0 else 1.0
+        # A wrong clock is fast at a constant pace. A recording that is played fast is not on a busy
+        # machine, or it is more than four times as fast: its samples are right.
         constant = fastest - slowest < MAX_PACE_CHANGE * slowest
         jumpy = self._n_jumps + self._n_jumps_before >= MIN_REPEATED_JUMPS
         self.unsteady = jumpy or (constant and 1.0 < self.pace <= MAX_FAULTY_PACE)
@@ -191,7 +193,7 @@ class Timeline:
 
     def __init__(self) -> None:
         self.offset = self.delay = 0.0
-        self._last = self._received = math.nan
+        self._last = self._received = math.nan  # times of the last sample, here and at the host
         self._delay = TransportDelay()
         self.clock = ClockPace()
 
@@ -208,9 +210,13 @@ class Timeline:
         if not is_plausible(device_time):
             raise ValueError(f"a time in seconds expected, {device_time} given")
         time = device_time + self.offset
+        # Before the delay is updated: the lead is against the samples before this one.
         lead = self._delay.lead(time, received)
-        jumped = self._jumped(time, lead)
+        is_first = math.isnan(self._last)
+        back = time <= self._last - MAX_BACKWARD_STEP  # False for the first
+        jumped = back or (not is_first and lead > MIN_CLOCK_JUMP)
         if jumped:
+            # The host's clock shows how long it was; what follows keeps this offset.
             time = self._last + max(received - self._received, 0.0)
             self.offset = time - device_time
             self._delay.reset()
@@ -218,17 +224,12 @@ class Timeline:
             time = math.nextafter(self._last, math.inf)
         late = self._delay.is_late(time, received)
         self.delay = self._delay.delay
-        if not math.isnan(self._last):
+        if not is_first:
             self.clock.update(lead, received - self._received, jumped=jumped)
         self._last, self._received = time, received
         return Stamp(
             time, (Fault.CLOCK_JUMP,) * (jumped or self.clock.unsteady) + (Fault.LATE,) * late
         )
-
-    def _jumped(self, time: float, lead: float) -> bool:
-        if math.isnan(self._last):
-            return False
-        return time <= self._last - MAX_BACKWARD_STEP or lead > MIN_CLOCK_JUMP
 
 
 def is_plausible(time: float) -> bool:
@@ -251,16 +252,13 @@ def clock_notice(stamp: float, now: float) -> str | None:
         'the stamps of the device are 2 h behind the clock of this machine: old data?'
     """
     behind = now - stamp
+    # A stamp that counts from the start of the device has no date to be compared.
     if stamp < MIN_EPOCH_TIME or abs(behind) <= NOTICED_CLOCK_DIFFERENCE:
         return None
     where = "behind" if behind > 0 else "ahead of"
     advice = "old data?" if behind > 0 else "is its clock set?"
-    how_far = _duration(abs(behind))
+    how_far = f"{abs(behind) / 60:.0f} min"
+    for unit, size in (("h", 3600.0), ("d", 86400.0)):
+        if abs(behind) >= 2 * size:
+            how_far = f"{abs(behind) / size:.0f} {unit}"
     return f"the stamps of the device are {how_far} {where} the clock of this machine: {advice}"
-
-
-def _duration(seconds: float) -> str:
-    for unit, size in (("d", 86400.0), ("h", 3600.0)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds / 60:.0f} min"

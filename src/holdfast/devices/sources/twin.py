@@ -38,9 +38,10 @@ class Twin(Player):
     """
 
     def __init__(self, address: Address, *, speed: float = 1.0, loop: bool = False) -> None:
+        # Simulates the next grasp while this one plays; made with the first grasp of a loop.
         self._simulator: _Simulator | None = None
         self._grasp = grasp_of(address)
-        self._current: list[Recording] = []
+        self._current: list[Recording] = []  # played again when a client restarts it at once
         super().__init__(address.text, speed=speed, loop=loop)
 
     def close(self) -> None:
@@ -99,7 +100,7 @@ class _Simulator:
         """Return whether the simulation ends within `timeout` [s]."""
         if self._process is None:
             return True
-        with suppress(subprocess.TimeoutExpired):
+        with suppress(subprocess.TimeoutExpired):  # then `poll` gives None
             self._process.wait(max(timeout, 0.0))
         return self._process.poll() is not None
 

@@ -23,10 +23,10 @@ from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording
+from holdfast.resampling import at_rate
 from holdfast.sensors.types import Array
 from holdfast.training.model_fit import TrainingData, fit_model
 from holdfast.training.setting import Setting
-from holdfast.training.training_samples import resample_if_needed
 
 MAX_AUDIT_FOLDS = 10
 """Largest number of groups of recordings that are held out in turn."""
@@ -213,7 +213,7 @@ class _FoldModels:
         }
         if model is None or not (ANY_FINGER in model.fingers or set(model.fingers) & set(modules)):
             return found
-        given = recording if model.rate is None else resample_if_needed(recording, model.rate)
+        given = recording if model.rate is None else at_rate(recording, model.rate)
         for finger, probability in model.predict_proba(given).items():
             if finger in self.fingers:
                 own_times, times = modules[finger].times, given.modules[finger].times

@@ -4,14 +4,14 @@ from collections.abc import Callable
 from inspect import signature
 from typing import Any, NamedTuple
 
-from holdfast.labelling.rules import command, signal, tracking
+from holdfast.labelling.rules import command, signal, tracking, video
 from holdfast.recordings import Label, Recording
 
 __all__ = ["RULES", "propose"]
 
 RULES = {
     "signal": "the force alone, as a person reads it from its plot",
-    "tracking": "the motion of the object relative to the fingertips, from their poses",
+    "tracking": "the motion of the object relative to the fingertips, from poses or a video",
     "command": "the markers of the protocol: closing, locked, disturbance, released",
 }
 """The evidence of each rule, in one line."""
@@ -37,6 +37,7 @@ _RULES = {
     "tracking": _Rule(tracking.propose, tracking.TrackingRule),
     "command": _Rule(command.propose),
 }
+_BY_VIDEO = _Rule(video.propose, video.VideoRule)
 
 
 def propose(
@@ -50,7 +51,8 @@ def propose(
         rule: one of `RULES`.
         recording: the recording. Its labels are ignored.
         parameters: arguments of the function `propose` of the rule, and fields of its `SignalRule`
-            or `TrackingRule`.
+            or `TrackingRule`. With `video`, the rule `tracking` is that of `rules/video.py`, with
+            the fields of `VideoRule`.
 
     Raises:
         RecordingError: the recording lacks what the rule needs.
@@ -58,7 +60,7 @@ def propose(
     """
     if rule not in _RULES:
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
-    chosen = _RULES[rule]
+    chosen = _BY_VIDEO if rule == "tracking" and "video" in parameters else _RULES[rule]
     known = [*chosen.arguments, *chosen.threshold_names]
     if unknown := sorted(set(parameters) - set(known)):
         raise ValueError(

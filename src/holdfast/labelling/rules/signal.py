@@ -159,9 +159,9 @@ class _GraspLabeller:
         self._rule = rule
         self._inside = np.zeros(len(hand.times), dtype=bool)
         self._inside[span] = True
-        self._begins_in_contact = all(finger.threshold is None for finger in hand.fingers.values())
+        self._starts_loaded = all(finger.threshold is None for finger in hand.fingers.values())
         self._locked = span.start
-        if not self._begins_in_contact:
+        if not self._starts_loaded:
             # Locked is the hand once no finger changes for long enough, at least two of them
             # touching if two ever do: one finger that waits for the other does not hold.
             fingers = hand.fingers.values()
@@ -185,7 +185,7 @@ class _GraspLabeller:
         if finger.evidence_threshold is not None:
             ratio_of_contact = evidence_ratio(finger.amplitude, finger.evidence_threshold)
         timeline.set_state(touching & before, UNSTABLE, Cause.CLOSING, ratio_of_contact)
-        if not self._begins_in_contact:
+        if not self._starts_loaded:
             self._label_end(name, touching, timeline)
 
     def _label_end(self, name: str, touching: Mask, timeline: StateTimeline) -> None:

@@ -101,8 +101,12 @@ class XelaServer:
         self.n_packets = 0
         self.failure: Exception | None = None
         self._start_failure: Exception | None = None
+        # Clients that get packets; and those that wait for the beginning of the next recording.
+        # The event loop alone changes both.
         self._clients: set[ServerConnection] = set()
         self._joining: set[ServerConnection] = set()
+        # Set by the event loop (listening, a client was seen, one joined), by the thread of the
+        # source (ended) and by `__exit__` (stopping); the others wait for them.
         self._listening = Event()
         self._stopping = Event()
         self._ended = Event()
@@ -111,9 +115,13 @@ class XelaServer:
             self._client_seen.set()
         self._restarts = restart
         self._joined = Event()
+        # From times of the source to stamps since 1970, and the time of the last packet. The
+        # thread of the source alone changes them.
         self._time_offset = self._sent_time = -math.inf
         self._has_offset = False
-        self._server_thread = Thread(target=self._serve, name="holdfast-play", daemon=True)
+        self._server_thread = Thread(
+            target=lambda: asyncio.run(self._run()), name="holdfast-play", daemon=True
+        )
         self._source_thread = Thread(
             target=self._read_source, name="holdfast-play-source", daemon=True
         )
@@ -167,7 +175,11 @@ class XelaServer:
         """Read the source, and pass its packets to the event loop that sends them."""
         try:
             if self._restarts:
-                self._encode_one()
+                # Encode the first samples now: readings of another kind fail before a client comes.
+                arrival = self._source.read(STOP_CHECK_INTERVAL)
+                if arrival is not None and arrival.samples:
+                    for batch in self._batcher.add(arrival.samples, arrival.time):
+                        self._packet(batch)
             while not self._stopping.is_set() and not self._source.ended:
                 arrival = self._source.read(STOP_CHECK_INTERVAL) if self._may_read() else None
                 if arrival is not None and arrival.samples:
@@ -177,15 +189,8 @@ class XelaServer:
             self.failure = failure
         finally:
             if not self._stopping.is_set() and self.failure is None:
-                self._wait_for_clients()
+                asyncio.run_coroutine_threadsafe(self._drain(), self._loop).result()
             self._ended.set()
-
-    def _encode_one(self) -> None:
-        """Encode the first samples, so that readings of another kind fail before a client comes."""
-        arrival = self._source.read(STOP_CHECK_INTERVAL)
-        if arrival is not None and arrival.samples:
-            for batch in self._batcher.add(arrival.samples, arrival.time):
-                self._packet(batch)
 
     def _may_read(self) -> bool:
         """Return whether to read the source now, after a wait for clients if necessary."""
@@ -193,19 +198,16 @@ class XelaServer:
             return self._client_seen.wait(STOP_CHECK_INTERVAL)
         if self._joined.is_set():
             self._joined.clear()
-            self._restart_source()
+            # Clients that joined receive nothing from before.
+            self._queue_packets(self._batcher.flush())
+            self._batcher = self._new_batcher()
+            self._has_offset = self._has_offset and bool(self._clients)
+            self._source.restart()
+            self._loop.call_soon_threadsafe(self._admit)
         elif not self.n_clients:
             self._joined.wait(STOP_CHECK_INTERVAL)
             return False
         return True
-
-    def _restart_source(self) -> None:
-        """Begin the next recording. Clients that joined receive nothing from before."""
-        self._queue_packets(self._batcher.flush())
-        self._batcher = self._new_batcher()
-        self._has_offset = self._has_offset and bool(self._clients)
-        self._source.restart()
-        self._loop.call_soon_threadsafe(self._admit)
 
     def _new_batcher(self) -> SampleBatcher:
         return SampleBatcher(self._source.sensors, own_stamps=self.encoder.has_own_stamps)
@@ -231,19 +233,14 @@ class XelaServer:
         packet = self.encoder.packet(batch.samples, batch.time + self._time_offset, now, times)
         return packet.decode()
 
-    def _wait_for_clients(self) -> None:
-        asyncio.run_coroutine_threadsafe(self._drain(), self._loop).result()
-
     async def _drain(self) -> None:
         """Wait until the last packet has been sent to all clients."""
         deadline = time.monotonic() + DRAIN_TIMEOUT
+        # There is no event for an empty buffer of a transport.
         while any(_unsent_bytes(client) for client in self._clients):
             if self._stopping.is_set() or time.monotonic() > deadline:
                 return
             await asyncio.sleep(0.01)
-
-    def _serve(self) -> None:
-        asyncio.run(self._run())
 
     async def _run(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -284,6 +281,7 @@ class XelaServer:
     def _refusal(self, client: ServerConnection, request: Request) -> Response | None:
         """Return the response to a client that is refused; None if it is accepted."""
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        # A second header could show another host to us than to a proxy before us.
         if len(hosts) != 1 or len(origins) > 1:
             return client.respond(HTTPStatus.BAD_REQUEST, "one host and one origin expected\n")
         origin = origins[0] if origins else None
@@ -327,6 +325,7 @@ def _unsent_bytes(client: ServerConnection) -> int:
 
 def _too_slow(backlogs: dict[ServerConnection, int]) -> list[ServerConnection]:
     """Return the clients to disconnect, given the unsent data of each client [bytes]."""
+    # The slowest first: disconnecting few frees most.
     total, slow = sum(backlogs.values()), []
     for client in sorted(backlogs, key=backlogs.__getitem__, reverse=True):
         if backlogs[client] <= MAX_BACKLOG and total <= MAX_TOTAL_BACKLOG:

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from http import HTTPStatus
 from importlib import resources
 from pathlib import Path
@@ -77,12 +78,14 @@ class WebSocketClient:
 
     def put(self, text: str) -> None:
         """Append a document to the queue; drop the oldest if the queue is full."""
+        # The oldest goes: for a page and for control, the newest state counts.
         if self._queue.full():
             self._queue.get_nowait()
         self._queue.put_nowait(text)
 
     async def run(self) -> None:
         """Send documents until the client disconnects."""
+        # Reading is needed too: it answers pings, and ends when the client disconnects.
         sending = asyncio.ensure_future(self._send())
         try:
             async for message in self._socket:
@@ -130,7 +133,7 @@ class LiveService:
             panel.add_listener(self._mark)
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
-        self._newest_document = b"{}"
+        self._newest_document = b"{}"  # for GET, made for the WebSockets anyway
         self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
         self.app.add_routes(self._routes())
@@ -141,8 +144,8 @@ class LiveService:
             web.get("/", self._get_page),
             web.static("/page", PAGE_FOLDER),
             web.static("/web", SHARED_FOLDER),
-            web.get("/api/v1/live", self._serve_live),
-            web.get("/api/v1/estimates", self._serve_estimates),
+            web.get("/api/v1/live", partial(self._serve_socket, kind="live")),
+            web.get("/api/v1/estimates", partial(self._serve_socket, kind="estimates")),
             web.get("/api/v1/info", self._get_info),
             web.get("/api/v1/state", self._get_state),
             web.get("/api/v1/schema", self._get_schema),
@@ -188,19 +191,16 @@ class LiveService:
         """Send the live documents; each is encoded once for all clients."""
         while True:
             await asyncio.sleep(1 / LIVE_DOCUMENT_RATE)
-            await self._stop_failed_recording()
+            recorder = self._recorder.current
+            if recorder is not None and recorder.failed:
+                try:
+                    await asyncio.to_thread(self._recorder.stop)
+                except HoldfastError as failure:
+                    self._status.add_notice(f"the recording has ended: {failure}")
             document = self._status.live_document(self._recorder.current)
             self._newest_document = _encode(document)
             for client in self._clients["live"]:
                 client.put(self._newest_document.decode())
-
-    async def _stop_failed_recording(self) -> None:
-        recorder = self._recorder.current
-        if recorder is not None and recorder.failed:
-            try:
-                await asyncio.to_thread(self._recorder.stop)
-            except HoldfastError as failure:
-                self._status.add_notice(f"the recording has ended: {failure}")
 
     def _send_estimates(self, update: StreamUpdate) -> None:
         for estimate, updated in update.estimates:
@@ -212,13 +212,8 @@ class LiveService:
             for client in self._clients["estimates"]:
                 client.put(text)
 
-    async def _serve_live(self, request: web.Request) -> web.WebSocketResponse:
-        return await self._serve_socket(request, "live")
-
-    async def _serve_estimates(self, request: web.Request) -> web.WebSocketResponse:
-        return await self._serve_socket(request, "estimates")
-
     async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
+        # The total first: with it full, the address does not matter.
         if sum(map(len, self._clients.values())) >= MAX_WEBSOCKETS:
             text = f"{MAX_WEBSOCKETS} WebSockets are open; close one of them"
             raise json_error(web.HTTPServiceUnavailable, text)
@@ -232,6 +227,7 @@ class LiveService:
             heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
         )
         await socket.prepare(request)
+        # The constants go first, and only then is the client one of those that get documents.
         client = WebSocketClient(socket, MAX_QUEUED_DOCUMENTS[kind], request.remote)
         client.put(_encode(self._hello()).decode())
         clients = self._clients[kind]
@@ -261,7 +257,9 @@ class LiveService:
         return web.Response(body=self._newest_document, content_type="application/json")
 
     async def _post_tare(self, _: web.Request) -> web.Response:
-        return await _answer(self._session.restart_tare)
+        session = self._session
+        work = partial(session.change, session.stream.restart_tare, "no tare can be taken")
+        return await _answer(work)
 
     async def _post_threshold(self, request: web.Request) -> web.Response:
         value = (await self._bodies.read(request, _ThresholdRequest)).value
@@ -271,7 +269,9 @@ class LiveService:
         return await self._set_threshold(None, "threshold of the model restored")
 
     async def _set_threshold(self, value: float | None, notice: str) -> web.Response:
-        answer = await _answer(lambda: self._session.set_threshold(value))
+        work = partial(self._session.stream.set_threshold, value)
+        change = partial(self._session.change, work, "the threshold was not changed")
+        answer = await _answer(change)
         if answer.status == HTTPStatus.OK:
             self._status.add_notice(notice)
         return answer

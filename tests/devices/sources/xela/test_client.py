@@ -6,7 +6,6 @@ from contextlib import ExitStack, suppress
 import numpy as np
 import pytest
 
-from holdfast.contact import Fault
 from holdfast.devices.sources import base, open_source
 from holdfast.devices.sources.xela import client as module
 from holdfast.errors import SourceError
@@ -183,24 +182,6 @@ class TestReading:
         assert notices[0].endswith("behind the clock of this machine: old data?")
         assert notices[1].startswith("invalid packet: ")
 
-    def test_another_number_of_taxels(self):
-        with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
-            said.put(text(2, [sensor(counts(15), taxels=15)]))
-            arrival = until(source, lambda a: a.faults)[-1]
-        assert (arrival.samples, arrival.faults) == ({}, {"finger1": (Fault.TAXEL_COUNT,)})
-
-    def test_silence_is_reported_once(self, quick):
-        with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
-            until(source, says("no new sample for 0.05 s"))
-            silent_until = time.monotonic() + 0.3
-            while time.monotonic() < silent_until:
-                assert source.read(0.02) is None
-            said.put(patch(2))
-            *_, again, sample = until(source, lambda a: a.samples)
-            assert again.notices[0].startswith("samples again after 0.")
-            np.testing.assert_array_equal(sample.samples["finger1"], counts(16, 2))
-            until(source, says("no new sample for 0.05 s"))  # another silence
-
     def test_repeats_are_silence_too(self, quick):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
             deadline = time.monotonic() + PATIENCE
@@ -282,28 +263,6 @@ class TestReconnecting:
             until(source, says("connected again"))
             said.put(patch(7))
             assert until(source, lambda a: a.samples)[-1].time == START + 7 * PERIOD
-
-    def test_attempts_become_less_frequent(self, monkeypatch):
-        """Half a second, then twice as long each time, two seconds at the most."""
-        waits = []
-        now = [1000.0]
-
-        def sleep(seconds):
-            waits.append(seconds)
-            now[0] += seconds
-
-        with server([patch(1)]) as (port, said):
-            source = open_source(f"xela://127.0.0.1:{port}")
-            source.open()
-            said.put(HANG_UP)
-            until(source, says("connection lost"))
-        monkeypatch.setattr(base.time, "sleep", sleep)
-        monkeypatch.setattr(base.time, "monotonic", lambda: now[0])
-        monkeypatch.setattr(module, "_connect", refuse)
-        source._retry_at = now[0] + base.MIN_RETRY_DELAY
-        assert source.read(7.6) is None
-        source.close()
-        assert waits[:5] == pytest.approx([0.5, 1.0, 2.0, 2.0, 2.0], abs=1e-6)
 
 
 def refuse(place):

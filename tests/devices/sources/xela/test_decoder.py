@@ -257,20 +257,6 @@ class TestTimes:
         assert [a.faults for a in arrivals[:10] + arrivals[11:]] == [{}] * 19
         assert arrivals[10].faults == {"finger1": (Fault.CLOCK_JUMP,)}
 
-    def test_a_jump_after_a_late_sample_leaves_nothing_late(self):
-        """Packet 10 comes 0.3 s late; those up to 40 are missing, then the clock has jumped."""
-
-        def packet(k, jump=0.0):
-            return text(k, [own(k, lag=-jump)], time=START + k * PERIOD + jump)
-
-        decoder = taught(packet(0))
-        fed(decoder, [packet(k) for k in range(10)])
-        (late,) = decoder.decode(packet(10), 100.4)
-        assert late.faults == {"finger1": (Fault.LATE,)}
-        after = fed(decoder, [packet(k, 3600.0) for k in range(41, 100)], 100.41)
-        assert after[0].faults == {"finger1": (Fault.CLOCK_JUMP,)}
-        assert not any(a.faults for a in after[1:])
-
     def test_a_stamp_from_before_the_jump_does_not_lead_into_the_future(self):
         """The clock goes back an hour; the sensor's stamp is still of the old time."""
         before = [text(k, [own(k)]) for k in range(10)]

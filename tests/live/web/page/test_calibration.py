@@ -139,9 +139,8 @@ def test_own_handling_of_another_sensor_is_a_notice(visit, service):
 
 
 @pytest.mark.parametrize("size", [*SCREENS, (1280, 720)])
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_nothing_overlaps_or_overflows(visit, service, size, scheme, tmp_path):
-    page = visit(service.url, size, scheme)
+def test_nothing_overlaps_or_overflows(visit, service, size, tmp_path):
+    page = visit(service.url, size)
     wait_for_samples(page)
     page.locator("#calibrate").click()
     shows(page, "#calibration-held", r"Held 0\ss of 60\ss")  # has begun

@@ -254,25 +254,6 @@ def test_the_probability_of_a_slip_has_a_curve_and_its_threshold(visit, service)
     assert plot_keys(page) == ["force", "sigma", "probability"]  # of a finger without a rule
 
 
-@pytest.mark.parametrize("size", SIZES[:3:2])
-def test_slips_fit_without_scrolling(visit, service, size, tmp_path):
-    service.tape.slip_threshold = 0.6
-    change(service, state="UNSTABLE", cause="slip", force=[-23456.7, -9876.5, -8e4])
-    page = visit(service.url, size)
-    until(page, "() => document.querySelectorAll('.sliding').length === 4")
-    page.screenshot(path=tmp_path / "page.png")
-    extent = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
-    assert page.evaluate(extent) == list(size)
-    heights = page.evaluate("holdfast.plots.rows.map(({ plot }) => plot.height)")
-    assert min(heights) >= 40
-    cut = page.evaluate(
-        """() => [...document.querySelectorAll(".slips, .legend, .name span")]
-          .filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1)
-          .map((e) => `${e.className} ${e.textContent}`)"""
-    )
-    assert cut == []
-
-
 def test_without_contact_no_probability_of_stability_is_shown(visit, service):
     change(service, state="NO_CONTACT", stable_probability=0.94)
     page = visit(service.url)

@@ -9,8 +9,7 @@ from grip.build import FINGERS, RATE, hand, holding
 from grip.loop.test_grip_loop import SLIPPING, Beats, Tape
 from holdfast.contact import ContactState
 from holdfast.devices.sources import Arrival
-from holdfast.live.arrival_detector import StreamEstimate
-from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast_grip import GripController, GripReason, Limits, LoopState
 from holdfast_grip.errors import HandError
 from holdfast_grip.loop import runner as module

@@ -222,10 +222,9 @@ def test_a_loop_that_has_ended_cannot_be_reset(visit, holding):
     assert page.locator("#grip-reset").is_disabled()
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
 @pytest.mark.parametrize("size", SCREENS)
-def test_nothing_overlaps_or_overflows(visit, holding, size, scheme, tmp_path):
-    page = visit(holding.url, size, scheme)
+def test_nothing_overlaps_or_overflows(visit, holding, size, tmp_path):
+    page = visit(holding.url, size)
     shows(page, "#grip-word", "REACT")
     wait_for_samples(page)
     page.screenshot(path=tmp_path / "react.png")
@@ -296,26 +295,26 @@ def test_in_a_fault_nothing_looks_as_if_the_loop_were_in_control(visit, holding)
     assert bar.evaluate(fill) != page.locator(".log .fill").first.evaluate(fill)
 
 
-@pytest.mark.parametrize(
-    ("fields", "word", "finger"),
-    [
-        ({"released": True, **LOST}, "RELEASED", r"index\s*–[\s\S]*released"),
-        ({"released": True, "state": "IDLE"}, "RELEASED", r"index\s*–[\s\S]*released"),
-        ({"failure": "no answer", **LOST}, "NOTHING SENT", r"index\s*–"),
-        ({"armed": False, **LOST}, "DRY RUN", r"1.50×[\s\S]*held"),
-    ],
-)
-def test_what_is_commanded(visit, holding, fields, word, finger):
-    holding.grip = gripping(**fields)
-    page = visit(holding.url)
-    shows(page, "#grip-armed", f"^{word}$")
-    shows(page, "#grip-fingers li:nth-child(2)", finger)
+COMMANDED = [
+    ({"released": True, **LOST}, "RELEASED", r"index\s*–[\s\S]*released"),
+    ({"released": True, "state": "IDLE"}, "RELEASED", r"index\s*–[\s\S]*released"),
+    ({"failure": "no answer", **LOST}, "NOTHING SENT", r"index\s*–"),
+    ({"armed": False, **LOST}, "DRY RUN", r"1.50×[\s\S]*held"),
+]
 
 
-@pytest.mark.parametrize("reason", GRIP_FAULTS)
-def test_every_fault_is_explained(visit, holding, reason):
-    failure = "the hand does not answer" if reason == ENDED else ""
-    holding.grip = gripping(state="FAULT", reason=reason, released=True, failure=failure)
+def test_what_is_commanded(visit, holding):
     page = visit(holding.url)
-    shows(page, "#fault-happened", re.escape(GRIP_FAULTS[reason].happened))
-    assert flaws(page, (1280, 720)) == []
+    for fields, word, finger in COMMANDED:
+        holding.grip = gripping(**fields)
+        shows(page, "#grip-armed", f"^{word}$")
+        shows(page, "#grip-fingers li:nth-child(2)", finger)
+
+
+def test_every_fault_is_explained(visit, holding):
+    page = visit(holding.url)
+    for reason, text in GRIP_FAULTS.items():
+        failure = "the hand does not answer" if reason == ENDED else ""
+        holding.grip = gripping(state="FAULT", reason=reason, released=True, failure=failure)
+        shows(page, "#fault-happened", re.escape(text.happened))
+        assert flaws(page, (1280, 720)) == [], reason

@@ -68,7 +68,7 @@ class XelaSource(DeviceSource):
         super().__init__()
         self.name = name
         self._places = places
-        self._place = places[0]
+        self._place = places[0]  # the one with the server, for messages
         self._options = (names, calibrated, sensor)
         self._decoder = self._new_decoder()
         self._connection: ClientConnection | None = None
@@ -80,6 +80,7 @@ class XelaSource(DeviceSource):
             SourceError: no server listens, it sends nothing, or other data than expected.
         """
         self.close()
+        # A new one: the server may have other sensors than when it was open before.
         self._decoder = self._new_decoder()
         self._connection = self._connected()
         text, received = self._first_packet(self._connection)
@@ -107,7 +108,18 @@ class XelaSource(DeviceSource):
             else:
                 self._place = place
                 return connection
-        raise SourceError(self._unreachable(failures)) from failures[-1]
+        where = " or ".join(map(str, self._places))
+        # The most helpful first: no server at all, another server, anything else.
+        if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
+            why = (
+                f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
+                "without a hand, use `holdfast play`"
+            )
+        elif any(isinstance(failure, WebSocketException) for failure in failures):
+            why = f"the server at {where} is no XELA server: {failures[-1]}"
+        else:
+            why = f"{where} cannot be reached: {failures[-1]}"
+        raise SourceError(why) from failures[-1]
 
     def _first_packet(self, connection: ClientConnection) -> tuple[bytes, float]:
         """Return the first packet that defines the modules, and its time of arrival."""
@@ -120,7 +132,7 @@ class XelaSource(DeviceSource):
                 if self._decoder.identify(text):
                     return text, received
             except InvalidPacket as why:
-                invalid = why
+                invalid = why  # the next one may be valid: the first may have been cut
             except TimeoutError:
                 break
             except ConnectionClosed as why:
@@ -156,25 +168,16 @@ class XelaSource(DeviceSource):
         return True
 
     def _disconnect(self) -> None:
+        # Set to None first: nothing uses it while it closes.
         connection, self._connection = self._connection, None
         if connection is None:
             return
         with suppress(OSError, WebSocketException):
             connection.close()
+        # It ends a little after the connection: no thread outlives the source.
         keepalive = getattr(connection, "keepalive_thread", None)
         if keepalive is not None:
             keepalive.join(XELA_CONNECT_TIMEOUT)
-
-    def _unreachable(self, failures: list[Exception]) -> str:
-        where = " or ".join(map(str, self._places))
-        if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
-            return (
-                f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
-                "without a hand, use `holdfast play`"
-            )
-        if any(isinstance(failure, WebSocketException) for failure in failures):
-            return f"the server at {where} is no XELA server: {failures[-1]}"
-        return f"{where} cannot be reached: {failures[-1]}"
 
 
 def _connect(place: Place) -> ClientConnection:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from holdfast.devices.sources.assembler import Assembler, Device
 from holdfast.devices.sources.base import Arrival
 from holdfast.devices.sources.xela.devices import xela_devices
-from holdfast.devices.sources.xela.packet import InvalidPacket, Packet, read_packet, read_sensor
+from holdfast.devices.sources.xela.packet import InvalidPacket, read_packet, read_sensor
 from holdfast.errors import SourceError
 from holdfast.sensors import Sensor
 
@@ -50,6 +50,7 @@ class XelaDecoder:
         self._sensor = sensor
         self.version = ""
         self._assembler = Assembler(hold_refusals=True)
+        # Counter and time of the newest packet: a server repeats it while nothing new comes.
         self._newest: tuple[int, float] | None = None
 
     @property
@@ -107,7 +108,23 @@ class XelaDecoder:
             return []
         self._newest = packet.counter, packet.time
         self._assembler.n_lost += self._assembler.n_missing(packet.counter)
-        self._add_sensors(packet, received)
+        self._assembler.stamp(packet.time, received)
+        invalid = False  # an invalid sensor does not affect the others
+        for number, raw in packet.sensors.items():
+            if not self._assembler.accepts_device(number, received):
+                continue
+            try:
+                part = read_sensor(raw, calibrated=self._calibrated)
+                readings = _checked(part.taxels, part.readings())
+                fits = self._assembler.accepts_taxels(number, len(readings), received)
+                # Version 1.8 repeats a sensor whose next sample has not come, with its old stamp.
+                if fits and self._assembler.is_new(number, part.time):
+                    self._assembler.add(number, readings, part.time)
+            except InvalidPacket as why:
+                invalid = True
+                text = f"sensor {number} is invalid: {why}"
+                self._assembler.notify(f"sensor {number}", text, received)
+        self._assembler.n_refused += invalid
         return self._assembler.finish(received)
 
     def _model(self, number: int, raw: msgspec.Raw) -> tuple[str, int]:
@@ -120,28 +137,6 @@ class XelaDecoder:
             return part.model, len(_checked(part.taxels, readings))
         except InvalidPacket as why:
             raise InvalidPacket(f"sensor {number}: {why}") from why
-
-    def _add_sensors(self, packet: Packet, received: float) -> None:
-        """Add all sensors of a packet; an invalid one does not affect the others."""
-        self._assembler.stamp(packet.time, received)
-        invalid = False
-        for number, raw in packet.sensors.items():
-            if not self._assembler.accepts_device(number, received):
-                continue
-            try:
-                self._add_sensor(number, raw, received)
-            except InvalidPacket as why:
-                invalid = True
-                text = f"sensor {number} is invalid: {why}"
-                self._assembler.notify(f"sensor {number}", text, received)
-        self._assembler.n_refused += invalid
-
-    def _add_sensor(self, number: int, raw: msgspec.Raw, received: float) -> None:
-        part = read_sensor(raw, calibrated=self._calibrated)
-        readings = _checked(part.taxels, part.readings())
-        fits = self._assembler.accepts_taxels(number, len(readings), received)
-        if fits and self._assembler.is_new(number, part.time):
-            self._assembler.add(number, readings, part.time)
 
 
 def no_calibration(number: int, model: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.devices.sources.assembler import Device
 from holdfast.errors import SourceError
-from holdfast.sensors import Hand, Sensor
+from holdfast.sensors import Sensor
 from holdfast.sensors.xela_models import is_known, module_sensors, whole_hand
 
 
@@ -34,20 +34,21 @@ def xela_devices(
     devices = {}
     for number, (model, n_taxels) in found.items():
         if number in hands:
+            # Two hands have the same names of modules; one hand has them without a prefix.
             prefix = f"hand{number}/" if len(hands) > 1 else ""
-            device = _hand(number, model, n_taxels, hands[number], prefix)
+            modules = _built_in(number, model, n_taxels)
+            order = np.concatenate([hands[number].modules[name].flat_indices for name in modules])
+            prefixed = {prefix + name: module for name, module in modules.items()}
+            device = Device(number, model, prefixed, order)
         else:
             name = names.get(number, f"finger{number}")
             device = _separate(number, name, model, n_taxels, given)
-        devices[number] = _in_newtons(device) if calibrated else device
+        if calibrated:  # the range is that of counts
+            units = {n: replace(m, unit="N", range=None) for n, m in device.modules.items()}
+            device = replace(device, modules=units)
+        devices[number] = device
     _check(devices, names, given)
     return devices
-
-
-def _hand(number: int, model: str, n_taxels: int, whole: Hand, prefix: str) -> Device:
-    modules = _built_in(number, model, n_taxels)
-    order = np.concatenate([whole.modules[name].flat_indices for name in modules])
-    return Device(number, model, {prefix + name: one for name, one in modules.items()}, order)
 
 
 def _separate(number: int, name: str, model: str, n_taxels: int, given: Sensor | None) -> Device:
@@ -73,14 +74,8 @@ def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
         ) from cause
 
 
-def _in_newtons(device: Device) -> Device:
-    modules = {
-        name: replace(module, unit="N", range=None) for name, module in device.modules.items()
-    }
-    return replace(device, modules=modules)
-
-
 def _check(devices: Mapping[int, Device], names: Mapping[int, str], given: Sensor | None) -> None:
+    # The modules of a whole hand have fixed names and layouts.
     separate = [device for device in devices.values() if device.order is None]
     present = ", ".join(f"{device.number} ({device.model})" for device in devices.values())
     if unknown := sorted(set(names) - {device.number for device in separate}):

@@ -78,7 +78,11 @@ class XelaEncoder:
         if whole_hand:
             _check_modules(sensors, allegro)
         self._parts: list[_Module | _WholeHand]
-        if whole_hand or _is_whole(sensors, allegro):
+        is_whole = set(sensors) == set(allegro.modules) and all(
+            sensors[name].n_taxels == module.sensor.n_taxels
+            for name, module in allegro.modules.items()
+        )
+        if whole_hand or is_whole:
             self._parts = [_WholeHand(sensors, allegro)]
         else:
             self._parts = [_Module(name, sensor) for name, sensor in sensors.items()]
@@ -124,7 +128,7 @@ class XelaEncoder:
         sensors: dict[str, Any] = {}
         for number, (part, constant) in enumerate(zip(self._parts, self._constant, strict=True), 1):
             readings = part.readings(samples)
-            if readings is not None:
+            if readings is not None:  # a server leaves out a sensor without a sample
                 own = time if times is None or self.is_hand else times[part.names[0]]
                 sensors[str(number)] = self._sensor(number, part, *readings, constant, own)
         top: dict[str, Any] = {"message": self._counter, "time": time, "sensors": len(sensors)}
@@ -203,6 +207,8 @@ class SampleBatcher:
     def __init__(self, modules: Iterable[str], *, own_stamps: bool) -> None:
         self._modules = frozenset(modules)
         self._own_stamps = own_stamps
+        # The newest sample of each module and its time; which of them were not passed on; and
+        # when the first came. `add` fills them, `flush` passes them on.
         self._samples: dict[str, npt.NDArray[Any]] = {}
         self._times: dict[str, float] = {}
         self._new: set[str] = set()
@@ -212,6 +218,7 @@ class SampleBatcher:
         """Add the samples of one instant [s]; yield the batches that are complete, in order."""
         if self._first_time is None:
             self._first_time = time
+        # A module has its next sample: the packet before is as complete as it gets.
         if not self._own_stamps and not self._new.isdisjoint(samples):
             yield from self.flush()
         self._samples.update(samples)
@@ -265,7 +272,10 @@ class _WholeHand:
         self._sensors = sensors
         self._indices = {name: whole.modules[name].flat_indices for name in sensors}
         self._present = np.concatenate(list(self._indices.values()))
-        self._rest = _rest_samples(whole.n_taxels)
+        random = np.random.default_rng(0)  # taxels at rest are always the same
+        shape = (N_REST_SAMPLES, whole.n_taxels, 3)
+        base = REST_READING + random.integers(-REST_SPREAD, REST_SPREAD + 1, (1, *shape[1:]))
+        self._rest = (base + random.integers(-REST_NOISE, REST_NOISE + 1, shape)).astype(np.uint16)
         self._counts = self._rest[0].copy()
         self._newtons = np.zeros((whole.n_taxels, 3))
         self._calibrated = all(sensor.unit == "N" for sensor in sensors.values())
@@ -275,6 +285,8 @@ class _WholeHand:
         """Return the readings, or None without a sample."""
         found = {name: sample for name, sample in samples.items() if name in self._indices}
         read = {name: _readings(name, self._sensors[name], one) for name, one in found.items()}
+        # Taxels of modules that the source lacks move by their noise, as real ones do: constant
+        # readings would be the fault `stuck`.
         counts = self._rest[self._n_packets % N_REST_SAMPLES].copy()
         counts[self._present] = self._counts[self._present]
         self._n_packets += 1
@@ -299,6 +311,7 @@ def _readings(name: str, sensor: Sensor, given: npt.NDArray[Any]) -> _Readings |
         return given.astype(np.uint16), None
     if not np.isfinite(given).all():
         return None
+    # Limits by half a count: what rounds to a uint16 is one.
     low, high = given.min(), given.max()
     if not (low > -0.5 and high < 65535.5):
         raise ValueError(
@@ -318,14 +331,6 @@ def _constant_fields(part: _Module | _WholeHand) -> dict[str, Any]:
     }
 
 
-def _rest_samples(n_taxels: int) -> npt.NDArray[np.uint16]:
-    """Return (N_REST_SAMPLES, n_taxels, 3) readings of taxels at rest, always the same."""
-    random = np.random.default_rng(0)
-    base = REST_READING + random.integers(-REST_SPREAD, REST_SPREAD + 1, (1, n_taxels, 3))
-    noise = random.integers(-REST_NOISE, REST_NOISE + 1, (N_REST_SAMPLES, n_taxels, 3))
-    return (base + noise).astype(np.uint16)
-
-
 def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:
     """Return whether all modules have names and numbers of taxels of an Allegro hand's."""
     try:
@@ -333,12 +338,6 @@ def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _is_whole(sensors: Mapping[str, Sensor], whole: Hand) -> bool:
-    return set(sensors) == set(whole.modules) and all(
-        sensors[name].n_taxels == module.sensor.n_taxels for name, module in whole.modules.items()
-    )
 
 
 def _check_modules(sensors: Mapping[str, Sensor], whole: Hand) -> None:

@@ -54,10 +54,11 @@ def read(path: Path) -> Iterator[Recording]:
     readings: dict[str, list[npt.NDArray[np.generic]]] = {}
     n_lost = n_refused = 0
     for line in _messages(path):
-        with suppress(InvalidPacket):
+        with suppress(InvalidPacket):  # a line that was cut does not end the log
             packet = read_packet(line)
             if packet is None:
                 continue
+            # The first message with samples defines the sensors, as for a connection.
             try:
                 if not decoder.sensors and not decoder.identify(line):
                     continue
@@ -76,6 +77,7 @@ def read(path: Path) -> Iterator[Recording]:
         for name in times
     }
     counts = {"n_lost": n_lost, "n_refused": n_refused}
+    # Zero is left out: metadata of a log without losses say nothing about them.
     found = {name: count for name, count in counts.items() if count}
     yield Recording(path.stem, modules, {"source": path.name, **decoder.metadata, **found})
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState, Fault
-from holdfast.live.arrival_detector import ArrivalDetector, RateMonitor
+from holdfast.live.source_filter import RateMonitor
+from holdfast.live.stream_detector import StreamDetector
 
 from . import build
 
@@ -64,24 +65,26 @@ def test_the_rate_may_return():
 
 def test_no_finger_is_stable_once_the_rate_fell():
     recording = build.grasp()
-    sensors = build.Script.of(recording).sensors
-    detector = ArrivalDetector(build.model(), sensors, watch_rate=True)
+    source = build.Script.of(recording)
+    source.is_device = True
+    detector = StreamDetector(build.model(), source)
     arrivals = build.arrivals_of(recording)
     for arrival in arrivals[:700]:
-        detector.update(arrival)
-    assert detector.notices == []
-    begin, after = arrivals[700].time, []
+        assert detector.update(arrival).arrival.notices == ()
+    begin, after, notices = arrivals[700].time, [], []
     for k, arrival in enumerate(arrivals[700:850]):
         slow = arrival._replace(time=begin + k / 50)
-        after += [one.estimate for one in detector.update(slow) if k > 50]
-    assert len(detector.notices) == 1
+        update = detector.update(slow)
+        after += [one.estimate for one in update.estimates if k > 50]
+        notices += update.arrival.notices
+    assert len(notices) == 1
     assert {one.state for one in after} == {ContactState.UNKNOWN}
     assert all(Fault.RATE in finger.faults for one in after for finger in one.fingers.values())
 
 
 def test_a_recording_is_not_watched():
-    detector = ArrivalDetector(build.model(), build.Script.of(build.grasp()).sensors)
+    detector = StreamDetector(build.model(), build.Script.of(build.grasp()))
     for k, arrival in enumerate(build.arrivals_of(build.grasp())[:400]):
-        (*_, last) = detector.update(arrival._replace(time=k / (150 if k < 200 else 50))) or [None]
-    assert Fault.RATE not in last.estimate.fingers["thumb"].faults
-    assert detector.notices == []
+        update = detector.update(arrival._replace(time=k / (150 if k < 200 else 50)))
+        assert update.arrival.notices == ()
+    assert Fault.RATE not in update.estimates[-1].estimate.fingers["thumb"].faults

@@ -1,0 +1,271 @@
+"""Filter between a source and the detector: buffering, rate, resampling, faults of the stream.
+
+No clock, no thread, no I/O: the times are those of the arrivals.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import Fault, Reason
+from holdfast.devices.sources.base import Arrival, ModuleSamples
+from holdfast.errors import ModelError
+from holdfast.live.readings_monitor import ReadingsMonitor
+from holdfast.model import Model
+from holdfast.recordings import GAP_PERIODS
+from holdfast.resampling import MIN_UPDATE_RATE, Resampler, UpdateFilter, rows_per_update
+from holdfast.sensors import Sensor
+
+MAX_RATE_CHANGE = 0.2
+"""A rate that differs by more than this from that at the start has changed."""
+RATE_CHECK_INTERVAL = 0.3
+"""Time over which the rate is measured again [s]; longer for rates below 33 Hz."""
+MIN_STEPS = 10
+"""Number of steps that this time has at the rate of the start."""
+PAUSE_PERIODS = 10.0
+"""A longer step between samples is a pause, and not part of the rate [sample periods]."""
+RATE_MEASUREMENT_TIME = 0.5
+"""Length of the first part of a stream, from which its rate is measured [s]."""
+MAX_BUFFERED_ARRIVALS = 4096
+"""Maximum number of arrivals in the buffer while the rate is measured.
+
+The clock of a device may stand still, so the time alone does not limit it."""
+
+FingerFaults = Mapping[str, tuple[Fault, ...]]
+"""FingerFaults by finger."""
+
+
+def measure_rate(arrivals: Iterable[Arrival], fingers: Iterable[str]) -> float | None:
+    """Return the median rate of the fingers, from steps without gaps [Hz]; None without steps."""
+    rates = []
+    for name in fingers:
+        steps = np.diff([arrival.time for arrival in arrivals if name in arrival.samples])
+        if len(steps):
+            rates.append(1 / steps[steps <= GAP_PERIODS * np.median(steps)].mean())
+    return float(np.median(rates)) if rates else None
+
+
+def measure_hold(arrivals: Iterable[Arrival], fingers: Iterable[str]) -> float:
+    """Return how many rows the sensors hold each sample; 1 if one of them does not."""
+    rows = []
+    for name in fingers:
+        samples = [arrival.samples[name] for arrival in arrivals if name in arrival.samples]
+        if samples:
+            changed = [not np.array_equal(*pair, equal_nan=True) for pair in pairwise(samples)]
+            rows.append(rows_per_update([True, *changed]))
+    return float(np.median(rows)) if rows and min(rows) > 1.0 else 1.0
+
+
+class RateMonitor:
+    """Comparison of the rates of the fingers with the rate at the start.
+
+    The detector counts samples, and takes them to be a period of the first rate apart.
+
+    Args:
+        rate: rate at the start [Hz].
+        fingers: names of the fingers.
+
+    Attributes:
+        changed: fingers whose rate has changed.
+    """
+
+    def __init__(self, rate: float, fingers: Iterable[str]) -> None:
+        self._rate = rate
+        self._interval = max(RATE_CHECK_INTERVAL, MIN_STEPS / rate)
+        self._longest_step = PAUSE_PERIODS / rate
+        # Of each finger: the time of its last sample, and the length and number of the steps since
+        # its rate was last compared. `update` alone changes them.
+        self._last = dict.fromkeys(fingers, math.nan)
+        self._steps = dict.fromkeys(self._last, (0.0, 0))
+        self.changed: set[str] = set()
+
+    def update(self, samples: Mapping[str, object], time: float) -> list[str]:
+        """Update the rates of the fingers with a sample at a time [s]; return new notices."""
+        notices: list[str] = []
+        for name in samples:
+            step, self._last[name] = time - self._last[name], time
+            if not step <= self._longest_step:  # a pause, or the first sample
+                continue
+            length, n = self._steps[name][0] + step, self._steps[name][1] + 1
+            self._steps[name] = (length, n) if length < self._interval else (0.0, 0)
+            if length < self._interval:
+                continue
+            if abs(n / length / self._rate - 1) <= MAX_RATE_CHANGE:
+                self.changed.discard(name)
+                continue
+            if not self.changed:  # the fingers of a device change together: one notice is enough
+                notices.append(
+                    f"{name} sends {n / length:.3g} samples per second, {self._rate:.3g} at the "
+                    "start: open the source again"
+                )
+            self.changed.add(name)
+        return notices
+
+
+class FilteredSamples(NamedTuple):
+    """Samples of one instant for the detector, and which fingers the stream makes UNKNOWN.
+
+    Attributes:
+        time: of the samples, at the rate of the model [s]; NaN without samples.
+        samples: (n_taxels, 3) by finger; empty if only faults arrived.
+        reported: fingers of which this arrival reports a fault.
+        hidden: faults by finger, and the reason why these fingers are UNKNOWN.
+    """
+
+    time: float
+    samples: ModuleSamples
+    reported: tuple[str, ...]
+    hidden: tuple[tuple[FingerFaults, Reason], ...]
+
+
+class SourceFilter:
+    """Filter that makes samples for a detector of the arrivals of a source.
+
+    It buffers the first half second, until it has measured the rate of the source. Of a
+    sample-and-hold sensor it takes the true updates. It resamples a source whose rate is not
+    within 20 % of the model's. It leaves out modules that the model does not use, and keeps the
+    faults of the stream until the next sample of their finger.
+
+    Args:
+        fingers: sensor of each finger that the model uses.
+        strict: refuse a rate that is not the model's instead of resampling.
+        watch_rate: report the fault RATE while a finger has another rate than at the start.
+        finds_pull: report a normal force below its first value, see `ReadingsMonitor`.
+
+    Attributes:
+        rate: measured rate of the source, of the true updates [Hz]; NaN while it is not known.
+        resampled: whether the source is resampled to the model's rate.
+        notices: messages for the user; whoever passes them on clears the list.
+    """
+
+    def __init__(
+        self, fingers: Mapping[str, Sensor], *, strict: bool, watch_rate: bool, finds_pull: bool
+    ) -> None:
+        self.rate, self.resampled = math.nan, False
+        self.notices: list[str] = []
+        self._fingers = fingers
+        self._strict, self._watch_rate, self._finds_pull = strict, watch_rate, finds_pull
+        # Empty from when the rate is known; the next three are made then.
+        self._buffer: deque[Arrival] = deque(maxlen=MAX_BUFFERED_ARRIVALS)
+        self._updates: dict[str, UpdateFilter] = {}  # empty if the sensors do not hold samples
+        self._resamplers: dict[str, Resampler] = {}  # empty if the rate is the model's
+        self._monitor: RateMonitor | None = None
+        self._time = -math.inf  # of the newest samples that were resampled
+        self._faults: dict[str, tuple[Fault, ...]] = {}  # until the next sample of the finger
+        self._silent: set[str] = set()  # set by `mark_silent`, until the next sample likewise
+        self.compare_from_now()
+
+    def compare_from_now(self) -> None:
+        """Compare the readings with those that come now, as the hand is open now."""
+        self._readings = ReadingsMonitor(self._fingers, finds_pull=self._finds_pull)
+
+    def mark_silent(self) -> tuple[tuple[FingerFaults, Reason], ...]:
+        """Hide every finger until its next sample; return what is hidden now."""
+        self._silent = set(self._fingers)
+        return self._hidden()
+
+    def update(self, arrival: Arrival, model: Model) -> Iterator[FilteredSamples]:
+        """Yield the samples and faults of an arrival; none while the rate is not known.
+
+        Args:
+            arrival: of the source.
+            model: that decides now, whose rate the samples get.
+
+        Raises:
+            ModelError: the rate is not the model's, and `strict`.
+        """
+        if not math.isnan(self.rate):
+            yield from self._filter(arrival)
+            return
+        buffer = self._buffer
+        if buffer and not (arrival.samples or buffer[-1].samples):
+            # Joined, or a device that sends nothing but faults would push the samples out.
+            arrival = arrival._replace(faults={**buffer.pop().faults, **arrival.faults})
+        buffer.append(arrival)
+        sampled = [earlier for earlier in buffer if earlier.samples]
+        if not arrival.samples or arrival.time - sampled[0].time < RATE_MEASUREMENT_TIME:
+            return
+        rate = measure_rate(sampled, self._fingers)
+        if rate is None:  # no samples of the model's fingers yet
+            buffer.clear()
+            buffer.append(arrival)
+            return
+        yield from self._begin(rate, model)
+
+    def finish(self, model: Model) -> Iterator[FilteredSamples]:
+        """Yield the samples of a source that ended before its rate was known."""
+        sampled = [arrival for arrival in self._buffer if arrival.samples]
+        if sampled:
+            nominal = next(iter(self._fingers.values())).rate
+            rate = measure_rate(sampled, self._fingers) or model.rate or nominal
+            yield from self._begin(rate, model)
+
+    def _begin(self, rate: float, model: Model) -> Iterator[FilteredSamples]:
+        """Choose what the rate [Hz] needs, and process the buffer."""
+        # The true updates first, as offline: rows that repeat are no samples of a faster sensor.
+        n_rows = measure_hold(self._buffer, self._fingers)
+        if n_rows > 1.0 and rate / n_rows >= MIN_UPDATE_RATE:
+            self.notices.append(
+                f"readings repeat in rows of {rate:.4g} Hz; the true updates are used, "
+                f"{rate / n_rows:.4g} Hz"
+            )
+            rate /= n_rows
+            self._updates = {name: UpdateFilter(rate) for name in self._fingers}
+        self.rate = rate
+        if model.rate is not None and not model.rate_fits(rate):
+            if self._strict:
+                raise ModelError(
+                    f"{rate:.4g} Hz given, the model expects {model.rate:g} Hz within 20 % "
+                    "(--rate resample accepts it)"
+                )
+            self.resampled = True
+            self._resamplers = {name: Resampler(rate, model.rate) for name in self._fingers}
+        if self._watch_rate:
+            self._monitor = RateMonitor(rate, self._fingers)
+        buffered = list(self._buffer)
+        self._buffer.clear()
+        for arrival in buffered:
+            yield from self._filter(arrival)
+
+    def _filter(self, arrival: Arrival) -> Iterator[FilteredSamples]:
+        if self._faults or self._silent:
+            for name in arrival.samples:
+                self._faults.pop(name, None)
+                self._silent.discard(name)
+        self._faults.update(arrival.faults)
+        time, used = arrival.time, arrival.samples
+        used = {name: used[name] for name in self._fingers if name in used}
+        if self._updates:
+            used = {n: new for n, new in used.items() if self._updates[n].is_update(time, new)}
+        if self._monitor is not None:
+            self.notices += self._monitor.update(used, time)
+            for name in self._monitor.changed & used.keys():
+                self._faults[name] = (*self._faults.get(name, ()), Fault.RATE)
+        self.notices += self._readings.update(used, time)
+        hidden = self._hidden()
+        if not used:
+            reported = tuple(name for name in self._fingers if name in arrival.faults)
+            if reported:
+                yield FilteredSamples(math.nan, {}, reported, hidden)
+        elif not self.resampled:
+            yield FilteredSamples(time, used, (), hidden)
+        else:
+            instants: dict[float, dict[str, npt.NDArray[Any]]] = {}
+            for name, sample in used.items():
+                for when, value in self._resamplers[name].push(time, sample):
+                    instants.setdefault(when, {})[name] = value
+            for when in sorted(instants):
+                # Every module has its own instants, and one may lag: times must increase.
+                self._time = max(when, math.nextafter(self._time, math.inf))
+                yield FilteredSamples(self._time, instants[when], (), hidden)
+
+    def _hidden(self) -> tuple[tuple[FingerFaults, Reason], ...]:
+        """Return the faults that hold now; a silent finger is rather a gap than a fault."""
+        gap = dict.fromkeys(self._silent, (Fault.PACKET_GAP,))
+        both = ((self._faults, Reason.FAULT), (gap, Reason.GAP))
+        return tuple((dict(faults), reason) for faults, reason in both if faults)
