@@ -206,7 +206,9 @@ class _Choice:
         lengths = Counter(prod(self.arrays[name].shape) for name in named)
         n_rows = max(lengths, key=lambda n: (n > 1, lengths[n]))
         places = [name for name in named if self.arrays[name].shape == (n_rows,)]
-        return {name: self.arrays[name] for name in places} if len(places) > 3 else {}
+        return (
+            {name: self.arrays[name] for name in places} if len(places) >= 3 * one.n_taxels else {}
+        )
 
     def _places(self, key: str, one: Sensor) -> list[str]:
         """Return the paths of the arrays that a key means."""
