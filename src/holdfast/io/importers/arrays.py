@@ -311,11 +311,25 @@ def _of_json(path: Path) -> StoredArrays:
     try:
         document = json.loads(text)
     except json.JSONDecodeError:
-        lines = [line for line in text.splitlines() if line.startswith("{")]
-        return arrays_of_records(json.loads(line) for line in lines)
+        return arrays_of_records(_records(path, text))
     if isinstance(document, list):
         return arrays_of_records(one for one in document if isinstance(one, dict))
     return _flat(document)
+
+
+def _records(path: Path, text: str) -> Iterator[dict[str, Any]]:
+    """Yield the lines of JSON in a text; the last one may be cut, as a killed logger leaves it.
+
+    Raises:
+        RecordingError: another line is damaged.
+    """
+    lines = [line for line in text.splitlines() if line.startswith("{")]
+    for number, line in enumerate(lines, start=1):
+        try:
+            yield json.loads(line)
+        except json.JSONDecodeError as cause:
+            if number < len(lines):
+                raise RecordingError(f"{path}: record {number} is damaged: {cause}") from cause
 
 
 def _of_pickle(path: Path) -> StoredArrays:
