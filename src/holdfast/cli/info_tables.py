@@ -60,9 +60,14 @@ def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
     print_line()
     faults = (", ".join(f"{x} {n}" for x, n in m["faults"].items()) for m in modules.values())
     print_table(
-        ("module", *_label_headings(), "faults"),
+        ("module", *_label_headings(), "drift [1/min]", "faults"),
         [
-            (name, *_label_cells([m]), text or "none")
+            (
+                name,
+                *_label_cells([m]),
+                "-" if m["drift"] is None else f"{m['drift']:.3g}",
+                text or "none",
+            )
             for (name, m), text in zip(modules.items(), faults, strict=True)
         ],
     )

@@ -56,11 +56,14 @@ CASES = {
     ),
     "clocks of two fingers": (
         timed(lambda times: times * 1.002, "index"),
-        [("index", "drift", "as many samples as thumb in "), ("", "no_labels", "no labels")],
+        [("index", "clock_drift", "as many samples as thumb in "), ("", "no_labels", "no labels")],
     ),
     "the clock of a bag": (
         replace(UNLABELLED, metadata={"clock_drift": 0.002}),
-        [("", "drift", "the bag's clock gains +120 ms a minute"), ("", "no_labels", "no labels")],
+        [
+            ("", "clock_drift", "the bag's clock gains +120 ms a minute"),
+            ("", "no_labels", "no labels"),
+        ],
     ),
 }  # fmt: skip
 

@@ -17,8 +17,9 @@ MAX_GAPS_SHOWN = 2
 DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
-    "dead", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps", "drift", "constant",
-    "hidden_labels", "rate", "one_taxel", "no_contact", "no_labels",
+    "dead", "copy", "invalid", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
+    "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel", "no_contact",
+    "no_labels",
 )  # fmt: skip
 
 
@@ -63,7 +64,7 @@ def _drifts(modules: dict[str, Tactile], of_bag: object) -> list[Finding]:
     found = []
     if isinstance(of_bag, float):
         text = f"the bag's clock gains {6e4 * of_bag:+.3g} ms a minute on that of the device: "
-        found.append(Finding("", "drift", text + "do not join its times with other topics"))
+        found.append(Finding("", "clock_drift", text + "do not join its times with other topics"))
     for (first, one), (second, other) in combinations(modules.items(), 2):
         lengths = np.array([module.times[-1] - module.times[0] for module in (one, other)])
         drift = lengths[1] / lengths[0] - 1
@@ -71,5 +72,5 @@ def _drifts(modules: dict[str, Tactile], of_bag: object) -> list[Finding]:
         if is_whole and abs(drift) >= MIN_CLOCK_DIFFERENCE:
             text = f"as many samples as {first} in {lengths[1]:.5g} s, where that has "
             text += f"{lengths[0]:.5g} s: one of their clocks drifts"
-            return [*found, Finding(second, "drift", text)]
+            return [*found, Finding(second, "clock_drift", text)]
     return found
