@@ -127,10 +127,6 @@ def _of_matlab(path: Path) -> StoredArrays:
     return _flat({name: one for name, one in content.items() if not name.startswith("__")})
 
 
-def _of_hdf5(path: Path) -> StoredArrays:
-    return arrays_of_hdf5(path)
-
-
 def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, StoredArray]:
     """Return the arrays of numbers in an HDF5 file, and the numbers in attributes, by path.
 
@@ -367,7 +363,7 @@ _READERS: dict[str, Callable[[Path], StoredArrays]] = {
     ".npy": _of_npy,
     ".npz": _of_npz,
     ".mat": _of_matlab,
-    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), _of_hdf5),
+    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), arrays_of_hdf5),
     **dict.fromkeys((".parquet", ".pq"), _of_parquet),
     **dict.fromkeys((".jsonl", ".ndjson", ".json"), _of_json),
     **dict.fromkeys((".pkl", ".pickle", ".joblib"), _of_pickle),
