@@ -52,6 +52,8 @@ def test_no_file_gives_a_wrong_value_or_an_exception_that_is_not_documented(resu
         "ROS definitions, and messages by them",
         "import lerobot data, .parquet",
         "import lerobot episodes, .parquet",
+        "import arrays, .mat",
+        "import arrays, .jsonl",
     ],
 )
 def test_some_files_are_accepted_and_some_refused(results, name):
