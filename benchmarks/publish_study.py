@@ -7,14 +7,15 @@ The first copies the results of a run and writes the pages, the second writes th
 The tables of real recordings (`real*`) are those of another run, `holdfast study` of the real
 recordings alone, so that they can be made anew with each model that ships.
 
-`publish` copies `study.json` and all tables as CSV from the folder of a finished study to
-docs/study/, in place of the old ones. The pages docs/study.md, docs/study-changes.md and
-docs/study/real-data.md are written from templates in docs/study/ (`*.md.j2`). Change the templates,
-not the pages: every figure in them is taken from `study.json`, and lab/tests/test_docs_study.py
-renders them again.
+`publish` copies all tables as CSV from the folder of a finished study to docs/study/, in place of
+the old ones, and `study.json` with the names of the tables. The pages docs/study.md,
+docs/study-changes.md and docs/study/real-data.md are written from templates in docs/study/
+(`*.md.j2`). Change the templates, not the pages: every figure in them is taken from these files,
+and lab/tests/test_docs_study.py renders them again.
 """
 
 import argparse
+import csv
 import json
 import math
 import shutil
@@ -29,11 +30,11 @@ from holdfast_lab.study.citation import compares_methods
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("study.md", "study-changes.md", "study/real-data.md")
 MISSING = "–"
-OWN_FIELDS = ("ours", "paper", "difference", "n", "interval", "infinite")
-MAY_BE_MISSING = ("paper", "difference", "interval", "infinite")
-"""Fields that are left out of the published rows where they are null."""
+NUMBERS = ("ours", "paper", "difference")
+VALUES = (*NUMBERS, "n", "low", "high")
+"""Columns of a table that are no keys."""
 DIGITS = 6
-"""Significant digits of published numbers."""
+"""Significant digits of the numbers from which the pages are written."""
 
 Row = dict[str, Any]
 Where = Mapping[str, object]
@@ -46,14 +47,11 @@ class Figures:
     table do not have selects nothing and excludes nothing.
 
     Args:
-        summary: contents of `study.json`.
+        tables: rows of each table.
     """
 
-    def __init__(self, summary: Mapping[str, Any]) -> None:
-        self.tables: Mapping[str, list[Row]] = {
-            name: [dict.fromkeys(MAY_BE_MISSING) | row for row in rows]
-            for name, rows in summary["tables"].items()
-        }
+    def __init__(self, tables: Mapping[str, list[Row]]) -> None:
+        self.tables = tables
 
     def rows(self, table: str, where: Where) -> list[Row]:
         """Return the rows of a table that meet a condition; none if there is no such table."""
@@ -76,8 +74,6 @@ class Figures:
         found = self.rows(table, where)
         if len(found) != 1:
             raise LookupError(f"{table}: one row expected for {dict(where)}, {len(found)} found")
-        if field == "ours" and found[0].get("infinite"):
-            return math.inf
         number = found[0][field]
         return None if number is None else float(number)
 
@@ -186,11 +182,11 @@ def number_text(value: float | None, digits: int) -> str:
     return f"{value:.{digits}f}".replace("-", "−")
 
 
-def interval_text(interval: Sequence[float | None] | None, digits: int) -> str:
+def interval_text(interval: Sequence[float] | None, digits: int) -> str:
     """Return an interval as text in brackets; empty if there is none."""
     if interval is None:
         return ""
-    low, high = (number_text(math.inf if end is None else end, digits) for end in interval)
+    low, high = (number_text(end, digits) for end in interval)
     return f" ({low} to {high})"
 
 
@@ -198,7 +194,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
     """Return the text of each page.
 
     Args:
-        summary: contents of `study.json`.
+        summary: of a published study, with its tables.
         templates: folder of the templates.
     """
     environment = Environment(
@@ -208,7 +204,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    figures = Figures(summary)
+    figures = Figures(summary["tables"])
     public = ("cell", "any_cell", "grid", "has", "ratio", "share_stable")
     names = {name: getattr(figures, name) for name in public}
     names["compares_methods"] = compares_methods
@@ -219,7 +215,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
 
 
 def publish(run: Path, docs: Path, real: Path | None = None) -> None:
-    """Copy `study.json` and all tables of a run to docs/study/, in place of the old ones.
+    """Copy the results of a run to docs/study/, in place of the old ones.
 
     Args:
         run: folder of a finished study.
@@ -241,50 +237,44 @@ def publish(run: Path, docs: Path, real: Path | None = None) -> None:
         old.unlink()
     for name, folder in folders.items():
         shutil.copyfile(folder / "tables" / f"{name}.csv", target / f"{name}.csv")
-    (target / "study.json").write_text(_compact(summary), encoding="utf-8")
+    summary["tables"] = list(folders)
+    text = json.dumps(summary, ensure_ascii=False, indent=1)
+    (target / "study.json").write_text(f"{text}\n", encoding="utf-8")
+
+
+def published(folder: Path) -> dict[str, Any]:
+    """Return what was published in a folder: `study.json`, with the rows of its tables."""
+    summary = json.loads((folder / "study.json").read_text("utf-8"))
+    tables = {}
+    for name in summary["tables"]:
+        with (folder / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+            tables[name] = [_row(line) for line in csv.DictReader(file)]
+    return {**summary, "tables": tables}
+
+
+def _row(line: Mapping[str, str]) -> Row:
+    """Return a row with its keys as text; a key without a value is left out."""
+    numbers = {name: _number(line[name]) for name in (*NUMBERS, "low", "high")}
+    ends = [numbers.pop("low"), numbers.pop("high")]
+    interval = None
+    if ends != [None, None] or numbers["ours"] == math.inf:  # an end that is missing has no bound
+        interval = [math.inf if end is None else end for end in ends]
+    keys = {key: value for key, value in line.items() if key not in VALUES and value}
+    return {**keys, **numbers, "interval": interval}
+
+
+def _number(text: str) -> float | None:
+    return float(f"{float(text):.{DIGITS}g}") if text else None
 
 
 def write_pages(docs: Path) -> None:
     """Write the pages from the published results."""
-    summary = json.loads((docs / "study" / "study.json").read_text("utf-8"))
-    for page, text in render(summary, docs / "study").items():
+    for page, text in render(published(docs / "study"), docs / "study").items():
         (docs / page).write_text(text, encoding="utf-8")
 
 
-def _compact(summary: Mapping[str, Any]) -> str:
-    """Return the summary as JSON with one row of a table a line."""
-    tables = ",\n".join(
-        f"{json.dumps(name)}: [\n"
-        + ",\n".join(json.dumps(_short(row), ensure_ascii=False) for row in rows)
-        + "\n]"
-        for name, rows in summary["tables"].items()
-    )
-    rest = {name: value for name, value in summary.items() if name != "tables"}
-    body = "".join(
-        f",\n{json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}"
-        for name, value in rest.items()
-    )
-    return f'{{"tables": {{\n{tables}\n}}{body}}}\n'
-
-
-def _short(row: Row) -> Row:
-    """Return a row with rounded numbers, without the fields that are null and may be missing."""
-    return {
-        key: _rounded(value)
-        for key, value in row.items()
-        if value is not None or key not in MAY_BE_MISSING
-    }
-
-
-def _rounded(value: object) -> object:
-    if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
-    return [_rounded(each) for each in value] if isinstance(value, list) else value
-
-
 def _cell_text(row: Row, digits: int) -> str:
-    value = math.inf if row.get("infinite") else row["ours"]
-    text = number_text(value, digits) + interval_text(row["interval"], digits)
+    text = number_text(row["ours"], digits) + interval_text(row["interval"], digits)
     return text if row["paper"] is None else f"{text}; paper {number_text(row['paper'], digits)}"
 
 

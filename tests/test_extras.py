@@ -74,6 +74,7 @@ MISSING = {
         ["import", "log.csv", "others", "--sensor", "anyskin", "--jobs", "2"],
     ],
     "label": [["label", "."], ["label", "--auto", "signal", "grasp.mcap"]],
+    "video": [["label", "markers", "sheet.pdf"]],
     "label,train": [["label", "--audit", "grasp.mcap"]],
     "parquet": [
         ["info", "other/grasp.parquet"],

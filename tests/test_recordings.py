@@ -356,3 +356,19 @@ def test_two_equal_modules():
     )
     still = replace(thumb, readings=np.zeros_like(thumb.readings))
     replace(whole, modules=dict.fromkeys(("thumb", "index"), still)).check_modules_differ()
+
+
+@pytest.mark.parametrize(("loaded", "expected"), [(None, True), (False, False), (True, True)])
+def test_a_start_is_declared_or_stays(loaded, expected):
+    made = synthetic_recording("a", seed=0)
+    recording = replace(made, metadata={"starts_loaded": True, "object": "can"})
+    declared = recording.with_start(loaded=loaded)
+    assert declared.starts_loaded is expected
+    assert declared.metadata["object"] == "can"
+    assert recording.starts_loaded  # the recording itself is unchanged
+
+
+def test_a_start_is_an_open_hand_unless_the_metadata_are_true():
+    made = synthetic_recording("a", seed=0)
+    assert not made.starts_loaded
+    assert not replace(made, metadata={"starts_loaded": "yes"}).starts_loaded

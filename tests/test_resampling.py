@@ -10,7 +10,14 @@ from holdfast.errors import StreamError
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.recordings import Label, Recording, Tactile
-from holdfast.resampling import Resampler, UpdateFilter, resample, rows_per_update, true_updates
+from holdfast.resampling import (
+    Resampler,
+    UpdateFilter,
+    at_rate,
+    resample,
+    rows_per_update,
+    true_updates,
+)
 from holdfast.sensors import Sensor
 from holdfast.twin.simulation import Grasp, simulate
 from live import build
@@ -332,6 +339,14 @@ class TestSampleAndHold:
         assert any("true updates are used, 50 Hz" in notice for notice in notices)
         assert list(states) == expected.times.tolist()
         assert np.mean(np.array(list(states.values())) == expected.hand) > 0.98
+
+    @pytest.mark.parametrize(
+        ("rate", "expected"), [(None, 50.0), (59.0, 50.0), (41.7, 50.0), (100.0, 100.0)]
+    )
+    def test_the_rate_of_a_model_is_compared_with_that_of_the_updates(self, grasp, rate, expected):
+        slow, held = slow_and_held(grasp)
+        assert at_rate(held, rate).rate == pytest.approx(expected, rel=0.01)
+        assert (at_rate(slow, rate) is slow) is (expected == 50.0)
 
     def test_a_sensor_that_updates_too_slowly_keeps_its_rows(self, grasp):
         _, held = slow_and_held(grasp, slow_rate=10.0)

@@ -6,6 +6,7 @@ from functools import lru_cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 
 PACKAGES = ("holdfast", "holdfast_grip", "holdfast_interop", "holdfast_lab")
 """Packages whose files count; other packages are pinned by the lock file."""
@@ -16,6 +17,10 @@ WITHOUT_RESULTS = (
 """Packages that only show results."""
 DATA_SUFFIXES = (".csv", ".json", ".toml", ".c", ".h")
 """Data files beside a module, and C files, on which its results depend too."""
+
+_PARSING = Lock()
+"""`ast.parse` of Python 3.11 fails where two threads call it at once, as those of a worker of Dask
+do (CPython issue 106905)."""
 
 
 @lru_cache
@@ -29,8 +34,10 @@ def source_digest(roots: tuple[str, ...] = PACKAGES, without: tuple[str, ...] = 
         roots: names of modules and packages; a package counts with all its modules.
         without: names of modules that are left out, beside the packages that show results.
     """
+    with _PARSING:
+        files = sorted(_closure(roots, without).items())
     digest = sha256()
-    for name, path in sorted(_closure(roots, without).items()):
+    for name, path in files:
         digest.update(f"{name} {sha256(path.read_bytes()).hexdigest()}\n".encode())
     return digest.hexdigest()
 
@@ -42,16 +49,17 @@ def _closure(roots: Iterable[str], without: tuple[str, ...]) -> dict[str, Path]:
     while waiting:
         name = waiting.pop()
         path = _module_files().get(name)
-        if path is None or name in files or name in without or _only_shows(name):
+        if (
+            path is None
+            or name in files
+            or name in without
+            or any(name == package or name.startswith(f"{package}.") for package in WITHOUT_RESULTS)
+        ):
             continue
         files[name] = path
         files.update(_data_files(path.parent))
         waiting += _imported_modules(name)
     return files
-
-
-def _only_shows(name: str) -> bool:
-    return any(name == package or name.startswith(f"{package}.") for package in WITHOUT_RESULTS)
 
 
 @lru_cache

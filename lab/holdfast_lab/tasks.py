@@ -86,7 +86,11 @@ class TaskRunner:
                 not run; the results of earlier ones stay stored.
         """
         keys = _keys(tasks)
-        self._prepare()
+        folder = self._path("").parent
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as cause:
+            raise OutputError(f"cannot write {folder}: {cause.strerror}") from cause
         by_key = {keys[task.name]: task for task in tasks}
         results = {key: self._load(key, task) for key, task in by_key.items()}
         missing = [task for key, task in by_key.items() if results[key] is UNSET]
@@ -111,13 +115,6 @@ class TaskRunner:
             stored = StoredResult(name, sha256(data).hexdigest(), Raw(data))
             write_whole(self._path(keys[name]), msgpack.encode(stored), force=True)
             yield by_name[name], result
-
-    def _prepare(self) -> None:
-        folder = self._path("").parent
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as cause:
-            raise OutputError(f"cannot write {folder}: {cause.strerror}") from cause
 
     def _path(self, key: str) -> Path:
         return self.folder / "work" / f"{key}.msgpack"
@@ -171,17 +168,13 @@ def _call(
         with one_thread():
             return msgpack.encode(function(*arguments), enc_hook=_to_builtin)
     except Exception as failure:
-        _add_name(name, failure)
+        # Put the name of a task before the text of an exception, or into a note.
+        match failure.args:
+            case (str(text),):
+                failure.args = (f"{name}: {text}",)
+            case _:
+                failure.add_note(f"in the task {name}")
         raise
-
-
-def _add_name(name: str, failure: Exception) -> None:
-    """Put the name of a task before the text of an exception, or into a note."""
-    match failure.args:
-        case (str(text),):
-            failure.args = (f"{name}: {text}",)
-        case _:
-            failure.add_note(f"in the task {name}")
 
 
 def _to_builtin(value: Any) -> Any:  # noqa: ANN401 (NumPy's numbers and arrays)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self, TypeVar, cast
 
 from holdfast.children import SAFE_PATH_VARIABLE, safe_path
 from holdfast.cluster import Arguments, Call, call_on_cluster
-from holdfast.errors import EngineError, MissingExtra, is_installed
+from holdfast.errors import EngineError, MissingExtra, OutputError, is_installed
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
@@ -76,6 +76,18 @@ class Engine(NamedTuple):
         A worker has another working folder. Its machine must have the file at the same path.
         """
         return path if self.scheduler is None else path.absolute()
+
+    def check_written(self, path: Path) -> None:
+        """Check that a file that a call has written is there.
+
+        Raises:
+            OutputError: a worker of a cluster wrote it to a disk of its own.
+        """
+        if self.scheduler is not None and not path.exists():
+            raise OutputError(
+                f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
+                "that all machines have at the same path"
+            )
 
     def check(self) -> None:
         """Make one call, so that an engine that cannot be reached is found before the work.

@@ -6,10 +6,11 @@ import msgspec
 import pytest
 
 from command_line import Verb
+from holdfast import twin_recordings
 from holdfast.cli import demo as verb
-from holdfast.cli import simulate as simulate_verb
 from holdfast.io import load_dataset
 from holdfast.model import Model
+from holdfast.parallel import Engine
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 
@@ -19,14 +20,14 @@ SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Simulate one mug per case, in this process."""
-    whole = simulate_verb.simulate_grasps
+    whole = twin_recordings.simulate_grasps
     monkeypatch.setattr(verb, "DEMO_OBJECTS", "mug")
     monkeypatch.setattr(verb, "N_DEMO_REPEATS", 1)
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
-        simulate_verb,
+        twin_recordings,
         "simulate_grasps",
-        lambda *given, **named: whole(*given, **{**named, "jobs": 1}),
+        lambda *given, **named: whole(*given, **{**named, "engine": Engine(1)}),
     )
 
 

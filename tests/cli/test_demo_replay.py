@@ -5,8 +5,8 @@ import math
 import pytest
 from rich.console import Console
 
-from holdfast.cli import demo
-from holdfast.cli.demo import TrueEvents, finger_table, replay
+from holdfast.cli import demo_replay
+from holdfast.cli.demo_replay import TrueEvents, finger_table, replay
 from holdfast.contact import ContactEstimate, ContactEvent, ContactState, HandEstimate, Reason
 from holdfast.io import save_recording
 from holdfast.metrics import InstabilityEvent
@@ -50,7 +50,7 @@ def test_every_sample_is_an_update_and_lasting_changes_are_lines(capsys, model, 
 
 
 def test_on_a_terminal_a_table_is_shown(capsys, model, recording, path, monkeypatch):
-    monkeypatch.setattr(demo.sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(demo_replay.sys.stderr, "isatty", lambda: True, raising=False)
     assert replay(model, path, 40.0, TrueEvents()) == recording.modules["thumb"].n_samples
     err = capsys.readouterr().err
     assert "thumb" in err
@@ -74,8 +74,8 @@ def test_words_of_a_change():
 
 
 def test_every_line_fits_80_columns():
-    longest = max(map(len, demo.CAUSE_WORDS.values())) + len("; detected after 250 ms")
-    other = max(map(len, demo.STATES.values()))
+    longest = max(map(len, demo_replay.CAUSE_WORDS.values())) + len("; detected after 250 ms")
+    other = max(map(len, demo_replay.STATES.values()))
     assert len(f"     {0:6.2f} s   {'':10}  ") + max(longest, other) <= 80
 
 

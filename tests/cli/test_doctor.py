@@ -46,8 +46,10 @@ def test_the_limits_of_imports(capsys, monkeypatch):
     assert "time, processor (NOT memory)" in capsys.readouterr().out
 
 
-def test_the_kernels_work(capsys):
-    assert report(capsys)["kernels"]["ok"] is True
+def test_the_kernel_works(capsys):
+    assert report(capsys)["kernels"] == {"ok": True, "error": None}
+    assert main(["doctor"]) == 0
+    assert [line.split() for line in capsys.readouterr().out.splitlines()][4] == ["kernel", "works"]
 
 
 def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):

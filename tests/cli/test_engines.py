@@ -113,9 +113,9 @@ def test_a_search_on_a_cluster_is_not_resumed(capsys, cluster):
 
 
 def test_a_folder_that_the_workers_do_not_share(capsys, cluster, monkeypatch):
-    from holdfast.cli import simulate
-
-    monkeypatch.setattr(simulate, "simulate_grasp", lambda grasp, out, force: [grasp.name])
+    monkeypatch.setattr(
+        "holdfast.twin_recordings.simulate_grasp", lambda grasp, out, force: [grasp.name]
+    )
     words = ("--objects", "flask", "--cases", "1", "--repeats", "1", "--engine", f"dask:{cluster}")
     assert main(["simulate", "there", *words]) == 2
     assert "flask-case1-1.parquet, but it is not on this machine" in capsys.readouterr().err

@@ -14,21 +14,21 @@ SHOWN = {
     "play": "--host --port --speed --once --json",
     "import": "--format --sensor --columns --no-labels --suffix --force --json",
     "info": "--plot --force --tare --json",
-    "label": "--tare --poses --author --browser --json",
+    "label": "--tare --poses --video --author --browser --json",
     "train": "--output --classifier --features --split --trials --own-slip-features --init "
     "--force --in-contact --json",
     "evaluate": "--plot --force --in-contact --json",
     "calibrate": "--output --false-alarms --seconds --in-contact --force --json",
     "demo": "--speed --browser --force --json",
-    "simulate": "--objects --cases --repeats --force --json",
+    "simulate": "--objects --cases --repeats --video --force --json",
     "hold": "--hand --law --armed --confirm --max-scale --max-force --on-fault --record --seconds "
     "--speed --in-contact --json",
     "export": "--like --sensor --fingers --float --format --model --fps --force --json",
     "datasets": "--only --yes --force --json",
     "trial": "--out --laws --model --quick --force --json",
     "study": "--out --twin --quick --force --json",
-    "label auto": "--tare --poses --author --dry-run --force --json",
-    "label compare": "--tare --poses --annotator --json",
+    "label auto": "--tare --poses --video --author --dry-run --force --json",
+    "label compare": "--annotator --json",
     "label audit": "--page --author --json",
 }
 """Options that the help of a verb shows; that of all other verbs shows all."""

@@ -12,6 +12,8 @@ from holdfast.io import load_recording, save_recording
 from holdfast.io.importers import FORMATS, HINTS, IMPORTER_PLUGINS, import_hint
 from holdfast.synthetic import synthetic_recording
 
+pytestmark = pytest.mark.slow
+
 HEADER = "# sensor: anyskin\ntime," + ",".join(
     f"t{taxel:02d}_{axis}" for taxel in range(1, 6) for axis in "xyz"
 )

@@ -9,6 +9,7 @@ from holdfast.cli import app
 OTHER_MEANING = {
     "--false-alarms": "by labels of events, and of all alarms in handling without labels",
     "--format": "of the input, and of exported recordings",
+    "--fps": "of an exported dataset, and of a video of stickers",
     "--hand": "the hand that play stands for is driven by another program",
     "--in-contact": "a declaration, and for an exported model a choice of two",
     "--model": "the detector of trials, and a model whose decisions a figure shows",
@@ -18,6 +19,7 @@ OTHER_MEANING = {
     "--set": "metadata of a recording, and parameters of a rule",
     "--speed": "play cannot send as fast as possible",
     "--separate": "classifiers of the fingers, and sensors in a packet",
+    "--video": "films each recording of the twin, and names the film of a recording",
     "-o": "the model file, and the folder of a report",
 }
 """Flags that two verbs use for different things, with the difference."""

@@ -2,8 +2,8 @@
 
 import pytest
 
-from holdfast.cli import real_clip
-from holdfast.cli.real_clip import ClipEvent, show_clip
+from holdfast.cli import demo_replay
+from holdfast.cli.demo_replay import ClipEvent, show_clip
 from holdfast.io import load_recording
 from holdfast.recorded import BOX_SLIPS
 
@@ -36,9 +36,9 @@ def test_it_tells_what_happens_in_the_order_of_time(shown):
 
 def test_lines_come_at_their_times(monkeypatch):
     waits = []
-    monkeypatch.setattr(real_clip.time, "sleep", waits.append)
-    monkeypatch.setattr(real_clip.time, "monotonic", lambda: 100.0)
+    monkeypatch.setattr(demo_replay.time, "sleep", waits.append)
+    monkeypatch.setattr(demo_replay.time, "monotonic", lambda: 100.0)
     events = [ClipEvent(0.5, "STABLE", "a"), ClipEvent(2.0, "slip", "b")]
-    monkeypatch.setattr(real_clip, "_events", lambda: events)
+    monkeypatch.setattr(demo_replay, "_events", lambda: events)
     assert show_clip(2.0, lambda line: None) == events
     assert waits == [0.25, 1.0]

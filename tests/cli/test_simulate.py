@@ -10,10 +10,9 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import main
-from holdfast.cli import simulate as verb
 from holdfast.io import load_dataset, load_recording
 from holdfast.twin import simulation
-from holdfast.twin.profile import profile
+from holdfast.twin.profile import GRASP_ATTEMPTS, profile
 
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
 WEAK = msgspec.structs.replace(SHORT, grip=0.2)
@@ -136,7 +135,7 @@ class TestFailures:
     def test_are_kept_and_repeated_a_limited_number_of_times(self, capsys, out, weak):
         code, printed, _ = run(capsys, out, *ONE, "--json")
         assert code == 0
-        assert weak == list(range(verb.GRASP_ATTEMPTS))
+        assert weak == list(range(GRASP_ATTEMPTS))
         assert names(out) == list(self.FAILED)
         assert json.loads(printed)["failed"] == [
             name.removesuffix(".parquet") for name in names(out)
@@ -230,7 +229,7 @@ MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, fri
 
 
 def test_an_own_object(tmp_path):
-    from holdfast.cli.simulate import plan_grasps
+    from holdfast.twin_recordings import plan_grasps
 
     table = tmp_path / "mine.toml"
     table.write_text(MUG)

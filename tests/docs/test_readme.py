@@ -4,9 +4,10 @@ import re
 import pytest
 from msgspec.structs import replace
 
+from holdfast import twin_recordings
 from holdfast.cli import demo
-from holdfast.cli import simulate as simulate_verb
 from holdfast.io import save_recording
+from holdfast.parallel import Engine
 from holdfast.recordings import Tactile
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
@@ -23,13 +24,13 @@ SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 @pytest.fixture
 def short_demo(monkeypatch):
     """The demo with short grasps, in this process."""
-    whole = simulate_verb.simulate_grasps
+    whole = twin_recordings.simulate_grasps
     monkeypatch.setattr(demo, "DEMO_OBJECTS", "mug")
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
-        simulate_verb,
+        twin_recordings,
         "simulate_grasps",
-        lambda *given, **named: whole(*given, **{**named, "jobs": 1}),
+        lambda *given, **named: whole(*given, **{**named, "engine": Engine(1)}),
     )
 
 

@@ -18,6 +18,8 @@ from holdfast.training import calibrate
 from live import build
 from training.build import handling_recording, normalised_model
 
+pytestmark = pytest.mark.slow
+
 PATIENCE = 60.0
 OPEN = 2.0  # time before and after the handling [s]
 

@@ -92,9 +92,21 @@ def draw_alarms(
     """
     figure, grid = panels(len(groups), 3, 2.8)
     styles = series_styles(chain.from_iterable(groups.values()))
-    floor = _floor(curve.x for curves in groups.values() for curve in curves.values())
+    # The x at which a rate of zero is drawn: well below the smallest rate.
+    rates = (curve.x for curves in groups.values() for curve in curves.values())
+    positive = [rate[np.isfinite(rate) & (rate > 0)] for rate in rates]
+    smallest = min((float(rate.min()) for rate in positive if len(rate)), default=1.0)
+    floor = float(10 ** np.floor(np.log10(smallest) - 0.3))
     for axes, (y, curves) in zip(grid, groups.items(), strict=True):
-        _prepare_alarm_axes(axes, floor, bar)
+        # Set a logarithmic x axis whose left end, `floor`, reads 0.
+        axes.set_xscale("log")
+        axes.grid(color=FAINT, linewidth=0.5)
+        if bar is not None:
+            axes.axvline(bar, color=GREY, linewidth=0.9, linestyle=":")
+        axes.xaxis.set_major_formatter(
+            FuncFormatter(lambda rate, _: "0" if rate <= floor * 1.01 else f"{rate:g}")
+        )
+        axes.xaxis.set_minor_locator(NullLocator())
         for name, curve in curves.items():
             finite = np.where(np.isfinite(curve.y), curve.y, np.nan)
             drawn = curve._replace(x=np.maximum(curve.x, floor), y=finite)
@@ -119,7 +131,11 @@ def draw_reliability(curves: Mapping[str, Array], notes: Mapping[str, str] | Non
     styles = series_styles(curves)
     axes.plot([0, 1], [0, 1], color=GREY, linewidth=0.9, linestyle=":")
     for name, table in curves.items():
-        _draw_bins(axes, below, table, styles[name])
+        style = styles[name]
+        look = style._asdict()
+        axes.plot(table[:, 0], table[:, 1], linewidth=1.1, markersize=4, **look)
+        share = 100 * table[:, 2] / max(table[:, 2].sum(), 1)
+        below.plot(table[:, 0], share, linewidth=0.9, markersize=3, **look)
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
     below.set_yscale("log")
     for panel in (axes, below):
@@ -132,13 +148,6 @@ def draw_reliability(curves: Mapping[str, Array], notes: Mapping[str, str] | Non
         handle.set_label(literal(", ".join(filter(None, (name, (notes or {}).get(name))))))
     axes.legend(handles=handles, loc="upper left", fontsize=FONT_SIZE, frameon=False)
     return figure
-
-
-def _draw_bins(axes: Axes, below: Axes, table: Array, style: SeriesStyle) -> None:
-    look = style._asdict()
-    axes.plot(table[:, 0], table[:, 1], linewidth=1.1, markersize=4, **look)
-    share = 100 * table[:, 2] / max(table[:, 2].sum(), 1)
-    below.plot(table[:, 0], share, linewidth=0.9, markersize=3, **look)
 
 
 def _draw_curve(axes: Axes, curve: PlottedCurve, style: SeriesStyle, *, dots: bool = True) -> None:
@@ -164,22 +173,3 @@ def _set_ticks(axes: Axes, curves: Iterable[PlottedCurve], log: bool) -> None:
         axes.xaxis.set_minor_locator(NullLocator())
     elif log:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-
-
-def _prepare_alarm_axes(axes: Axes, floor: float, bar: float | None) -> None:
-    """Set a logarithmic x axis whose left end, `floor`, reads 0."""
-    axes.set_xscale("log")
-    axes.grid(color=FAINT, linewidth=0.5)
-    if bar is not None:
-        axes.axvline(bar, color=GREY, linewidth=0.9, linestyle=":")
-    axes.xaxis.set_major_formatter(
-        FuncFormatter(lambda rate, _: "0" if rate <= floor * 1.01 else f"{rate:g}")
-    )
-    axes.xaxis.set_minor_locator(NullLocator())
-
-
-def _floor(rates: Iterable[Array]) -> float:
-    """Return the x at which a rate of zero is drawn: well below the smallest rate."""
-    positive = [rate[np.isfinite(rate) & (rate > 0)] for rate in rates]
-    smallest = min((float(rate.min()) for rate in positive if len(rate)), default=1.0)
-    return float(10 ** np.floor(np.log10(smallest) - 0.3))

@@ -118,7 +118,11 @@ def palm_motion(
         carrier: (n, 3) acceleration of what carries the hand, added to all else [m/s^2].
     """
     times = np.arange(int(duration * GRID_RATE) + 1) / GRID_RATE
-    acceleration = _vibration(generator, times, vibration)
+    # (n, 3) acceleration of an arm that is never quite still, between 3 and 40 Hz.
+    rates = np.exp(generator.uniform(math.log(3.0), math.log(40.0), size=(N_VIBRATIONS, 3)))
+    phases = generator.uniform(0, 2 * math.pi, size=(N_VIBRATIONS, 3))
+    waves = np.sin(2 * math.pi * rates * times[:, None, None] + phases)
+    acceleration = np.asarray(vibration * math.sqrt(2.0 / N_VIBRATIONS) * waves.sum(axis=1))
     acceleration *= _vibration_factor(segments, times, moving_factor)[:, None]
     spin, turn = np.zeros((2, len(times), 3))
     for segment in segments:
@@ -154,14 +158,6 @@ def _acceleration(segment: Segment, elapsed: Array) -> Array:
     pace = np.where(rising, elapsed / start, (elapsed - start) / stop)
     length = np.where(rising, start, -stop)
     return segment.size * math.pi / (2 * length) * np.sin(math.pi * pace)
-
-
-def _vibration(generator: np.random.Generator, times: Array, rms: float) -> Array:
-    """(n, 3) acceleration of an arm that is never quite still, between 3 and 40 Hz."""
-    rates = np.exp(generator.uniform(math.log(3.0), math.log(40.0), size=(N_VIBRATIONS, 3)))
-    phases = generator.uniform(0, 2 * math.pi, size=(N_VIBRATIONS, 3))
-    waves = np.sin(2 * math.pi * rates * times[:, None, None] + phases)
-    return np.asarray(rms * math.sqrt(2.0 / N_VIBRATIONS) * waves.sum(axis=1))
 
 
 def _vibration_factor(segments: list[Segment], times: Array, moving_factor: float) -> Array:

@@ -240,7 +240,23 @@ class Scenario(OperatorForce):
         over = slid >= event.until or since >= event.start + event.duration
         if over and self._ended_at == math.inf:
             self._ended_at = since
-        self._change_grip(event, since)
+        elapsed = since - event.start
+        if event.kind == "regrip":
+            share = min(elapsed / event.duration, 1.0)
+            self.grip_scale = self._base_grip * (1 + event.size * share)
+            if share == 1.0:
+                self._base_grip = self.grip_scale
+        elif event.kind == "loosen":
+            end = min(since, self._ended_at) - event.start
+            low = max(1.0 - event.rate * end, -0.1)
+            back = min(max(since - self._ended_at, 0.0) / RECOVERY_TIME, 1.0)
+            self.grip_scale = self._base_grip * (low + (1.1 - low) * back)
+            if back == 1.0:
+                self._base_grip = self.grip_scale
+        elif event.kind == "slippery":
+            fallen = min(elapsed / event.rate, 1.0)
+            back = min(max(since - self._ended_at, 0.0) / RECOVERY_TIME, 1.0)
+            self.friction_scale = 1.0 - (1.0 - event.size) * fallen * (1.0 - back)
         self.acting = event.kind in OPERATOR_KINDS and (
             event.kind != "weight" or since < event.start + event.duration
         )
@@ -262,25 +278,6 @@ class Scenario(OperatorForce):
             self._ended_at = math.inf
             self._origin[:] = body[:12]
 
-    def _change_grip(self, event: Event, since: float) -> None:
-        elapsed = since - event.start
-        if event.kind == "regrip":
-            share = min(elapsed / event.duration, 1.0)
-            self.grip_scale = self._base_grip * (1 + event.size * share)
-            if share == 1.0:
-                self._base_grip = self.grip_scale
-        elif event.kind == "loosen":
-            end = min(since, self._ended_at) - event.start
-            low = max(1.0 - event.rate * end, -0.1)
-            back = min(max(since - self._ended_at, 0.0) / RECOVERY_TIME, 1.0)
-            self.grip_scale = self._base_grip * (low + (1.1 - low) * back)
-            if back == 1.0:
-                self._base_grip = self.grip_scale
-        elif event.kind == "slippery":
-            fallen = min(elapsed / event.rate, 1.0)
-            back = min(max(since - self._ended_at, 0.0) / RECOVERY_TIME, 1.0)
-            self.friction_scale = 1.0 - (1.0 - event.size) * fallen * (1.0 - back)
-
     def fill(self, body: Array, out: Array, ahead: float) -> None:
         """Fill the operator's force and torque: see `OperatorForce`."""
         out[:] = 0.0
@@ -296,7 +293,18 @@ class Scenario(OperatorForce):
                     event.push.duration, self._tremors[1], self._tremor, elapsed,
                 )  # fmt: skip
         elif event.kind in ("drag", "spin"):
-            out += self._dragged(event, body, elapsed)
+            # Force of a hand that grips the object and takes it along at a steady speed.
+            closed = min(elapsed, event.duration - elapsed) / HAND_TIME
+            gain = min(max(closed, 0.0), 1.0) * event.size / HOLD_STIFFNESS
+            way = event.rate * min(max(elapsed - HAND_TIME, 0.0), event.duration - 2 * HAND_TIME)
+            anchor = self._origin.copy()
+            if event.kind == "drag":
+                anchor[:3] += way * event.direction
+            else:
+                turn = Rotation.from_rotvec(way * event.direction).as_matrix()
+                anchor[3:12] = (turn @ anchor[3:12].reshape(3, 3)).ravel()
+            held = hold_wrench(body, anchor, gain, 0.0, self._tremors[1], self._tremor, elapsed)
+            out += np.array(held)
         elif event.kind == "weight":
             share = min(elapsed / (event.duration - WEIGHT_SETTLE_TIME), 1.0)
             self._weight = event.size * self.spare * share * self._down
@@ -308,20 +316,6 @@ class Scenario(OperatorForce):
             else:
                 out[:3] += force * event.direction
                 out[3:] += force * np.cross(event.arm, event.direction)
-
-    def _dragged(self, event: Event, body: Array, elapsed: float) -> Array:
-        """Force of a hand that grips the object and takes it along at a steady speed."""
-        closed = min(elapsed, event.duration - elapsed) / HAND_TIME
-        gain = min(max(closed, 0.0), 1.0) * event.size / HOLD_STIFFNESS
-        way = event.rate * min(max(elapsed - HAND_TIME, 0.0), event.duration - 2 * HAND_TIME)
-        anchor = self._origin.copy()
-        if event.kind == "drag":
-            anchor[:3] += way * event.direction
-        else:
-            turn = Rotation.from_rotvec(way * event.direction).as_matrix()
-            anchor[3:12] = (turn @ anchor[3:12].reshape(3, 3)).ravel()
-        held = hold_wrench(body, anchor, gain, 0.0, self._tremors[1], self._tremor, elapsed)
-        return np.array(held)
 
     _down = np.array([0.0, 0.0, -1.0])
 

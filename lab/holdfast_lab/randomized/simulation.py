@@ -210,8 +210,12 @@ class _Run:
             if self.protocol.locked_at is not None:
                 since = time - self.protocol.locked_at
                 if touch_depths is None:
-                    touch_depths = self._touch_depths(command)
-                    self.scenario.spare = self._spare()
+                    # Depths at which each drive, alone, would just hold its load: where the grip
+                    # begins.
+                    touch_depths = command.depths + self.world.loads / self.world.drives.stiffness
+                    item = self.world.item
+                    limit = float(item.mu_static * self.world.loads.sum())
+                    self.scenario.spare = max(limit - 9.81 * item.mass, 0.0)
                 holding = self.protocol.lost_at is None and command.phase is not Phase.RELEASED
                 if holding and since < self.plan.profile.hold:
                     self.scenario.step(since, self.world.slip, body[15:18], body, self.period)
@@ -232,15 +236,6 @@ class _Run:
         self.world.scale_friction(self.scenario.friction_scale)
         self.holder.command(command, self.protocol.anchor, since, self.world.time)
         self.world.advance(travels, self.holder, self.palm, since)
-
-    def _touch_depths(self, command: Command) -> Array:
-        """Depths at which each drive, alone, would just hold its load: where the grip begins."""
-        return command.depths + self.world.loads / self.world.drives.stiffness
-
-    def _spare(self) -> float:
-        item = self.world.item
-        limit = float(item.mu_static * self.world.loads.sum())
-        return max(limit - 9.81 * item.mass, 0.0)
 
     def _log(self, command: Command) -> None:
         world = self.world

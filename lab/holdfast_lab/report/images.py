@@ -70,18 +70,15 @@ def inline_image(figure: Figure, name: str) -> InlineImage:
         figure: to draw.
         name: begins every id of the SVG, so that ids of two figures differ.
     """
-    view_box, svg = _svg_contents(svg_of(figure, name), name)
-    if len(svg) <= MAX_INLINE_SVG:
-        return InlineImage(view_box, svg, "")
-    return InlineImage.of(png_of(figure), "png")
-
-
-def _svg_contents(document: str, name: str) -> tuple[str, str]:
-    """Return the viewBox and the contents of an SVG document, without metadata."""
+    # The viewBox and the contents of an SVG document, without metadata.
+    document = svg_of(figure, name)
     opening = _OPENING.search(document)
     if opening is None:
         raise ValueError(f"figure {name}: an SVG with a viewBox expected, none given")
     inner = _NOT_NEEDED.sub("", document[opening.end() :]).replace("xlink:href", "href")
     inner = re.sub(r"\n\s*", "\n", inner)
     inner = _PATH.sub(lambda path: _EXTRA_DIGITS.sub("", path[0]), inner)
-    return opening[1], _REFERENCE.sub(f"{name}-", _ID.sub(f"{name}-", inner))
+    view_box, svg = opening[1], _REFERENCE.sub(f"{name}-", _ID.sub(f"{name}-", inner))
+    if len(svg) <= MAX_INLINE_SVG:
+        return InlineImage(view_box, svg, "")
+    return InlineImage.of(png_of(figure), "png")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from holdfast_lab.report.environment import fact_texts
-from holdfast_lab.study.plan import Corpus, StudyPlan
+from holdfast_lab.study.plan import StudyPlan
 
 ROLES = {
     "main": "used for training",
@@ -26,7 +26,18 @@ ROLES = {
 def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:
     """Return a description of each corpus of a plan, by its role."""
     corpora = plan.corpora | ({"real": plan.real} if plan.real is not None else {})
-    return {role: _describe(corpus) for role, corpus in corpora.items()}
+    return {
+        role: {
+            "name": Path(corpus.folder).name,
+            "digest": corpus.digest,
+            "recordings": len(corpus.recordings),
+            "samples": corpus.n_samples,
+            "fingers": list(corpus.fingers),
+            "rate": corpus.rate,
+            "tare": corpus.tare,
+        }
+        for role, corpus in corpora.items()
+    }
 
 
 def report_facts(summary: Mapping[str, Any]) -> dict[str, object]:
@@ -53,18 +64,6 @@ def run_notes(summary: Mapping[str, Any]) -> list[str]:
         "earlier run are not counted in the time."
     )
     return [*notes, *(f"Left out: {sentence}" for sentence in summary["left_out"])]
-
-
-def _describe(corpus: Corpus) -> dict[str, Any]:
-    return {
-        "name": Path(corpus.folder).name,
-        "digest": corpus.digest,
-        "recordings": len(corpus.recordings),
-        "samples": corpus.n_samples,
-        "fingers": list(corpus.fingers),
-        "rate": corpus.rate,
-        "tare": corpus.tare,
-    }
 
 
 def _corpus_text(corpus: Mapping[str, Any]) -> str:

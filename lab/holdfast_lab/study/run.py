@@ -110,7 +110,17 @@ def run_study(
         for name, part in PARTS.items()
     }
     seconds = {"data": made_in, "study": time.perf_counter() - start}
-    summary = _summary(plan, seconds, len(tasks), [*left_out, *whole_hand_note(plan)])
+    # The contents of `study.json`, except the tables.
+    summary = {
+        "seed": plan.seed,
+        "quick": plan.quick,
+        "data": environment.data(plan),
+        "versions": versions(),
+        "machine": machine(),
+        "seconds": {name: round(value, 1) for name, value in seconds.items()},
+        "tasks": len(tasks),
+        "left_out": [*left_out, *whole_hand_note(plan)],
+    }
     sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
     tables = [table for section in sections for table in section.tables]
     document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
@@ -129,19 +139,3 @@ def whole_hand_note(plan: StudyPlan) -> list[str]:
         return []
     titles = ", ".join(method.title for method in METHODS.values() if method.whole_hand)
     return [f"{titles}, because only the {plan.main.fingers[0]} has labels of both classes."]
-
-
-def _summary(
-    plan: StudyPlan, seconds: Mapping[str, float], n_tasks: int, left_out: Sequence[str]
-) -> dict[str, Any]:
-    """Return the contents of `study.json`, except the tables."""
-    return {
-        "seed": plan.seed,
-        "quick": plan.quick,
-        "data": environment.data(plan),
-        "versions": versions(),
-        "machine": machine(),
-        "seconds": {name: round(value, 1) for name, value in seconds.items()},
-        "tasks": n_tasks,
-        "left_out": list(left_out),
-    }

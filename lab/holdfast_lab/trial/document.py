@@ -36,6 +36,7 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
         results: by law, in the order of the trials.
         example: number of the trial of the film; None if there is none.
     """
+    # A result for JSON, null for what is infinite or unknown.
     return {
         "laws": _summaries(results),
         "unseen_objects": _summaries(results, _of("unseen", True)),
@@ -49,7 +50,11 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
         },
         "example": None if example is None else _example(results, example),
         "infeasible": infeasible_of(results),
-        "trials": [_plain(one) for each in results.values() for one in each],
+        "trials": [
+            msgspec.json.decode(msgspec.json.encode(one))
+            for each in results.values()
+            for one in each
+        ],
         "n_trials": plan.n,
         "model": plan.model if plan.model.startswith("builtin:") else Path(plan.model).name,
         "model_digest": plan.model_digest,
@@ -116,8 +121,3 @@ def _example(results: TrialResults, number: int) -> dict[str, Any]:
         "number": number, "object": one.object, "kind": one.kind, "n_fingers": one.n_fingers,
         "lost_by": BASELINE_LAW, "held_by": OWN_LAW,
     }  # fmt: skip
-
-
-def _plain(result: TrialResult) -> object:
-    """Return a result for JSON, null for what is infinite or unknown."""
-    return msgspec.json.decode(msgspec.json.encode(result))

@@ -14,7 +14,6 @@ from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import (
     BASELINE_LAW,
     OWN_LAW,
-    TrialResults,
     document_of,
     example_of,
     trials_csv,
@@ -60,7 +59,13 @@ def run_trials(
     check_output_folder(out, COMPARISON, force=force)
     start = time.perf_counter()
     runner = TaskRunner(Path(out), engine, progress, notify)
-    results = _results(plan, runner)
+    # The results of all trials, by law and in the order of the trials.
+    tasks = {law: [plan.trial_task(number, law) for number in range(plan.n)] for law in plan.laws}
+    by_number = (task for same in zip(*tasks.values(), strict=True) for task in same)
+    done = runner.run(list(by_number))
+    results = {
+        law: [done[task.name] for task in tasks_of_law] for law, tasks_of_law in tasks.items()
+    }
     number = example_of(results)
     example = None if number is None else _example(plan, number, runner)
     seconds = {"trials": round(time.perf_counter() - start, 1)}
@@ -69,25 +74,23 @@ def run_trials(
     document |= {"versions": versions(), "machine": machine(), "seconds": seconds}
     sections = report_sections(document, results, example)
     others = {"trials.csv": trials_csv(results).encode()}
+    # The head of the report.
     write_report(
         out,
         COMPARISON,
         TRIAL_TITLE,
-        _facts(document),
+        {
+            "trials": f"{document['n_trials']} with each of {len(document['laws'])} laws",
+            "plant": document["plant"]["name"],
+            "model": f"{document['model']}, digest {document['model_digest'][:12]}",
+            **fact_texts(document),
+        },
         sections,
         document,
         others=others,
         force=force,
     )
     return document
-
-
-def _results(plan: TrialPlan, runner: TaskRunner) -> TrialResults:
-    """Return the results of all trials, by law and in the order of the trials."""
-    tasks = {law: [plan.trial_task(number, law) for number in range(plan.n)] for law in plan.laws}
-    by_number = (task for same in zip(*tasks.values(), strict=True) for task in same)
-    done = runner.run(list(by_number))
-    return {law: [done[task.name] for task in tasks_of_law] for law, tasks_of_law in tasks.items()}
 
 
 def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
@@ -114,13 +117,3 @@ def _describe(plan: TrialPlan, number: int, courses: Mapping[str, TrialCourse]) 
         f"Trial {number}: {trial.grasp.object}, {trial.n_fingers} fingers, load "
         f"{trial.load.kind.value}{when}."
     )
-
-
-def _facts(document: Mapping[str, Any]) -> dict[str, object]:
-    """Return the head of the report."""
-    return {
-        "trials": f"{document['n_trials']} with each of {len(document['laws'])} laws",
-        "plant": document["plant"]["name"],
-        "model": f"{document['model']}, digest {document['model_digest'][:12]}",
-        **fact_texts(document),
-    }

@@ -120,7 +120,21 @@ def draw_courses(courses: Mapping[str, TrialCourse]) -> Figure:
     upper, lower = grid[: len(courses)], grid[len(courses) :]
     for index, (title, course) in enumerate(courses.items()):
         add_title(upper[index], title)
-        _draw_force(upper[index], course)
+        axes = upper[index]
+        axes.grid(color=FAINT, linewidth=0.5)
+        axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
+        axes.plot(
+            course.times, course.force, color=COLOURS[0], linewidth=1.1, label="force of the hand"
+        )
+        axes.plot(
+            course.times,
+            course.least,
+            color=INK,
+            linewidth=0.9,
+            linestyle="--",
+            label="least force",
+        )
+        _mark_loss(axes, course)
         _draw_slip(lower[index], course)
     for row in (upper, lower):
         _share_limits(row)
@@ -164,18 +178,6 @@ def _draw_cross(axes: Axes, values: TradeOff, style: SeriesStyle) -> None:
     if y.low is not None and y.high is not None:
         axes.vlines(x.value, y.low, y.high, color=style.color, linewidth=1.1)
     axes.plot(x.value, y.value, color=style.color, marker=style.marker, markersize=5, linestyle="")
-
-
-def _draw_force(axes: Axes, course: TrialCourse) -> None:
-    axes.grid(color=FAINT, linewidth=0.5)
-    axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
-    axes.plot(
-        course.times, course.force, color=COLOURS[0], linewidth=1.1, label="force of the hand"
-    )
-    axes.plot(
-        course.times, course.least, color=INK, linewidth=0.9, linestyle="--", label="least force"
-    )
-    _mark_loss(axes, course)
 
 
 def _draw_slip(axes: Axes, course: TrialCourse) -> None:

@@ -63,7 +63,15 @@ class TrialPlan:
             raise ValueError(f"at least 1 trial expected, {self.n} given")
         if self.seed < 0:
             raise ValueError(f"a seed of at least 0 expected, {self.seed} given")
-        _check_model(Model.load(self.model))
+        # Check that a model has all fingers of the twin, and can be used live.
+        model = Model.load(self.model)
+        lacking = [finger for finger in FINGERS if not {finger, "*"} & set(model.fingers)]
+        if lacking:
+            raise ModelError(
+                f"the trials need {', '.join(FINGERS)}; the model has no {', '.join(lacking)}, "
+                f"only {', '.join(model.fingers)}"
+            )
+        Detector(model, dict.fromkeys(FINGERS, sensor("uskin-curved")))
 
     @property
     def model_digest(self) -> str:
@@ -134,17 +142,6 @@ def film_of(
 def _check_digest(model: str, digest: str) -> None:
     if Model.load(model).digest != digest:
         raise ModelError(f"the model {model} has another content here: copy it to every worker")
-
-
-def _check_model(model: Model) -> None:
-    """Check that a model has all fingers of the twin, and can be used live."""
-    lacking = [finger for finger in FINGERS if not {finger, "*"} & set(model.fingers)]
-    if lacking:
-        raise ModelError(
-            f"the trials need {', '.join(FINGERS)}; the model has no {', '.join(lacking)}, "
-            f"only {', '.join(model.fingers)}"
-        )
-    Detector(model, dict.fromkeys(FINGERS, sensor("uskin-curved")))
 
 
 @cache

@@ -268,22 +268,22 @@ class _TrialLog:
         if began or is_loaded:
             self._slid += np.where(speeds > SLIP_SPEED, speeds, 0.0) / RATE
         if began and not is_loaded:
-            self._add_quiet(held_for, command, slides=bool(speeds.max() > SLIP_SPEED))
+            # Count rises before the load, and the time in which one would be false.
+            slides = bool(speeds.max() > SLIP_SPEED)
+            if slides:
+                self._slid_at = held_for
+            quiet = (
+                held_for - self._slid_at > SLIP_MEMORY and held_for - self._began_at > START_TIME
+            )
+            self._quiet_time += quiet / RATE
+            if command.state is LoopState.REACT and not self._was_rising:
+                self._n_false += quiet
         self._was_rising = command.state is LoopState.REACT
         self._at_limit = bool((scales >= LIMIT_SHARE * self._highest_scale).any())
         least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
         force = float(tips[:, TIP_LOAD].sum())
         self._samples.append(_Sample(held_for, force, *least, float(speeds.max())))
         self._scales.append(scales)
-
-    def _add_quiet(self, held_for: float, command: GripCommand, *, slides: bool) -> None:
-        """Count rises before the load, and the time in which one would be false."""
-        if slides:
-            self._slid_at = held_for
-        quiet = held_for - self._slid_at > SLIP_MEMORY and held_for - self._began_at > START_TIME
-        self._quiet_time += quiet / RATE
-        if command.state is LoopState.REACT and not self._was_rising:
-            self._n_false += quiet
 
     def result(self, law: str, *, lost: bool) -> TrialResult:
         """Return the result of the trial."""

@@ -59,19 +59,13 @@ def bench(
     if as_json:
         print_json(report)
         return
-    _print_batch(report["batch"])
-    _print_update(report["hand_update"])
-
-
-def _print_batch(batch: dict[str, Any]) -> None:
+    batch = report["batch"]
     print_line(f"batch features of {batch['n_samples']:,} samples, window {batch['window']}")
     print_line(f"  {1e9 * batch['seconds_per_sample']:.1f} ns a sample")
     print_line(f"  {batch['ratio_to_copy']:.2f} times as long as copying the same bytes")
     for peer in ("pywt", "scipy", "tsflex"):
         print_line(_speedup(peer, batch[f"speedup_over_{peer}"]))
-
-
-def _print_update(update: dict[str, Any]) -> None:
+    update = report["hand_update"]
     print_line()
     print_line(f"update of a hand, {update['n_fingers']} fingers of {update['n_taxels']} taxels")
     print_line("  " + ", ".join(f"{p} {1e6 * update[p]:.1f} us" for p in ("p50", "p99", "p999")))
@@ -146,7 +140,9 @@ def batch(n_samples: int) -> dict[str, Any]:
 def hand_update(n_updates: int) -> dict[str, Any]:
     """Measure the time from a sample of a hand to its estimate [s]."""
     detector = Detector(_create_model())
-    samples = _random_samples(1024)
+    generator = np.random.default_rng(0)
+    readings = generator.integers(32000, 34000, size=(1024, len(FINGERS), 30, 3)).astype(np.uint16)
+    samples = [dict(zip(FINGERS, hand, strict=True)) for hand in readings]
     for k in range(200):
         detector.update(samples[k], k / 150)
     nanoseconds = np.empty(n_updates, dtype=np.int64)
@@ -253,12 +249,6 @@ def _create_model() -> Model:
     tip = sensor("uskin-curved")
     finger = FingerModel(heads=(head,), sensor=tip.name, contact_threshold=20.0)
     return Model(fingers=dict.fromkeys(FINGERS, finger), sensors={tip.name: tip}, rate=150.0)
-
-
-def _random_samples(n: int) -> list[dict[str, Any]]:
-    generator = np.random.default_rng(0)
-    readings = generator.integers(32000, 34000, size=(n, len(FINGERS), 30, 3)).astype(np.uint16)
-    return [dict(zip(FINGERS, hand, strict=True)) for hand in readings]
 
 
 def _peer_updates(samples: list[dict[str, Any]]) -> float:

@@ -101,8 +101,9 @@ def _text(row: "Row | None", digits: int) -> str:
 
 
 def _simulate(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
-    from holdfast.cli.simulate import GraspOptions, plan_grasps, simulate_grasps
+    from holdfast.cli.simulate import GraspOptions
     from holdfast.twin.objects import OTHER_OBJECTS
+    from holdfast.twin_recordings import plan_grasps, simulate_grasps
     from holdfast_lab.study.benchmark.protocol import MEASURED_ALL
     from holdfast_lab.verbs.randomized import HandOptions, RandomizedHands
 
@@ -114,4 +115,6 @@ def _simulate(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
         return
     table = OTHER_OBJECTS if split.other_objects else None
     planned = plan_grasps("", "1,2", split.repeats, "reference", split.seed, table=table)
-    simulate_grasps(planned, folder, engine=engine, force=False)
+    simulate_grasps(
+        planned, folder, engine=engine, force=False, notify=print_message, steps=progress
+    )

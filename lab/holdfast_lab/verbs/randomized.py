@@ -6,13 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.simulate import (
-    GraspOptions,
-    check_numbers,
-    is_recorded,
-    path_of,
-    simulate_all,
-)
+from holdfast.cli.simulate import GraspOptions
+from holdfast.cli.terminal.console import print_message
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
@@ -63,6 +59,7 @@ class RandomizedHands:
             ValueError: a number is out of range.
             OutputError: an existing recording has another seed or profile.
         """
+        from holdfast.twin_recordings import check_numbers, is_recorded, path_of, simulate_all
         from holdfast_lab.randomized.simulation import RandomHold
 
         if not options.randomize:
@@ -90,7 +87,10 @@ class RandomizedHands:
         missing = [
             hold for hold in holds if force or not is_recorded(path_of(hold.name, out), expected)
         ]
-        return simulate_all(simulate_hand, missing, len(holds), out, engine=engine, force=force)
+        return simulate_all(
+            simulate_hand, missing, len(holds), out,
+            engine=engine, force=force, notify=print_message, steps=progress,
+        )  # fmt: skip
 
 
 def mechanisms_of(text: str) -> tuple[str, ...]:
@@ -112,6 +112,7 @@ def mechanisms_of(text: str) -> tuple[str, ...]:
 def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> list[str]:
     """Simulate a randomized hand; return the name of the recording."""
     from holdfast.io import save_recording
+    from holdfast.twin_recordings import path_of
     from holdfast_lab.randomized.simulation import simulate_random
 
     save_recording(simulate_random(hold), path_of(hold.name, out), force=force)

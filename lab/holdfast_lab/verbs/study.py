@@ -18,7 +18,6 @@ from holdfast.cli.options import (
     TareOption,
     start_engine,
 )
-from holdfast.cli.simulate import plan_grasps, simulate_grasps
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 from holdfast_lab.verbs import OutOption, QuickOption
@@ -331,7 +330,9 @@ def twin_corpora(out: Path, seed: int, *, quick: bool, jobs: int, tare: str) -> 
 
 def _simulate(folder: Path, corpus: TwinCorpus, seed: int, repeats: int, jobs: int) -> None:
     from holdfast.errors import OutputError
+    from holdfast.parallel import Engine
     from holdfast.twin.objects import OTHER_OBJECTS
+    from holdfast.twin_recordings import plan_grasps, simulate_grasps
 
     table = OTHER_OBJECTS if corpus.other_objects else None
     seed += corpus.seed_offset
@@ -341,7 +342,10 @@ def _simulate(folder: Path, corpus: TwinCorpus, seed: int, repeats: int, jobs: i
     ]
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        simulate_grasps(grasps, folder, jobs=jobs, force=False)
+        simulate_grasps(
+            grasps, folder,
+            engine=Engine(jobs), force=False, notify=print_message, steps=progress,
+        )  # fmt: skip
     except OutputError as cause:
         problem, _, advice = str(cause).rpartition(": ")
         if "--force" not in advice:

@@ -223,7 +223,9 @@ def test_corpora_of_three_rates_of_glitches():
 
 def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
     given = []
-    monkeypatch.setattr(verb, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps))
+    monkeypatch.setattr(
+        "holdfast.twin_recordings.simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
+    )
     verb._simulate(tmp_path / "one", verb.TWIN_CORPORA["glitch-1"], 5, 1, 1)
     assert {grasp.glitch_rate for grasp in given} == {1 / 60}
     assert {grasp.seed for grasp in given} == {7}

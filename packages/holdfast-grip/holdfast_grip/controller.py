@@ -197,10 +197,17 @@ class GripController:
         is_new = self._is_new(estimate)
         fault, self._reported = self._reported, _NONE
         if self._clock_is_new and math.isfinite(time):
-            self._accept_clock(time)
+            # Continue at another time; that of the law goes on as if none had passed.
+            self._clock_is_new = False
+            if not math.isnan(self._time):
+                self._shift += self._time - time
+                self._time = time
         dt = time - self._time
         if self._stopped:
-            return self._in_stop(estimate, time, dt)
+            # Hold or open, and follow the contacts of the grip, if there is one.
+            if self._touches:
+                self._problem(estimate, time, dt)
+            return self._in_fault(GripReason.STOPPED, time)
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
@@ -221,13 +228,6 @@ class GripController:
         for name, finger in estimate.fingers.items():
             self._monitors[name].update(finger)
         return True
-
-    def _accept_clock(self, time: float) -> None:
-        """Continue at another time; that of the law goes on as if none had passed."""
-        self._clock_is_new = False
-        if not math.isnan(self._time):
-            self._shift += self._time - time
-            self._time = time
 
     def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
@@ -325,12 +325,6 @@ class GripController:
         self._bad_since[k] = min(self._bad_since[k], time)
         return time - self._bad_since[k] >= self.limits.fault_after
 
-    def _in_stop(self, estimate: HandEstimate, time: float, dt: float) -> GripCommand:
-        """Hold or open, and follow the contacts of the grip, if there is one."""
-        if self._touches:
-            self._problem(estimate, time, dt)
-        return self._in_fault(GripReason.STOPPED, time)
-
     def _in_fault(self, problem: GripReason, time: float) -> GripCommand:
         """Hold or open; recover after enough valid data, where that is allowed."""
         if problem is not GripReason.CLOCK:
@@ -348,7 +342,10 @@ class GripController:
             self._fault = GripReason.NONE
             self._change(LoopState.HOLD, time)
         released = self._fault is not GripReason.NONE and self.limits.on_fault == "open"
-        self._settle_commands()
+        # Keep every scale; nothing rises or falls in a fault.
+        self._commands = {
+            name: FingerCommand(command.scale) for name, command in self._commands.items()
+        }
         return GripCommand(time, self.state, dict(self._commands), released, self._fault)
 
     def _control(self, time: float, dt: float) -> GripCommand:
@@ -393,12 +390,6 @@ class GripController:
             self._events.append(event)
         touch.scale = scale
         self._commands[touch.finger] = FingerCommand(scale, reason)
-
-    def _settle_commands(self) -> None:
-        """Keep every scale; nothing rises or falls in a fault."""
-        self._commands = {
-            name: FingerCommand(command.scale) for name, command in self._commands.items()
-        }
 
     def _change(self, state: LoopState, time: float, reason: GripReason = GripReason.NONE) -> None:
         self.state = state

@@ -80,7 +80,11 @@ class CommandGuard:
         """Return a command that is not sent, or the safe command in its place."""
         self.violation = self.violation or self._violation(command)
         if self.stopped or self.violation:
-            command = self._safe(command)
+            names: Mapping[str, object] = self._scales or command.fingers
+            fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
+            release = self.limits.on_fault == "open"
+            reason = GripReason.STOPPED if self.stopped else GripReason.LIMIT
+            command = GripCommand(command.time, LoopState.FAULT, fingers, release, reason)
         self._scales = {name: one.scale for name, one in command.fingers.items()}
         if math.isfinite(command.time):
             self._checked_at = max(self._checked_at, command.time)
@@ -105,13 +109,6 @@ class CommandGuard:
                     f"{name}: a rise of {rise:g} in {elapsed:g} s given, {limits.rise:g}/s at most"
                 )
         return ""
-
-    def _safe(self, command: GripCommand) -> GripCommand:
-        names: Mapping[str, object] = self._scales or command.fingers
-        fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
-        release = self.limits.on_fault == "open"
-        reason = GripReason.STOPPED if self.stopped else GripReason.LIMIT
-        return GripCommand(command.time, LoopState.FAULT, fingers, release, reason)
 
 
 def safe_command(last: GripCommand, reason: GripReason, *, release: bool) -> GripCommand:

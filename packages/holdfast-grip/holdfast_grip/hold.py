@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -34,10 +33,9 @@ if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.live.recorder import Recorder
     from holdfast.live.session import Session
-    from holdfast.live.stream_detector import StreamDetector, StreamUpdate
+    from holdfast.live.stream_detector import StreamUpdate
     from holdfast_grip import GripCommand
     from holdfast_grip.loop.grip_loop import GripLoop
-    from holdfast_grip.loop.runner import LoopRunner
 
 
 def hold(
@@ -157,7 +155,14 @@ def _run(
         return stop.requested or time.monotonic() >= end
 
     if not source.paced:
-        _run_directly(runner, session.stream, log, is_over)
+        # Read the source and step the loop in turn, so that the same seed gives the same
+        # commands.
+        stream = session.stream
+        while not (is_over() or stream.source.ended):
+            update = stream.read()
+            log.update(update, wait=True)
+            runner.process(update)
+        runner.process(stream.finish())
         return
     # Reads of the source may block for longer than the loop may wait.
     session.add_listener(log.update)
@@ -166,17 +171,6 @@ def _run(
     runner.run(lambda: session.ended or is_over())
     if session.failure is not None:
         raise session.failure
-
-
-def _run_directly(
-    runner: "LoopRunner", stream: "StreamDetector", log: _Log, is_over: Callable[[], bool]
-) -> None:
-    """Read the source and step the loop in turn, so that the same seed gives the same commands."""
-    while not (is_over() or stream.source.ended):
-        update = stream.read()
-        log.update(update, wait=True)
-        runner.process(update)
-    runner.process(stream.finish())
 
 
 def _report(loop: "GripLoop", settings: GripSettings) -> None:

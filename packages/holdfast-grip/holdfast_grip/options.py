@@ -187,21 +187,7 @@ def open_loop(
 
     limits = settings.limits()
     hand.check(limits, stream.fingers)
-    _check_fingers(hand, stream)
-    controller = GripController(
-        limits, settings.law, sensors=stream.fingers, newtons_per_unit=settings.newtons
-    )
-    loop = GripLoop(controller, hand, armed=settings.armed, watchdog=watchdog, log=log)
-    with ExitStack() as stack:
-        if watchdog is not None:
-            stack.push(watchdog)  # it runs already
-        yield stack.enter_context(loop)
-    if hand.n_refused:
-        print_message(f"{hand.n_refused} joint states of {hand.name} were refused")
-
-
-def _check_fingers(hand: "HandDevice", stream: "StreamDetector") -> None:
-    """Check that the fingers of the hand which the source has also have estimates."""
+    # Check that the fingers of the hand which the source has also have estimates.
     missing = [
         finger
         for finger in hand.fingers or ()
@@ -213,3 +199,13 @@ def _check_fingers(hand: "HandDevice", stream: "StreamDetector") -> None:
             f"estimates; it gives those of {', '.join(stream.fingers)}: use builtin:any, or "
             "train a model of all fingers"
         )
+    controller = GripController(
+        limits, settings.law, sensors=stream.fingers, newtons_per_unit=settings.newtons
+    )
+    loop = GripLoop(controller, hand, armed=settings.armed, watchdog=watchdog, log=log)
+    with ExitStack() as stack:
+        if watchdog is not None:
+            stack.push(watchdog)  # it runs already
+        yield stack.enter_context(loop)
+    if hand.n_refused:
+        print_message(f"{hand.n_refused} joint states of {hand.name} were refused")

@@ -207,19 +207,21 @@ class RosPublisher(Openable):
                     return
                 item = self._queue.popleft() if self._queue else None
             try:
-                self._publish_item(item)
+                if item is not None:
+                    estimate, fingers, stamp = item
+                    self._newest = estimate, stamp
+                    self._publish_estimate(estimate, fingers, stamp)
+                grip = None if self._grip is None else self._grip.document()
+                if grip is not None:
+                    self._publish_text(f"{self._namespace}/grip/state", grip.state)
+                    self._publish_text(f"{self._namespace}/grip/reason", grip.reason)
+                    for finger, command in grip.fingers.items():
+                        if finger in self._names:
+                            scale = number_message(command.scale)
+                            self._publish(f"{self._names[finger]}/force_scale", scale)
+                self._update_diagnostics(grip)
             except Exception:  # of any kind; the next estimate may succeed
                 self.n_failed += 1
-
-    def _publish_item(self, item: tuple[HandEstimate, tuple[str, ...], float] | None) -> None:
-        if item is not None:
-            estimate, fingers, stamp = item
-            self._newest = estimate, stamp
-            self._publish_estimate(estimate, fingers, stamp)
-        grip = None if self._grip is None else self._grip.document()
-        if grip is not None:
-            self._publish_grip(grip)
-        self._update_diagnostics(grip)
 
     def _publish_estimate(
         self, estimate: HandEstimate, fingers: Iterable[str], stamp: float
@@ -238,14 +240,6 @@ class RosPublisher(Openable):
             self._publish(f"{topic}/force", message)
         self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 
-    def _publish_grip(self, grip: "GripDocument") -> None:
-        self._publish_text(f"{self._namespace}/grip/state", grip.state)
-        self._publish_text(f"{self._namespace}/grip/reason", grip.reason)
-        for finger, command in grip.fingers.items():
-            if finger in self._names:
-                scale = number_message(command.scale)
-                self._publish(f"{self._names[finger]}/force_scale", scale)
-
     def _update_diagnostics(self, grip: "GripDocument | None") -> None:
         """Publish the diagnostics if they are due or have changed."""
         now = time.time()
@@ -257,7 +251,16 @@ class RosPublisher(Openable):
             return
         self._levels = levels
         self._diagnostics_due = time.monotonic() + DIAGNOSTICS_PERIOD
-        messages = [_status_message(status) for status in statuses]
+        messages = [
+            {
+                "level": status.level,
+                "name": f"holdfast: {status.name}",
+                "message": status.message,
+                "hardware_id": "holdfast",
+                "values": [{"key": key, "value": value} for key, value in status.values],
+            }
+            for status in statuses
+        ]
         self._publish("/diagnostics", {"header": header(now), "status": messages})
 
 
@@ -364,16 +367,6 @@ def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:
     return DiagnosticStatus(
         name, level, faults or (str(finger.reason) if is_lost else "well"), values
     )
-
-
-def _status_message(status: DiagnosticStatus) -> dict[str, Any]:
-    return {
-        "level": status.level,
-        "name": f"holdfast: {status.name}",
-        "message": status.message,
-        "hardware_id": "holdfast",
-        "values": [{"key": key, "value": value} for key, value in status.values],
-    }
 
 
 def _text(value: object) -> str:

@@ -89,7 +89,11 @@ def start_node(master: str) -> ModuleType:
         os.environ["ROS_MASTER_URI"] = master  # rospy reads it as long as the process runs
         rospy.init_node("holdfast", argv=["holdfast"], anonymous=True, disable_signals=True)
         atexit.register(rospy.signal_shutdown, "the process ends")
-        _remove_console_log()
+        # Stop rospy from writing its log to stdout, which is for results; its log file stays.
+        logger = logging.getLogger("rosout")
+        for handler in logger.handlers[:]:
+            if type(handler).__name__ == "RosStreamHandler":
+                logger.removeHandler(handler)
         _master = master
         return rospy
 
@@ -231,14 +235,6 @@ def _rospy_folders() -> Iterator[str]:
 def _system_pythons() -> Sequence[str]:
     """Return the names of the Pythons of the operating system, which use these folders."""
     return [path.name for path in Path("/usr/bin").glob("python3.*")]
-
-
-def _remove_console_log() -> None:
-    """Stop rospy from writing its log to stdout, which is for results; its log file stays."""
-    logger = logging.getLogger("rosout")
-    for handler in logger.handlers[:]:
-        if type(handler).__name__ == "RosStreamHandler":
-            logger.removeHandler(handler)
 
 
 class Ros1Link(Link):

@@ -31,17 +31,16 @@ from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Sequence
 
     from holdfast.model import Model
     from holdfast.recordings import Recording
-    from holdfast.training.calibration import CalibratedModel, HandlingSummary
+    from holdfast.training.calibration import CalibratedModel
 
 PROGRESS_STEP = 3.0
 """Held time between two lines of progress [s]."""
 HANDLING_SECONDS = 60.0
 """Time for which a live source is recorded, unless `--seconds` is given [s]."""
-MAX_FINGERS_SHOWN = 5
 
 ROWS = (
     ("STABLE in the held samples [%]", "stable", 1),
@@ -101,6 +100,7 @@ def calibrate(
       holdfast calibrate builtin:any handling/ -o mine.json --false-alarms 1
     """
     from holdfast.devices.uri import is_uri
+    from holdfast.errors import TrainingError
     from holdfast.files import refuse_overwrite
     from holdfast.model import Model
     from holdfast.training.calibration import calibrate_with_report, check_normalised
@@ -119,10 +119,13 @@ def calibrate(
     else:
         recordings = start.load_dataset(data, labels=False)
     calibrated = calibrate_with_report(
-        loaded, recordings, false_alarms=false_alarms, progress=_with_progress
+        loaded, recordings, false_alarms=false_alarms, progress=lambda x: progress(x, "reading")
     )
-    if not force:
-        _check(calibrated)
+    try:
+        calibrated.check()
+    except TrainingError as refusal:  # a calibration that makes the model worse
+        if not force:
+            raise TrainingError(f"{refusal} (--force saves all the same)") from None
     calibrated.model.save(out, force=force)
     for warning in calibrated.warnings:
         print_message(warning)
@@ -130,20 +133,6 @@ def calibrate(
         print_json({"model": out, "sensors": calibrated.sensors, "warnings": calibrated.warnings})
         return
     _print(calibrated, out)
-
-
-def _with_progress(recordings: "Iterable[Recording]") -> "Iterator[Recording]":
-    return progress(recordings, "reading")
-
-
-def _check(calibrated: "CalibratedModel") -> None:
-    """Refuse a calibration that makes the model worse."""
-    from holdfast.errors import TrainingError
-
-    try:
-        calibrated.check()
-    except TrainingError as refusal:
-        raise TrainingError(f"{refusal} (--force saves all the same)") from None
 
 
 def _recorded(
@@ -179,7 +168,7 @@ def _recorded(
 
 def _print(calibrated: "CalibratedModel", out: Path) -> None:
     for summary in calibrated.sensors:
-        print_paragraph(_seen(summary))
+        print_paragraph(summary.text())
         rows = [
             (title, *(format_number(getattr(figures, field), digits) for figures in columns))
             for title, field, digits in ROWS
@@ -188,21 +177,3 @@ def _print(calibrated: "CalibratedModel", out: Path) -> None:
         print_table(("", "before", "after"), rows)
         print_line()
     print_line(f"{out}: {calibrated.model.name or 'the model'}")
-
-
-def _motion(summary: "HandlingSummary") -> str:
-    if math.isnan(summary.load_change):
-        return "how much the force changed is not known, as the hand was never seen open"
-    share = 100 * summary.load_change
-    return f"while it was held, the force changed by {share:.0f} % in half a second (median)"
-
-
-def _seen(summary: "HandlingSummary") -> str:
-    """Return what was seen of a sensor, as a text."""
-    held = [f"{name} {seconds:.0f} s" for name, seconds in summary.fingers.items()]
-    more = ", ..." if len(held) > MAX_FINGERS_SHOWN else ""
-    return (
-        f"{summary.sensor}: held {summary.seconds:.0f} s ({', '.join(held[:MAX_FINGERS_SHOWN])}"
-        f"{more}); {_motion(summary)}. {summary.n_changed} of {summary.n_features} features differ "
-        "from those of the default."
-    )

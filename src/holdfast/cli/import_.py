@@ -21,7 +21,6 @@ from holdfast.cli.options import (
     ForceOption,
     JobsOption,
     JsonOption,
-    check_shared,
     start_engine,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
@@ -265,7 +264,7 @@ def _collect(
                 print_message(text)
         printed |= messages.keys()
         for recording in recordings:
-            check_shared(folder / recording.file_name, engine)
+            engine.check_written(folder / recording.file_name)
             _check_new(recording.document["name"], recording.file_name in names)
             names.add(recording.file_name)
             yield recording

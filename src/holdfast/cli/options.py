@@ -347,21 +347,6 @@ def start_engine(engine: str, jobs: int) -> "Engine":
     return started
 
 
-def check_shared(path: Path, engine: "Engine") -> None:
-    """Check that a file that an engine has written is there.
-
-    Raises:
-        OutputError: a worker of a cluster wrote it to a disk of its own.
-    """
-    from holdfast.errors import OutputError
-
-    if engine.scheduler is not None and not path.exists():
-        raise OutputError(
-            f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
-            "that all machines have at the same path"
-        )
-
-
 def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, object]) -> None:
     """Print the fingers of the model that a source or recording lacks."""
     missing = [finger for finger in model.fingers if finger not in ("*", *modules)]

@@ -77,56 +77,19 @@ def record(
       holdfast record twin:?object=can can.mcap --seconds 10
       (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
+    from holdfast.devices.sources import open_source
+
     check_seconds(seconds)
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
     path = _output_path(source, out, object_name, force=force)
-    recorder = capture(
-        source, path, metadata, seconds=seconds, speed=speed, fingers_only=fingers_only,
-        force=force, fsync=fsync,
-    )  # fmt: skip
-    _print_result(recorder.path, recorder.status, as_json)
-
-
-def capture(
-    source: str,
-    path: Path,
-    metadata: dict[str, Any] | None = None,
-    *,
-    seconds: float | None,
-    speed: float,
-    fingers_only: bool = False,
-    force: bool = False,
-    fsync: bool = False,
-) -> "Recorder":
-    """Record a source to a file, until `seconds` are over or a person stops it.
-
-    Args:
-        source: URI of a source, or path of a recording.
-        path: of the file.
-        metadata: of the recording.
-        seconds: time to record [s]; None for any.
-        speed: of a recording or the twin.
-        fingers_only: leave out pads and palm.
-        force: replace an existing file.
-        fsync: wait for the disk.
-
-    Returns:
-        The recorder, which is closed.
-
-    Raises:
-        SourceError: the source cannot be opened, or no samples arrived.
-        OutputError: the file cannot be written.
-    """
-    from holdfast.devices.sources import open_source
-
     with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
         stop.graceful = True
         recorder = _create_recorder(
-            opened, path, metadata or {}, fingers_only=fingers_only, force=force, fsync=fsync
+            opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
         )
         _record(opened, recorder, stop, _read(opened, seconds, speed))
-    return recorder
+    _print_result(recorder.path, recorder.status, as_json)
 
 
 def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Arrival | None]":
@@ -171,28 +134,31 @@ def _record(
                 if stop.requested or keys.stop_pressed or recorder.failed:
                     break
     except OutputError as failure:
-        kept = not _remove_empty(recorder) and recorder.path.exists()
+        if not recorder.status.n_samples:
+            recorder.path.unlink(missing_ok=True)
+        kept = recorder.path.exists()
         hint = f"; see the recorded part with: holdfast info {recorder.path}" if kept else ""
         raise OutputError(f"{failure}{hint}") from failure
-    if _remove_empty(recorder):
+    if not recorder.status.n_samples:
+        recorder.path.unlink(missing_ok=True)
         raise SourceError(f"{source.name} sent no samples: nothing was recorded")
 
 
-def _remove_empty(recorder: "Recorder") -> bool:
-    """Remove the file if it has no samples; return whether it was removed."""
-    if recorder.status.n_samples:
-        return False
-    recorder.path.unlink(missing_ok=True)
-    return True
-
-
 def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Path:
-    """Return the file to write, and check that it can be written."""
-    from holdfast.files import refuse_overwrite
+    """Return the file to write, and check that it can be written.
+
+    In a folder, it is named as the source recording, or as the object or device with the time.
+    """
+    from holdfast.devices.uri import is_uri
+    from holdfast.files import file_stem, refuse_overwrite
 
     path = out
     if out.is_dir() or not out.suffix:
-        path = out / f"{_recording_name(source, object_name)}{_SUFFIX}"
+        name = file_stem(Path(source).stem)
+        if is_uri(source):
+            what = re.sub(r"[^\w.-]+", "_", object_name or source.partition(":")[0]).strip("._")
+            name = f"{file_stem(what or 'grasp')}-{time.strftime('%Y%m%d-%H%M%S')}"
+        path = out / f"{name}{_SUFFIX}"
     elif out.suffix != _SUFFIX:
         raise ValueError(
             f"{out}: NAME{_SUFFIX} expected (holdfast import converts recordings to .parquet)"
@@ -202,17 +168,6 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
     if path == out or out.exists():
         refuse_overwrite(path, force=force)
     return path
-
-
-def _recording_name(source: str, object_name: str) -> str:
-    """Return the name of the source recording, or the object or device with the time."""
-    from holdfast.devices.uri import is_uri
-    from holdfast.files import file_stem
-
-    if not is_uri(source):
-        return file_stem(Path(source).stem)
-    name = re.sub(r"[^\w.-]+", "_", object_name or source.partition(":")[0]).strip("._")
-    return f"{file_stem(name or 'grasp')}-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 def _create_recorder(
@@ -274,11 +229,15 @@ def _value(text: str) -> float | str:
 
 def _print_result(path: Path, status: "RecorderStatus", as_json: bool) -> None:
     """Print what was recorded, and the next command."""
-    if as_json:
-        print_json(_to_dict(path, status))
-        return
     from holdfast.cli.terminal.progress import format_size
 
+    if as_json:
+        mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
+        fields = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
+        counts = {field: getattr(status, field) for field in fields}
+        known = {"path": path, "seconds": status.seconds, "n_samples": status.modules}
+        print_json({**known, "rate": mean, **counts, "complete": True})
+        return
     print_line(
         f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "
         f"in {path} ({format_size(status.n_bytes)})"
@@ -289,21 +248,3 @@ def _print_result(path: Path, status: "RecorderStatus", as_json: bool) -> None:
             "or the file cannot store them"
         )
     print_message(f"next: holdfast info {path}")
-
-
-def _to_dict(path: Path, status: "RecorderStatus") -> dict[str, Any]:
-    mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
-    return {
-        "path": path,
-        "seconds": status.seconds,
-        "n_samples": status.modules,
-        "rate": mean,
-        "n_gaps": status.n_gaps,
-        "n_lost": status.n_lost,
-        "n_refused": status.n_refused,
-        "n_dropped": status.n_dropped,
-        "n_bytes": status.n_bytes,
-        "n_markers": status.n_markers,
-        "faults": status.faults,
-        "complete": True,
-    }

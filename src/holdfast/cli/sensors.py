@@ -54,19 +54,28 @@ def sensors(
       holdfast sensors fingertip.urdf --base tip_link --json
       holdfast sensors --template 3x3 --pitch 4.7 > sensor.json
     """
+    from holdfast import sensors as known
+
     if template is not None:
         if name is not None:
             raise ValueError(f"--template makes a new sensor; {name!r} given as well")
         _print_template(template, pitch, rate, unit)
         return
     if name is None:
-        _refuse_options(figure.plot, base)
-        _show_all(as_json)
+        if figure.plot is not None or base is not None:
+            raise ValueError(
+                "--plot and --base need the name of a sensor; holdfast sensors lists them"
+            )
+        _print_all(as_json)
         return
     layout = _find(name, base)
     figure.check()
     figure.save(lambda: _draw(layout))
-    _show_one(layout, as_json)
+    if isinstance(layout, known.Sensor):
+        facts = layout.to_dict() | {"n_taxels": layout.n_taxels}
+        print_json(facts) if as_json else _print_sensor(layout)
+    else:
+        print_json(_hand_facts(layout)) if as_json else _print_hand(layout)
 
 
 def find_sensor(name: str) -> "Sensor":
@@ -102,29 +111,16 @@ def _print_template(grid: str, pitch: float, rate: float, unit: str) -> None:
     if unit not in ("count", "N"):
         raise ValueError(f"--unit: count or N expected, {unit!r} given")
     made = flat_sensor(
-        f"grid-{grid.lower()}",
-        int(rows),
-        int(columns),
-        1e-3 * pitch,
-        rate=rate,
-        unit="N" if unit == "N" else "count",
-    )
-    fields = [f"{json.dumps(key)}: {_lines(value)}" for key, value in made.to_dict().items()]
+        f"grid-{grid.lower()}", int(rows), int(columns), 1e-3 * pitch,
+        rate=rate, unit="N" if unit == "N" else "count",
+    )  # fmt: skip
+    fields = []
+    for key, value in made.to_dict().items():
+        text = json.dumps(value)
+        if isinstance(value, list) and isinstance(value[0], list):
+            text = "[\n    " + ",\n    ".join(map(json.dumps, value)) + "\n  ]"
+        fields.append(f"{json.dumps(key)}: {text}")
     print_lines(("{\n  " + ",\n  ".join(fields) + "\n}").split("\n"))
-
-
-def _lines(value: object) -> str:
-    """Return JSON, with one line for each element of an array of arrays."""
-    import json
-
-    if isinstance(value, list) and isinstance(value[0], list):
-        return "[\n    " + ",\n    ".join(json.dumps(row) for row in value) + "\n  ]"
-    return json.dumps(value)
-
-
-def _refuse_options(plot: Path | None, base: str | None) -> None:
-    if plot is not None or base is not None:
-        raise ValueError("--plot and --base need the name of a sensor; holdfast sensors lists them")
 
 
 def _find(name: str, base: str | None) -> "Sensor | Hand":
@@ -150,19 +146,16 @@ def _find(name: str, base: str | None) -> "Sensor | Hand":
     )
 
 
-def _show_all(as_json: bool) -> None:
+def _print_all(as_json: bool) -> None:
     from holdfast import sensors as known
 
     all_sensors = [known.sensor(name) for name in known.built_in_sensors()]
     all_sensors += known.SENSOR_PLUGINS.load_all().values()
     all_hands = [known.hand(name) for name in known.built_in_hands()]
     if as_json:
-        print_json(
-            {
-                "sensors": [_sensor_summary(sensor) for sensor in all_sensors],
-                "hands": [_hand_summary(hand) for hand in all_hands],
-            }
-        )
+        fields = ("name", "n_taxels", "unit", "rate", "range", "normal")
+        facts = [{field: getattr(s, field) for field in fields} for s in all_sensors]
+        print_json({"sensors": facts, "hands": [_hand_facts(hand) for hand in all_hands]})
         return
     rows = [(s.name, s.n_taxels, s.unit, f"{s.rate:g} Hz") for s in all_sensors]
     print_table(("sensor", "taxels", "unit", "rate"), rows)
@@ -172,32 +165,7 @@ def _show_all(as_json: bool) -> None:
     )
 
 
-def _show_one(layout: "Sensor | Hand", as_json: bool) -> None:
-    from holdfast.sensors import Sensor
-
-    if isinstance(layout, Sensor):
-        if as_json:
-            print_json(layout.to_dict() | {"n_taxels": layout.n_taxels})
-        else:
-            _print_sensor(layout)
-    elif as_json:
-        print_json(_hand_summary(layout))
-    else:
-        _print_hand(layout)
-
-
-def _sensor_summary(sensor: "Sensor") -> dict[str, Any]:
-    return {
-        "name": sensor.name,
-        "n_taxels": sensor.n_taxels,
-        "unit": sensor.unit,
-        "rate": sensor.rate,
-        "range": sensor.range,
-        "normal": sensor.normal,
-    }
-
-
-def _hand_summary(hand: "Hand") -> dict[str, Any]:
+def _hand_facts(hand: "Hand") -> dict[str, Any]:
     modules = {
         name: {
             "sensor": module.sensor.name,

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.evaluate import print_verdict, warn_about_recordings
 from holdfast.cli.options import (
     ForceOption,
     JsonOption,
@@ -15,16 +14,19 @@ from holdfast.cli.options import (
     StartOptions,
     report_handling,
 )
-from holdfast.cli.slip_scores import print_slip_points, slips_origin
-from holdfast.cli.terminal.console import format_number, print_json, print_line, print_table
+from holdfast.cli.scores import (
+    print_points,
+    print_verdict,
+    warn_about_recordings,
+)
+from holdfast.cli.terminal.console import print_json, print_line
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from holdfast.recordings import Recording
-    from holdfast.training import CurvePoint, Tuned
 
 
 class TunedQuestion(StrEnum):
@@ -92,66 +94,17 @@ def tune(
     warn_about_recordings(evaluation, n)
     tuned.model.save(out, force=force)
     if as_json:
-        known = evaluation.trained_on
-        document = _slip_document(tuned) if tuned.chosen.slips else _document(tuned)
-        print_json({"model": out, "verdict": evaluation.verdict, **document, "trained_on": known})
+        head = {"model": out, "verdict": evaluation.verdict}
+        print_json({**head, **tuned.document(), "trained_on": evaluation.trained_on})
         return
     print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), n))
     chosen, before = tuned.chosen, tuned.before
     points = {point.threshold: point for point in (*tuned.points, before)}
     notes = {before.threshold: "before", chosen.threshold: "chosen"}
-    _print_points([points[t] for t in sorted(points)], notes)
+    print_points([points[t] for t in sorted(points)], notes)
     print_line()
     answer = "STABLE" if chosen.slips is None else "a slip"
     print_line(
         f"{out}: {answer} from a probability of {chosen.threshold:.3g} on, was "
         f"{before.threshold:.3g}"
     )
-
-
-def _document(tuned: "Tuned") -> dict[str, object]:
-    def document(point: "CurvePoint") -> dict[str, object]:
-        return {"threshold": point.threshold, "stable": point.stable, "events": point.events}
-
-    return {
-        "threshold": tuned.chosen.threshold,
-        "chosen": document(tuned.chosen),
-        "before": document(tuned.before),
-        "around": [document(point) for point in tuned.points],
-    }
-
-
-def _slip_document(tuned: "Tuned") -> dict[str, object]:
-    from msgspec import to_builtins
-
-    return {
-        "for": TunedQuestion.SLIP.value,
-        "threshold": tuned.chosen.threshold,
-        "chosen": tuned.chosen.slips,
-        "before": tuned.before.slips,
-        "around": [{"threshold": p.threshold, **to_builtins(p.slips)} for p in tuned.points],
-    }
-
-
-def _print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> None:
-    slips = {point.threshold: point.slips for point in points if point.slips is not None}
-    if slips:
-        origin = slips_origin(next(iter(slips.values())))
-        print_slip_points(slips.items(), notes, origin)
-        return
-    print_line("of the hand; missed events within 0.05, 0.1 and 0.2 s of their onset")
-    header = ("threshold", "STABLE %", "false/min", "0.05 s %", "0.1 s %", "0.2 s %",
-              "delay s", "")  # fmt: skip
-    print_table(header, [(*_cells(p), notes.get(p.threshold, "")) for p in points])
-
-
-def _cells(point: "CurvePoint") -> tuple[str, ...]:
-    events = point.events
-    if events is None:
-        return ()
-    missed = (format_number(share, 1) for share in events.missed.values())
-    never = events.delay_median is None and events.n_events
-    delay = "never" if never else format_number(events.delay_median, 3)
-    return (
-        f"{point.threshold:.4g}", f"{point.stable:.1f}", f"{point.false_alarms:.2f}", *missed, delay
-    )  # fmt: skip

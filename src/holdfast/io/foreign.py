@@ -146,6 +146,8 @@ def read_stickers(
     Raises:
         RecordingError: as `read_foreign`.
     """
+    if not path.is_file():
+        raise RecordingError(f"{path} does not exist; a video expected")
     times: list[npt.NDArray[np.float64]] = []
     parts: list[dict[int, npt.NDArray[np.float64]]] = []
     for document, (part_times, *places) in _values("stickers", path, {"fps": fps}):

@@ -12,13 +12,18 @@ from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.io import labels_to_csv, load_dataset, load_recording
 from holdfast.io.label_files import SUFFIX, labels_for, labels_path, load_labels
 from holdfast.io.recording_files import SUFFIXES
+from holdfast.labelling.review.compare import RecordingAgreement, compare
 from holdfast.labelling.review.content import label_seconds
 from holdfast.labelling.review.spans import doubtful, state_name
+from holdfast.labelling.rules import RULES
 from holdfast.labelling.rules.forces import evidence_of_contact
 from holdfast.labelling.server.documents import labels_data
 from holdfast.labelling.server.store import ModuleLabels, revision_of, save_stored
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.recordings import Recording
+
+LabelsOf = Callable[[Recording, Path], ModuleLabels]
+"""Function that returns the labels of a recording, from it and its path."""
 
 
 def recordings_at(paths: Sequence[Path]) -> list[Path]:
@@ -63,6 +68,52 @@ def recordings_beside(place: Path) -> list[Path]:
     return [path for path in beside if path.is_file()][:1]
 
 
+def is_rule(place: Path) -> bool:
+    """Return whether a path is the name of a rule, and no file."""
+    return str(place) in RULES and not place.exists()
+
+
+def recordings_to_compare(a: Path, b: Path) -> list[Path]:
+    """Return the recordings to compare: those in A, otherwise those in B.
+
+    Args:
+        a: files or folders of labels or recordings, or a rule.
+        b: likewise.
+
+    Raises:
+        RecordingError: there are none.
+        ValueError: both are rules.
+    """
+    places = [place for place in (a, b) if not is_rule(place)]
+    if not places:
+        raise ValueError(f"rules {a} and {b} given; A or B must be recordings or labels")
+    for place in places:
+        if not place.exists():
+            raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
+    for place in places:
+        if files := recordings_beside(place):
+            return files
+    raise RecordingError(
+        f"no recordings beside the labels in {a} or {b}; recordings give the sample times"
+    )
+
+
+def compare_file(
+    path: Path, labels_of_a: LabelsOf, labels_of_b: LabelsOf
+) -> tuple[str, RecordingAgreement | str]:
+    """Return the name of a recording, with the agreement of A and B or why it is left out."""
+    try:
+        recording = load_recording(path, labels=False)
+        a, b = labels_of_a(recording, path), labels_of_b(recording, path)
+        if not (any(a.values()) and any(b.values())):
+            side = "B" if any(a.values()) else "A"
+            return recording.name, f"{side} has no labels of this recording"
+        times = {name: module.times for name, module in recording.modules.items()}
+        return recording.name, compare(a, b, times, recording.name)
+    except RecordingError as cause:
+        return path.stem, str(cause)
+
+
 def check_no_manual_labels(files: Sequence[Path]) -> None:
     """Check that no recording has labels of a person.
 
@@ -94,7 +145,7 @@ def _manual_author(path: Path) -> str | None:
 
 def label_file(
     path: Path,
-    labels_of: Callable[[Recording, Path], ModuleLabels],
+    labels_of: LabelsOf,
     author: str,
     time: str | None,
 ) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 
 MILLIMETRE = 72 / 25.4
 """Points of a PDF in a millimetre."""
-PAGE = (210.0, 297.0)
+A4 = (210.0, 297.0)
 """Width and height of A4, which US Letter contains but for 18 mm at the foot [mm]."""
 SHEET_STICKERS = ((24.0, (0,)), (15.0, (1, 2, 3, 4, 5)))
 """Side [mm] and numbers of the stickers in each row: the object, then the fingers."""
@@ -20,8 +20,8 @@ def sticker_sheet() -> bytes:
     objects = (
         "<< /Type /Catalog /Pages 2 0 R >>",
         "<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-        f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {PAGE[0] * MILLIMETRE:.2f} "
-        f"{PAGE[1] * MILLIMETRE:.2f}] /Contents 5 0 R "
+        f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {A4[0] * MILLIMETRE:.2f} "
+        f"{A4[1] * MILLIMETRE:.2f}] /Contents 5 0 R "
         "/Resources << /Font << /F 4 0 R >> >> >>",
         "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>",
         f"<< /Length {len(drawing)} >>\nstream\n{drawing}\nendstream",
@@ -38,7 +38,7 @@ def sticker_sheet() -> bytes:
 
 def _drawing() -> Iterator[str]:
     """Yield the operators of the page, in millimetres from its upper left corner."""
-    yield f"{MILLIMETRE:.6f} 0 0 {-MILLIMETRE:.6f} 0 {PAGE[1] * MILLIMETRE:.3f} cm 0.1 w"
+    yield f"{MILLIMETRE:.6f} 0 0 {-MILLIMETRE:.6f} 0 {A4[1] * MILLIMETRE:.3f} cm 0.1 w"
     yield _words(20, 18, 4, "Stickers of holdfast: print at 100 %, on matt paper; cut on the lines")
     yield _words(20, 25, 3, "This line is 100 mm long; if not, give the sides that you measure:")
     yield "20 29 100 1 re f"

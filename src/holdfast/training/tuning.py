@@ -164,3 +164,27 @@ def search_key(*parts: object) -> str:
 
 def _text(parameters: Mapping[str, Any]) -> str:
     return repr(sorted(parameters.items()))
+
+
+def search_journal(model: Path, *, resume: bool, force: bool) -> Path:
+    """Return the file that keeps the trials of a search until the model is written.
+
+    Args:
+        model: path of the model.
+        resume: continue the search that the file has.
+        force: delete the file, and begin again.
+
+    Raises:
+        OutputError: there is a file and it is neither continued nor deleted, or none to continue.
+    """
+    journal = model.with_name(f"{model.name}.search")
+    if journal.exists() and force and not resume:
+        journal.unlink()
+    if journal.exists() and not resume:
+        raise OutputError(
+            f"{journal} holds a search that was stopped: continue it with --resume, or start "
+            "again with --force"
+        )
+    if resume and not journal.exists():
+        raise OutputError(f"nothing to resume: {journal} does not exist")
+    return journal

@@ -21,7 +21,7 @@ from holdfast.twin.slip_events import GRASP_LINE, SIDEWAYS, UPRIGHT
 
 TIP_SIZE, OBJECT_SIZE = 0.015, 0.024
 """Sides of the black squares of stickers for fingertips, which are 28 mm wide, and objects [m]."""
-MARGIN = 1 / 6
+RIM = 1 / 6
 """White rim of a sticker, as a share of its side: one cell of the pattern."""
 FLAG = (0.014, 0.0, 0.031)
 """Middle of the sticker of a fingertip, in its frame [m]: on a flag of card that begins at the end
@@ -208,7 +208,7 @@ def _texture(number: int) -> npt.NDArray[np.float32]:
 
     book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     black = cv2.aruco.generateImageMarker(book, number, 6 * TEXTURE_CELL)
-    rim = round(6 * TEXTURE_CELL * MARGIN)
+    rim = round(6 * TEXTURE_CELL * RIM)
     ink = np.pad(black, rim, constant_values=255).astype(np.float32)
     return np.asarray(35 + 185 * ink / 255, dtype=np.float32)
 
@@ -232,7 +232,7 @@ def _draw(
         return  # a sticker at the edge of the picture is not seen
     part = picture[low[1] : high[1], low[0] : high[0]]
     below = cv2.resize(part, None, fx=N_SUBPIXELS, fy=N_SUBPIXELS, interpolation=cv2.INTER_NEAREST)
-    rim = texture.shape[0] * MARGIN / (1 + 2 * MARGIN)
+    rim = texture.shape[0] * RIM / (1 + 2 * RIM)
     far = texture.shape[0] - rim
     source = np.array([[rim, rim], [far, rim], [far, far], [rim, far]], "f4") - 0.5
     total = np.zeros_like(part)

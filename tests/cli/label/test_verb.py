@@ -22,7 +22,8 @@ from .helpers import run
         ),
         (
             ("--auto", "tracking", "F", "--track", "object=/pose"),
-            "--track names topics or frames of a bag: give --poses BAG",
+            "--track names topics or frames of a bag: give --poses BAG (or stickers of a video: "
+            "give --video FILE)",
         ),
         (("--auto", "signal", "gone"), "gone does not exist; a recording or a folder expected"),
         (("--auto", "signal", "F", "--compare"), "--auto and --compare given; only one of them"),

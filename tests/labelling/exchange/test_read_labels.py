@@ -6,7 +6,7 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
 from holdfast.io import labels_to_csv, save_labels, save_recording
-from holdfast.labelling.exchange.read_labels import read_labels
+from holdfast.labelling.exchange.read_labels import LABEL_PLUGINS, read_labels
 from holdfast.recordings import Label
 from labelling.tiny import tiny_recording
 
@@ -136,3 +136,13 @@ def test_files_without_labels(tmp_path, bare):
     assert refusal(tmp_path / "no.json", bare) == "cannot read PATH: No such file or directory"
     (tmp_path / "odd.json").write_text("[]")
     assert refusal(tmp_path / "odd.json", bare).startswith("PATH is not a label file: ")
+
+
+def test_json_of_a_package_that_is_not_installed(tmp_path, bare, monkeypatch):
+    monkeypatch.setattr(LABEL_PLUGINS, "names", lambda: ())
+    for name, end in (("tasks.json", "; not installed: label-studio (holdfast-interop)"),
+                      ("tasks.labels.json", "got `array`")):  # fmt: skip
+        (tmp_path / name).write_text("[]")
+        text = refusal(tmp_path / name, bare)
+        assert text.startswith("PATH is not a label file: ")
+        assert text.endswith(end)

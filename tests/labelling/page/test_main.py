@@ -20,7 +20,9 @@ SIZES = [(1280, 720), (1024, 768), (1920, 1080)]
 HOSTILE = "<img src=x onerror=alert(1)>"
 
 
-@pytest.mark.parametrize(("size", "scheme"), zip(SIZES, ("dark", "light", "dark"), strict=True))
+@pytest.mark.parametrize(
+    ("size", "scheme"), list(zip(SIZES, ("dark", "light", "dark"), strict=True))
+)
 def test_four_fingers_fit_without_scrolling(visit, service, size, scheme):
     page = visit(service.url, size, scheme)
     ready(page)

@@ -3,7 +3,7 @@
 The scorer chooses every threshold itself, on the split `tuning`, for a budget of false alarms.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -128,7 +128,20 @@ def score_submission(
         ValueError: a split, recording or finger is unknown or incomplete, or `tuning` is missing.
         RecordingError: the recordings of a split do not exist.
     """
-    names = _splits(submission, protocol)
+    # The splits to read, in the order of the protocol.
+    usable = [name for name, split in protocol.splits.items() if split.scored or name == TUNING]
+    submitted = submission.splits()
+    if unknown := [name for name in submitted if name not in usable]:
+        raise ValueError(
+            f"{submission.name}: unknown split {unknown[0]!r}; recordings are SPLIT/NAME, with "
+            f"the splits {', '.join(usable)}"
+        )
+    if TUNING not in submitted or len(submitted) < 2:
+        raise ValueError(
+            f"{submission.name}: scores of {TUNING} and of another split expected, "
+            f"{', '.join(submitted)} given; thresholds are chosen on {TUNING}"
+        )
+    names = [name for name in usable if name in submitted]
     differ: list[str] = []
     scored: dict[str, Scored] = {}
     for name in names:
@@ -145,27 +158,6 @@ def score_submission(
         name for name, split in protocol.splits.items() if split.scored and name not in scored
     ]
     return BenchmarkResult(tables, differ, left_out)
-
-
-def _splits(submission: Submission, protocol: BenchmarkProtocol) -> list[str]:
-    """Return the splits to read, in the order of the protocol.
-
-    Raises:
-        ValueError: one is unknown, or a needed one is missing.
-    """
-    usable = [name for name, split in protocol.splits.items() if split.scored or name == TUNING]
-    submitted = submission.splits()
-    if unknown := [name for name in submitted if name not in usable]:
-        raise ValueError(
-            f"{submission.name}: unknown split {unknown[0]!r}; recordings are SPLIT/NAME, with "
-            f"the splits {', '.join(usable)}"
-        )
-    if TUNING not in submitted or len(submitted) < 2:
-        raise ValueError(
-            f"{submission.name}: scores of {TUNING} and of another split expected, "
-            f"{', '.join(submitted)} given; thresholds are chosen on {TUNING}"
-        )
-    return [name for name in usable if name in submitted]
 
 
 def _scored(
@@ -228,7 +220,18 @@ def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
     for split, recordings in scored.items():
         for budget in EVENT_BUDGETS:
             shift = threshold_shift(ranges, budget)
-            alarms = [_alarms(fingers.values(), shift) for fingers in recordings.values()]
+            # The statistics of all fingers of a recording together.
+            alarms = [
+                AlarmStatistics.total(
+                    [
+                        AlarmStatistics.of(
+                            own.scores.hold(HOLD_TIME), AlarmLabels.of(own.labels), shift
+                        )
+                        for own in fingers.values()
+                    ]
+                )
+                for fingers in recordings.values()
+            ]
             keys: dict[str, Key] = {"on": split, "threshold": f"for {budget:g}/min"}
             scored_rows = event_rows(keys, alarms, BOOTSTRAP_SEED)
             rows += [row for row in scored_rows if row.keys["figure"] not in GLITCH_FIGURES]
@@ -236,16 +239,6 @@ def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
         "events", "Events", EVENTS_NOTE, rows, ("on", "threshold"), digits_of=EVENT_DIGITS,
         has_paper=False,
     )  # fmt: skip
-
-
-def _alarms(fingers: Iterable[FingerTruth], shift: float) -> AlarmStatistics:
-    """Return the statistics of all fingers of a recording together."""
-    return AlarmStatistics.total(
-        [
-            AlarmStatistics.of(own.scores.hold(HOLD_TIME), AlarmLabels.of(own.labels), shift)
-            for own in fingers
-        ]
-    )
 
 
 def _slips_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:

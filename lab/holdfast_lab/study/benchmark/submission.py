@@ -144,11 +144,7 @@ def _read_table(path: Path) -> pa.Table:
         table = table.select(names).cast(pa.schema([(name, COLUMN_TYPES[name]) for name in names]))
     except pa.ArrowException as cause:
         raise ValueError(f"{path}: {str(cause).splitlines()[0]}") from cause
-    return _checked(path, table)
-
-
-def _checked(path: Path, table: pa.Table) -> pa.Table:
-    """Return the table, if it has rows and no cell of a name or number is empty."""
+    # The table, if it has rows and no cell of a name or number is empty.
     if not len(table):
         raise ValueError(f"{path}: no row given; one for each sample of each finger expected")
     for name in ("recording", "finger", "sample"):

@@ -13,7 +13,6 @@ from holdfast_lab.study.comparison.rows import ratio_row
 from holdfast_lab.study.evaluation.error_breakdown import (
     OBLIQUE,
     PULL_DIRECTIONS,
-    CountPair,
     ErrorBreakdown,
     GripErrors,
 )
@@ -70,7 +69,11 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     n_disturbances: dict[str, int] = {}
     for keys, breakdowns in _lines(plan, results):
         for direction in (*PULL_DIRECTIONS, OBLIQUE):
-            events = [_disturbances(breakdown, direction) for breakdown in breakdowns]
+            # The counts of the disturbances in a direction that have labelled samples.
+            events = [
+                [count for name, count in breakdown.disturbances if count[0] and name == direction]
+                for breakdown in breakdowns
+            ]
             n = [sum(n for n, _ in of_recording) for of_recording in events]
             wrong = [sum(wrong for _, wrong in of_recording) for of_recording in events]
             if sum(n):
@@ -85,11 +88,6 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     )
     title = "Disturbed called stable, by direction [%]"
     return ResultTable("directions", title, note, rows, ("on", "method"), column="direction")
-
-
-def _disturbances(breakdown: ErrorBreakdown, direction: str) -> list[CountPair]:
-    """Return the counts of the disturbances in a direction that have labelled samples."""
-    return [count for name, count in breakdown.disturbances if count[0] and name == direction]
 
 
 def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:
@@ -111,12 +109,8 @@ def _counts_of_quarter(
     for column, errors in enumerate(breakdowns):
         for grip in _holding_grips([errors]):
             if np.searchsorted(edges, grip.force) == quarter:
-                counts[:, column] += _count_of(grip, kind)
+                counts[:, column] += grip.stable if kind == STABLE_MISSED else grip.not_stable
     return counts
-
-
-def _count_of(grip: GripErrors, kind: str) -> CountPair:
-    return grip.stable if kind == STABLE_MISSED else grip.not_stable
 
 
 def _lines(plan: StudyPlan, results: Results) -> Iterator[Line]:

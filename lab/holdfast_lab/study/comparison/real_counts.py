@@ -8,7 +8,6 @@ from msgspec.structs import replace
 
 from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, ContactState
 from holdfast.metrics import bootstrap_interval, match_alarms
-from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.statistics import auc_of, mann_whitney_u
 from holdfast.sensors.types import Array
@@ -278,7 +277,20 @@ def _count(labels: RecordingLabels, estimates: RecordingEstimates, common: Mask)
         at_finger = common[np.searchsorted(labels.hand.times.array, finger.times.array)]
         fingers[name] = _count_unit(finger, estimate, estimate.states.array != UNKNOWN, at_finger)
     hand = _count_unit(labels.hand, estimates.hand, estimates.known.array, common)
-    events = _count_events(labels.hand, estimates.alarm_states.array, common)
+    times, slip = labels.hand.times.array, labels.hand.slip.array
+    codes = np.where(common, labels.hand.codes.array, UNKNOWN)
+    match = match_alarms(times, codes, estimates.alarm_states.array)
+    slips = [
+        event
+        for event in match.events
+        if slip[np.searchsorted(times, event.onset) : np.searchsorted(times, event.end)].any()
+    ]
+    events = RealAlarmCounts(
+        n_slips=len(slips),
+        n_missed=sum(event.delay > MISSED_AFTER + TIME_TOLERANCE for event in slips),
+        n_false_alarms=sum(alarm.label is ContactState.STABLE for alarm in match.false_alarms),
+        stable_minutes=match.stable_seconds / 60,
+    )
     return RecordingCounts(labels.name, fingers, hand, events)
 
 
@@ -299,21 +311,4 @@ def _count_unit(
         n_stable=int(stable.sum()),
         n_called_stable=int((stable & called).sum()),
         scores=SlipAgainstStable(probability[stable], probability[slip]),
-    )
-
-
-def _count_events(labels: UnitLabels, alarm_states: Codes, common: Mask) -> RealAlarmCounts:
-    times, slip = labels.times.array, labels.slip.array
-    codes = np.where(common, labels.codes.array, UNKNOWN)
-    match = match_alarms(times, codes, alarm_states)
-    slips = [
-        event
-        for event in match.events
-        if slip[np.searchsorted(times, event.onset) : np.searchsorted(times, event.end)].any()
-    ]
-    return RealAlarmCounts(
-        n_slips=len(slips),
-        n_missed=sum(event.delay > MISSED_AFTER + TIME_TOLERANCE for event in slips),
-        n_false_alarms=sum(alarm.label is ContactState.STABLE for alarm in match.false_alarms),
-        stable_minutes=match.stable_seconds / 60,
     )

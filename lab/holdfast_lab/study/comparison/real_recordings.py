@@ -110,7 +110,13 @@ def tasks(plan: StudyPlan) -> list[Task]:
         for making in MODELS
     ]
     methods = [
-        Task(_task_name(name), method_estimates, (name, plan.real, plan.seed), result, _cost(name))
+        Task(
+            _task_name(name),
+            method_estimates,
+            (name, plan.real, plan.seed),
+            result,
+            (120.0 if name == NETWORK else 5.0),
+        )
         for name in real_methods(plan, plan.real)
     ]
     return [read, *models, *methods]
@@ -120,7 +126,10 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """Return the tables: pooled, by recording, by finger; none without real recordings."""
     if plan.real is None:
         return []
-    lines = _lines(plan, plan.real)
+    # The lines of the tables, by name of the making or of the method.
+    methods = real_methods(plan, plan.real).items()
+    models = {str(making): line for making, line in MODELS.items()}
+    lines = models | {name: Line(title, THE_OTHERS) for name, title in methods}
     estimates = {name: results[_task_name(name)] for name in lines}
     counts = count_recordings(results[LABELS], estimates)
     by_line = {lines[name]: each for name, each in counts.items()}
@@ -147,13 +156,6 @@ def real_methods(plan: StudyPlan, real: Corpus) -> dict[str, str]:
         if not (METHODS[name].whole_hand and one_finger)
         and not (plan.quick and name not in QUICK_REAL_METHODS)
     }
-
-
-def _lines(plan: StudyPlan, real: Corpus) -> dict[str, Line]:
-    """Return the lines of the tables, by name of the making or of the method."""
-    methods = real_methods(plan, real).items()
-    models = {str(making): line for making, line in MODELS.items()}
-    return models | {name: Line(title, THE_OTHERS) for name, title in methods}
 
 
 def _pooled(by_line: Mapping[Line, Sequence[RecordingCounts]], note: str, seed: int) -> ResultTable:
@@ -230,7 +232,3 @@ def _task_name(line: str) -> str:
 
 def _is_box(real: Corpus) -> bool:
     return real.load()[0].metadata.get("source") == uskin_pick_move.SOURCE
-
-
-def _cost(method: str) -> float:
-    return 120.0 if method == NETWORK else 5.0

@@ -141,7 +141,10 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
         "rates",
         "Sensitivity to the sampling rate",
         RATE_NAME,
-        {round(plan.main.rate / step, 1): Variation(every=step) for step in _steps(plan)},
+        {
+            round(plan.main.rate / step, 1): Variation(every=step)
+            for step in ((1, 3) if plan.quick else SAMPLE_STEPS)
+        },
         "Every 1st, 2nd, ... sample, in training and in test. Windows keep their number of "
         "samples, so they last longer.",
     )
@@ -151,10 +154,6 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
 def _noise(plan: StudyPlan) -> dict[float, Variation]:
     levels = (NOISE_LEVELS[0], NOISE_LEVELS[-1]) if plan.quick else NOISE_LEVELS
     return {level: Variation(noise=level) for level in levels}
-
-
-def _steps(plan: StudyPlan) -> tuple[int, ...]:
-    return (1, 3) if plan.quick else SAMPLE_STEPS
 
 
 def _margins(plan: StudyPlan) -> dict[float, Variation]:

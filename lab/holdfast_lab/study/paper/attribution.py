@@ -9,7 +9,6 @@ import numpy as np
 
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
-from holdfast.metrics.statistics import Statistic
 from holdfast.sensors.types import Array
 from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.report.html_report import ReportFigure
@@ -206,7 +205,12 @@ def difference_row(
     else:
         both = np.vstack([np.pad(first, ((0, 0), (0, 2))), np.pad(second, ((0, 0), (2, 0)))])
     both = both[both.any(axis=1)]
-    statistic = _accuracy_difference(both)
+
+    def statistic(draws: Array) -> Array:
+        correct, n, other_correct, other_n = (draws @ both).T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(100 * (correct / n - other_correct / other_n))
+
     ours = float(statistic(np.ones((1, len(both))))[0])
     interval = bootstrap_interval(statistic, len(both), seed=seed)
     n = sum(any(row) for row in counts)
@@ -216,12 +220,3 @@ def difference_row(
 def _correct_and_all(counts: ConfusionCounts) -> Array:
     table = np.array(counts, dtype=np.float64).reshape(-1, 4)
     return np.column_stack([table[:, 0] + table[:, 3], table.sum(axis=1)])
-
-
-def _accuracy_difference(both: Array) -> Statistic:
-    def statistic(draws: Array) -> Array:
-        correct, n, other_correct, other_n = (draws @ both).T
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(100 * (correct / n - other_correct / other_n))
-
-    return statistic

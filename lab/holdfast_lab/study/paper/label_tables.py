@@ -111,7 +111,16 @@ def evaluate_labels(
         seed: of folds and fits.
     """
     method = METHODS[name]
-    by_source = _features_by_source(corpus, corpus_features(method, corpus))
+    # The features with each kind of labels.
+    features = corpus_features(method, corpus)
+    by_name = {recording.name: recording for recording in corpus.load()}
+    by_source = {
+        source: [
+            _with_labels(feature, by_name[feature.name], source, corpus.tare)
+            for feature in features
+        ]
+        for source in SOURCES
+    }
     metrics = {}
     for trained in SOURCES:
         training = MethodTraining.of(method, by_source[trained], max_samples, seed)
@@ -129,20 +138,6 @@ def evaluate_labels(
             metrics[f"{trained}/{tested}"] = summarise(ordered, seed=seed)
     rule = [_confusion(exact, drawn) for exact, drawn in zip(*by_source.values(), strict=True)]
     return LabelEvaluation(metrics, rule)
-
-
-def _features_by_source(
-    corpus: Corpus, features: Sequence[RecordingFeatures]
-) -> dict[LabelSource, list[RecordingFeatures]]:
-    """Return the features with each kind of labels."""
-    by_name = {recording.name: recording for recording in corpus.load()}
-    return {
-        source: [
-            _with_labels(feature, by_name[feature.name], source, corpus.tare)
-            for feature in features
-        ]
-        for source in SOURCES
-    }
 
 
 def _with_labels(

@@ -145,7 +145,12 @@ def grasp_verdicts(
         max_samples: of a finger, that train a classifier.
         seed: of folds and fits.
     """
-    cases = {role: _cases(corpus) for role, corpus in corpora.items()}
+    cases = {
+        role: {
+            recording.name: str(recording.metadata.get("case", "")) for recording in corpus.load()
+        }
+        for role, corpus in corpora.items()
+    }
     others: dict[str, Corpus] = {}
     for role, corpus in corpora.items():
         names = tuple(
@@ -163,10 +168,6 @@ def grasp_verdicts(
         for role, (_, recordings) in zip(("main", *others), score_splits(job), strict=True)
         for scored in recordings
     ]
-
-
-def _cases(corpus: Corpus) -> dict[str, str]:
-    return {recording.name: str(recording.metadata.get("case", "")) for recording in corpus.load()}
 
 
 def _verdict(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:

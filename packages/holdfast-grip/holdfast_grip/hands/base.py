@@ -100,7 +100,14 @@ class HandDevice(Openable):
         Raises:
             HandError: the hand refuses it, or is disconnected.
         """
-        self._check_command(command)
+        # Raise `HandError` for a finger that the hand lacks, or a scale that is no force.
+        if unknown := self._unknown(command.fingers):
+            raise HandError(unknown)
+        for finger, one in command.fingers.items():
+            if not (math.isfinite(one.scale) and one.scale >= 0.0):
+                raise HandError(
+                    f"{self.name}: a scale of at least 0 expected, {one.scale:g} given for {finger}"
+                )
         self._watch()
         self._follow(command.state)
         if not (command.release or self._begun or self.needs_idle or repeat):
@@ -152,16 +159,6 @@ class HandDevice(Openable):
         elif state is not LoopState.FAULT and not self._begun:
             self._begin()
             self._begun, self._sent = True, None
-
-    def _check_command(self, command: GripCommand) -> None:
-        """Raise `HandError` for a finger that the hand lacks, or a scale that is no force."""
-        if unknown := self._unknown(command.fingers):
-            raise HandError(unknown)
-        for finger, one in command.fingers.items():
-            if not (math.isfinite(one.scale) and one.scale >= 0.0):
-                raise HandError(
-                    f"{self.name}: a scale of at least 0 expected, {one.scale:g} given for {finger}"
-                )
 
     @abstractmethod
     def close(self) -> None:

@@ -93,7 +93,13 @@ class LiveTwin(Source, HandDevice):
         if self.simulation is None or self.ended:
             return None
         if self.simulation.is_over:
-            self._begin_again(self.simulation.time)
+            # Begin the grasp once more, after a pause.
+            ended_at = self.simulation.time
+            self._sent = None  # the new grasp has no command yet
+            self.simulation = Simulation(self.grasp)
+            self._scales = np.ones(len(FINGERS))
+            self._shift += ended_at + PAUSE
+            self._begun_at = time.monotonic() + PAUSE / self.speed if self.paced else None
         if self._begun_at is None:
             self._begun_at = time.monotonic()
         if self.paced:
@@ -110,14 +116,6 @@ class LiveTwin(Source, HandDevice):
     def joint_reports(self) -> Sequence[Array]:
         """Return the joint angles (16,) of each sample since the last call [rad]."""
         return [self._reports.popleft() for _ in range(len(self._reports))]
-
-    def _begin_again(self, ended_at: float) -> None:
-        """Begin the grasp once more, after a pause."""
-        self._sent = None  # the new grasp has no command yet
-        self.simulation = Simulation(self.grasp)
-        self._scales = np.ones(len(FINGERS))
-        self._shift += ended_at + PAUSE
-        self._begun_at = time.monotonic() + PAUSE / self.speed if self.paced else None
 
     def _send(self, command: GripCommand) -> None:
         """Set the force scales from the next sample on, or release the object."""

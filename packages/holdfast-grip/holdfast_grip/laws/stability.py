@@ -157,7 +157,15 @@ class Stability(Law):
             self._jerked_at = time
         is_calm = time - self._unsettled_at > self.settle_time
         if is_calm:
-            self._follow_calm(scale, min(dt / FOLLOW_TIME, 1.0))
+            # Follow the forces of the calm grip.
+            part = min(dt / FOLLOW_TIME, 1.0)
+            self._calm_load += part * (self._load - self._calm_load)
+            self._calm_press += part * (self._press - self._calm_press)
+            if self._press > 0:
+                self._calm_ratio += part * (self._load / self._press - self._calm_ratio)
+            self._calm_scale = scale
+            for finger in self._fingers:
+                finger.share += part * (finger.press - finger.share)
         self._friction *= 1.0 + dt / self.memory
         self._react(doubt, scale, time, dt)
         pressing = time - max(self._stepped_at, self._followed_at) < PRESS_TIME
@@ -186,16 +194,6 @@ class Stability(Law):
     def _sums(self) -> tuple[float, float]:
         fingers = self._fingers
         return sum(finger.load for finger in fingers), sum(finger.press for finger in fingers)
-
-    def _follow_calm(self, scale: float, part: float) -> None:
-        """Follow the forces of the calm grip."""
-        self._calm_load += part * (self._load - self._calm_load)
-        self._calm_press += part * (self._press - self._calm_press)
-        if self._press > 0:
-            self._calm_ratio += part * (self._load / self._press - self._calm_ratio)
-        self._calm_scale = scale
-        for finger in self._fingers:
-            finger.share += part * (finger.press - finger.share)
 
     def _react(self, doubt: float, scale: float, time: float, dt: float) -> None:
         """Begin a step if the doubt lasts; else follow a load that grows."""
@@ -233,21 +231,18 @@ class Stability(Law):
     def _step(self, evidence: float, scale: float, time: float, missing: float) -> None:
         """Begin a step; the first one of an episode shows the friction."""
         if time - self._stepped_at >= self.episode:
-            self._learn()
+            # Take T/N of the fingers that slide, or of all, as the friction, if it is lower.
+            sliding = [finger for finger in self._fingers if finger.slides] or self._fingers
+            press = sum(finger.press for finger in sliding)
+            if press > 0:
+                ratio = sum(finger.load for finger in sliding) / press
+                least = max(LEAST_FRICTION, HELD_SHARE * self._calm_ratio)
+                self._friction = min(self._friction, max(ratio, least))
         step = self.least_step + self.step_growth * evidence
         if missing > 0:
             step += FALLING_STEP
         self._target = scale + step / max(scale, 1.0)
         self._stepped_at, self._reason, self._sum = time, GripReason.UNSTABLE, 0.0
-
-    def _learn(self) -> None:
-        """Take T/N of the fingers that slide, or of all, as the friction, if it is lower."""
-        sliding = [finger for finger in self._fingers if finger.slides] or self._fingers
-        press = sum(finger.press for finger in sliding)
-        if press > 0:
-            ratio = sum(finger.load for finger in sliding) / press
-            least = max(LEAST_FRICTION, HELD_SHARE * self._calm_ratio)
-            self._friction = min(self._friction, max(ratio, least))
 
     def _follow_load(self, scale: float, time: float) -> None:
         """Follow a load that has grown beyond the margin; a fall of N alone is no growth."""

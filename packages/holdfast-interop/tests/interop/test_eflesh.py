@@ -9,6 +9,8 @@ from holdfast.cli import main
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings, load_recording
 
+pytestmark = pytest.mark.slow
+
 N = 20
 VALUES = np.arange(N * 30, dtype="<f4").reshape(N, 30)
 

@@ -41,7 +41,10 @@ class ControllerKind:
         order = JointOrder(given.named_joints("joints"))
         n = len(order.names)
         positions = given.word("command", ("positions", "efforts")) == "positions"
-        _check_words(given, positions=positions)
+        # Check that no parameter of set-points is given for efforts.
+        for name in ("stiffness", "lowest", "highest", "home"):
+            if not positions and given.has(name):
+                raise ValueError(f"{given.text}: {name}= is a parameter of command=positions")
         torques = given.joints("effort", each=True, n=n) if given.has("effort") else None
         lowest, highest = np.full(n, -np.pi), np.full(n, np.pi)
         if positions:
@@ -116,14 +119,3 @@ class WidthKind:
 def _types(*, positions: bool) -> tuple[str, ...]:
     """Return the names of the message types that carry set-points, or efforts."""
     return tuple(JOINT_TYPES) if positions else ("Float64MultiArray",)
-
-
-def _check_words(given: Parameters, *, positions: bool) -> None:
-    """Check that no parameter of set-points is given for efforts.
-
-    Raises:
-        ValueError: there is one.
-    """
-    for name in ("stiffness", "lowest", "highest", "home"):
-        if not positions and given.has(name):
-            raise ValueError(f"{given.text}: {name}= is a parameter of command=positions")

@@ -1,13 +1,12 @@
 """`holdfast label compare`: the agreement of two sets of labels."""
 
-from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from holdfast.cli.label.inputs import AnnotatorOption, RuleOptions
-from holdfast.cli.options import JsonOption
+from holdfast.cli.options import RARE, JsonOption
 from holdfast.cli.terminal.console import (
     format_number,
     print_json,
@@ -20,22 +19,19 @@ from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
+    from holdfast.labelling.labelled_files import LabelsOf
     from holdfast.labelling.review.compare import (
         Agreement,
         FingerAgreement,
         PooledAgreement,
-        RecordingAgreement,
     )
-    from holdfast.recordings import Label, Recording
-
-LabelsOf = Callable[["Recording"], "dict[str, tuple[Label, ...]]"]
 
 
 def compare(
     a: Annotated[Path, typer.Argument(help="A: recordings, labels of them, or a rule.")],
     b: Annotated[Path, typer.Argument(help="B: likewise; one of both is no rule.")],
     *,
-    options: RuleOptions,
+    options: Annotated[RuleOptions, RARE],
     annotator: AnnotatorOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -51,15 +47,25 @@ def compare(
     require_extras("label")
     from msgspec import to_builtins
 
+    from holdfast.errors import RecordingError
+    from holdfast.labelling.exchange.read_labels import read_labels
+    from holdfast.labelling.labelled_files import compare_file, is_rule, recordings_to_compare
     from holdfast.labelling.review.compare import pool
 
-    files = _recordings_to_compare(a, b)
-    both = (_labels_of(a, options, annotator), _labels_of(b, options, annotator))
-    results = dict(_compare_each(files, both))
+    def labels_of(place: Path) -> "LabelsOf":
+        if is_rule(place):
+            return lambda recording, _: options.propose(str(place), recording)
+        return lambda recording, _: read_labels(place, recording, annotator)
+
+    files = recordings_to_compare(a, b)
+    both = labels_of(a), labels_of(b)
+    results = dict(compare_file(path, *both) for path in progress(files, "comparing"))
     compared = [result for result in results.values() if not isinstance(result, str)]
     left_out = {name: text for name, text in results.items() if isinstance(text, str)}
     if not compared:
-        raise _nothing_to_compare(left_out)
+        name, text = next(iter(left_out.items()))
+        more = f" (and {len(left_out) - 1} other recordings)" if len(left_out) > 1 else ""
+        raise RecordingError(f"nothing to compare: {name}: {text}{more}")
     agreement = pool(compared)
     if as_json:
         document = to_builtins(agreement)
@@ -68,73 +74,6 @@ def compare(
     _print(agreement)
     for name, text in left_out.items():
         print_message(f"{name} is left out: {text}")
-
-
-def _nothing_to_compare(left_out: dict[str, str]) -> Exception:
-    from holdfast.errors import RecordingError
-
-    name, text = next(iter(left_out.items()))
-    more = f" (and {len(left_out) - 1} other recordings)" if len(left_out) > 1 else ""
-    return RecordingError(f"nothing to compare: {name}: {text}{more}")
-
-
-def _compare_each(
-    files: Sequence[Path], both: tuple[LabelsOf, LabelsOf]
-) -> "Iterator[tuple[str, RecordingAgreement | str]]":
-    """Yield the name of each recording with its agreement, or with why it is left out."""
-    from holdfast.errors import RecordingError
-    from holdfast.io import load_recording
-    from holdfast.labelling.review.compare import compare
-
-    for path in progress(files, "comparing"):
-        try:
-            recording = load_recording(path, labels=False)
-            a, b = (labels_of(recording) for labels_of in both)
-            if not (any(a.values()) and any(b.values())):
-                side = "B" if any(a.values()) else "A"
-                yield recording.name, f"{side} has no labels of this recording"
-                continue
-            times = {name: module.times for name, module in recording.modules.items()}
-            yield recording.name, compare(a, b, times, recording.name)
-        except RecordingError as cause:
-            yield path.stem, str(cause)
-
-
-def _labels_of(place: Path, options: RuleOptions, annotator: str | None) -> LabelsOf:
-    from holdfast.labelling.exchange.read_labels import read_labels
-
-    if _is_rule(place):
-        return lambda recording: options.propose(str(place), recording)
-    return lambda recording: read_labels(place, recording, annotator)
-
-
-def _is_rule(place: Path) -> bool:
-    from holdfast.labelling.rules import RULES
-
-    return str(place) in RULES and not place.exists()
-
-
-def _recordings_to_compare(a: Path, b: Path) -> list[Path]:
-    """Return the recordings to compare: those in A, otherwise those in B.
-
-    Raises:
-        RecordingError: there are none.
-        ValueError: both are rules.
-    """
-    from holdfast.errors import RecordingError
-    from holdfast.labelling.labelled_files import recordings_beside
-
-    if _is_rule(a) and _is_rule(b):
-        raise ValueError(f"rules {a} and {b} given; A or B must be recordings or labels")
-    for place in (a, b):
-        if not _is_rule(place) and not place.exists():
-            raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
-    for place in (a, b):
-        if not _is_rule(place) and (files := recordings_beside(place)):
-            return files
-    raise RecordingError(
-        f"no recordings beside the labels in {a} or {b}; recordings give the sample times"
-    )
 
 
 def _print(agreement: "Agreement") -> None:
@@ -167,17 +106,12 @@ def _print_causes(pooled: "PooledAgreement") -> None:
     from holdfast.contact import Cause
 
     counts = dict(zip(Cause, pooled.causes, strict=True))
-    in_b = [cause for k, cause in enumerate(Cause) if any(row[k] for row in counts.values())]
-    if not in_b:
+    columns = [k for k in range(len(Cause)) if any(row[k] for row in counts.values())]
+    if not columns:
         return
-    order = list(Cause)
-    rows = [
-        (cause, *(row[order.index(other)] for other in in_b))
-        for cause, row in counts.items()
-        if any(row)
-    ]
+    rows = [(cause, *(row[k] for k in columns)) for cause, row in counts.items() if any(row)]
     print_line()
-    print_table(("cause", *in_b), rows)
+    print_table(("cause", *(list(Cause)[k] for k in columns)), rows)
     print_line()
     print_paragraph(
         "samples for which both give a cause, by that in A (rows) and in B (columns); "
@@ -187,16 +121,12 @@ def _print_causes(pooled: "PooledAgreement") -> None:
 
 def _row(labels: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:
     onsets = labels.onset_differences
+    times = (None if time is None else 1e3 * time for time in (onsets.median, onsets.p95))
     return (
         format_number(labels.kappa, 3),
         format_number(labels.kappa_stable, 3),
         f"{onsets.n}",
-        _milliseconds(onsets.median),
-        _milliseconds(onsets.p95),
+        *(format_number(time, 0) for time in times),
         f"{100 * labels.only_a:.1f}",
         f"{100 * labels.only_b:.1f}",
     )
-
-
-def _milliseconds(seconds: float | None) -> str:
-    return format_number(None if seconds is None else 1e3 * seconds, 0)

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.label.auto import label_all, print_labelled
 from holdfast.cli.label.inputs import (
     AnnotatorOption,
     AuthorOption,
@@ -13,6 +12,7 @@ from holdfast.cli.label.inputs import (
     SaveOptions,
     login_name,
 )
+from holdfast.cli.label.output import label_all, print_labelled
 from holdfast.cli.options import JsonOption
 from holdfast.errors import require_extras
 

@@ -48,14 +48,6 @@ class RuleOptions:
     poses: Annotated[
         Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a ROS bag.")
     ] = None
-    video: Annotated[
-        Path | None,
-        typer.Option(
-            help="Video of stickers for the rule tracking.",
-            show_default="NAME.mp4 beside the recording",
-        ),
-    ] = None
-    fps: FpsOption = None
     tracks: Annotated[
         list[str] | None,
         typer.Option(
@@ -71,6 +63,14 @@ class RuleOptions:
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
         RARE,
     ] = None
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            help="Video of stickers for the rule tracking.",
+            show_default="NAME.mp4 beside the recording",
+        ),
+    ] = None
+    fps: FpsOption = None
 
     @cached_property
     def tracking(self) -> "Poses | None":

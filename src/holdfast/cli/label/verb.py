@@ -43,14 +43,11 @@ class ModeOptions:
         Raises:
             ValueError: two modes are given, or the page of no audit.
         """
-        modes = {
-            "auto": self.auto is not None,
-            "compare": self.compare,
-            "audit": self.audit,
-            "export": self.export is not None,
-            "import": self.import_from is not None,
-        }
-        wanted = [name for name, is_wanted in modes.items() if is_wanted]
+        wanted = [
+            name.removesuffix("_from")
+            for name, value in vars(self).items()
+            if name != "page" and value not in (None, False)
+        ]
         if len(wanted) > 1:
             raise ValueError(f"--{wanted[0]} and --{wanted[1]} given; only one of them expected")
         if self.page and not self.audit:

@@ -4,6 +4,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import msgspec
+
 from holdfast.errors import RecordingError
 from holdfast.files import file_stem
 from holdfast.io.header import label_of
@@ -71,7 +73,13 @@ def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
             labels: Labels = source.read(file, recording, annotator)
             return labels
     if file.suffix == ".json":
-        found = load_labels(file)
+        try:
+            found = load_labels(file)
+        except RecordingError as cause:
+            # Any other JSON may be of a format whose package is missing.
+            if file.name.endswith(SUFFIX) or not isinstance(cause.__cause__, msgspec.DecodeError):
+                raise
+            raise RecordingError(f"{cause}{LABEL_PLUGINS.missing_text()}") from cause
         _check_digest(file, found.recording, found.name, recording)
         try:
             return {name: tuple(map(label_of, own)) for name, own in found.modules.items()}

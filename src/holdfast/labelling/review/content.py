@@ -18,6 +18,7 @@ from holdfast.labelling.review.findings import (
     hidden_labels,
     invalid_readings,
 )
+from holdfast.labelling.review.oddities import with_oddities
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.model import Model
@@ -50,6 +51,7 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
         for name, module in scan.modules.items()
     ]
     findings = [*findings_of_scan(scan), *(each for each in [*invalid, hidden] if each)]
+    findings = with_oddities(findings, scan, path)
     return {
         "name": found.name,
         "modules": {

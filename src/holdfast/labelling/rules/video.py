@@ -28,7 +28,14 @@ from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.base import check_positive, evidence_ratio, label_confidence
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import OBJECT
-from holdfast.metrics.masks import Mask, covered, hysteresis, n_samples_of, runs
+from holdfast.metrics.masks import (
+    Mask,
+    covered,
+    fill_short_gaps,
+    hysteresis,
+    n_samples_of,
+    runs,
+)
 from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Array
 
@@ -55,15 +62,20 @@ MIN_FITTED = 100
 """Least number of pictures of a loaded finger."""
 N_CLOCK_PARTS = 8
 """Parts of the recording that are left out in turn for the error of the offset (jackknife)."""
-FIT_TIME = 0.13
-"""Time between the two ends of the changes that are fitted [s]."""
+FIT_TIMES = (0.13, 0.25)
+"""Time between the two ends of the changes that are fitted [s]: first all, then those without the
+slips that were seen, or C would explain a part of them."""
+SLIP_MARGIN = 0.05
+"""Time around a slip that is left out of the second fit [s]."""
 TURN_TIME = 0.15
 """Time over which the tilts are averaged: they are 50 times less exact than places [s]."""
 SCALE_TIME = 0.5
 """Time over which the size of a sticker in the picture is averaged: it is the distance [s]."""
 TURN_SCALE = 30.0
 """Millimetres that a unit of turn counts in the fit: the lever of a fingertip."""
-HELD_SHARE = 0.2
+RETURN_TIME = 0.3
+"""Motions with less time between them are one: a push goes there, rests, and comes back [s]."""
+FITTED_SHARE = 0.2
 """A finger whose force is below this share of its usual one is not fitted."""
 
 
@@ -84,7 +96,7 @@ class VideoRule:
     tip_size: float = 0.015
     window: float = 0.05
     step: float = 0.00012
-    slid: float = 0.00025
+    slid: float = 0.0002
     before: float = 0.2
 
     def __post_init__(self) -> None:
@@ -171,8 +183,12 @@ def propose(
     for finger, tip in tips.items():
         held = held_at(base[finger], grid + clock.offset) & tip.seen
         force = force_at(recording, finger, how, grid + clock.offset)
-        rest = unexplained(tip, force, held, n_samples_of(FIT_TIME, grid[1] - grid[0]))
-        slips = seen_slips(grid + clock.offset, rest, held, rule)
+        slips, stuck = [], held
+        for time in FIT_TIMES:
+            n = n_samples_of(time, grid[1] - grid[0])
+            rest = unexplained(tip, force, stuck, n)
+            slips = seen_slips(grid + clock.offset, rest, held, rule)
+            stuck = held & ~_during(slips, grid + clock.offset)
         note = f"video {video.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
         labels[finger] = with_slips(base[finger], slips, note)
     return labels
@@ -289,7 +305,7 @@ def video_clock(
     costs = np.zeros((len(offsets), N_CLOCK_PARTS))
     for finger, tip in tips.items():
         loaded = np.linalg.norm(force_at(recording, finger, tare, grid + coarse), axis=1)
-        held = ((loaded > HELD_SHARE) & tip.seen)[1:-1]
+        held = ((loaded > FITTED_SHARE) & tip.seen)[1:-1]
         jerks = np.diff(tip.place, 2, axis=0)
         size = _mean(np.linalg.norm(jerks, axis=1), 5)
         if held.sum() < MIN_FITTED:
@@ -376,7 +392,8 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
     least = max(1e3 * rule.step, 6 * noise)
     slips: list[SeenSlip] = []
     free = 0
-    for first, last in runs(hysteresis(np.where(held, moved / least, 0.0), 0.7, 1.0)):
+    moving = hysteresis(np.where(held, moved / least, 0.0), 0.7, 1.0)
+    for first, last in runs(_for_good(rest, moving, n, max(1e3 * rule.slid, 6 * noise), step)):
         n_rest = 3 * n
         before = np.median(rest[max(first - n_rest, 0) : first + 1], axis=0)
         after = np.median(rest[last - 1 : last - 1 + n_rest], axis=0)
@@ -397,6 +414,24 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         ratio = away / max(1e3 * rule.slid, 6 * noise)
         slips.append(SeenSlip(onset, error, until, 1e-3 * distance, 2e-3 * noise, float(ratio)))
     return slips
+
+
+def _for_good(rest: Array, moving: Mask, n: int, slid: float, step: float) -> Mask:
+    """Return the motions after which the finger is elsewhere; those that come back are none."""
+    kept = moving.copy()
+    for first, last in runs(fill_short_gaps(moving, n_samples_of(RETURN_TIME, step))):
+        before = np.median(rest[max(first - 3 * n, 0) : first + 1], axis=0)
+        after = np.median(rest[last - 1 : last - 1 + 3 * n], axis=0)
+        if np.linalg.norm(after - before) < slid:
+            kept[first:last] = False
+    return kept
+
+
+def _during(slips: list[SeenSlip], times: Array) -> Mask:
+    mask = np.zeros(len(times), dtype=bool)
+    for slip in slips:
+        mask |= (times > slip.onset - SLIP_MARGIN) & (times < slip.end + SLIP_MARGIN)
+    return mask
 
 
 def change_point(times: Array, values: Array, noise: float) -> tuple[float, float]:
@@ -433,26 +468,29 @@ def with_slips(
     """Return labels in which slips replace what they overlap of a held contact."""
     made: list[Label] = []
     for label in labels:
-        at = label.start
         if label.state is ContactState.NO_CONTACT or label.cause not in (None, Cause.DISTURBANCE):
             made.append(label)
             continue
+        at = label.start
         for slip in slips:
             start, end = max(slip.onset, at), min(slip.end, label.end)
             if start >= end:
                 continue
-            if start - at > 1e-3:
+            if start > at:
                 made.append(_part(label, at, start))
             text = (
                 f"slides {1e3 * slip.distance:.2f} mm (+/- {1e3 * slip.distance_error:.2f}), "
                 f"onset +/- {1e3 * slip.onset_error:.0f} ms; {note}"
             )
-            sure = round(label_confidence(float(evidence_ratio(slip.ratio, 0.5)), end - start), 3)
+            if made and made[-1].evidence == text:  # it goes on over an edge of the labels
+                start = made.pop().start
+            ratio = float(evidence_ratio(slip.ratio, 0.5))
+            sure = round(label_confidence(ratio, end - start), 3)
             made.append(
                 Label(start, end, ContactState.UNSTABLE, Cause.SLIP, text, sure, VIDEO_RULE)
             )
             at = end
-        if label.end - at > 1e-3:
+        if label.end > at:
             made.append(_part(label, at, label.end))
     return tuple(made)
 

@@ -1,0 +1,114 @@
+"""Labels that `holdfast label auto` and `import` write, and what they print of them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from holdfast.cli.label.inputs import SaveOptions, current_time
+from holdfast.cli.terminal.console import (
+    print_error,
+    print_json,
+    print_line,
+    print_message,
+    print_table,
+)
+from holdfast.cli.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from holdfast.labelling.labelled_files import LabelsOf
+
+MAX_DOUBTFUL_SHOWN = 20
+"""Maximum number of doubtful labels in the table; JSON has all of them."""
+
+
+def label_all(
+    paths: Sequence[Path],
+    labels_of: "LabelsOf",
+    author: str,
+    saving: SaveOptions,
+) -> list[dict[str, Any]]:
+    """Label recordings; return a JSON document of each: its labels, or an error.
+
+    Raises:
+        RecordingError: there is no recording at a path.
+        OutputError: a recording has labels of a person.
+    """
+    from holdfast.labelling.labelled_files import check_no_manual_labels, label_file, recordings_at
+
+    files = recordings_at(paths)
+    if not (saving.dry_run or saving.force):
+        check_no_manual_labels(files)
+    return [
+        label_file(path, labels_of, author, None if saving.dry_run else current_time())
+        for path in progress(files, "labelling")
+    ]
+
+
+def print_labelled(
+    origin: dict[str, str],
+    documents: Sequence[dict[str, Any]],
+    saving: SaveOptions,
+    *,
+    as_json: bool,
+) -> None:
+    """Print what was labelled; report labels that are hidden now, and recordings that failed.
+
+    Args:
+        origin: what made the labels; the first field of the JSON document.
+        documents: from `label_all`.
+        saving: how the labels were saved.
+        as_json: print JSON.
+
+    Raises:
+        RecordingError: a recording failed.
+    """
+    from holdfast.errors import RecordingError
+
+    if as_json:
+        print_json({**origin, "written": not saving.dry_run, "recordings": documents})
+    else:
+        _print_documents(documents)
+    if n_hidden := sum(bool(document.get("n_inside")) for document in documents):
+        outrank = (
+            "would outrank them in train and evaluate"
+            if saving.dry_run
+            else "outrank them in train and evaluate: delete NAME.labels.json to use them again"
+        )
+        print_message(
+            f"{n_hidden} of {len(documents)} recordings came with labels; the label files {outrank}"
+        )
+    errors = [document["error"] for document in documents if "error" in document]
+    for error in errors[:-1]:
+        print_error(error)
+    if errors:
+        raise RecordingError(errors[-1])
+
+
+def _print_documents(documents: Sequence[dict[str, Any]]) -> None:
+    """Print seconds per state of each recording, and labels with low confidence."""
+    good = [document for document in documents if "error" not in document]
+    if not good:
+        return
+    print_table(
+        ("recording", "stable [s]", "unstable [s]", "no contact [s]", "doubtful"),
+        [
+            (x["name"], *(f"{s:.2f}" for s in x["seconds"].values()), len(x["doubtful"]))
+            for x in good
+        ],
+    )
+    doubtful = [(document["name"], label) for document in good for label in document["doubtful"]]
+    if not doubtful:
+        return
+    doubtful.sort(key=lambda item: item[1]["confidence"])
+    print_line()
+    print_line("labels of low confidence, check these first:")
+    print_table(
+        ("recording", "finger", "start [s]", "end [s]", "state", "confidence", "evidence"),
+        [
+            (name, x["finger"], f"{x['start']:.2f}", f"{x['end']:.2f}", x["state"],
+             f"{x['confidence']:.2f}", x["evidence"])
+            for name, x in doubtful[:MAX_DOUBTFUL_SHOWN]
+        ],
+    )  # fmt: skip
+    if len(doubtful) > MAX_DOUBTFUL_SHOWN:
+        print_line(f"and {len(doubtful) - MAX_DOUBTFUL_SHOWN} more: --json prints all")

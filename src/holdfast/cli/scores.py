@@ -1,0 +1,256 @@
+"""Tables of the scores of a model, for `holdfast evaluate`, `train` and `tune`."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from holdfast.cli.terminal.console import (
+    format_number,
+    print_line,
+    print_message,
+    print_paragraph,
+    print_table,
+)
+
+if TYPE_CHECKING:
+    from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
+    from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
+    from holdfast.metrics.slips import SlipMetrics
+    from holdfast.metrics.statistics import Interval
+    from holdfast.training import CurvePoint
+    from holdfast.training.evaluation import Evaluation
+
+PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
+AUC_NOTE = (
+    "AUC in contact: stable against unstable. AUC of all: also against no contact, "
+    "where the force decides, not the probability."
+)
+"""Explanation of the two AUCs below their table."""
+NO_RULE = "slips of fingers: the model has no slip rule"
+UNKNOWN_SLIPS = "slips of fingers: not known in these recordings; the slip rule is not scored"
+KEPT_RULE = "slips of fingers: the slip rule of --init is kept; holdfast evaluate scores it"
+SHARES_NOTE = (
+    "Shares found [%]: before the onset; within 0.03, 0.05 and 0.1 s of it; of the slips over "
+    "1 mm, within 0.1 s and before they slid 1 mm. False alarms per minute of quiet hold and of "
+    "all held time."
+)
+"""Explanation of the columns of the scores of slips."""
+NEVER_NOTE = ' The row "never" is a model that never reports a slip.'
+SHARES_HEADER = (
+    "by onset", "0.03", "0.05", "0.1", "0.1, 1 mm", "before 1 mm", "quiet", "held",
+)  # fmt: skip
+
+
+def warn_about_recordings(evaluation: "Evaluation", n_recordings: int) -> None:
+    """Print the names of recordings on which the model was trained, and of copies."""
+    pairs = [f"{name} of {original}" for name, original in evaluation.copies]
+    trained_on = evaluation.trained_on
+    copies, names = (", ".join(x[:5]) + (" ..." if len(x) > 5 else "") for x in (pairs, trained_on))
+    if copies:
+        print_message(f"copies, with the same readings: {copies}; the verdict counts them once")
+    if trained_on:
+        print_message(
+            f"the model was trained on {len(trained_on)} of these {n_recordings} recordings "
+            f"({names}): their metrics are optimistic"
+        )
+
+
+def print_verdict(sentence: str) -> None:
+    """Print the sentence on what a model is good for."""
+    print_paragraph(sentence)
+    print_line()
+
+
+def print_metrics(metrics: "Metrics") -> None:
+    """Print two tables, by sample and by event, and the intervals of all fingers together.
+
+    The last row of each is of a model that decides every sample STABLE.
+    """
+    pooled, hand = metrics.pooled, metrics.events.hand
+    (tn, fp), (fn, tp) = pooled.confusion
+    shares = [format_number(100 * k / max(pooled.n, 1), 1) for k in (fn + tp, tn + fp)]
+    print_line("by sample")
+    print_table(
+        ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC in contact", "AUC of all"),
+        [
+            *(_sample_row(name, finger) for name, finger in metrics.fingers.items()),
+            _sample_row("all", pooled),
+            ("always STABLE", str(pooled.n), *shares, "100.0", "0.0", "0.500", "0.500"),
+        ],
+    )
+    print_paragraph(AUC_NOTE)
+    print_line()
+    words = {"mixed": "by truth or labels", "rule": "by labels of a rule, without their margin"}
+    onsets = words.get(hand.onsets, f"by the {hand.onsets}")
+    print_line(f"by event (onset of instability in a held contact, {onsets})")
+    missed = ["100.0" if hand.n_events else "-"] * len(hand.missed)
+    print_table(
+        ("", "events", "missed 0.05 s", "0.1 s", "0.2 s %", "delay s", "p95 s", "alarms/min"),
+        [
+            *(_event_row(name, finger) for name, finger in metrics.events.fingers.items()),
+            _event_row("hand", hand),
+            ("always STABLE", str(hand.n_events), *missed, "never", "never", "0.0"),
+        ],
+    )
+    if metrics.intervals is not None:
+        _print_intervals(metrics.intervals)
+    if metrics.score_bins is not None:
+        print_line(f"AUC from {metrics.score_bins} bins of probability, because of many samples")
+
+
+def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
+    percents = (format_number(getattr(metrics, field), 1) for field in PERCENT_FIELDS)
+    aucs = (format_number(metrics.auc_contact, 3), format_number(metrics.auc, 3))
+    return name, str(metrics.n), *percents, *aucs
+
+
+def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:
+    missed = (format_number(share, 1) for share in metrics.missed.values())
+    delays = (
+        format_number(delay, 3) if delay is not None or not metrics.n_events else "never"
+        for delay in (metrics.delay_median, metrics.delay_p95)
+    )
+    false_alarms = format_number(metrics.false_alarms_per_minute, 1)
+    return name, str(metrics.n_events), *missed, *delays, false_alarms
+
+
+def _print_intervals(intervals: "Intervals") -> None:
+    parts = [
+        f"{name} {format_number(low, digits)} to {format_number(high, digits)}"
+        for name, field, digits in (
+            ("accuracy", "accuracy", 1),
+            ("FDR", "fdr", 1),
+            ("FNR", "fnr", 1),
+            ("AUC in contact", "auc_contact", 3),
+        )
+        if (interval := getattr(intervals, field)) is not None
+        for low, high in [interval]
+    ]
+    groups = "" if intervals.n_groups is None else f" in {intervals.n_groups} groups"
+    of = f"{intervals.n_recordings} recordings{groups}"
+    print_line()
+    print_paragraph(f"{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
+
+
+def print_slips(
+    summary: "SlipSummary | None", *, has_rule: bool, unscored: str = UNKNOWN_SLIPS
+) -> None:
+    """Print the table of slips, or one line that says why there is none.
+
+    Args:
+        summary: of the slips of all fingers; None if no slips are known.
+        has_rule: whether the model has a slip rule.
+        unscored: the line for a rule without scores.
+    """
+    print_line()
+    if not has_rule or summary is None:
+        print_line(unscored if has_rule else NO_RULE)
+        return
+    print_line(f"slips of fingers ({slips_origin(summary.pooled)})")
+    rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]
+    print_table(
+        ("", "slips", "over 1 mm", *SHARES_HEADER, "AUC"),
+        [*rows, _finger_row("all", summary.pooled), _never_a_slip(summary.pooled)],
+    )
+    print_paragraph(SHARES_NOTE)
+    print_paragraph(_support(summary.pooled) + NEVER_NOTE)
+    if summary.intervals is not None:
+        print_line()
+        print_paragraph(_intervals(summary.intervals, chosen=summary.threshold_chosen))
+
+
+def slips_origin(metrics: "SlipMetrics") -> str:
+    """Return where the slips come from."""
+    return {"truth": "by the truth", "mixed": "by truth or labels"}.get(metrics.onsets, "by labels")
+
+
+def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
+    """Return the cells below `SHARES_HEADER`."""
+    rates = metrics.false_alarms_per_minute
+    shares = (*metrics.incipient.values(), metrics.over_1mm["0.1"], metrics.before_1mm)
+    return (
+        *(format_number(share, 0) for share in shares),
+        *(format_number(rates[time], 2) for time in ("quiet", "held")),
+    )
+
+
+def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
+    n_over = "-" if metrics.onsets in ("labels", "rule") else str(metrics.n_over_1mm)
+    return (
+        name, str(metrics.n), n_over, *share_cells(metrics), format_number(metrics.auc, 3)
+    )  # fmt: skip
+
+
+def _never_a_slip(metrics: "SlipMetrics") -> tuple[str, ...]:
+    """Return the row of a model that never reports a slip."""
+    n, n_over = _finger_row("", metrics)[1:3]
+    shares = ["0"] * (len(SHARES_HEADER) - 2) if metrics.n else ["-"] * (len(SHARES_HEADER) - 2)
+    return "never", n, n_over, *shares, "0.00", "0.00", "0.500"
+
+
+def _support(metrics: "SlipMetrics") -> str:
+    """Return of how much time the rates are, and how long a slip is reported in quiet hold."""
+    minutes = f"{metrics.quiet_minutes:.1f} min quiet of {metrics.held_minutes:.1f} min held"
+    if metrics.raised_quiet is None:
+        return f"Of one finger: {minutes}."
+    return (
+        f"Of one finger: {minutes}; a slip is reported in {metrics.raised_quiet:.2f} % of quiet "
+        "hold."
+    )
+
+
+def _intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
+    """Return the intervals of the row of all fingers, and whether they include the choice."""
+    from holdfast.metrics.summary import LEVEL
+
+    shares = {
+        "before the onset": intervals.incipient["before"],
+        "within 0.1 s": intervals.incipient["0.1"],
+        "over 1 mm within 0.1 s": intervals.over_1mm["0.1"],
+        "before 1 mm": intervals.before_1mm,
+    }
+    rates = {
+        f"false alarms of {name}": intervals.false_alarms_per_minute[name]
+        for name in ("quiet", "held")
+    }
+    parts = [*_ranges(shares, "{:.0f} to {:.0f} %"), *_ranges(rates, "{:.2f} to {:.2f}")]
+    choice = "with the choice of the threshold" if chosen else "without a choice of the threshold"
+    return f"{100 * LEVEL:g} % intervals of all slips, {choice}: " + ", ".join(parts)
+
+
+def _ranges(intervals: "Mapping[str, Interval | None]", form: str) -> list[str]:
+    known = {name: interval for name, interval in intervals.items() if interval is not None}
+    return [f"{name} {form.format(*interval)}" for name, interval in known.items()]
+
+
+def print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> None:
+    """Print the scores at several thresholds of the probability of stability, or of a slip.
+
+    Args:
+        points: lowest threshold first.
+        notes: word beside a threshold.
+    """
+    slips = {point.threshold: point.slips for point in points if point.slips is not None}
+    if slips:
+        print_line(
+            f"slips of fingers at each threshold ({slips_origin(next(iter(slips.values())))})"
+        )
+        print_table(
+            ("threshold", *SHARES_HEADER, ""),
+            [(f"{t:.4g}", *share_cells(x), notes.get(t, "")) for t, x in slips.items()],
+        )
+        print_paragraph(SHARES_NOTE)
+        return
+    print_line("of the hand; missed events within 0.05, 0.1 and 0.2 s of their onset")
+    rows = []
+    for point in points:
+        cells: tuple[str, ...] = ()
+        if (events := point.events) is not None:
+            missed = (format_number(share, 1) for share in events.missed.values())
+            never = events.delay_median is None and events.n_events
+            delay = "never" if never else format_number(events.delay_median, 3)
+            rates = f"{point.stable:.1f}", f"{point.false_alarms:.2f}"
+            cells = f"{point.threshold:.4g}", *rates, *missed, delay
+        rows.append((*cells, notes.get(point.threshold, "")))
+    header = ("threshold", "STABLE %", "false/min", "0.05 s %", "0.1 s %", "0.2 s %",
+              "delay s", "")  # fmt: skip
+    print_table(header, rows)

@@ -1,0 +1,110 @@
+"""Stickers in videos that a test draws: places, stamps, and files that are no video."""
+
+import numpy as np
+import pytest
+
+from holdfast.errors import RecordingError
+from holdfast.io import foreign, stickers
+from holdfast.io.foreign import read_stickers
+from holdfast.io.stickers import sticker_places
+
+cv2 = pytest.importorskip("cv2")
+
+SIZE, SIDE, N = (320, 240), 48, 40
+
+
+def middle(k, number):
+    """Where the middle of a sticker is in picture k, from the middle of the picture [pixels]."""
+    return np.array([-60.0 + 90 * number + 0.13 * k, 5.0 * np.sin(k / 7)])
+
+
+def picture(k, numbers):
+    book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    grey = np.full((4 * SIZE[1], 4 * SIZE[0]), 120, np.uint8)
+    for number in numbers:
+        black = cv2.aruco.generateImageMarker(book, number, 4 * SIDE)
+        ink = np.pad(black, 32, constant_values=230)
+        x, y = 4 * (middle(k, number) + np.array(SIZE) / 2) - len(ink) / 2
+        turn = np.array([[1.0, 0, x], [0, 1.0, y]])
+        grey = cv2.warpAffine(
+            ink, turn, grey.shape[::-1], grey, cv2.INTER_LINEAR, cv2.BORDER_TRANSPARENT
+        )
+    return cv2.cvtColor(cv2.resize(grey, SIZE, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR)
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    """A film of two stickers; number 1 is covered for some pictures."""
+    path = tmp_path_factory.mktemp("film") / "run.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, SIZE)
+    for k in range(N):
+        writer.write(picture(k, (0,) if 20 <= k < 24 else (0, 1)))
+    writer.release()
+    yield path
+    foreign.end_children()
+
+
+def test_places_are_exact_to_hundredths_of_a_pixel(film):
+    times, places = read_stickers(film)
+    assert times == pytest.approx(np.arange(N) / 30)
+    assert sorted(places) == [0, 1]
+    truth = np.array([middle(k, 0) for k in range(N)])
+    away = places[0][:, :, 2] - truth
+    assert away.std(axis=0).max() < 0.07
+    assert np.abs(away.mean(axis=0)).max() < 0.3
+    assert places[0][:, 0, 0] == pytest.approx(np.full(N, SIDE), rel=0.03)
+
+
+def test_a_covered_sticker_is_not_seen_and_comes_back(film):
+    _, places = read_stickers(film)
+    seen = np.isfinite(places[1][:, 0, 0])
+    assert seen[:20].all()
+    assert not seen[21:24].any()
+    assert seen[28:].all()
+
+
+def test_the_rate_can_be_given(film):
+    assert read_stickers(film, fps=10.0)[0] == pytest.approx(np.arange(N) / 10)
+
+
+def test_parts_join_to_the_whole(film, monkeypatch):
+    whole = read_stickers(film)
+    monkeypatch.setattr(stickers, "PICTURES_PER_PART", 7)
+    parts = list(sticker_places(film))
+    assert [len(times) for times, _ in parts] == [7, 7, 7, 7, 7, 5]
+    assert np.concatenate([times for times, _ in parts]) == pytest.approx(whole[0])
+
+
+@pytest.mark.parametrize("content", [b"", b"no video\n" * 99, b"\0\0\0\x18ftypmp42" + b"\xff" * 99])
+def test_what_is_no_video_is_one_line(tmp_path, content):
+    path = tmp_path / "run.mp4"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"run\.mp4 is no video that OpenCV can decode here: "):
+        read_stickers(path)
+
+
+def test_a_damaged_film_ends(film, tmp_path):
+    content = bytearray(film.read_bytes())
+    content[2000:9000] = bytes(7000)
+    path = tmp_path / "run.mp4"
+    path.write_bytes(content)
+    times, _ = read_stickers(path)
+    assert len(times) <= N
+
+
+LIMITS = {
+    "MAX_VIDEO": (1000, r"run\.mp4 has 0\.\d+ MB; a video of at most \S+ MB expected: cut it"),
+    "MAX_PIXELS": (100, r"run\.mp4 has pictures of 320 x 240 pixels; at most 3840 x 2160 expected"),
+}
+
+
+@pytest.mark.parametrize(("name", "most", "message"), [(k, *v) for k, v in LIMITS.items()])
+def test_a_film_that_is_too_large_is_refused(film, monkeypatch, name, most, message):
+    monkeypatch.setattr(stickers, name, most)
+    with pytest.raises(RecordingError, match=message):
+        next(sticker_places(film))
+
+
+def test_a_missing_film(tmp_path):
+    with pytest.raises(RecordingError, match=r"run\.mp4 does not exist; a video expected"):
+        read_stickers(tmp_path / "run.mp4")

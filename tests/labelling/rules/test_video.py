@@ -1,0 +1,224 @@
+"""Slips in a video, from places of stickers that a test makes: what moves, and what is felt."""
+
+import numpy as np
+import pytest
+
+from holdfast.errors import RecordingError
+from holdfast.labelling.rules import propose, video
+from holdfast.labelling.rules.video import VideoRule, change_point, seen_slips, with_slips
+from holdfast.metrics.slip_truth import label_slips
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors import sensor
+
+RATE, FPS, SECONDS = 100.0, 60.0, 40.0
+SLIPS = ((12.0, 1.5), (24.0, 0.8))
+"""Onset [s] and distance [mm] of the slips of the index finger; each lasts 0.2 s."""
+PIXELS = 2.5
+"""Pixels in a millimetre of the object's sticker."""
+SHIFT = 0.237
+"""Time that is added to the clock of the video [s]."""
+
+
+def forces(times, seed=0):
+    """Return (n, 3): free, closing, held with loads that come and go, and free again."""
+    generator = np.random.default_rng(seed)
+    grip = np.interp(times, [2, 3, SECONDS - 3, SECONDS - 2], [0, 10.0, 10.0, 0])
+    held = (times > 4) & (times < SECONDS - 4)
+    load = np.zeros((len(times), 2))
+    for start in np.arange(5, SECONDS - 5, 1.0) + generator.uniform(0, 0.3, int(SECONDS - 10)):
+        shape = np.exp(-(((times - start - 0.3) / generator.uniform(0.05, 0.2)) ** 2))
+        load += 4 * shape[:, None] * generator.normal(0, 1, 2)
+    return np.column_stack([load * held[:, None], grip])
+
+
+def recording(seed=0):
+    patch = sensor("uskin-4x4")
+    times = np.arange(0, SECONDS, 1 / RATE)
+    modules = {}
+    for k, finger in enumerate(("thumb", "index")):
+        noise = np.random.default_rng([seed, k]).normal(0, 1, (len(times), 16, 3))
+        readings = 100 * forces(times, seed)[:, None] / 16 + noise
+        modules[finger] = Tactile(patch, times, np.round(readings).astype(np.int32))
+    return Recording("pulls", modules, {})
+
+
+def places(slips=SLIPS, tip_size=15.0, elastic=0.3, tip=2, fps=FPS):
+    """Return times [s] and places of the stickers of the object and of a fingertip."""
+    times = np.arange(0, SECONDS - 1, 1 / fps)
+    shown = times + SHIFT
+    slid = sum(size * np.clip((shown - onset) / 0.2, 0, 1) for onset, size in slips)
+    moved = elastic * forces(shown)[:, :2] + np.column_stack([slid, np.zeros(len(times))])
+    generator = np.random.default_rng(5)
+    found = {}
+    for number, side, middle in (
+        (0, 24.0, np.zeros((1, 2))),
+        (tip, tip_size, moved + np.array([30.0, 5.0])),
+    ):
+        place = np.zeros((len(times), 2, 3))
+        place[:, 0, 0] = place[:, 1, 1] = side * PIXELS
+        place[:, :, 2] = middle * PIXELS
+        found[number] = place + generator.normal(0, 0.01, place.shape)
+    return times, found
+
+
+@pytest.fixture
+def film(monkeypatch):
+    def shown(times, found):
+        monkeypatch.setattr(video, "read_stickers", lambda path, fps: (times, found))
+
+    return shown
+
+
+def slips_of(labels):
+    return [label for label in labels if label.cause == "slip"]
+
+
+def test_slips_are_found_and_yielding_is_none(film):
+    film(*places())
+    labels = propose("tracking", recording(), video="run.mp4")
+    assert list(labels) == ["index"]  # no sticker of the thumb is in view
+    found = slips_of(labels["index"])
+    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.02)
+    for label, (onset, size) in zip(found, SLIPS, strict=True):
+        assert label.end == pytest.approx(onset + 0.2, abs=0.06)
+        distance = float(label.evidence.split()[1])
+        assert distance == pytest.approx(size, abs=0.1)
+        offset = float(label.evidence.split("later by ")[1].split()[0])
+        assert offset == pytest.approx(SHIFT, abs=0.008)
+        assert "video run.mp4" in label.evidence
+        assert label.author == "rule:tracking"
+        assert label.confidence > 0.5
+    states = {(str(label.state), str(label.cause)) for label in labels["index"]}
+    assert ("UNSTABLE", "closing") in states
+    assert ("STABLE", "None") in states
+    assert len(label_slips(labels["index"])) == len(SLIPS)
+
+
+def test_pulls_without_sliding_have_no_slip(film):
+    film(*places(slips=((0.0, 0.0),)))
+    assert slips_of(propose("tracking", recording(), video="run.mp4")["index"]) == []
+
+
+def test_irregular_stamps_and_short_gaps_are_no_hindrance(film):
+    times, found = places()
+    kept = np.random.default_rng(3).random(len(times)) > 0.1  # a tenth of the pictures is lost
+    found[2][1200:1203] = np.nan
+    film(times[kept], {number: place[kept] for number, place in found.items()})
+    labels = propose("tracking", recording(), video="run.mp4")
+    starts = [label.start for label in slips_of(labels["index"])]
+    assert starts == pytest.approx([s for s, _ in SLIPS], abs=0.03)
+
+
+def test_an_offset_and_numbers_of_stickers_can_be_given(film):
+    times, found = places(tip=7)
+    film(times, found)
+    labels = propose(
+        "tracking", recording(), video="run.mp4", offset=SHIFT, bodies={"object": 0, "thumb": 7}
+    )
+    assert list(labels) == ["thumb"]
+    assert "later by 0.237 s (+/- 0.000)" in slips_of(labels["thumb"])[0].evidence
+
+
+def without(number):
+    times, found = places()
+    del found[number]
+    return times, found
+
+
+def hidden(number):
+    times, found = places()
+    found[number][500:] = np.nan
+    return times, found
+
+
+def of_another_time():
+    times, found = places()
+    found[2][:, :, 2] = np.array([75.0, 12.0]) + 3 * forces(times, seed=9)[:, :2]
+    return times, found
+
+
+def with_lost_pictures():
+    """Pictures that were dropped without a gap in the stamps."""
+    times, found = places()
+    kept = np.arange(len(times)) % 50 < 49
+    return times[: kept.sum()], {number: place[kept] for number, place in found.items()}
+
+
+def still():
+    times, found = places(slips=((0, 0),), elastic=0)
+    return times, found
+
+
+NOT_ALIKE = r"run\.mp4: its (motion is not that of|clock is known to \d+ ms only)"
+BAD_FILMS = {
+    "no sticker": (lambda: (places()[0], {}), r"stickers seen in its 2340 pictures: none; that"),
+    "no object": (lambda: without(0), r"pictures: index \(2\) in 100%; that of the object \(0\)"),
+    "no finger": (lambda: without(2), r"pictures: object \(0\) in 100%; that of the object \(0\)"),
+    "hidden": (lambda: hidden(0), r"object \(0\) in 21%, index \(2\) in 100%; that of"),
+    "other size": (
+        lambda: places(tip_size=30.0),
+        r"sticker 2 \(index\) looks 2 times as large as 15 mm beside the 24 mm of the object; give",
+    ),
+    "other time": (of_another_time, r"run\.mp4: its motion is not that of recording 'pulls' at"),
+    "nothing moves": (still, NOT_ALIKE),
+    "lost pictures": (with_lost_pictures, NOT_ALIKE),
+}
+
+
+@pytest.mark.parametrize(("made", "message"), BAD_FILMS.values(), ids=BAD_FILMS)
+def test_a_film_that_shows_no_slips_is_refused(film, made, message):
+    film(*made())
+    with pytest.raises(RecordingError, match=message) as refused:
+        propose("tracking", recording(), video="run.mp4")
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("bodies", [{"object": 0}, {"index": 2}, {"object": 0, "toe": 3}])
+def test_stickers_of_other_bodies_are_refused(film, bodies):
+    film(*places())
+    with pytest.raises(ValueError, match="object and at least one of thumb, index expected"):
+        propose("tracking", recording(), video="run.mp4", bodies=bodies)
+
+
+def test_the_size_of_a_sticker_is_above_zero():
+    with pytest.raises(ValueError, match="tip_size: a number above 0 expected, -1 given"):
+        VideoRule(tip_size=-1)
+
+
+def test_a_change_point_is_before_the_noise_is_left():
+    times, generator = np.arange(30) / FPS, np.random.default_rng(0)
+    errors, spreads = [], []
+    for _ in range(50):
+        line = np.maximum(times - 0.3, 0) + generator.normal(0, 0.02, len(times))
+        onset, spread = change_point(times, line, 0.02)
+        errors.append(onset - 0.3)
+        spreads.append(spread)
+    assert abs(np.mean(errors)) < 0.02
+    assert np.std(errors) == pytest.approx(np.mean(spreads), rel=0.6)
+
+
+def test_what_comes_back_has_not_slid():
+    times = np.arange(600) / FPS
+    there_and_back = np.exp(-(((times - 5) / 0.1) ** 2))
+    rest = np.column_stack([there_and_back, np.zeros(600)])
+    rest += np.random.default_rng(0).normal(0, 0.005, rest.shape)
+    held = np.ones(600, dtype=bool)
+    assert seen_slips(times, rest, held, VideoRule()) == []
+    rest[300:, 0] += 0.5
+    slips = seen_slips(times, rest, held, VideoRule())
+    assert slips[0].onset == pytest.approx(4.85, abs=0.1)
+
+
+def test_slips_cut_held_labels_only():
+    made = (
+        Label(0, 1, "NO_CONTACT", author="rule:signal"),
+        Label(1, 2, "UNSTABLE", "closing", author="rule:signal"),
+        Label(2, 5, "STABLE", author="rule:signal"),
+    )
+    slip = video.SeenSlip(3.0, 0.01, 3.5, 0.001, 0.0001, 4.0)
+    early = slip._replace(onset=1.2, end=1.8)
+    cut = with_slips(made, [early, slip])
+    assert [(x.start, x.end, str(x.cause)) for x in cut] == [
+        (0, 1, "None"), (1, 2, "closing"), (2, 3, "None"), (3, 3.5, "slip"), (3.5, 5, "None"),
+    ]  # fmt: skip
+    assert with_slips(made, [])[:2] == made[:2]
