@@ -78,3 +78,16 @@ def test_times_that_go_back_do_no_harm():
     run(watch, 0.0, 1.0, thumb=())
     run(watch, 1.0, 1.0, thumb=LATE)
     assert watch.current == [Problem(Fault.LATE, ("thumb",))]
+
+
+def test_invalid_readings_of_single_samples_are_reported_when_they_are_many():
+    watch, found = FaultWatch(), []
+    for k in range(2000):
+        faults = (Fault.INVALID,) if k % 40 == 0 else ()
+        found += [(k, problem) for problem in watch.update(hand(k * PERIOD, thumb=faults))]
+    assert found == [(9 * 40, Problem(Fault.INVALID, ("thumb",)))]
+    assert watch.current == [Problem(Fault.INVALID, ("thumb",))]
+    few = FaultWatch()
+    for k in range(9):
+        assert few.update(hand(k * 7.0, thumb=(Fault.INVALID,))) == []
+        assert few.update(hand(k * 7.0 + 1, thumb=())) == []

@@ -15,7 +15,7 @@
 /* A field, and its motion, count from this many times the noise of a component of the force: less
  * than any contact does. */
 #define HF_FIELD_TO_NOISE ((hf_real)4)
-/* Factor of the squared noise of taxels: twice what is expected, because the tare has noise, too. */
+/* Factor of the squared noise of taxels: twice what is expected, as the tare has noise, too. */
 #define HF_FIELD_MARGIN ((hf_real)4)
 /* Share of a change that is normal in a press; a field has any direction. */
 #define HF_PRESSED_SHARE ((hf_real)0.7)
@@ -46,8 +46,9 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
     const size_t n = f->n;
     hf_sum parts[7];
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_vectors plain = {{0}, {0}, {0}}, turned = {{0}, {0}, {0}};
-        hf_wide squares = {0};
+        const hf_wide zero = {0};
+        hf_vectors plain = {zero, zero, zero}, turned = plain;
+        hf_wide squares = zero;
         for (size_t i = lane; i < n; i += HF_LANES) {
             const hf_vectors h =
                 hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
@@ -61,8 +62,7 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
             turned.z += g.z;
             squares += used * hf_squares(h);
         }
-        const hf_wide all[7] = {plain.x,  plain.y,  plain.z, turned.x,
-                                turned.y, turned.z, squares};
+        const hf_wide all[7] = {plain.x, plain.y, plain.z, turned.x, turned.y, turned.z, squares};
         for (size_t k = 0; k < 7; ++k) {
             hf_put(&parts[k], lane, all[k]);
         }
@@ -136,8 +136,8 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
         return false;
     }
     /* Alike: sum |h_i - mean|^2 <= n (0.1 max(|mean|, |change|))^2 + 4 times that of noise. */
-    const hf_real limit = common->n * (HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE) *
-                          hf_max(hf_square(mean), square);
+    const hf_real limit =
+        common->n * (HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE) * hf_max(hf_square(mean), square);
     const bool is_alike = common->differences <= limit + of_noise;
     /* A load: a press that is too fast for a field, or too strong. Where the unit is not known, any
      * press is one, unless it is small beside a field that was found, or in the fingertip frame:
@@ -146,9 +146,9 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     const bool is_known = !isinf(most), is_strong = hf_square(mean) > most * most;
     const bool is_fast = moved > fastest * fastest;
     const bool is_small = square < hf_square(s->field) / 4;
-    const bool is_load = hf_is_press(f, common, change) &&
-                         (is_known ? is_fast || is_strong || s->field_is_load
-                                   : !is_small && !common->is_turned);
+    const bool is_load =
+        hf_is_press(f, common, change) &&
+        (is_known ? is_fast || is_strong || s->field_is_load : !is_small && !common->is_turned);
     if (!is_alike) {
         s->field_is_load = false;
         if (common->differences > HF_DEEP_LOAD * (limit + of_noise)) {
@@ -197,10 +197,10 @@ static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
         for (size_t i = 0; i < f->n_taxels; ++i) {
             for (size_t axis = 0; axis < 3; ++axis) {
                 const hf_real *const turn = f->rotations + axis * n + i;
-                f->readings[axis * n + i] -=
-                    s->field_is_turned ? turn[0] * s->field[0] + turn[3 * n] * s->field[1] +
-                                             turn[6 * n] * s->field[2]
-                                       : f->used[i] * s->field[axis];
+                f->readings[axis * n + i] -= s->field_is_turned ? turn[0] * s->field[0] +
+                                                                      turn[3 * n] * s->field[1] +
+                                                                      turn[6 * n] * s->field[2]
+                                                                : f->used[i] * s->field[axis];
             }
         }
     }
