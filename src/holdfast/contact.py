@@ -260,6 +260,8 @@ class StateChanges:
             raise ValueError(f"a duration of at least 0 s expected, {min_duration} given")
         self._names = tuple(names)
         self._min_duration = min_duration
+        # `states` are those that were reported; `_newest` the latest of all, and since when, which
+        # may not last.
         self.states = [ContactState.UNKNOWN] * len(self._names)
         self._newest = [(ContactState.UNKNOWN, -math.inf)] * len(self._names)
 
@@ -284,6 +286,7 @@ class StateChanges:
         for index, (state, lasting) in enumerate(zip(states, self.states, strict=True)):
             if state is not self._newest[index][0]:
                 self._newest[index] = state, time
+            # The event has the time at which the state began, not that at which it has lasted.
             begin = self._newest[index][1]
             if state is not lasting and time - begin >= shortest:
                 events.append(self._change(index, state, begin))
@@ -312,6 +315,7 @@ class StateChanges:
             ]
         if not len(times):
             return []
+        # The states of the chunk before come first: a change at its first sample counts, too.
         codes = np.vstack([[state.code for state in self.states], codes])
         rows, columns = np.nonzero(codes[1:] != codes[:-1])
         self.states = [_STATES[code] for code in codes[-1]]
@@ -349,6 +353,7 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int
         >>> hand_state(np.array([STABLE, STABLE, NO_CONTACT], dtype=np.int8), 3) == STABLE
         True
     """
+    # Instability outranks all: a finger that slips must not hide behind one that is not known.
     n_stable = 0
     n_unknown = 0
     for code in codes:
@@ -362,6 +367,7 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int
     return STABLE if holds else NO_CONTACT
 
 
+# By the rule itself, so that it stands once: 4 unstable + 2 unknown + held is the index.
 _HAND_STATES = np.array(
     [
         hand_state(np.array([UNSTABLE] * unstable + [UNKNOWN] * unknown + [STABLE] * held), 1)

@@ -318,6 +318,7 @@ class Recording:
         for name in sorted(self.modules):
             module = self.modules[name]
             readings = np.ascontiguousarray(module.readings)
+            # Shapes and types too: the same bytes in another shape are another recording.
             head = (name, module.sensor.name, module.unit, readings.dtype.str, readings.shape)
             state.update(repr(head).encode())
             state.update(np.ascontiguousarray(module.times).data)
@@ -465,7 +466,7 @@ def _check_samples(times: Array, readings: npt.NDArray[Any], sensor: Sensor) -> 
     if not np.isfinite(times).all():
         raise RecordingError("a time is not finite; seconds expected")
     steps = np.diff(times)
-    if (steps <= 0).any():
+    if (steps <= 0).any():  # windows by time, and the search for a sample, rest on their order
         k = int(np.flatnonzero(steps <= 0)[0])
         what = "stand still" if steps[k] == 0 else "go back"
         raise RecordingError(
@@ -477,6 +478,7 @@ def _check_samples(times: Array, readings: npt.NDArray[Any], sensor: Sensor) -> 
 def _check_labels(labels: tuple[Label, ...], times: Array, period: float) -> None:
     if len(times) == 0:
         raise RecordingError(f"{len(labels)} labels given for a module without samples")
+    # The last sample lasts for a period; half of one more allows for edges from another time grid.
     start, end = float(times[0]), float(times[-1]) + 1.5 * period
     tolerance = 1e-6
     for label in labels:
@@ -495,6 +497,7 @@ def _span(label: Label) -> str:
 
 
 def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    # A view, so that the array of the caller stays writable.
     view = array.view()
     view.flags.writeable = False
     return view

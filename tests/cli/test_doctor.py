@@ -6,10 +6,13 @@ from importlib import metadata
 import numpy as np
 import pytest
 
+from holdfast import save_recording
 from holdfast.cli import main
 from holdfast.devices.sources.xela import places
 from holdfast.devices.uri import source_states
 from holdfast.errors import EXTRA_PURPOSES, install_command
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
 
 
 @pytest.fixture(autouse=True)
@@ -124,3 +127,27 @@ def test_missing_extras_are_reported(monkeypatch):
     monkeypatch.setitem(sys.modules, "serial", None)
     monkeypatch.delitem(sys.modules, "holdfast.devices.sources.serial", raising=False)
     assert source_states()["serial"] == f"not installed: {install_command('serial')}"
+
+
+def test_the_modules_of_a_source(capsys, tmp_path):
+    path, history = tmp_path / "open.parquet", tmp_path / "history.json"
+    readings = 33_000 + np.rint(np.random.default_rng(0).normal(0, 3, (300, 16, 3)))
+    module = Tactile(sensor("uskin-4x4"), np.arange(300) / 100, readings)
+    save_recording(Recording("open", {"index": module}), path)
+    call = ["doctor", str(path), "--history", str(history), "--plot", str(tmp_path / "x.svg")]
+    assert main(call) == 0
+    out, err = capsys.readouterr()
+    assert "\nindex " in out
+    assert out.endswith("- nothing is wrong, and nothing is worse than at the last check\n")
+    assert err.endswith("x.svg written\n") and (tmp_path / "x.svg").exists()
+    assert main([*call, "--force", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (list(found["modules"]), found["findings"]) == (["index"], [])
+    assert found["last"] == found["date"] and found["history"] == str(history)
+
+
+def test_options_of_a_check_need_a_source(capsys):
+    assert main(["doctor", "--history", "x.json"]) == 2
+    assert capsys.readouterr().err == (
+        "holdfast: --plot and --history are for the modules of a source; SOURCE expected\n"
+    )

@@ -71,6 +71,7 @@ def test_json_of_a_recording(capsys, path, grasp):
         "rate": pytest.approx(150.0),
         "gaps": 0,
         "repeats": 0,
+        "drift": None,
         "labels": pytest.approx(labels),
         "faults": {},
     }
@@ -105,7 +106,7 @@ def test_the_table(capsys, path):
     assert re.search(r"^notes +very [^\n]*\n +very .*\.\.\.$", out, re.MULTILINE)
     assert re.search(r"^truth +phase, thumb\.slip_speed$", out, re.MULTILINE)
     assert re.search(r"^thumb +uskin-curved +30 +count +1725 +150\.0 +0 +0$", out, re.MULTILINE)
-    assert re.search(r"^thumb( +\d\.\d\d){3} +none$", out, re.MULTILINE)
+    assert re.search(r"^thumb( +\d\.\d\d){3} +- +none$", out, re.MULTILINE)
     assert re.search(r"^ +5\.300 +shaken$", out, re.MULTILINE)
     assert max(map(len, out.splitlines())) <= 80
 

@@ -184,6 +184,7 @@ class Finger:
         self.jumped = set()
         self.field = self.still_field = self.common = np.zeros(3)
         self.is_turned, self.is_load, self.n_unclear = False, False, 0
+        self.n_skipped = 0
         self.stretch = []  # forces since the last interruption
         self.last = None
         self.gapped = False
@@ -294,8 +295,10 @@ class Finger:
             return False
         limit = 130.0 if self.sensor.name == "anyskin" else math.inf
         kept = [i for i in self.used if i not in left_out]
-        unclear = len(kept) >= 4 and self.follow_field(readings, kept, limit)
-        self.n_unclear = self.n_unclear + 1 if unclear else 0
+        self.n_skipped -= 1
+        if self.n_skipped < 0:
+            unclear = len(kept) >= 4 and self.follow_field(readings, kept, limit)
+            self.n_unclear = self.n_unclear + 1 if unclear else 0
         for i in self.used:
             turn = self.sensor.rotations[i].T if self.is_turned else np.eye(3)
             readings[i] = readings[i] - turn @ self.field
@@ -323,10 +326,14 @@ class Finger:
         fast, strong = moved > (0.15 * limit) ** 2, mean @ mean > limit**2
         press = along**2 >= 0.49 * size and (along > 0 or limit == math.inf)
         small = size < self.field @ self.field / 4
-        load = press and (not small if limit == math.inf else fast or strong or self.is_load)
+        load = press and not (small or is_turned)
+        if limit < math.inf:
+            load = press and (fast or strong or self.is_load)
         noise = 12 * self.noise**2
-        if apart > n * 0.01 * (mean @ mean) + noise:
+        if apart > (alike := n * 0.01 * max(mean @ mean, size) + noise):
             self.is_load = False
+            if apart > 16 * alike:
+                self.n_skipped = 3
             return not load and apart <= n * 0.0625 * size + noise
         self.is_load = load
         if load and limit < math.inf and fast:

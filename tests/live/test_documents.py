@@ -12,7 +12,8 @@ import pytest
 from msgspec.structs import fields
 
 import holdfast
-from holdfast.cli.detect.output import EstimateChunk, json_lines
+from holdfast.cli.detect.estimates import EstimateChunk
+from holdfast.cli.detect.output import json_lines
 from holdfast.contact import ContactEstimate
 from holdfast.live.documents import FingerDocument, document_type, finger_document
 from live import estimates
@@ -23,7 +24,8 @@ NEW_FIELD = "    slip_distance: float | None = None\n"
 PROGRAM = """
 import json, sys
 import holdfast
-from holdfast.cli.detect.output import EstimateChunk, json_lines
+from holdfast.cli.detect.estimates import EstimateChunk
+from holdfast.cli.detect.output import json_lines
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.live.documents import finger_document
 from holdfast.live.web.schema import EstimateDocument

@@ -51,6 +51,30 @@ def test_a_grip_at_the_start_that_ends():
     assert notices(grasp()[400:], TIMES[400:], finds_pull=False) == []
 
 
+def test_a_long_hold_that_drifts():
+    times = np.arange(0, 80, 0.05)
+    force = np.interp(times, [2, 3], [0, 300]) + 0.5 * times
+    readings = force[:, None, None] * [0, 0, 1] + np.random.default_rng(0).normal(
+        0, 2, (len(times), 16, 3)
+    )
+    ((text, time),) = notices(readings, times)
+    assert text.startswith("index: the force of this hold drifts by ")
+    assert "count a minute, by warming or creep: take a new tare" in text
+    assert time > 60
+
+
+def test_two_modules_with_the_same_readings_are_a_notice():
+    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
+    found = [
+        notice
+        for sample, time in zip(grasp(), TIMES, strict=True)
+        for name in ("index", "thumb")  # samples may come one by one
+        for notice in monitor.update({name: sample}, time)
+    ]
+    text = "has the same readings as index: one sensor is read twice, or written to both"
+    assert found == [f"thumb {text}; check the channels"]
+
+
 def test_axes_that_never_change():
     readings = grasp()
     readings[:, :, :2] = 1000

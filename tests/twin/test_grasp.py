@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.twin.grasp import MIDDLE_PLACE, PATH_GAPS, closing_path, object_pose
-from holdfast.twin.grasp import _aims as aims
+from holdfast.twin.grasp import MIDDLE_PLACE, PATH_GAPS, aims_of, closing_path, object_pose
 from holdfast.twin.hand import FINGERS, JOINTS, HandModel
 from holdfast.twin.objects import OTHER_OBJECTS, distance_to, load_objects, object_named
 
@@ -42,7 +41,7 @@ def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name):
     place, turn = object_pose(item)
     c, s = np.cos(turn), np.sin(turn)
     for finger in FINGERS:
-        push, points = aims(item, finger)
+        push, points = aims_of(item, finger)
         world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] - place
         own = world @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
         far = distance_to(item, own)

@@ -97,7 +97,7 @@ def test_joints_have_the_friction_of_the_plant():
 class TestMotor:
     def followed(self, plant, n=40):
         simulation = Simulation(Grasp("can", 1, 1, plant=plant))
-        return [float(simulation._followed(np.full(4, 2.0))[0]) for _ in range(n)]
+        return [float(simulation.followed(np.full(4, 2.0))[0]) for _ in range(n)]
 
     def test_a_mild_force_follows_at_once(self):
         assert self.followed("mild", 3) == [2.0] * 3

@@ -76,7 +76,7 @@ def test_connections_that_are_not_known():
     ("descriptors", "total", "each"), [(20_000, 256, 128), (256, 96, 48), (40, 8, 8)]
 )
 def test_the_limit_leaves_the_process_descriptors(monkeypatch, descriptors, total, each):
-    monkeypatch.setattr(connections, "_max_descriptors", lambda: descriptors)
+    monkeypatch.setattr(connections, "max_descriptors", lambda: descriptors)
     limit = ConnectionLimit.of_process()
     assert (limit._max_total, limit._max_per_address) == (total, each)
 

@@ -22,7 +22,7 @@ from holdfast_ros.bag_storage.folder import METADATA, open_folder
 from holdfast_ros.bag_storage.mcap import open_mcap
 from holdfast_ros.bag_storage.ros1 import open_ros1
 from holdfast_ros.bag_storage.sqlite import open_sqlite
-from holdfast_ros.pose_messages import PoseDecoder, has_poses, known_pose_definition
+from holdfast_ros.pose_messages import PoseDecoder, has_poses
 from holdfast_ros.sensor_messages import known_definition
 
 MAGICS = {
@@ -116,7 +116,21 @@ class Bag:
                 return parse_definition(kind, text)
             except ValueError:
                 return None
-        return known_definition(kind, ros2=self.ros2) or known_pose_definition(kind, ros2=self.ros2)
+        standard = standard_definition(kind) if self.ros2 else None
+        return known_definition(kind, ros2=self.ros2) or standard
+
+
+def standard_definition(kind: str) -> Definition | None:
+    """Return the definition of a type that ROS 2 itself has; None of others.
+
+    Databases before ROS 2 Jazzy have no definitions.
+    """
+    from rosbags.typesys import Stores, get_typestore
+
+    store, name = get_typestore(Stores.ROS2_HUMBLE), short_name(kind).replace("/", "/msg/")
+    if name not in store.fielddefs:
+        return None
+    return parse_definition(kind, store.generate_msgdef(name, ros_version=2)[0])
 
 
 def find_bags(path: Path) -> list[Path]:

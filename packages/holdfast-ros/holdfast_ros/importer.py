@@ -5,8 +5,8 @@ ignored.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,8 +15,12 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.importers.array_tables import recordings_of_arrays
+from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.generic_csv import ANY_MODULE
+from holdfast.io.importers.table import first_texts
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import xela_models
+from holdfast.sensors import Sensor, xela_models
 from holdfast.sensors.types import Array
 from holdfast_ros.bag_storage.folder import METADATA
 from holdfast_ros.bags import Bag, BagTopic, find_bags, open_bag, poses_of
@@ -27,9 +31,13 @@ from holdfast_ros.sensor_messages import (
     readings_of,
     sensors_of,
 )
+from holdfast_ros.topic_arrays import arrays_of_topics
 
+TAKES_SENSORS = True
 HINT = f"{IF_IN_CONTACT}; bias a PapillArray before, without load"
 """Option that helps with the recordings, for the person who imports them."""
+MIN_DRIFT = 1e-3
+"""Smallest relative difference of the clocks of a device and a bag that is noted."""
 CLOCKS = ("device", "header", "bag")
 """Clocks that the times of a recording can come from, best first."""
 ONE_CLOCK_DIFFERENCE = 1.0
@@ -56,15 +64,38 @@ def parts(path: Path) -> list[Path]:
     return bags
 
 
-def read(path: Path) -> Iterator[Recording]:
+def read(
+    path: Path,
+    sensors: Mapping[str, Sensor] | None = None,
+    columns: Columns | None = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> Iterator[Recording]:
     """Yield the recording in a bag.
+
+    Args:
+        path: path of the bag.
+        sensors: sensor by topic, or by `TOPIC.FIELD`: any numbers in its messages are read.
+        columns: as in `recordings_of_arrays`.
+        report: as in `recordings_of_arrays`.
 
     Raises:
         RecordingError: it is damaged or has no known topic.
     """
     with open_bag(path) as bag:
-        recording = _BagImport(path, bag).recording()
-    yield recording
+        try:
+            if not sensors and not columns:
+                recordings = [_BagImport(path, bag).recording()]
+            else:
+                wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
+                arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
+                found = recordings_of_arrays(path, arrays, wanted, columns, report, "--topic")
+                recordings = [replace(recording, complete=bag.complete) for recording in found]
+        except RecordingError as cause:
+            if bag.complete:
+                raise
+            text = str(cause).removeprefix(f"{path} ")
+            raise RecordingError(f"{path} is cut or damaged: up to the cut it {text}") from cause
+    yield from recordings
 
 
 def poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
@@ -211,7 +242,7 @@ class _BagImport:
         if not topics:
             raise RecordingError(
                 f"{self._path} has no topic of a supported tactile sensor; it has "
-                f"{', '.join(others) or 'none'}"
+                f"{first_texts(others)}; for numbers x, y, z of any topic: --topic /TOPIC=SENSOR"
             )
         return list(topics.values())
 
@@ -262,6 +293,14 @@ class _BagImport:
             modules.update({f"{prefix}{name}": module for name, module in new.items()})
         return modules
 
+    def _drift(self, clock: str) -> float:
+        """Return how much faster the bag's clock runs than that of the longest track."""
+        track = max(self._tracks.values(), key=lambda track: len(track.stamps))
+        place = CLOCKS.index(clock)
+        times = np.array([(stamps[place], stamps[-1]) for stamps in track.stamps], dtype=np.float64)
+        device, bag = (times - times[0]).T
+        return round(float(np.polyfit(device, bag - device, 1)[0]), 6) if len(times) > 2 else 0.0
+
     def _tracks_by_finger(self) -> dict[tuple[str, str], _DeviceTrack]:
         """Return tracks by topic and finger; devices without a number are counted by topic."""
         tracks: dict[tuple[str, str], _DeviceTrack] = {}
@@ -283,6 +322,7 @@ class _BagImport:
             **({"hand": names[0]} if len(names) == 1 else {}),
             **({"n_refused": n_refused} if n_refused else {}),
             **({"n_undated": self._n_undated} if self._n_undated else {}),
+            **({"clock_drift": drift} if abs(drift := self._drift(clock)) >= MIN_DRIFT else {}),
         }
 
 

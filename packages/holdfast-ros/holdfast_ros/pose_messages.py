@@ -4,38 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from holdfast.io.cdr import MessageDecoder
-from holdfast.io.definitions import (
-    ROS1_HEADER,
-    ROS2_HEADER,
-    SEPARATOR,
-    Definition,
-    field_paths,
-    parse_definition,
-    short_name,
-)
-
-_QUATERNION = SEPARATOR + "geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
-_DEFINITIONS = {
-    "geometry_msgs/PoseStamped": (
-        "std_msgs/Header header\nPose pose\n"
-        + SEPARATOR
-        + "geometry_msgs/Pose\nPoint position\nQuaternion orientation\n"
-        + SEPARATOR
-        + "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
-        + _QUATERNION
-    ),
-    "tf2_msgs/TFMessage": (
-        "geometry_msgs/TransformStamped[] transforms\n"
-        + SEPARATOR
-        + "geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\n"
-        + "Transform transform\n"
-        + SEPARATOR
-        + "geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n"
-        + SEPARATOR
-        + "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
-        + _QUATERNION
-    ),
-}
+from holdfast.io.definitions import Definition, field_paths
 
 
 class StampedPose(NamedTuple):
@@ -57,14 +26,6 @@ class StampedPose(NamedTuple):
     quaternion: tuple[float, float, float, float]
 
 
-def known_pose_definition(name: str, *, ros2: bool) -> Definition | None:
-    """Return the definition of a type of pose messages, or None for any other type."""
-    text = _DEFINITIONS.get(short_name(name))
-    if text is None:
-        return None
-    return parse_definition(name, text + (ROS2_HEADER if ros2 else ROS1_HEADER))
-
-
 class PoseDecoder:
     """Decoder of messages of one type into the poses in them.
 
@@ -79,7 +40,8 @@ class PoseDecoder:
     def __init__(self, definition: Definition, *, ros2: bool) -> None:
         if not has_poses(definition):
             raise ValueError(
-                f"{definition.name} has no poses; messages like {' and '.join(_DEFINITIONS)} have"
+                f"{definition.name} has no poses; messages like geometry_msgs/PoseStamped and "
+                "tf2_msgs/TFMessage have"
             )
         self._decode = MessageDecoder(definition, ros2=ros2)
 

@@ -51,26 +51,17 @@ def fit_svm(
     columns = np.vstack([features.T, np.ones(len(features))])
     columns *= np.where(positive, 1.0, -1.0)
     limits = c * np.where(positive, class_weights[1], class_weights[0])
-    point = _start(columns, limits)
+    one = np.ones(len(limits))
+    point = _Point(np.zeros(len(columns)), one, one, limits / 2)  # far from every bound
     for _ in range(MAX_STEPS):
         margins, supported = point.weights @ columns, columns @ point.multipliers
-        if _gap(limits, point, margins, supported) < LAST_GAP:
+        # The dual objective is a lower bound, from any multipliers within their limits.
+        objective = point.weights @ point.weights / 2 + limits @ np.maximum(0.0, 1.0 - margins)
+        bound = point.multipliers.sum() - supported @ supported / 2
+        if float((objective - bound) / objective) < LAST_GAP:
             break
         point = _next(_System(columns, limits, point, margins, supported))
     return Solution(point.weights[:-1], float(point.weights[-1]))
-
-
-def _start(columns: Array, limits: Array) -> _Point:
-    """Return a point with multipliers of half their limits."""
-    one = np.ones(len(limits))
-    return _Point(np.zeros(len(columns)), one, one, limits / 2)
-
-
-def _gap(limits: Array, point: _Point, margins: Array, supported: Array) -> float:
-    """Return (objective - lower bound) / objective; the bound is the dual objective."""
-    objective = point.weights @ point.weights / 2 + limits @ np.maximum(0.0, 1.0 - margins)
-    bound = point.multipliers.sum() - supported @ supported / 2
-    return float((objective - bound) / objective)
 
 
 class _System:
@@ -141,6 +132,7 @@ def _next(system: _System) -> _Point:
     product = system.product()
     predicted = system.step(0.0, 0.0)
     left = system.product(predicted, system.longest(predicted))
+    # The better the predicted step, the smaller the target of the corrected one (Mehrotra's cube).
     target = (left / product) ** 3 * product / (2 * len(system.upper))
     corrected = system.step(
         target - predicted.multipliers * predicted.slacks,

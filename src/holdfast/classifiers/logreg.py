@@ -134,24 +134,21 @@ class Adapted:
         if parameters["change"] == NONE:
             return Fitted(self.prior, self.threshold)
         check_classes(samples)
-        fit = _calibrated if parameters["change"] == CALIBRATION else _reweighted
-        return Fitted(fit(self.prior, samples, parameters["C"]), self.threshold)
-
-
-def _calibrated(prior: Linear, samples: Samples, c: float) -> Linear:
-    odds = prior.slope * prior.decision(samples.features) + prior.offset
-    identity = Solution(np.array([1.0]), 0.0)
-    (slope,), shift = fit_logistic(odds[:, None], samples.positive, (1.0, 1.0), c, identity)
-    stretch = max(float(slope), MIN_SLOPE)
-    return replace(prior, slope=stretch * prior.slope, offset=stretch * prior.offset + shift)
-
-
-def _reweighted(prior: Linear, samples: Samples, c: float) -> Linear:
-    standardised = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
-    weights, intercept = fit_logistic(
-        standardised, samples.positive, (1.0, 1.0), c, log_odds(prior)
-    )
-    return Linear.of(np.array(prior.mean), np.array(prior.scale), weights, intercept)
+        prior, positive, c = self.prior, samples.positive, parameters["C"]
+        # Classes weigh as they are: balancing would move the odds away from the prior's.
+        if parameters["change"] == CALIBRATION:
+            odds = prior.slope * prior.decision(samples.features) + prior.offset
+            identity = Solution(np.array([1.0]), 0.0)
+            (slope,), shift = fit_logistic(odds[:, None], positive, (1.0, 1.0), c, identity)
+            stretch = max(float(slope), MIN_SLOPE)  # more of the prior never means less stable
+            offset = stretch * prior.offset + shift
+            return Fitted(
+                replace(prior, slope=stretch * prior.slope, offset=offset), self.threshold
+            )
+        mean, scale = prior.moments
+        standardised = (samples.features - mean) / scale
+        fitted = fit_logistic(standardised, positive, (1.0, 1.0), c, log_odds(prior))
+        return Fitted(Linear.of(mean, scale, fitted.weights, fitted.intercept), self.threshold)
 
 
 def linear_prior(rule: Rule) -> Linear:

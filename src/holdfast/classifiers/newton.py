@@ -116,11 +116,16 @@ def _minimise(evaluate: Evaluate, start: Array) -> Array:
     hessian = np.empty((len(start), len(start)))
     objective = evaluate(weights, gradient, hessian)
     for _ in range(MAX_ITERATIONS):
-        step = _step(hessian, gradient)
+        try:
+            step = np.linalg.solve(hessian, gradient)
+        except np.linalg.LinAlgError:
+            # Classes that are far apart leave the intercept free: the shortest step.
+            step = np.linalg.lstsq(hessian, gradient)[0]
         last = bool(np.abs(step).max() < LAST_STEP)
         if not last:
             limit = objective + ROUNDING_RISE * abs(objective)
             objective = evaluate(weights - step, gradient, hessian)
+            # Far from the minimum a whole step may overshoot; halved, some step of it goes down.
             while objective > limit and np.abs(step).max() > MIN_STEP:
                 step /= 2
                 objective = evaluate(weights - step, gradient, hessian)
@@ -128,14 +133,6 @@ def _minimise(evaluate: Evaluate, start: Array) -> Array:
         if last:
             break
     return weights
-
-
-def _step(hessian: Array, gradient: Array) -> Array:
-    """Return Newton's step; the shortest where the classes leave the intercept free."""
-    try:
-        return np.asarray(np.linalg.solve(hessian, gradient))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(hessian, gradient)[0])
 
 
 def _evaluate(

@@ -1,32 +1,59 @@
-"""`holdfast doctor`: check the installation and the live sources."""
+"""`holdfast doctor`: check the installation and the live sources, or the modules of a source."""
 
 import os
 import platform
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from holdfast.cli.extensions import plugin_states
-from holdfast.cli.options import JsonOption
-from holdfast.cli.terminal.console import print_json, print_line, print_table
+from holdfast.cli.options import JsonOption, PlotOptions, check_seconds
+from holdfast.cli.terminal.console import print_json, print_line, print_paragraph, print_table
 from holdfast.errors import EXTRA_PURPOSES, install_command, package_versions
 from holdfast.threads import usable_processors
 
+if TYPE_CHECKING:
+    from holdfast.live.health import HealthCheck
 
-def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
-    """Check the installation and the reachable sources.
+
+def doctor(
+    context: typer.Context,
+    source: Annotated[
+        str | None, typer.Argument(help="Source or recording whose modules are checked.")
+    ] = None,
+    *,
+    figure: PlotOptions,
+    seconds: Annotated[float, typer.Option(help="Duration of the check [s].")] = 10.0,
+    history: Annotated[
+        Path | None,
+        typer.Option(help="File of the checks of this source; by default in the state folder."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check the installation and the reachable sources, or the modules of a source.
 
     Report Python, the packages, the extras and how to install them, the kernel, the
     live sources that can be reached, which limits hold for imports (time, time of the processor,
     memory), the plug-ins of other packages, the configuration file of
     the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
 
+    With SOURCE, read ten seconds of the open hand, which nothing touches, and report for each
+    module the rate, the jitter, the gaps, the noise by axis and of the loudest taxel, dead and
+    stuck taxels, zeros, the range, and the magnetic field, if you turn the hand. The check is
+    kept, and compared with the last one.
+
     Example:
       holdfast doctor
       holdfast doctor --json
+      holdfast doctor xela://auto --plot health.png
     """
+    if source is not None:
+        _check_modules(source, seconds, history, figure, as_json)
+        return
+    if figure.plot is not None or history is not None:
+        raise ValueError("--plot and --history are for the modules of a source; SOURCE expected")
     from holdfast.cli.config import config_state
     from holdfast.devices.uri import source_states
     from holdfast.io.foreign import limits
@@ -59,6 +86,54 @@ def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
         print_json(report)
     else:
         _print(report)
+
+
+def _check_modules(
+    uri: str, seconds: float, history: Path | None, figure: PlotOptions, as_json: bool
+) -> None:
+    from holdfast.devices.sources import open_source
+    from holdfast.live.health import (
+        changes_since,
+        check_health,
+        history_path,
+        keep,
+        read_history,
+    )
+
+    check_seconds(seconds)
+    figure.check()
+    path = history_path(uri) if history is None else history
+    earlier = read_history(path)
+    with open_source(uri, speed=0) as source:
+        check = check_health(source, seconds)
+    last = earlier[-1] if earlier else None
+    findings = changes_since(check, last)
+    keep(path, earlier, check)
+    figure.save(lambda: _plot(check))
+    if as_json:
+        from msgspec import to_builtins
+
+        report = to_builtins(check) | {"last": last and last.date, "findings": findings}
+        print_json(report | {"history": str(path)})
+    else:
+        _print_health(check, findings)
+
+
+def _plot(check: "HealthCheck") -> Any:  # noqa: ANN401 (a figure, where matplotlib is installed)
+    from holdfast.plots.sensors import plot_noise
+
+    return plot_noise({name: module.noise for name, module in check.modules.items()})
+
+
+def _print_health(check: "HealthCheck", findings: list[str]) -> None:
+    from holdfast.live.health import table_of
+
+    header = ("module", "rate [Hz]", "jitter [ms]", "gaps", "zeros", "noise x y z",
+              "loudest (taxel)", "readings", "field")  # fmt: skip
+    print_table(header, table_of(check.modules))
+    print_line()
+    for finding in findings or ["nothing is wrong, and nothing is worse than at the last check"]:
+        print_paragraph(finding, "- ", "  ")
 
 
 def _kernels() -> dict[str, Any]:

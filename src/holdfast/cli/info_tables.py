@@ -60,9 +60,14 @@ def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
     print_line()
     faults = (", ".join(f"{x} {n}" for x, n in m["faults"].items()) for m in modules.values())
     print_table(
-        ("module", *_label_headings(), "faults"),
+        ("module", *_label_headings(), "drift [1/min]", "faults"),
         [
-            (name, *_label_cells([m]), text or "none")
+            (
+                name,
+                *_label_cells([m]),
+                "-" if m["drift"] is None else f"{m['drift']:.3g}",
+                text or "none",
+            )
             for (name, m), text in zip(modules.items(), faults, strict=True)
         ],
     )
@@ -105,7 +110,8 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
     modules = list(document["modules"].values())
     rates = sorted(m["rate"] for m in modules if m["n_samples"])
     faults = sorted({fault for m in modules for fault in m["faults"]})
-    findings = dict.fromkeys(finding["kind"] for finding in document["findings"])
+    kinds = dict.fromkeys(finding["kind"] for finding in document["findings"])
+    findings = [kind for kind in kinds if kind not in ("no_labels", "gaps")]  # other columns
     return (
         document["name"],
         len(modules),

@@ -22,29 +22,16 @@ def code_size(header: CHeader) -> int | None:
     with TemporaryDirectory() as folder:
         source, compiled = Path(folder) / "model.h", Path(folder) / "model.o"
         source.write_text(header.text)
-        words = [
-            "-std=c99",
-            "-O2",
-            "-DHOLDFAST_API=extern",
-            "-x",
-            "c",
-            "-c",
-            source,
-            "-o",
-            compiled,
-        ]
+        options = ["-std=c99", "-O2", "-DHOLDFAST_API=extern", "-x", "c", "-c"]
         try:
-            _run([compiler, *map(str, words)])
-            sections = _run([size, "-A", str(compiled)])
+            for command in (
+                [compiler, *options, str(source), "-o", str(compiled)],
+                [size, "-A", str(compiled)],
+            ):
+                sections = subprocess.run(
+                    command, capture_output=True, text=True, timeout=COMPILE_SECONDS, check=True
+                ).stdout
         except (OSError, subprocess.SubprocessError):
             return None
     lines = [line.split() for line in sections.splitlines()]
     return sum(int(words[1]) for words in lines if words and words[0].startswith(".text"))
-
-
-def _run(command: list[str]) -> str:
-    """Run a program, and return what it prints."""
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=COMPILE_SECONDS, check=True
-    )
-    return done.stdout

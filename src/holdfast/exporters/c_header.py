@@ -14,9 +14,8 @@ import numpy as np
 from holdfast.classifiers import Linear
 from holdfast.contact import Fault, Reason
 from holdfast.errors import ModelError
-from holdfast.exporters.c_tables import Field, Tables, kernel_text
+from holdfast.exporters.c_tables import Tables, kernel_text
 from holdfast.features.start import OPEN_HAND, Start
-from holdfast.features.tables import StreamPlan
 from holdfast.model import Model
 from holdfast.sensors import Sensor
 
@@ -75,14 +74,9 @@ def header_of(
             f"the model's tare is the interval {model.tare} s of a recording; a header holds a "
             "tare of seconds, 'first' or 'none', because samples come one by one"
         )
-    return _assembled(model, plan, rate, single=single)
-
-
-def _assembled(model: Model, plan: StreamPlan, rate: float, *, single: bool) -> CHeader:
     kernel = kernel_text()
     tables = Tables(kernel, model, plan, single=single)
     state_size = ctypes.sizeof(tables.types["holdfast_detector_memory"]) + HEADER_FIELDS
-    sensors = plan.sensors
     parts = {
         "VERSION": version("holdfast"),
         "MODEL": re.sub(r"[^\w.:-]", "_", model.name or "model"),
@@ -104,20 +98,16 @@ def _assembled(model: Model, plan: StreamPlan, rate: float, *, single: bool) -> 
     text = (resources.files("holdfast.exporters") / "header_template.h").read_text("utf-8")
     for name, part in parts.items():
         text = text.replace(f"@{name}@", part)
+    # The id depends on all but itself: a state that another header has left is refused by it.
     header_id = f"0x{sha256(text.encode()).hexdigest()[:8]}u"
     text = text.replace("@HEADER_ID@", header_id)
-    return CHeader(text, state_size, tables.n_bytes, _times(tables.structs) if single else ())
-
-
-def _times(structs: Mapping[str, Sequence[Field]]) -> tuple[str, ...]:
-    """Return the fields of the state that are double in single precision too."""
-    return tuple(
-        f"{name.removeprefix('holdfast_')}.{field.name}"
-        for name in ("holdfast_mask", "holdfast_track", "holdfast_motion", "holdfast_finger_memory",
-                     "holdfast_decision")
-        for field in structs[name]
+    times = tuple(
+        f"{name}.{field.name}"
+        for name in ("mask", "track", "motion", "finger_memory", "decision")
+        for field in tables.structs[f"holdfast_{name}"]
         if field.kind == "double"
-    )  # fmt: skip
+    )
+    return CHeader(text, state_size, tables.n_bytes, times if single else ())
 
 
 def _sizes(
@@ -127,6 +117,7 @@ def _sizes(
     for name, value in sizes.items():
         yield f"#define HOLDFAST_{name.upper()} {value}"
     normals = {tuple(sensor.normal.tolist()) for sensor in sensors.values()}
+    # Where all normals are one axis, the compiler drops the products with the others.
     for axis, unit in enumerate(np.eye(3).tolist()):
         if normals == {tuple(unit)}:
             yield f"#define HOLDFAST_NORMAL_AXIS {axis}"
@@ -145,6 +136,7 @@ def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     The kernel has those of states and causes.
     """
     first = np.cumsum([0, *(sensor.n_taxels for sensor in sensors.values())]).tolist()
+    # Names that are the same in capitals, or without signs, give way to numbers.
     names = [re.sub(r"\W", "_", name, flags=re.ASCII).upper() for name in sensors]
     if len(set(names)) < len(names):
         names = [f"{place}" for place in range(len(names))]

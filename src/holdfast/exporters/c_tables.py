@@ -121,6 +121,7 @@ class Tables:
 
     def _add(self, kind: str, name: str, rows: TableRows, *, is_array: bool = True) -> None:
         self.n_bytes += len(rows) * ctypes.sizeof(self.types[kind])
+        # Lines of about 100 characters: C99 guarantees no more than 4095 in one.
         lines = [""]
         for row in [self._text(kind, row) for row in rows]:
             if len(lines[-1]) + len(row) + 2 > LINE:
@@ -142,6 +143,7 @@ class Tables:
             return "HF_NAN"
         if math.isinf(value):
             return "HF_INFINITY" if value > 0 else "-HF_INFINITY"
+        # The shortest text that is read back as the same number, in either precision.
         is_single = self._single and kind == "hf_real"
         return f"{np.float32(value)!s}f" if is_single else repr(float(value))
 

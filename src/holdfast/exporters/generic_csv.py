@@ -13,7 +13,7 @@ from holdfast.csv_cells import csv_text
 from holdfast.errors import OutputError, RecordingError
 from holdfast.exporters.output import whole_files
 from holdfast.files import file_stem, whole_file
-from holdfast.recordings import Label, Recording, Tactile
+from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_numbers
 from holdfast.sensors.types import Array
 
@@ -65,7 +65,18 @@ def export(
     result = CsvExport([], [], [])
     sensors: dict[str, Sensor] = {}
     if out.suffix == CSV_SUFFIX and not out.is_dir():
-        _write_file(recordings, out, result, force=force)
+        # One table: of a single recording, without a file of a sensor beside it.
+        tables = _tables(recordings[0]) if len(recordings) == 1 else {}
+        modules = next(iter(tables.values()), {})
+        if len(tables) != 1 or any(not _is_built_in(m.sensor) for m in modules.values()):
+            raise OutputError(
+                f"{out} is one table; a folder expected for several recordings, for modules with "
+                "different times, and for sensors that are not built in"
+            )
+        with whole_file(out, force=force) as part:
+            _write_table(part, modules)
+        result.files.append(out.name)
+        _note_left_out(recordings[0], result)
         return result
     with whole_files(out, force=force) as folder:
         for recording in progress(recordings):
@@ -75,23 +86,6 @@ def export(
                 result.files.append(f"{name}{CSV_SUFFIX}")
             _note_left_out(recording, result)
     return result
-
-
-def _write_file(
-    recordings: Sequence[Recording], out: Path, result: CsvExport, *, force: bool
-) -> None:
-    """Write the single table of a single recording."""
-    tables = _tables(recordings[0]) if len(recordings) == 1 else {}
-    modules = next(iter(tables.values()), {})
-    if len(tables) != 1 or any(not _is_built_in(m.sensor) for m in modules.values()):
-        raise OutputError(
-            f"{out} is one table; a folder expected for several recordings, for modules with "
-            "different times, and for sensors that are not built in"
-        )
-    with whole_file(out, force=force) as part:
-        _write_table(part, modules)
-    result.files.append(out.name)
-    _note_left_out(recordings[0], result)
 
 
 def _tables(recording: Recording) -> dict[str, dict[str, Tactile]]:
@@ -120,6 +114,7 @@ def _is_built_in(item: Sensor) -> bool:
     """Return whether the importer finds this sensor by its name, apart from the unit."""
     if item.name not in built_in_sensors():
         return False
+    # A built-in name with other positions is another sensor: it needs a file of its own.
     known = sensor(item.name)
     calibrated = replace(known, unit=item.unit, range=None)  # as `Tactile` makes it
     return item in (known, calibrated)
@@ -155,51 +150,37 @@ def _write_table(path: Path, modules: Mapping[str, Tactile]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         for name, module in modules.items():
             file.write(f"# sensor: {name}={module.sensor.name}\n# unit: {name}={module.unit}\n")
-        file.write(csv_text([_header(modules)]))
+        columns = ["time"]
+        for name, module in modules.items():
+            width = max(2, len(str(module.sensor.n_taxels)))
+            for number in taxel_numbers(range(module.sensor.n_taxels)):
+                columns += [f"{name}.t{number:0{width}d}.{axis}" for axis in "xyz"]
+        for name, module in modules.items():
+            columns += [f"{name}.label", f"{name}.cause"] if module.labels else []
+        file.write(csv_text([columns]))
         for block in _rows(modules):
             file.write(block)
-
-
-def _header(modules: Mapping[str, Tactile]) -> list[str]:
-    names = ["time"]
-    for name, module in modules.items():
-        width = max(2, len(str(module.sensor.n_taxels)))
-        for number in taxel_numbers(range(module.sensor.n_taxels)):
-            names += [f"{name}.t{number:0{width}d}.{axis}" for axis in "xyz"]
-    for name, module in modules.items():
-        if module.labels:
-            names += [f"{name}.label", f"{name}.cause"]
-    return names
 
 
 def _rows(modules: Mapping[str, Tactile]) -> Iterator[str]:
     """Yield the rows as text, in blocks."""
     times: Array = next(iter(modules.values())).times
-    labels = [_label_cells(module) for module in modules.values() if module.labels]
+    labels = []  # of each labelled module, the cells `label,cause` of each sample
+    for module in modules.values():
+        cells = [","] * module.n_samples
+        for label in module.labels:
+            first, last = np.searchsorted(times, (label.start, label.end)).tolist()
+            text = f"{label.state.value.lower()},{label.cause or ''}"
+            cells[first:last] = [text] * (last - first)
+        labels += [cells] if module.labels else []
     for start in range(0, len(times), ROWS_AT_ONCE):
         cut = slice(start, start + ROWS_AT_ONCE)
         columns = [module.readings[cut].reshape(len(times[cut]), -1) for module in modules.values()]
         parts: list[Iterable[str]] = [map(repr, times[cut].tolist())]
-        parts += [map(_numbers_text, column.tolist()) for column in columns]
+        # `repr` is the shortest text that is read back as the same number.
+        parts += [(",".join(map(repr, row)) for row in column.tolist()) for column in columns]
         parts += [cells[cut] for cells in labels]
         yield "".join(",".join(row) + "\n" for row in zip(*parts, strict=True))
-
-
-def _numbers_text(row: list[float]) -> str:
-    return ",".join(map(repr, row))
-
-
-def _label_cells(module: Tactile) -> list[str]:
-    """Return the cells `label,cause` of each sample."""
-    cells = [","] * module.n_samples
-    for label in module.labels:
-        first, last = np.searchsorted(module.times, (label.start, label.end)).tolist()
-        cells[first:last] = [_cells_of(label)] * (last - first)
-    return cells
-
-
-def _cells_of(label: Label) -> str:
-    return f"{label.state.value.lower()},{label.cause or ''}"
 
 
 def _note_left_out(recording: Recording, result: CsvExport) -> None:

@@ -76,8 +76,8 @@ def export(
         sensors = named_fingers(model) if fingers is None else dict(fingers)
         rate, start = next(iter(model.fingers_of(sensors).values())).rate, Start(in_contact is True)
     else:
-        sensors = _fingers_like(model, like)
-        rate, start = like.rate, Start.of(like.with_start(loaded=in_contact).metadata, sensors)
+        sensors, rate = _fingers_like(model, like), like.rate
+        start = Start.of(like.with_start(loaded=in_contact).metadata, sensors)
     header = header_of(model, sensors, rate, single=single, start=start)
     data = header.text.encode()
     write_whole(target, data, force=force)

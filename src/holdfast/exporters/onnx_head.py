@@ -103,6 +103,7 @@ def _add_finger(graph: _Graph, name: str, part: FingerModel) -> None:
 
 def _linear(graph: _Graph, name: str, rule: Linear) -> str:
     """Add w . phi + w_0, and return its name."""
+    # Scale and calibration are inside the weights: the input is features as they are computed.
     weights = rule.raw_weights()[0]
     graph.inputs.append(graph.value(f"{name}_features", rule.n_features))
     factors = graph.constant(f"{name}_weights", weights[1:, None])

@@ -69,6 +69,7 @@ def whole_files(out: Path, *, force: bool = False) -> Iterator[Path]:
             staging.replace(out)
             return
         files = sorted(staging.iterdir())
+        # All are checked before the first is moved: all of the export, or nothing.
         for file in files:
             refuse_overwrite(out / file.name, force=force)
         for file in files:
@@ -91,6 +92,7 @@ def _staging_beside(out: Path) -> Iterator[Path]:
             raise  # an input that the block reads, not the output
         raise OutputError(f"cannot write {out}: {cause.strerror or cause}") from cause
     except OutputError as cause:
+        # The user knows the folder, and not the temporary one.
         raise OutputError(str(cause).replace(str(staging), str(out))) from cause
     finally:
         shutil.rmtree(parent, ignore_errors=True)

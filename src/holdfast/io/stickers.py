@@ -145,9 +145,8 @@ class _Sticker:
         x, y = np.meshgrid(TEMPLATE_SIDE * side, TEMPLATE_SIDE * side)
         self._template = self._sample(grey)
         down, right = np.gradient(self._template.reshape(N_POINTS, N_POINTS), self._scale)
-        x, y, right, down = x.ravel(), y.ravel(), right.ravel(), down.ravel()
-        steepest = np.stack([right * x, right * y, right, down * x, down * y, down], axis=1)
-        self._solve = np.linalg.pinv(steepest)
+        steepest = [right * x, right * y, right, down * x, down * y, down]
+        self._solve = np.linalg.pinv(np.stack([part.ravel() for part in steepest], axis=1))
 
     def start(self, corners: Array) -> None:
         """Take the place from the corners (4, 2) [pixels]."""

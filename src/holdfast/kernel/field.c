@@ -19,6 +19,10 @@
 #define HF_FIELD_MARGIN ((hf_real)4)
 /* Share of a change that is normal in a press; a field has any direction. */
 #define HF_PRESSED_SHARE ((hf_real)0.7)
+/* Under a load that differs from a field by this factor of its square, only each fourth sample is
+ * compared: it takes time, and a load goes slower. */
+#define HF_DEEP_LOAD ((hf_real)16)
+#define HF_SKIPPED_SAMPLES 3
 /* Time for which it must be unclear whether a change is a field or a load [s]. */
 #define HF_UNCLEAR_SECONDS ((hf_real)0.1)
 /* Time constant over which the common part is smoothed [s]. */
@@ -131,19 +135,25 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
         s->field_is_load = false;
         return false;
     }
-    /* Alike: sum |h_i - mean|^2 <= n (0.1 |mean|)^2 + 4 times that of noise. */
-    const hf_real limit = common->n * (HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE) * hf_square(mean);
+    /* Alike: sum |h_i - mean|^2 <= n (0.1 max(|mean|, |change|))^2 + 4 times that of noise. */
+    const hf_real limit = common->n * (HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE) *
+                          hf_max(hf_square(mean), square);
     const bool is_alike = common->differences <= limit + of_noise;
     /* A load: a press that is too fast for a field, or too strong. Where the unit is not known, any
-     * press is one, unless it is small beside a field that was found. */
+     * press is one, unless it is small beside a field that was found, or in the fingertip frame:
+     * on a curved patch, no press is alike there. */
     const hf_real fastest = HF_FIELD_SPEED * HF_COMMON_SECONDS * most;
     const bool is_known = !isinf(most), is_strong = hf_square(mean) > most * most;
     const bool is_fast = moved > fastest * fastest;
     const bool is_small = square < hf_square(s->field) / 4;
     const bool is_load = hf_is_press(f, common, change) &&
-                         (is_known ? is_fast || is_strong || s->field_is_load : !is_small);
+                         (is_known ? is_fast || is_strong || s->field_is_load
+                                   : !is_small && !common->is_turned);
     if (!is_alike) {
         s->field_is_load = false;
+        if (common->differences > HF_DEEP_LOAD * (limit + of_noise)) {
+            s->n_skipped = HF_SKIPPED_SAMPLES;
+        }
         const hf_real nearly = common->n * (HF_LOAD_SHARE * HF_LOAD_SHARE) * square;
         return !is_load && common->differences <= nearly + of_noise;
     }
@@ -158,6 +168,7 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
         return true;
     }
     memcpy(s->field, mean, sizeof s->field);
+    s->has_new_field = true;
     s->field_is_turned = common->is_turned;
     return false;
 }
@@ -171,10 +182,15 @@ static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
     if (!(f->finger->max_field > 0) || isnan(s->noise)) {
         return 0;
     }
-    const hf_common common = hf_find_common(f, left_out);
-    /* Of fewer taxels, all may be loaded alike. A touch may be unclear while it begins. */
-    const bool is_unclear = common.n >= HF_MIN_TAXELS && hf_update_field(f, &common);
-    s->n_unclear = is_unclear ? s->n_unclear + 1 : 0;
+    s->has_new_field = false;
+    if (s->n_skipped > 0) {
+        s->n_skipped -= 1;
+    } else {
+        const hf_common common = hf_find_common(f, left_out);
+        /* Of fewer taxels, all may be loaded alike. A touch may be unclear while it begins. */
+        const bool is_unclear = common.n >= HF_MIN_TAXELS && hf_update_field(f, &common);
+        s->n_unclear = is_unclear ? s->n_unclear + 1 : 0;
+    }
     if (hf_square(s->field) > 0) {
         /* f_i -= field, or R_i^T field. */
         const size_t n = f->n;

@@ -360,6 +360,8 @@ typedef struct {
     hf_real common[3];      /* the readings' mean beyond the tare, smoothed over 0.05 s */
     bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
     bool field_is_load;     /* the taxels moved alike, as no field does */
+    int32_t n_skipped;      /* next samples whose field is not looked for, under a load */
+    bool has_new_field;     /* the field changed at this sample */
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
     /* Samples that cannot be true (untrue.c). */

@@ -119,12 +119,13 @@ static hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3
     m->pressure_squares = sums.pressure_squares;
     m->taxel_load = hf_sqrt(sums.squares);
     /* Sums over the block: squares of steps of F and of all g_i. Repeated samples do not count, nor
-     * steps over a gap that is bridged, in which the force may change. */
+     * steps over a gap that is bridged, in which the force may change; nor samples whose noise went
+     * out with a field. */
     if (!has_previous) {
         m->block_squares = m->block_taxel_squares = 0;
         m->block_steps = 0;
         m->block_start = NAN;
-    } else if (f->state->n_unchanged == 0 && elapsed <= limit) {
+    } else if (f->state->n_unchanged == 0 && elapsed <= limit && !f->state->has_new_field) {
         hf_real step[3];
         hf_force_between(f, before, now, step);
         m->block_squares += hf_square(step);

@@ -167,7 +167,7 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_hold_lost(f);
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
-    const uint64_t jumps = after_gap ? 0 : hf_find_jumps(f);
+    const uint64_t jumps = after_gap ? 0 : hf_find_jumps(f, &scan);
     if (jumps || !hf_are_valid(f, &scan)) {
         if (!hf_replace_or_refuse(f, &scan, jumps)) {
             s->n_stretch = 0;

@@ -159,40 +159,43 @@ static bool hf_is_near_end(const hf_finger *f, const hf_scan *scan)
     return (hf_real)(2 * n_near) > f->finger->n_used;
 }
 
-/* Steps of the taxels from the last sample to this one. */
+/* Squared steps of the taxels from the last sample to this one. */
 typedef struct {
-    hf_real total;    /* sum of their squares */
-    hf_real largest;  /* of their squares */
-    hf_real quietest; /* least sum of the absolute readings of a taxel: 0 if one reads zeros */
+    hf_real total;
+    hf_real largest;
 } hf_steps;
 
 static hf_steps hf_find_steps(const hf_finger *f)
 {
     const size_t n = f->n;
-    hf_sum total, largest, minus_quietest;
+    hf_sum total, largest;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
         hf_wide sum = {0}, most = {0};
-        const hf_wide none = sum - HF_INFINITY;
-        hf_wide least = none;
         for (size_t i = lane; i < n; i += HF_LANES) {
             const hf_vectors now = hf_load_vectors(f->readings, n, i);
             const hf_wide square = hf_squares(hf_minus(now, hf_load_vectors(f->previous, n, i)));
-            const hf_wide size = hf_wide_abs(now.x) + hf_wide_abs(now.y) + hf_wide_abs(now.z);
             sum += square;
             most = hf_greater(square, most);
-            least = hf_greater(hf_where(hf_load(f->used + i) > 0, -size, none), least);
         }
         hf_put(&total, lane, sum);
         hf_put(&largest, lane, most);
-        hf_put(&minus_quietest, lane, least);
     }
-    const hf_steps steps = {
-        hf_total(total), hf_largest_lane(largest), -hf_largest_lane(minus_quietest)};
+    const hf_steps steps = {hf_total(total), hf_largest_lane(largest)};
     return steps;
 }
 
+/* Return whether a taxel reads zeros in all axes. */
+static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
+{
+    bool has_zeros = false;
+    for (size_t i = 0; scan->least <= 0 && scan->most >= 0 && i < f->n_taxels; ++i) {
+        has_zeros |= f->readings[i] == 0 && !hf_has_reading(f->readings, f->n, i) && f->used[i] > 0;
+    }
+    return has_zeros;
+}
+
 /* Return the bits of the magnetometers that read zeros, or jump alone, at this sample. */
-static uint64_t hf_find_jumps(const hf_finger *f)
+static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_finger_memory *const s = f->state;
     const uint64_t before = s->jumped;
@@ -201,7 +204,7 @@ static uint64_t hf_find_jumps(const hf_finger *f)
         return 0;
     }
     hf_steps steps = hf_find_steps(f);
-    if (steps.quietest > 0 && steps.largest < HF_LONE_SHARE * steps.total) {
+    if (steps.largest < HF_LONE_SHARE * steps.total && !hf_has_zeros(f, scan)) {
         return 0;
     }
     /* Steps of noise: two samples in three axes. Not known before the noise is. */

@@ -1,7 +1,8 @@
 """What the readings show about the sensor, as notices: dead, an axis missing, z inwards. No clock.
 
-These are no faults, because each can also be right: a sensor with a dead band is still at rest,
-and a hand may hold an object at the start. `holdfast info` finds the same in a recording.
+Drift, copies and cross-talk, too. These are no faults, because each can also be right: a sensor
+with a dead band is still at rest, and a hand may hold an object at the start. `holdfast info` finds
+the same in a recording.
 """
 
 import math
@@ -11,11 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, ModuleComparison
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
-SAMPLE_CHECK_INTERVAL = 0.05
-"""Time between the samples that are looked at [s]; more would cost time and show nothing else."""
 START_NOISE_SECONDS = 0.5
 """Time from the start in which the noise is measured [s]."""
 STILL_SECONDS = 10.0
@@ -28,11 +28,19 @@ PULL_OF_NOISE = 20.0
 """Least fall below the first value, in standard deviations of its noise."""
 PULL_OF_LARGEST = 0.1
 """Least fall below the first value, as a share of the largest change; elastomers creep by less."""
+DRIFT_SECONDS = 60.0
+"""Duration of a hold from which on its drift is reported [s]."""
+DRIFT_SHARE = 0.05
+"""Least drift within a minute that is reported, as a share of the load."""
 
 NO_CHANGE = (
     "no reading has changed since the start: touch the sensor; if that changes none, check it"
 )
 MISSING_AXES = "readings along {} never change: 3 axes are expected, and slip shows in the shear"
+DRIFTS = (
+    "the force of this hold drifts by {:.3g} {} a minute, by warming or creep: take a new tare "
+    "when the hand is open"
+)
 PULLED = (
     "the normal force fell far below its first value: the finger was in contact at the start, or "
     "z of the sensor points inwards (docs/sensors.md)"
@@ -60,23 +68,39 @@ class ReadingsMonitor:
         self._fingers = {
             name: _FingerReadings(sensor, finds_pull) for name, sensor in fingers.items()
         }
+        self._comparison = ModuleComparison()
+        self._latest: dict[str, npt.NDArray[Any]] = {}
+        self._instant = -math.inf
 
     def update(self, samples: Mapping[str, npt.NDArray[Any]], time: float) -> list[str]:
         """Look at samples, (n_taxels, 3) by finger, of a time [s]; return new notices."""
-        return [
+        notices = [
             f"{name}: {text}"
             for name, readings in samples.items()
             for text in self._fingers[name].update(readings, time)
         ]
+        if len(self._fingers) > 1:
+            # Modules of one instant may come one by one: the instant before is complete.
+            if time != self._instant and self._comparison.is_due(self._instant):
+                alike = self._comparison.update(self._latest, self._instant)
+                notices += [f"{each.module} {each.text}" for each in alike]
+            self._latest = dict(samples) if time != self._instant else self._latest | dict(samples)
+            self._instant = time
+        return notices
 
     def update_recording(self, part: Recording) -> list[str]:
         """Look at the next part of a recording; return new notices."""
         notices: list[str] = []
         for name in self._fingers.keys() & part.modules.keys():
             module = part.modules[name]
-            stride = max(1, int(SAMPLE_CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
+            stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
             for k in range(0, module.n_samples, stride):
-                notices += self.update({name: module.readings[k]}, float(module.times[k]))
+                notices += [
+                    f"{name}: {text}"
+                    for text in self._fingers[name].update(
+                        module.readings[k], float(module.times[k])
+                    )
+                ]
         return notices
 
 
@@ -84,6 +108,7 @@ class _FingerReadings:
     """Memory of the readings of one finger."""
 
     def __init__(self, sensor: Sensor, finds_pull: bool) -> None:
+        self._sensor = sensor
         # The normal force is one sum over readings: the normal, turned into each taxel's frame.
         self._weights = np.einsum("j,ijk->ik", sensor.normal, sensor.rotations)
         self._finds_pull = finds_pull
@@ -97,11 +122,12 @@ class _FingerReadings:
         self._noise = 0.0
         self._largest = 0.0
         self._pulled_since = math.inf
+        self._drift = HoldDrift()
         self._reported: set[str] = set()
 
     def update(self, readings: npt.NDArray[Any], time: float) -> list[str]:
         """Look at the readings (n_taxels, 3) of a time [s], and return new notices."""
-        if time - self._last < SAMPLE_CHECK_INTERVAL or not np.isfinite(readings).all():
+        if time - self._last < CHECK_INTERVAL or not np.isfinite(readings).all():
             return []
         self._last = time
         if self._first is None or time < self._start:  # the next recording of a player
@@ -111,11 +137,12 @@ class _FingerReadings:
         moved = (change != 0).any(axis=0)
         self._moved |= moved
         self._n_moved += bool(moved.any())
-        found = []
+        self._drift.update(np.einsum("ijk,ik->j", self._sensor.rotations, change), time)
+        found = self._drifting()
         if not self._n_moved:
             if time - self._start >= STILL_SECONDS:
                 found.append(NO_CHANGE)
-        elif not self._moved.all() and self._n_moved * SAMPLE_CHECK_INTERVAL >= MOVED_SECONDS:
+        elif not self._moved.all() and self._n_moved * CHECK_INTERVAL >= MOVED_SECONDS:
             axes = [axis for axis, known in zip("xyz", self._moved, strict=True) if not known]
             found.append(MISSING_AXES.format(" and ".join(axes)))
         normal = float((self._weights * change).sum())
@@ -135,3 +162,13 @@ class _FingerReadings:
         new = [text for text in found if text not in self._reported]
         self._reported.update(new)
         return new
+
+    def _drifting(self) -> list[str]:
+        """Return a notice if the force of a long hold drifts."""
+        drift = self._drift
+        is_reported = any(text.startswith(DRIFTS[:20]) for text in self._reported)
+        if is_reported or drift.seconds < DRIFT_SECONDS:
+            return []
+        if abs(drift.per_minute) < max(DRIFT_SHARE * drift.load, PULL_OF_NOISE * self._noise):
+            return []
+        return [DRIFTS.format(drift.per_minute, self._sensor.unit)]

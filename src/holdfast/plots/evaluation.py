@@ -1,6 +1,6 @@
 """Figure of an evaluation: accuracy, calibration, delays and slips."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,7 +9,6 @@ from matplotlib.ticker import PercentFormatter
 
 from holdfast.metrics import (
     Decisions,
-    EventMetrics,
     Metrics,
     RecordingMetrics,
     SampleMetrics,
@@ -56,11 +55,13 @@ def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
     """
     n_recordings = len(metrics.recordings)
     named = n_recordings <= MAX_NAMED_RECORDINGS
+    # The texts beside few recordings need the height of four rows; dots without names need half.
     n_rows = max(4, n_recordings if named else MAX_NAMED_RECORDINGS // 2)
     heights = [1.0 + 0.16 * n_rows, 3.3, *([] if metrics.slips is None else [SLIPS_HEIGHT])]
     figure = page_figure(0.4 + sum(heights), WIDTH)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
-    styles = _finger_styles(metrics.fingers)
+    series = series_styles(metrics.fingers)
+    styles = {name: series[name]._replace(linestyle="-") for name in metrics.fingers}
     left = figure.add_subplot(grid[0, 0])
     right = figure.add_subplot(grid[0, 1], sharey=left)
     _draw_recordings(left, right, metrics, styles)
@@ -72,7 +73,12 @@ def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
     for axes in figure.axes:
         style_axes(axes)
     right.tick_params(labelleft=False)
-    _add_legend(figure, styles)
+    fingers = [
+        left.plot([], [], linewidth=0.9, markersize=4, label=literal(name), **style._asdict())[0]
+        for name, style in styles.items()
+    ]
+    hand = left.plot([], [], color=HAND_COLOUR, label="all samples, or the hand")
+    add_legend(figure, [*fingers, *hand])
     return figure
 
 
@@ -92,16 +98,17 @@ def calibration(decisions: Sequence[FingerDecisions]) -> Array:
     return table
 
 
-def _finger_styles(fingers: Collection[str]) -> dict[str, SeriesStyle]:
-    styles = series_styles(fingers)
-    return {name: styles[name]._replace(linestyle="-") for name in fingers}
-
-
 def _draw_recordings(
     left: Axes, right: Axes, metrics: Metrics, styles: Mapping[str, SeriesStyle]
 ) -> None:
     """Draw a row for each recording, the best on top, and a dot for each finger."""
-    ordered = sorted(metrics.recordings, key=lambda recording: _mean(recording.fingers, "accuracy"))
+
+    def mean_accuracy(recording: RecordingMetrics) -> float:
+        values = [finger.accuracy for finger in recording.fingers.values()]
+        return float(np.mean([v for v in values if v is not None] or [-1.0]))
+
+    # Sorted as a whole, so that both panels have a recording in the same row.
+    ordered = sorted(metrics.recordings, key=mean_accuracy)
     _draw_dots(left, metrics, ordered, "accuracy", styles)
     _draw_dots(right, metrics, ordered, "auc_contact", styles)
     right.axvline(0.5, color=GREY, linewidth=0.8, linestyle=":")
@@ -117,8 +124,11 @@ def _draw_recordings(
     )
     left.set_ylim(-0.7, max(len(ordered), 1) - 0.3)
     if len(ordered) <= MAX_NAMED_RECORDINGS:
-        names = [literal(_shortened(recording.name)) for recording in ordered]
-        left.set_yticks(range(len(ordered)), names)
+        # Of a long name the end: the names of recordings often begin alike.
+        names = [recording.name for recording in ordered]
+        most = MAX_NAME_LENGTH
+        shown = [name if len(name) <= most else f"…{name[1 - most :]}" for name in names]
+        left.set_yticks(range(len(ordered)), [literal(name) for name in shown])
     else:
         left.set_yticks([])
         add_labels(left, y=f"{len(ordered)} recordings, by accuracy")
@@ -157,6 +167,7 @@ def _draw_calibration(
         axes.plot(table[:, 0], table[:, 1], color=style.color, linewidth=0.8, alpha=0.7)
     every = calibration([finger for decision in decisions for finger in decision.fingers.values()])
     if len(every):
+        # Bars of the samples lie under the curve: where there are few, it means little.
         share = every[:, 2] / every[:, 2].sum()
         axes.bar(every[:, 0], 0.25 * share / share.max(), width=0.06, color="#dddddd", zorder=0)
         axes.plot(every[:, 0], every[:, 1], "o-", color=HAND_COLOUR, linewidth=1.4, markersize=3)
@@ -183,7 +194,12 @@ def _draw_delays(
     axes.set(xlim=(-EARLY_TOLERANCE, MAX_DELAY), ylim=(0, 1.02))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     add_labels(axes, "time since the onset [s]", "events with an alarm by then")
-    add_title(axes, _events_title(metrics.events.hand))
+    hand = metrics.events.hand
+    title = "no event in the labels"
+    if hand.n_events:
+        rate = _text(hand.false_alarms_per_minute, ", {:.1f} false alarms/min")
+        title = f"{hand.n_events} event{'s' * (hand.n_events > 1)}{rate}"
+    add_title(axes, f"alarms of the hand: {title}")
 
 
 def _draw_delay_curve(
@@ -193,38 +209,12 @@ def _draw_delay_curve(
     delays = event_delays(matches)
     if not len(delays):
         return
+    # The curve ends below 1 by the share of missed events, whose delay is infinite.
     detected = delays[delays <= MAX_DELAY]
     times = np.concatenate([[-EARLY_TOLERANCE], detected, [MAX_DELAY]])
     counts = np.concatenate([[0], np.arange(1, len(detected) + 1), [len(detected)]])
     share = counts / len(delays)
     axes.step(times, share, where="post", color=color, linewidth=linewidth, alpha=alpha)
-
-
-def _events_title(hand: EventMetrics) -> str:
-    if not hand.n_events:
-        return "alarms of the hand: no event in the labels"
-    rate = _text(hand.false_alarms_per_minute, ", {:.1f} false alarms/min")
-    return f"alarms of the hand: {hand.n_events} event{'s' * (hand.n_events > 1)}{rate}"
-
-
-def _add_legend(figure: Figure, styles: Mapping[str, SeriesStyle]) -> None:
-    axes = figure.axes[0]
-    fingers = [
-        axes.plot([], [], linewidth=0.9, markersize=4, label=literal(name), **style._asdict())[0]
-        for name, style in styles.items()
-    ]
-    hand = axes.plot([], [], color=HAND_COLOUR, label="all samples, or the hand")
-    add_legend(figure, [*fingers, *hand])
-
-
-def _mean(fingers: Mapping[str, SampleMetrics], field: str) -> float:
-    values = [getattr(finger, field) for finger in fingers.values()]
-    return float(np.mean([v for v in values if v is not None] or [-1.0]))
-
-
-def _shortened(name: str) -> str:
-    """Return the end of a long name, for the names of recordings often begin alike."""
-    return name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"
 
 
 def _text(value: float | None, form: str) -> str:

@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from holdfast.contact import ContactState
 from holdfast.features import DEFAULT_WINDOW, Tare
 from holdfast.model import Model
 from holdfast.plots.slips import (
@@ -71,15 +69,30 @@ def plot_recording(
         ModelError: the recording has other fingers or sensors than the model.
     """
     chosen = tare or Tare.parse(0.5)
-    fingers = _fingers(recording)
-    origin = shown_origin(recording.start)
-    curves = {
-        name: _since(finger_series(recording, name, chosen, window), origin) for name in fingers
+    every = {name: module for name, module in recording.modules.items() if module.n_samples}
+    fingers = {name: module for name, module in every.items() if "/" not in name} or every
+    origin = shown_origin(recording.start)  # times of a clock are too long for an axis
+    curves = {}
+    for name in fingers:
+        series = finger_series(recording, name, chosen, window)
+        slip = series.slip and (series.slip[0] - origin, series.slip[1])
+        curves[name] = series._replace(times=series.times - origin, slip=slip)
+    decisions: dict[str, SlipDecisionSeries] | None = None
+    if model is not None:
+        if not model.has_slip_rule:
+            raise ValueError(
+                f"{model.name or 'the model'} has no slip rule, whose decisions to draw"
+            )
+        decided = slip_series(model, recording)
+        decisions = {n: slips._replace(times=slips.times - origin) for n, slips in decided.items()}
+    # The axes of a finger, from top to bottom.
+    absent = {
+        "slip": all(series.slip is None for series in curves.values()),
+        "decision": decisions is None,
     }
-    decisions = None if model is None else _decisions(model, recording, origin)
-    rows = _rows(curves, has_decisions=decisions is not None)
-    figure, stacks = _stacks(curves, rows)
-    n_columns = _n_columns(curves)
+    rows = [row for row in ROW_HEIGHTS if not absent.get(row, False)]
+    n_columns = 1 if len(curves) <= MAX_FINGERS_IN_COLUMN else 2
+    figure, stacks = _stacks(curves, rows, n_columns)
     for place, (name, axes) in enumerate(zip(fingers, stacks, strict=False)):
         panels = dict(zip(rows, axes, strict=True))
         _draw_finger(panels, fingers[name], curves[name], origin)
@@ -87,54 +100,36 @@ def plot_recording(
             draw_slip_decisions(panels.get("slip"), panels["decision"], decisions.get(name))
         _draw_markers(axes, recording, origin, named=place < n_columns)
         if place + n_columns >= len(fingers):
-            add_labels(axes[-1], x=_time_label(origin))
+            label = "time [s]" if origin == 0 else f"time since {origin:.3f} s [s]"
+            add_labels(axes[-1], x=label)
     for axes in stacks[len(fingers) :]:
         for axis in axes:
             axis.set_axis_off()
     figure.align_ylabels()
-    figure.suptitle(literal(_title(recording, chosen, window)), fontsize=FONT_SIZE + 1.5)
-    handles = _handles(list(fingers.values()))
+    tare_text = {
+        "seconds": f"tare: first {chosen.seconds:g} s",
+        "first": "tare: first sample",
+        "none": "no tare",
+        "interval": f"tare: {chosen.interval[0]:g} to {chosen.interval[1]:g} s",
+    }[chosen.kind]
+    title = f"{recording.name}   ({tare_text}, window of {window} samples)"
+    figure.suptitle(literal(title), fontsize=FONT_SIZE + 1.5)
+    states = {label.state.code: label.state for m in fingers.values() for label in m.labels}
+    handles = component_handles(COMPONENT_COLOURS) + [
+        Patch(facecolor=c, alpha=SHADE_ALPHA, label=states[k].value.lower().replace("_", " "))
+        for k, c in STATE_COLOURS.items()
+        if k in states
+    ]
     if decisions is not None:
         handles.append(Patch(facecolor=SLIP_COLOUR, alpha=DECIDED_ALPHA, label="slides (decided)"))
     add_legend(figure, handles, "outside lower center")
     return figure
 
 
-def _fingers(recording: Recording) -> dict[str, Tactile]:
-    every = {name: module for name, module in recording.modules.items() if module.n_samples}
-    return {name: module for name, module in every.items() if "/" not in name} or every
-
-
-def _since(series: FingerSeries, origin: float) -> FingerSeries:
-    """Return the series with times since an origin [s]."""
-    slip = series.slip and (series.slip[0] - origin, series.slip[1])
-    return series._replace(times=series.times - origin, slip=slip)
-
-
-def _decisions(model: Model, recording: Recording, origin: float) -> dict[str, SlipDecisionSeries]:
-    """Return the decisions about slips with times since an origin [s]."""
-    if not model.has_slip_rule:
-        raise ValueError(f"{model.name or 'the model'} has no slip rule, whose decisions to draw")
-    series = slip_series(model, recording)
-    return {name: slips._replace(times=slips.times - origin) for name, slips in series.items()}
-
-
-def _n_columns(curves: Mapping[str, FingerSeries]) -> int:
-    return 1 if len(curves) <= MAX_FINGERS_IN_COLUMN else 2
-
-
-def _rows(curves: Mapping[str, FingerSeries], *, has_decisions: bool) -> list[str]:
-    """Return the names of the axes of a finger, from top to bottom."""
-    has_slip = any(series.slip is not None for series in curves.values())
-    absent = {"slip": not has_slip, "decision": not has_decisions}
-    return [row for row in ROW_HEIGHTS if not absent.get(row, False)]
-
-
 def _stacks(
-    curves: Mapping[str, FingerSeries], rows: Sequence[str]
+    curves: Mapping[str, FingerSeries], rows: Sequence[str], n_columns: int
 ) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure and the axes of each finger, from top to bottom; fingers row by row."""
-    n_columns = _n_columns(curves)
     n_lines = -(-len(curves) // n_columns)
     heights = [ROW_HEIGHTS[row] for row in rows] * n_lines
     width = PAGE_WIDTH * (1 if n_columns == 1 else 1.6)
@@ -142,6 +137,7 @@ def _stacks(
     grid = figure.subplots(
         len(heights), n_columns, sharex=True, squeeze=False, height_ratios=heights
     )
+    # One time axis for all fingers, which may begin and end at different times.
     start = min(series.times[0] for series in curves.values())
     end = max(series.times[-1] for series in curves.values())
     grid[0, 0].set_xlim(start, end if end > start else start + 1)
@@ -157,8 +153,13 @@ def _draw_finger(
     panels: Mapping[str, Axes], module: Tactile, series: FingerSeries, origin: float
 ) -> None:
     for row, axes in panels.items():
-        if row in ("force", "sigma") or "decision" not in panels:
-            _shade_labels(axes, module, origin)
+        # Beside decisions, labels would be a second shade on the axis of the slip.
+        is_shaded = row in ("force", "sigma") or "decision" not in panels
+        for label in module.labels if is_shaded else ():
+            axes.axvspan(
+                label.start - origin, label.end - origin, linewidth=0, edgecolor="none",
+                facecolor=STATE_COLOURS[label.state.code], alpha=SHADE_ALPHA, zorder=0,
+            )  # fmt: skip
         style_axes(axes)
     force, sigma = panels["force"], panels["sigma"]
     draw_curve(force, series, series.amplitude, COMPONENT_COLOURS["F_a"], 1.5)
@@ -172,18 +173,11 @@ def _draw_finger(
         draw_slip_speed(panels["slip"], series)
 
 
-def _shade_labels(axes: Axes, module: Tactile, origin: float) -> None:
-    for label in module.labels:
-        axes.axvspan(
-            label.start - origin, label.end - origin, facecolor=STATE_COLOURS[label.state.code],
-            alpha=SHADE_ALPHA, edgecolor="none", linewidth=0, zorder=0,
-        )  # fmt: skip
-
-
 def _draw_markers(axes: Sequence[Axes], recording: Recording, origin: float, named: bool) -> None:
     """Draw a dotted line for each marker, with its text above where texts do not overlap."""
     left, right = axes[0].get_xlim()
     letter = MARKER_LETTER_WIDTH * (right - left)
+    # Texts begin behind the title of the panel, and each behind the one before.
     free = left + letter * (len(axes[0].get_title("left")) + 4)
     for time, text in sorted(recording.markers):
         at = time - origin
@@ -198,30 +192,3 @@ def _draw_markers(axes: Sequence[Axes], recording: Recording, origin: float, nam
                 va="bottom",
             )  # fmt: skip
             free = at + letter * (len(text) + 2)
-
-
-def _title(recording: Recording, tare: Tare, window: int) -> str:
-    text = {
-        "seconds": f"tare: first {tare.seconds:g} s",
-        "first": "tare: first sample",
-        "none": "no tare",
-        "interval": f"tare: {tare.interval[0]:g} to {tare.interval[1]:g} s",
-    }[tare.kind]
-    return f"{recording.name}   ({text}, window of {window} samples)"
-
-
-def _time_label(origin: float) -> str:
-    return "time [s]" if origin == 0 else f"time since {origin:.3f} s [s]"
-
-
-def _handles(modules: Sequence[Tactile]) -> list[Artist]:
-    states = {label.state.code: label.state for module in modules for label in module.labels}
-    return component_handles(COMPONENT_COLOURS) + [
-        Patch(facecolor=colour, alpha=SHADE_ALPHA, label=_state_name(states[code]))
-        for code, colour in STATE_COLOURS.items()
-        if code in states
-    ]
-
-
-def _state_name(state: ContactState) -> str:
-    return state.value.lower().replace("_", " ")

@@ -1,5 +1,7 @@
 """Figures of sensors and hands: positions and normals of the taxels."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
@@ -35,9 +37,15 @@ def plot_sensor(sensor: Sensor) -> Figure:
         f"{literal(sensor.name)}: {sensor.n_taxels} taxels, {sensor.rate:g} Hz, readings in {unit}",
         fontsize=10,
     )
-    right, up = _view(sensor.normal)
+    # Right and up in a view from outside, along the normal; up is distal where z is not the normal.
+    axis = np.array([0.0, 0.0, 1.0]) if abs(sensor.normal[2]) < 0.7 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(axis, sensor.normal)
+    right /= np.linalg.norm(right)
+    up = np.cross(sensor.normal, right)
     height = sensor.positions @ sensor.normal * MM_PER_M
-    scale = _height_scale(height)
+    low, high = float(height.min()), float(height.max())
+    margin = 0.1 * (high - low) if high - low > MIN_HEIGHT_RANGE else 1.0  # flat: one colour
+    scale = ScalarMappable(Normalize(low - margin, high + margin), "viridis")
     colours: Array = scale.to_rgba(height)
     _draw_space(figure.add_subplot(1, 2, 1, projection="3d"), sensor, colours, up)
     front = figure.add_subplot(1, 2, 2)
@@ -46,6 +54,25 @@ def plot_sensor(sensor: Sensor) -> Figure:
         bar = figure.colorbar(scale, ax=front, shrink=0.6, aspect=25)
         bar.set_label(f"{_axis_name(sensor.normal)} [mm]", fontsize=7)
         bar.ax.tick_params(labelsize=6)
+    return figure
+
+
+def plot_noise(noise: Mapping[str, npt.ArrayLike]) -> Figure:
+    """Draw the noise of each taxel and axis, (n_taxels, 3) by module, one panel a module."""
+    figure = PageFigure(figsize=(7.2, 0.4 + 1.4 * len(noise)), dpi=160, layout="constrained")
+    panels = figure.subplots(len(noise), 1, squeeze=False)[:, 0]
+    for axes, (name, values) in zip(panels, noise.items(), strict=True):
+        levels = np.asarray(values, dtype=np.float64)
+        numbers = np.arange(len(levels))
+        for axis, colour in enumerate(AXIS_COLOURS):
+            place = numbers + 0.27 * (axis - 1)
+            axes.bar(place, levels[:, axis], 0.25, color=colour, label="xyz"[axis])
+        axes.set_title(literal(name), fontsize=8, loc="left")
+        axes.set_xticks(numbers, [str(taxel_number(i)) for i in numbers.tolist()], fontsize=6)
+        axes.tick_params(axis="y", labelsize=6)
+        axes.set_ylabel("noise", fontsize=7)
+    panels[0].legend(fontsize=6, ncols=3, frameon=False)
+    panels[-1].set_xlabel("taxel", fontsize=7)
     return figure
 
 
@@ -76,33 +103,19 @@ def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None
     drawn = np.vstack([places, places + normals, np.zeros(3), np.full(3, 0.36 * size)])
     axes.scatter(*places.T, c=colours, s=22, depthshade=False, edgecolors="black", linewidths=0.4)
     axes.quiver(*places.T, *normals.T, color="#444444", linewidth=0.8, arrow_length_ratio=0.3)
-    _draw_frame(axes, size)
-    _same_scale(axes, drawn)
-    _look_from_outside(axes, sensor.normal, up)
-
-
-def _draw_frame(axes: Axes3D, size: float) -> None:
-    """Draw the axes of the fingertip frame at its origin."""
     for axis, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         arrow = np.zeros(3)
         arrow[axis] = 0.3 * size
         axes.quiver(0, 0, 0, *arrow, color=colour, linewidth=1.6, arrow_length_ratio=0.2)
         axes.text(*(1.2 * arrow), name, color=colour, fontsize=8, ha="center", va="center")
-
-
-def _same_scale(axes: Axes3D, drawn: Array) -> None:
-    """Set one scale for all axes, with room for all points that are drawn, from any side."""
+    # One scale for all axes, with room for all that is drawn, from any side.
     low, high = drawn.min(axis=0), drawn.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_proj_type("ortho")
     axes.set_box_aspect(high - low, zoom=0.95)
     axes.set_axis_off()
-
-
-def _look_from_outside(axes: Axes3D, normal: Array, up: Array) -> None:
-    """Set the view from outside, slightly above and beside the normal."""
-    right = np.cross(up, normal)
-    eye = normal + 0.6 * right + 0.45 * up
+    # From outside, slightly above and beside the normal: along it, normals would be points.
+    eye = sensor.normal + 0.6 * np.cross(up, sensor.normal) + 0.45 * up
     elevation = np.degrees(np.arcsin(eye[2] / np.linalg.norm(eye)))
     axes.view_init(elev=elevation, azim=np.degrees(np.arctan2(eye[1], eye[0])))
 
@@ -119,12 +132,9 @@ def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, A
         places[:, 0], places[:, 1], c=colours, s=130, edgecolors="black", linewidths=0.6, zorder=2
     )
     for k, (x, y) in enumerate(places):
+        # Numbers are readable on dark and on light colours.
         ink = "white" if colours[k, :3].mean() < 0.55 else "black"
         axes.text(x, y, str(taxel_number(k)), ha="center", va="center", fontsize=6.5, color=ink)
-    _label_front(axes, view)
-
-
-def _label_front(axes: Axes, view: tuple[Array, Array]) -> None:
     right, up = view
     axes.set_aspect("equal")
     axes.margins(0.16)
@@ -137,6 +147,7 @@ def _label_front(axes: Axes, view: tuple[Array, Array]) -> None:
 
 def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
     colour = PART_COLOURS.get(name.split("/", maxsplit=1)[0], "#777777")
+    # Fingertips stand out against the pads of the same finger.
     strength = 0.55 if "/" not in name else 0.28
     for k, (row, column) in enumerate(module.grid):
         cell = FancyBboxPatch(
@@ -146,30 +157,11 @@ def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
         axes.add_patch(cell)
         number = str(taxel_number(k))
         axes.text(column + 0.5, row + 0.52, number, ha="center", va="center", fontsize=4.6)
-    _label_module(axes, name, module.grid, colour)
-
-
-def _label_module(axes: Axes, name: str, grid: npt.NDArray[np.int64], colour: str) -> None:
-    (top, left), (_, right) = grid.min(axis=0), grid.max(axis=0)
+    (top, left), (_, right) = module.grid.min(axis=0), module.grid.max(axis=0)
     axes.text(
         (left + right + 1) / 2, top - 0.12, literal(name),
         ha="center", va="bottom", fontsize=6.5, color=colour, fontweight="bold",
     )  # fmt: skip
-
-
-def _view(normal: Array) -> tuple[Array, Array]:
-    """Return the directions right and up in a view of the sensor from outside."""
-    axis = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.7 else np.array([0.0, 1.0, 0.0])
-    right = np.cross(axis, normal)
-    right /= np.linalg.norm(right)
-    return right, np.cross(normal, right)
-
-
-def _height_scale(height: Array) -> ScalarMappable:
-    """Return the colours of heights along the normal; one colour for a flat sensor."""
-    low, high = float(height.min()), float(height.max())
-    margin = 0.1 * (high - low) if high - low > MIN_HEIGHT_RANGE else 1.0
-    return ScalarMappable(Normalize(low - margin, high + margin), "viridis")
 
 
 def _axis_name(direction: Array) -> str:

@@ -1,6 +1,6 @@
 """Panels about slips: share found over time, false alarms, and decisions beside the truth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -106,20 +106,17 @@ def draw_slip_decisions(
     draw_line(probability, decisions.times, decisions.probability, INK, 0.8)
     probability.axhline(decisions.threshold, color=GREY, linewidth=0.8, linestyle="--", zorder=1)
     if speed is not None and speed.get_yticks().size:
+        # Linear below the limit of a slip, so that creep and fast slides are both seen.
         speed.set_yscale("symlog", linthresh=MM_PER_M * SLIP_SPEED)
         speed.yaxis.set_major_formatter(FormatStrFormatter("%g"))
         speed.axhline(MM_PER_M * SLIP_SPEED, color=GREY, linewidth=0.8, linestyle="--", zorder=1)
-    for axes in (speed, probability):
-        if axes is not None:
-            _shade(axes, decisions)
-
-
-def _shade(axes: Axes, decisions: SlipDecisionSeries) -> None:
-    for start, end in runs(decisions.raised):
-        axes.axvspan(
-            decisions.times[start], decisions.times[min(end, len(decisions.times) - 1)],
-            facecolor=SLIP_COLOUR, alpha=DECIDED_ALPHA, edgecolor="none", linewidth=0, zorder=0.5,
-        )  # fmt: skip
+    for axes in filter(None, (speed, probability)):
+        for start, end in runs(decisions.raised):
+            axes.axvspan(
+                decisions.times[start], decisions.times[min(end, len(decisions.times) - 1)],
+                facecolor=SLIP_COLOUR, alpha=DECIDED_ALPHA, edgecolor="none", linewidth=0,
+                zorder=0.5,
+            )  # fmt: skip
 
 
 def draw_slips_found(axes: Axes, decisions: Sequence[Decisions], slips: SlipMetrics) -> None:
@@ -142,8 +139,18 @@ def draw_slips_found(axes: Axes, decisions: Sequence[Decisions], slips: SlipMetr
     for k, (name, delays) in enumerate(
         (("incipient", counts.delays), ("gross", counts.gross_delays), ("over 1 mm", over))
     ):
-        if len(delays):
-            _draw_share(axes, delays, f"{name} ({len(delays)})", COLOURS[k])
+        if not len(delays):
+            continue
+        # What is found before the axis begins is found at its beginning.
+        start, end = DELAY_LIMITS
+        n_early = np.count_nonzero(delays < start)
+        within = np.sort(delays[(delays >= start) & (delays <= end)])
+        times = np.concatenate([[start], within, [end]])
+        n_found = n_early + np.append(np.arange(len(within) + 1), len(within))
+        axes.step(
+            times, n_found / len(delays), where="post", color=COLOURS[k], linewidth=1.4,
+            label=f"{name} ({len(delays)})",
+        )  # fmt: skip
     axes.set(xlim=DELAY_LIMITS, ylim=(0, 1.02))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     add_labels(axes, "time since the onset of the slip [s]", "slips found by then")
@@ -156,41 +163,23 @@ def draw_slips_found(axes: Axes, decisions: Sequence[Decisions], slips: SlipMetr
         )  # fmt: skip
 
 
-def _draw_share(axes: Axes, delays: Array, label: str, colour: str) -> None:
-    start, end = DELAY_LIMITS
-    n_early = np.count_nonzero(delays < start)
-    within = np.sort(delays[(delays >= start) & (delays <= end)])
-    times = np.concatenate([[start], within, [end]])
-    counts = n_early + np.append(np.arange(len(within) + 1), len(within))
-    axes.step(
-        times, counts / len(delays), where="post", color=colour, linewidth=1.4, label=label
-    )  # fmt: skip
-
-
 def draw_false_alarms(axes: Axes, summary: SlipSummary) -> None:
     """Draw the false alarms of slips per minute, of each finger and of all."""
     rows = {**summary.fingers, "all": summary.pooled}
     names = list(rows)[::-1]
-    limits = _draw_rates(axes, {name: rows[name] for name in names})
+    longest = 0.0
+    for kind, label, colour, offset in (
+        ("quiet", "of quiet hold", COLOURS[4], 0.2),
+        ("held", "of held time", COLOURS[0], -0.2),
+    ):
+        rates = [rows[name].false_alarms_per_minute[kind] or 0.0 for name in names]
+        axes.barh(np.arange(len(rates)) + offset, rates, 0.38, color=colour, label=label)
+        longest = max(longest, *rates)
     axes.set_yticks(range(len(names)), [literal(name) for name in names])
-    axes.set_xlim(0, max(1.0, 1.15 * limits))
+    axes.set_xlim(0, max(1.0, 1.15 * longest))
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.grid(axis="x", color=FAINT, linewidth=0.6)
     add_labels(axes, "false alarms per minute")
     minutes = f"{summary.pooled.quiet_minutes:.1f} min quiet of {summary.pooled.held_minutes:.1f}"
     add_title(axes, f"false alarms of slips: {minutes} min held")
     axes.legend(fontsize=FONT_SIZE, frameon=False, loc="lower right", borderaxespad=0.1)
-
-
-def _draw_rates(axes: Axes, rows: Mapping[str, SlipMetrics]) -> float:
-    """Draw two bars for each row; return the longest."""
-    longest = 0.0
-    kinds = (
-        ("quiet", "of quiet hold", COLOURS[4], 0.2),
-        ("held", "of held time", COLOURS[0], -0.2),
-    )
-    for kind, label, colour, offset in kinds:
-        rates = [row.false_alarms_per_minute[kind] or 0.0 for row in rows.values()]
-        axes.barh(np.arange(len(rates)) + offset, rates, 0.38, color=colour, label=label)
-        longest = max(longest, *rates)
-    return longest

@@ -59,6 +59,7 @@ def series_styles(names: Iterable[str]) -> dict[str, SeriesStyle]:
     styles: dict[str, SeriesStyle] = {}
     others = [name for name in dict.fromkeys(names) if name != PAPER]
     for k, name in enumerate(others):
+        # After six series the colours repeat, with other markers and dashes.
         lap = k // len(COLOURS)
         marker = MARKERS[(k + lap) % len(MARKERS)]
         styles[name] = SeriesStyle(COLOURS[k % len(COLOURS)], marker, _DASHES[lap % len(_DASHES)])
@@ -142,6 +143,7 @@ def add_legend(
     """Add a legend above or below all axes."""
     if not handles:
         return
+    # Lines of about equal length, not a full one and a rest.
     n_lines = -(-len(handles) // per_row)
     figure.legend(
         handles=handles, loc=place, ncols=-(-len(handles) // n_lines),

@@ -16,7 +16,7 @@ from holdfast.contact import Phase
 from holdfast.features import DEFAULT_WINDOW, FEATURE_NAMES, Tare, haar_features
 from holdfast.features.force import tared_force
 from holdfast.plots.style import COMPONENT_COLOURS, FONT_SIZE, INK, PHASE_COLOURS
-from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.recordings import GAP_PERIODS, Recording
 from holdfast.sensors.types import Array
 
 StateCodes = npt.NDArray[np.integer[Any]]
@@ -78,8 +78,18 @@ def finger_series(
     Raises:
         ValueError: no finite sample lies in the time of the tare.
     """
-    module = recording.modules[finger]
-    force = _force(module, tare)
+    module, truth = recording.modules[finger], recording.truth
+    if np.isfinite(module.readings).all(axis=(1, 2)).any():
+        force = tared_force(module, tare).force
+    else:  # nothing to take a tare from: drawn as unknown
+        force = np.full((module.n_samples, 3), np.nan)
+    phases, slip = np.full(module.n_samples, ""), None
+    if truth is not None and "phase" in truth.hand and len(truth.times):
+        latest = np.searchsorted(truth.times, module.times, side="right") - 1
+        phases = np.asarray(truth.hand["phase"])[np.clip(latest, 0, None)].astype(str)
+    if truth is not None and "slip_speed" in truth.fingers.get(finger, {}):
+        slip = truth.times, truth.fingers[finger]["slip_speed"]
+    # A window across a gap has no sigma: a sample of NaN stands in the gap, and is taken out again.
     gaps = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
     features = haar_features(np.insert(force, gaps, np.nan, axis=0), window)
     features = np.delete(features, gaps + np.arange(len(gaps)), axis=0)
@@ -91,10 +101,10 @@ def finger_series(
         mean=features[:, FEATURE_NAMES.index("m")],
         sigma=features[:, FEATURE_NAMES.index("sigma")],
         labels=module.label_states,
-        phases=_phases(recording, module.times),
+        phases=phases,
         unit=str(module.unit),
         gaps=gaps,
-        slip=_slip(recording, finger),
+        slip=slip,
     )
 
 
@@ -169,6 +179,7 @@ def draw_sigma(axes: Axes, series: FingerSeries) -> None:
         axes.set_ylim(bottom=0)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         return
+    # From the 0.5 % quantile: single values near 0 would take most of a logarithmic axis.
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(np.quantile(known, 0.005) / 1.5, known.max() * 1.5)
     axes.yaxis.set_major_locator(LogLocator(numticks=4))
@@ -236,24 +247,3 @@ def phase_handles(series: FingerSeries) -> list[Artist]:
         for phase, colour in PHASE_COLOURS.items()
         if phase in present
     ]
-
-
-def _force(module: Tactile, tare: Tare) -> Array:
-    """Return F_tip (n, 3); NaN if no sample is finite."""
-    if not np.isfinite(module.readings).all(axis=(1, 2)).any():
-        return np.full((module.n_samples, 3), np.nan)
-    return tared_force(module, tare).force
-
-
-def _phases(recording: Recording, times: Array) -> npt.NDArray[np.str_]:
-    truth = recording.truth
-    if truth is None or "phase" not in truth.hand or not len(truth.times):
-        return np.full(len(times), "")
-    latest = np.searchsorted(truth.times, times, side="right") - 1
-    return np.asarray(truth.hand["phase"])[np.clip(latest, 0, None)].astype(str)
-
-
-def _slip(recording: Recording, finger: str) -> tuple[Array, Array] | None:
-    truth = recording.truth
-    values = truth.fingers.get(finger, {}) if truth is not None else {}
-    return (truth.times, values["slip_speed"]) if truth and "slip_speed" in values else None

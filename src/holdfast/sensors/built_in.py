@@ -155,8 +155,25 @@ def _allegro_uskin() -> Hand:
     by_module: dict[str, list[dict[str, str]]] = {}
     for row in _table("allegro_uskin.csv"):
         by_module.setdefault(row["module"], []).append(row)
-    names = sorted(by_module, key=_module_order)
-    return Hand("allegro-uskin", {name: _hand_module(by_module[name]) for name in names})
+
+    def order(name: str) -> tuple[bool, int, str]:
+        # Fingertips first, then pads and palm, from the thumb on.
+        parts = ("thumb", "index", "middle", "ring", "palm")
+        return "/" in name, parts.index(name.split("/", maxsplit=1)[0]), name
+
+    modules = {}
+    for name in sorted(by_module, key=order):
+        rows = sorted(by_module[name], key=lambda row: int(row["taxel"]))
+        positions, rotations = _poses(rows)
+        modules[name] = HandModule(
+            sensor=sensor(rows[0]["sensor"]),
+            flat_indices=np.array([int(row["flat_index"]) for row in rows]),
+            link=rows[0]["link"],
+            positions=positions,
+            rotations=rotations,
+            grid=np.array([(int(row["row"]), int(row["column"])) for row in rows]),
+        )
+    return Hand("allegro-uskin", modules)
 
 
 SENSORS = {
@@ -184,25 +201,6 @@ def _plugin_sensor(name: str, loaded: Any) -> Sensor:  # noqa: ANN401
 
 SENSOR_PLUGINS = PluginGroup("sensors", SENSORS, _plugin_sensor)
 """Sensors of other packages."""
-
-
-def _module_order(name: str) -> tuple[bool, int, str]:
-    """Return a key to sort modules: fingertips first, then pads and palm, from the thumb on."""
-    parts = ("thumb", "index", "middle", "ring", "palm")
-    return "/" in name, parts.index(name.split("/", maxsplit=1)[0]), name
-
-
-def _hand_module(rows: list[dict[str, str]]) -> HandModule:
-    rows = sorted(rows, key=lambda row: int(row["taxel"]))
-    positions, rotations = _poses(rows)
-    return HandModule(
-        sensor=sensor(rows[0]["sensor"]),
-        flat_indices=np.array([int(row["flat_index"]) for row in rows]),
-        link=rows[0]["link"],
-        positions=positions,
-        rotations=rotations,
-        grid=np.array([(int(row["row"]), int(row["column"])) for row in rows]),
-    )
 
 
 def _table(name: str) -> list[dict[str, str]]:

@@ -2,7 +2,6 @@
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -33,12 +32,36 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
     Raises:
         ValueError: the file is not a URDF file, or the link or the joints do not exist.
     """
-    joints = _joints(path)
+    try:
+        text = read_input(path, MAX_URDF_SIZE).decode()
+    except UnicodeError as cause:
+        raise ValueError(f"{path} is not a URDF file: {cause}") from cause
+    # Entities can make a text of gigabytes out of a file of a few lines.
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError(f"{path} declares a document type, which a URDF file never needs")
+    try:
+        elements = list(ET.fromstring(text).iter("joint"))
+        joints = [_Joint(element) for element in elements if element.find("parent") is not None]
+    except (ET.ParseError, ValueError) as cause:
+        raise ValueError(
+            f"{path} is not a URDF file (a xacro file must be expanded first): {cause}"
+        ) from cause
     parents = {joint.child: joint for joint in joints}
     links = set(parents) | {joint.parent for joint in joints}
     if base not in links:
         raise ValueError(f"{path} has no link {base!r}; it has {', '.join(sorted(links)[:10])}")
-    frames = _frames(base, parents)
+    # The pose of `base` and of each link below it in the frame of `base`.
+    below: dict[str, list[str]] = {}
+    for link, joint in parents.items():
+        below.setdefault(joint.parent, []).append(link)
+    frames: dict[str, LinkPose] = {base: (np.zeros(3), np.eye(3))}
+    left = [base]
+    while left:
+        link = left.pop()
+        for child in below.get(link, ()):
+            if child not in frames:  # links in a circle are visited once
+                frames[child] = _pose(parents[child], frames[link])
+                left.append(child)
     poses = [_pose(j, frames[j.parent]) for j in joints if match in j.name and j.parent in frames]
     if not poses:
         raise ValueError(f"{path} has no joint below {base!r} whose name contains {match!r}")
@@ -48,6 +71,7 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
 class _Joint:
     def __init__(self, element: ET.Element) -> None:
         origin = element.find("origin")
+        # A joint without an origin has the frame of its parent link, as the format says.
         attributes = {} if origin is None else origin.attrib
         self.name = element.get("name", "")
         self.parent = _link(element, "parent")
@@ -55,24 +79,6 @@ class _Joint:
         self.position = _three_numbers(attributes.get("xyz", "0 0 0"))
         angles = _three_numbers(attributes.get("rpy", "0 0 0"))
         self.rotation: Array = _rotation(*angles)
-
-
-def _joints(path: Path) -> list[_Joint]:
-    try:
-        text = read_input(path, MAX_URDF_SIZE).decode()
-    except UnicodeError as cause:
-        raise ValueError(f"{path} is not a URDF file: {cause}") from cause
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError(f"{path} declares a document type, which a URDF file never needs")
-    try:
-        root = ET.fromstring(text)
-        return [
-            _Joint(element) for element in root.iter("joint") if element.find("parent") is not None
-        ]
-    except (ET.ParseError, ValueError) as cause:
-        raise ValueError(
-            f"{path} is not a URDF file (a xacro file must be expanded first): {cause}"
-        ) from cause
 
 
 def _three_numbers(text: str) -> Array:
@@ -116,27 +122,6 @@ def _product(a: Quaternion, b: Quaternion) -> Quaternion:
 def _link(joint: ET.Element, end: str) -> str:
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
-
-
-def _frames(base: str, parents: Mapping[str, _Joint]) -> dict[str, LinkPose]:
-    """Return the pose of `base` and of each link below it in the frame of `base`.
-
-    Args:
-        base: name of the link.
-        parents: joint above each link.
-    """
-    below: dict[str, list[str]] = {}
-    for link, joint in parents.items():
-        below.setdefault(joint.parent, []).append(link)
-    frames: dict[str, LinkPose] = {base: (np.zeros(3), np.eye(3))}
-    left = [base]
-    while left:
-        link = left.pop()
-        for child in below.get(link, ()):
-            if child not in frames:  # links in a circle are visited once
-                frames[child] = _pose(parents[child], frames[link])
-                left.append(child)
-    return frames
 
 
 def _pose(joint: _Joint, parent: LinkPose) -> LinkPose:

@@ -233,16 +233,6 @@ def _stretch(part: FingerModel, scale: Array) -> float:
     return float(np.exp(np.median(np.log(part.default_handling[1] / scale))))
 
 
-def _at_least_default(part: FingerModel, location: Array, scale: Array) -> tuple[Array, Array]:
-    """Return location and scale of still handling, at least those of default handling.
-
-    The default is the spread over all hands of the training: still handling does not show how far
-    motion takes the features of this one. It shows the noise of the skin, so the ratios of the
-    scales stay, and one factor stretches them until their median is that of the default.
-    """
-    return np.maximum(location, part.default_handling[0]), _stretch(part, scale) * scale
-
-
 def n_changed(part: FingerModel, handling: Handling) -> int:
     """Return the number of features whose location or scale differs from the default."""
     location, scale = part.default_handling
@@ -270,6 +260,7 @@ class _Calibration:
             TrainingError: most of the handling seems to be slip, or no threshold gives so few
                 alarms.
         """
+        # The thresholds are chosen on decisions by the new location and scale: these come first.
         handling = {key: self._normalisation(key) for key in self.keys}
         before = self._decide(self.model)
         after = self._decide(_with_handling(self.model, handling))
@@ -280,12 +271,25 @@ class _Calibration:
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
         model = _with_handling(self.model, handling)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)
-        sensors = tuple(
-            self._summary(key, handling[key], before[key], after[key]) for key in self.keys
-        )
+        sensors = []
+        for key, own in handling.items():
+            part = self.model.finger(key.finger)
+            summary = HandlingSummary(
+                sensor=str(key),
+                fingers=self.seen.fingers(key),
+                seconds=own.seconds,
+                load_change=self.seen.load_change(key),
+                n_features=len(own.location),
+                n_changed=n_changed(part, own),
+                activity=activity(part, self.seen.features(key)),
+                still=self._still(key),
+                before=before[key].figures(part.for_sensor(key.sensor)),
+                after=after[key].figures(part.with_handling(own)),
+            )
+            sensors.append(summary)
         return CalibratedModel(
             msgspec.structs.replace(model, name=f"{name}{CALIBRATED_SUFFIX}" if name else ""),
-            sensors,
+            tuple(sensors),
             tuple(self._warnings(sensors)),
         )
 
@@ -305,7 +309,12 @@ class _Calibration:
             )
         location, scale = location_and_scale(features)
         if self._still(key):
-            location, scale = _at_least_default(part, location, scale)
+            # The default is the spread over all hands of the training: still handling does not show
+            # how far motion takes the features of this one. It shows the noise of the skin, so the
+            # ratios of the scales stay, and one factor stretches them until their median is that
+            # of the default.
+            location = np.maximum(location, part.default_handling[0])
+            scale = _stretch(part, scale) * scale
         return Handling(
             location=tuple(location.tolist()),
             scale=tuple(scale.tolist()),
@@ -331,23 +340,6 @@ class _Calibration:
                 grasped = grasped_samples(decisions.times, decisions.states)
                 fingers.setdefault(key, []).append(GraspingFinger(name, replay, grasped))
         return {key: GraspingFingers(grasped) for key, grasped in fingers.items()}
-
-    def _summary(
-        self, key: HandlingKey, handling: Handling, before: GraspingFingers, after: GraspingFingers
-    ) -> HandlingSummary:
-        part = self.model.finger(key.finger)
-        return HandlingSummary(
-            sensor=str(key),
-            fingers=self.seen.fingers(key),
-            seconds=handling.seconds,
-            load_change=self.seen.load_change(key),
-            n_features=len(handling.location),
-            n_changed=n_changed(part, handling),
-            activity=activity(part, self.seen.features(key)),
-            still=self._still(key),
-            before=before.figures(part.for_sensor(key.sensor)),
-            after=after.figures(part.with_handling(handling)),
-        )
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
         for summary in sensors:

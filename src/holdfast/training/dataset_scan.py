@@ -173,7 +173,12 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
     counts = {name: count for name, count in counts.items() if count}
     step = 1
     if relative and counts:
-        _check_rate(recording)
+        low, high = RELATIVE_RATES
+        if not low * (1 - EXACT_RATE) <= recording.rate <= high * (1 + EXACT_RATE):
+            raise TrainingError(
+                f"recording {recording.name!r} has {recording.rate:.4g} Hz, relative features "
+                f"expect {low:g} to {high:g} Hz"
+            )
         step = max(1, round(recording.rate / RELATIVE_SAMPLE_RATE))
     held_object = recording.metadata.get("object")
     scanned = ScannedRecording(
@@ -200,38 +205,22 @@ def combine_scans(
         for finger, sensor in sensors_of_recording.items():
             known = sensors.setdefault(finger, sensor)
             smallest = min(smallest or sensor, sensor, key=lambda each: each.n_taxels)
-            if not relative:
-                _check_same_sensor(f"{finger} of {recording.name!r}", sensor, known)
+            # Relative features carry over between sensors; the others are numbers of one sensor.
+            if not relative and sensor != known:
+                texts = [f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, known)]
+                layout = "" if texts[0] != texts[1] else " with another layout or rate"
+                raise TrainingError(
+                    f"{finger} of {recording.name!r} has the sensor {texts[0]}, other recordings "
+                    f"have {texts[1]}{layout}"
+                )
     if not scanned:
         raise TrainingError("no recordings given; at least one expected")
     if smallest is None:
         raise TrainingError(f"none of the {len(scanned)} recordings has labels to train from")
-    _check_no_duplicates(scanned)
-    return DatasetScan(tuple(scanned), sensors, smallest, rate, relative)
-
-
-def _check_rate(recording: Recording) -> None:
-    low, high = RELATIVE_RATES
-    if not low * (1 - EXACT_RATE) <= recording.rate <= high * (1 + EXACT_RATE):
-        raise TrainingError(
-            f"recording {recording.name!r} has {recording.rate:.4g} Hz, relative features "
-            f"expect {low:g} to {high:g} Hz"
-        )
-
-
-def _check_same_sensor(what: str, sensor: Sensor, known: Sensor) -> None:
-    if sensor != known:
-        texts = [f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, known)]
-        layout = "" if texts[0] != texts[1] else " with another layout or rate"
-        raise TrainingError(
-            f"{what} has the sensor {texts[0]}, other recordings have {texts[1]}{layout}"
-        )
-
-
-def _check_no_duplicates(recordings: list[ScannedRecording]) -> None:
+    # By the readings alone, so that a copy with other times is found, too.
     name_of_digest: dict[str, str] = {}
     names: set[str] = set()
-    for recording in recordings:
+    for recording in scanned:
         if recording.name in names:
             raise TrainingError(
                 f"two recordings are called {recording.name!r}; different names expected"
@@ -243,3 +232,4 @@ def _check_no_duplicates(recordings: list[ScannedRecording]) -> None:
                 f"recordings {first!r} and {recording.name!r} hold the same readings: one would "
                 "be tested by a model that was trained on the other"
             )
+    return DatasetScan(tuple(scanned), sensors, smallest, rate, relative)

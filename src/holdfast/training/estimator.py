@@ -64,9 +64,18 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         Raises:
             TrainingError: there are no labels, or only one class.
         """
-        self.model_ = fit_recordings(
-            X, self._setting(), {"C": self.C, "class_weight": self.class_weight}
+        # Checked here and not in the constructor, as scikit-learn's own estimators do.
+        setting = Setting(
+            classifier=self.classifier,
+            features=parse_features(self.features, self.window),
+            window=self.window,
+            tare=Tare.parse(self.tare),
+            trials=0,
+            seed=self.seed,
+            shared=self.shared,
         )
+        parameters = {"C": self.C, "class_weight": self.class_weight}
+        self.model_ = fit_recordings(X, setting, parameters)
         self.classes_ = np.array([0, 1])
         return self
 
@@ -96,14 +105,3 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         check_is_fitted(self)
         accuracy = evaluate(self.model_, X).pooled.accuracy
         return float("nan") if accuracy is None else accuracy / 100
-
-    def _setting(self) -> Setting:
-        return Setting(
-            classifier=self.classifier,
-            features=parse_features(self.features, self.window),
-            window=self.window,
-            tare=Tare.parse(self.tare),
-            trials=0,
-            seed=self.seed,
-            shared=self.shared,
-        )

@@ -121,13 +121,19 @@ class OwnHandling:
             return
         self.digests[recording.name] = recording.digest
         recording = at_rate(recording, self.model.rate)
+        # Without debouncing: hold and hysteresis would stretch or shorten what is held.
         raw = msgspec.structs.replace(self.model, debounce=Debounce())
         traces = detect(raw, recording).fingers
         sensors = {name: recording.modules[name].sensor for name in traces}
         rows = extract(self.model.plan(sensors, recording.rate), recording)
         loaded = recording.starts_loaded and BASELINES not in recording.metadata
         for name, trace in traces.items():
-            self._count_faults(name, trace)
+            before = self._faults.get(name, _Faults(0, 0, 0))
+            faulty = trace.reason == FAULT_CODE
+            mask = int(np.bitwise_or.reduce(trace.faults[faulty].astype(np.int64), initial=0))
+            self._faults[name] = _Faults(
+                before.n_faulty + int(faulty.sum()), before.n + len(trace), before.mask | mask
+            )
             self._add_finger(name, sensors[name], trace, rows[name].features, loaded=loaded)
 
     def fingers(self, key: HandlingKey) -> dict[str, float]:
@@ -196,21 +202,22 @@ class OwnHandling:
                 f"{known[0].sensor.n_taxels} in {known[0].sensor.unit}; one sensor of a name "
                 "expected"
             )
+        # Features are taken while something is held; its duration counts closing and opening, too.
         grasped = grasped_samples(trace.times, trace.state) & np.isfinite(features).all(axis=1)
         touching = grasped_samples(trace.times, trace.state, edge_seconds=0.0)
         seconds = float(grasped_durations(trace.times)[touching].sum())
-        changes = _load_changes(trace, grasped)
+        # The change of the force within `CHANGE_SECONDS`, as a share of it, of samples that were
+        # held for that time.
+        changes, step = np.empty(0), max(1, round(CHANGE_SECONDS / _period(trace.times)))
+        if len(trace) > step:
+            n_grasped = np.cumsum(np.append(0, grasped))
+            kept = n_grasped[step + 1 :] - n_grasped[: -step - 1] == step + 1
+            moved = np.linalg.norm(trace.force[step:] - trace.force[:-step], axis=1)[kept]
+            load = np.linalg.norm(trace.force[step:], axis=1)[kept]
+            changes = moved[load > 0] / load[load > 0]
         if loaded and sensor.unit == "count":  # newtons have a zero
             changes = np.full_like(changes, np.nan)
         known.append(GraspedSamples(name, sensor, features[grasped], changes, seconds))
-
-    def _count_faults(self, finger: str, trace: FingerTrace) -> None:
-        before = self._faults.get(finger, _Faults(0, 0, 0))
-        faulty = trace.reason == FAULT_CODE
-        mask = int(np.bitwise_or.reduce(trace.faults[faulty].astype(np.int64), initial=0))
-        self._faults[finger] = _Faults(
-            before.n_faulty + int(faulty.sum()), before.n + len(trace), before.mask | mask
-        )
 
 
 def location_and_scale(features: Array) -> tuple[Array, Array]:
@@ -231,6 +238,7 @@ def location_and_scale(features: Array) -> tuple[Array, Array]:
     tails = math.erfc(c / math.sqrt(2))
     density = math.exp(-0.5 * c * c) / math.sqrt(2 * math.pi)
     shrinkage = math.sqrt(1 - tails * (1 - c * c) - 2 * c * density)
+    # From the median, which half of the samples may not move, and a scale that is rather too large.
     location, scale = np.median(features, axis=0), features.std(axis=0)
     for _ in range(MAX_CLIP_STEPS):
         before = location, scale
@@ -256,6 +264,8 @@ def grasped_samples(times: Array, states: Codes, *, edge_seconds: float = EDGE_S
     touching = np.asarray((states == STABLE) | (states == UNSTABLE))
     grasped = np.zeros_like(touching)
     for start, end in runs(touching):
+        # Only towards no contact is an edge closing or opening: at the end of a recording, or at a
+        # fault, the object is held as before.
         edge = min(round(edge_seconds / period), int(MAX_EDGE_SHARE * (end - start)))
         closes = start > 0 and states[start - 1] == NO_CONTACT
         opens = end < len(states) and states[end] == NO_CONTACT
@@ -272,18 +282,3 @@ def grasped_durations(times: Array) -> Array:
 def _period(times: Array) -> float:
     """Return the median step in time [s]; `MIN_TOUCH` for a single sample."""
     return float(np.median(np.diff(times))) if len(times) > 1 else MIN_TOUCH
-
-
-def _load_changes(trace: FingerTrace, grasped: Flags) -> Array:
-    """Return the change of the force within `CHANGE_SECONDS`, as a share of it, where it is held.
-
-    Samples before which the finger did not hold for so long are left out.
-    """
-    step = max(1, round(CHANGE_SECONDS / _period(trace.times)))
-    if len(trace) <= step:
-        return np.empty(0)
-    n_grasped = np.cumsum(np.append(0, grasped))
-    kept = n_grasped[step + 1 :] - n_grasped[: -step - 1] == step + 1
-    change = np.linalg.norm(trace.force[step:] - trace.force[:-step], axis=1)[kept]
-    load = np.linalg.norm(trace.force[step:], axis=1)[kept]
-    return np.asarray(change[load > 0] / load[load > 0])

@@ -16,7 +16,6 @@ from holdfast.contact import STABLE
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import (
     EventMetrics,
-    FingerDecisions,
     match_decisions,
     pool_events,
 )
@@ -152,6 +151,7 @@ class Curve:
                 f"recordings; the least is {best.false_alarms:.2g} at the threshold "
                 f"{best.threshold:.3g}, which {misses}"
             )
+        # All neighbours up to the next threshold that was looked at on either side.
         index = self.thresholds.index(best.threshold)
         around = self.thresholds[max(index - COARSE_STEP + 1, 0) : index + COARSE_STEP]
         points += self._usable([t for t in around if t != best.threshold])
@@ -278,7 +278,20 @@ def _of_stability(model: Model, recordings: Iterable[Recording]) -> Curve:
     replays = [ThresholdReplay.of(model, recording) for recording in recordings]
 
     def at(threshold: float) -> CurvePoint:
-        return _stable_point([replay.hand(threshold) for replay in replays], threshold)
+        hands = [replay.hand(threshold) for replay in replays]
+        labelled = [hand for hand in hands if hand.labels.any()]
+        if not labelled:
+            raise TrainingError(
+                f"none of the recordings ({len(hands)}) has labels; labels expected"
+            )
+        events = pool_events([match_decisions(hand) for hand in labelled])
+        stable = np.concatenate([hand.states[hand.labels == STABLE] == STABLE for hand in labelled])
+        if not events.stable_minutes or not len(stable):
+            raise TrainingError(
+                "no time in which the hand is labelled stable; false alarms are counted per "
+                "minute of it"
+            )
+        return CurvePoint.of_events(threshold, events, 100 * int(stable.sum()) / len(stable))
 
     most = at(float(THRESHOLDS[0])).stable or 0.0
     if most == 0:
@@ -292,20 +305,6 @@ def _of_stability(model: Model, recordings: Iterable[Recording]) -> Curve:
         return (point.stable or 0.0) >= USABLE_SHARE * most and (point.missed["0.2"] or 0.0) < 100
 
     return Curve(THRESHOLDS.tolist(), at, is_usable)
-
-
-def _stable_point(hands: Sequence[FingerDecisions], threshold: float) -> CurvePoint:
-    labelled = [hand for hand in hands if hand.labels.any()]
-    if not labelled:
-        raise TrainingError(f"none of the recordings ({len(hands)}) has labels; labels expected")
-    events = pool_events([match_decisions(hand) for hand in labelled])
-    stable = np.concatenate([hand.states[hand.labels == STABLE] == STABLE for hand in labelled])
-    if not events.stable_minutes or not len(stable):
-        raise TrainingError(
-            "no time in which the hand is labelled stable; false alarms are counted per minute "
-            "of it"
-        )
-    return CurvePoint.of_events(threshold, events, 100 * int(stable.sum()) / len(stable))
 
 
 def _of_slips(model: Model, recordings: Iterable[Recording]) -> Curve:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from holdfast.metrics import EventMetrics, Metrics, SampleMetrics
+from holdfast.metrics import Metrics, SampleMetrics
 from holdfast.metrics.slip_thresholds import SlipSummary
 from holdfast.metrics.statistics import Interval
 
@@ -106,6 +106,7 @@ def verdict(metrics: Metrics, tares: LoadedTares | None = None, *, in_sample: bo
         any(finger.n + finger.n_undecided for finger in recording.fingers.values())
         for recording in metrics.recordings
     )
+    # What is not usable at all has no rates worth a sentence.
     sentence = _unusable(metrics.pooled) or _by_events(metrics, n, in_sample=in_sample)
     ending = f"; {tares}: see --tare." if tares is not None and tares.loaded else "."
     slips = metrics.slips
@@ -167,16 +168,21 @@ def _by_events(metrics: Metrics, n_recordings: int, *, in_sample: bool) -> str:
     use = _use(USES, alarms, missed, support, in_sample=in_sample, by_rule=by_rule)
     hint = " at this threshold (see holdfast tune)" if alarms.value > USES[-1][1] else ""
     rate = alarms.alarms() if minutes else "the hand is never labelled stable"
-    texts = f"{rate}{hint}, {_missed(events, missed)}; {_right(metrics.pooled)}"
-    return f"{use[0].upper()}{use[1:]}: {texts}"
-
-
-def _missed(events: EventMetrics, missed: Bounded) -> str:
-    if not events.n_events:
-        return "no instability after a stable hold in these recordings"
-    what = f"{events.n_events} onset{'s' * (events.n_events != 1)} of instability"
-    upper = f" (up to {missed.upper:.0f} %)" if missed.upper > missed.value else ""
-    return f"{missed.value:.0f} %{upper} of {what} missed within 0.2 s"
+    misses = "no instability after a stable hold in these recordings"
+    if events.n_events:
+        what = f"{events.n_events} onset{'s' * (events.n_events != 1)} of instability"
+        upper = f" (up to {missed.upper:.0f} %)" if missed.upper > missed.value else ""
+        misses = f"{missed.value:.0f} %{upper} of {what} missed within 0.2 s"
+    # The accuracy stands beside that of always deciding the commoner class: labels are rarely half
+    # and half, and 90 % may be worse than no detector.
+    samples = metrics.pooled
+    (tn, fp), (fn, tp) = samples.confusion
+    constant = 100 * max(fn + tp, tn + fp) / samples.n
+    name = "always STABLE" if fn + tp >= tn + fp else "never STABLE"
+    right = f"{samples.accuracy:.0f} % of the samples right ({name}: {constant:.0f} %)"
+    if samples.accuracy is not None and samples.accuracy <= constant:
+        right = f"only {right}"
+    return f"{use[0].upper()}{use[1:]}: {rate}{hint}, {misses}; {right}"
 
 
 def _by_slips(summary: SlipSummary, n_recordings: int, *, in_sample: bool) -> str:
@@ -231,15 +237,3 @@ def _unusable(samples: SampleMetrics) -> str:
     if auc is not None and auc <= CHANCE_AUC:
         return f"Not usable: it orders stable and unstable samples like chance (AUC {auc:.2f})"
     return ""
-
-
-def _right(samples: SampleMetrics) -> str:
-    """Return the accuracy, beside that of always deciding the commoner class."""
-    (tn, fp), (fn, tp) = samples.confusion
-    stable = fn + tp >= tn + fp
-    constant = 100 * max(fn + tp, tn + fp) / samples.n
-    name = "always STABLE" if stable else "never STABLE"
-    text = f"{samples.accuracy:.0f} % of the samples right ({name}: {constant:.0f} %)"
-    if samples.accuracy is not None and samples.accuracy <= constant:
-        return f"only {text}"
-    return text

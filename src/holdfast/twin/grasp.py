@@ -85,13 +85,40 @@ def closing_path(item: GraspObject) -> ClosingPath:
     joints = np.empty((len(FINGERS), len(PATH_GAPS), 4))
     misses, cosines = np.empty(len(FINGERS)), np.empty(len(FINGERS))
     for place, finger in enumerate(FINGERS):
-        push, points = _aims(item, finger)
-        joints[place] = _follow(hand, place, points, push)
+        push, points = aims_of(item, finger)
+        # Each point is solved from the last, so that the joints never jump; the first from itself,
+        # until it no longer depends on the guess.
+        is_thumb = finger == "thumb"
+        guess = np.array([1.2, 0.4, 0.2, 0.4] if is_thumb else [0.0, 0.3, 0.6, 0.5])
+        for _ in range(N_SETTLE_SOLUTIONS):
+            guess = _solve(hand, place, points[0], push, guess)
+        for k, point in enumerate(points):
+            joints[place, k] = guess = _solve(hand, place, point, push, guess)
         pad, normal = _pad(hand, place, joints[place, touch])
         misses[place] = np.linalg.norm(pad - points[touch])
         cosines[place] = normal @ push
-    _check(item, misses, cosines)
+    worst = int(np.argmax(np.maximum(misses / MAX_MISS, (1 - cosines) / (1 - MIN_PAD_COSINE))))
+    if misses[worst] > MAX_MISS or cosines[worst] < MIN_PAD_COSINE:
+        off = np.degrees(np.arccos(np.clip(cosines[worst], -1.0, 1.0)))
+        raise ValueError(
+            f"the object {item.name!r} cannot be grasped: the pad of the {FINGERS[worst]} misses "
+            f"it by {1e3 * misses[worst]:.0f} mm, at {off:.0f} degrees; half widths of 24 to "
+            "45 mm between thumb and fingers fit the hand"
+        )
     return ClosingPath(PATH_GAPS, joints, misses, cosines)
+
+
+def aims_of(item: GraspObject, finger: str) -> tuple[Array, Array]:
+    """Return direction of the push and targets (m, 3) [m] of a pad in the right palm."""
+    along = np.array([np.cos(GRASP_DIRECTION), 0.0, np.sin(GRASP_DIRECTION)])
+    push = along if finger == "thumb" else -along
+    height = {"index": item.finger_height, "ring": -item.finger_height}.get(finger, 0.0)
+    angle = np.arctan2(push[2], -push[0]) - item.yaw  # palm x, z to world x, y
+    outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+    reach = reach_of(item, outward, height + _middle(item))
+    reach = 0.0 if np.isnan(reach) else reach  # over or under the object: its axis
+    meet = np.add(MIDDLE_PLACE, (0.0, height, 0.0)) - push * reach
+    return push, meet - push * PATH_GAPS[:, None]
 
 
 def object_pose(item: GraspObject) -> tuple[Array, float]:
@@ -109,34 +136,6 @@ _FIRST = np.array([JOINTS[finger] for finger in FINGERS], np.intc)
 def _middle(item: GraspObject) -> float:
     """Return the height of the object's middle above its centre of mass [m]."""
     return float(item.foot[2]) + item.half_height
-
-
-def _aims(item: GraspObject, finger: str) -> tuple[Array, Array]:
-    """Return direction of the push and targets (m, 3) [m] of a pad in the right palm."""
-    along = np.array([np.cos(GRASP_DIRECTION), 0.0, np.sin(GRASP_DIRECTION)])
-    push = along if finger == "thumb" else -along
-    height = {"index": item.finger_height, "ring": -item.finger_height}.get(finger, 0.0)
-    reach = _reach(item, -push, height + _middle(item))
-    meet = np.add(MIDDLE_PLACE, (0.0, height, 0.0)) - push * reach
-    return push, meet - push * PATH_GAPS[:, None]
-
-
-def _reach(item: GraspObject, outward: Array, height: float) -> float:
-    """Return the distance from the object's axis to its surface in a direction of the palm [m]."""
-    angle = np.arctan2(-outward[2], outward[0]) - item.yaw  # palm x, z to world x, y
-    reach = reach_of(item, np.array([np.cos(angle), np.sin(angle), 0.0]), height)
-    return 0.0 if np.isnan(reach) else reach
-
-
-def _follow(hand: HandModel, place: int, points: Array, push: Array) -> Array:
-    """Return joint angles (m, 4) that bring the pad to the points, each solved from the last."""
-    guess = np.array([1.2, 0.4, 0.2, 0.4] if FINGERS[place] == "thumb" else [0.0, 0.3, 0.6, 0.5])
-    for _ in range(N_SETTLE_SOLUTIONS):
-        guess = _solve(hand, place, points[0], push, guess)
-    joints = np.empty((len(points), 4))
-    for k, point in enumerate(points):
-        joints[k] = guess = _solve(hand, place, point, push, guess)
-    return joints
 
 
 def _solve(hand: HandModel, place: int, point: Array, push: Array, guess: Array) -> Array:
@@ -161,17 +160,6 @@ def _pad(hand: HandModel, place: int, joints: Array) -> tuple[Array, Array]:
     turn = hand.data.xmat[hand.tips[place]].reshape(3, 3)
     pad = hand.data.xpos[hand.tips[place]] + turn @ (MOUNTS[place] + np.array(PAD_MIDDLE))
     return palm.T @ pad, palm.T @ turn[:, 0]
-
-
-def _check(item: GraspObject, misses: Array, cosines: Array) -> None:
-    worst = int(np.argmax(np.maximum(misses / MAX_MISS, (1 - cosines) / (1 - MIN_PAD_COSINE))))
-    if misses[worst] > MAX_MISS or cosines[worst] < MIN_PAD_COSINE:
-        angle = np.degrees(np.arccos(np.clip(cosines[worst], -1.0, 1.0)))
-        raise ValueError(
-            f"the object {item.name!r} cannot be grasped: the pad of the {FINGERS[worst]} misses "
-            f"it by {1e3 * misses[worst]:.0f} mm, at {angle:.0f} degrees; half widths of 24 to "
-            "45 mm between thumb and fingers fit the hand"
-        )
 
 
 SERIES_GAIN = 1.8

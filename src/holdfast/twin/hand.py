@@ -92,7 +92,9 @@ def hand_xml(item: GraspObject | None = None) -> str:
     Args:
         item: object that floats before the hand; None for none.
     """
-    rows = _table()
+    path = resources.files("holdfast.twin").joinpath("tables", "allegro_right.csv")
+    lines = path.read_text("utf-8").splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     body = "" if item is None else object_xml(item)
     return f"""<mujoco model="allegro right">
   <compiler angle="radian" eulerseq="XYZ"/>
@@ -165,41 +167,30 @@ class HandModel:
         )  # fmt: skip
 
 
-def _table() -> Rows:
-    path = resources.files("holdfast.twin").joinpath("tables", "allegro_right.csv")
-    lines = path.read_text("utf-8").splitlines()
-    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
-
-
 def _link_xml(row: dict[str, str], rows: Rows) -> str:
     children = "".join(_link_xml(other, rows) for other in rows if other["parent"] == row["link"])
     number = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
     sides = tuple(float(row[f"side_{a}"]) for a in "xyz")
     middle = tuple(float(row[f"middle_{a}"]) for a in "xyz")
-    tip = "" if children else _tip_xml(number)
+    # Of the motor, which is only drawn, the ends on the axis of its joint.
+    x, y, z = (MOTOR_SIZE[1] * float(row[f"axis_{a}"]) for a in "xyz")
+    motor = (
+        f'<geom type="cylinder" fromto="{-x:.6g} {-y:.6g} {-z:.6g} {x:.6g} {y:.6g} {z:.6g}" '
+        f'size="{MOTOR_SIZE[0]}" mass="0" rgba="{FRAME_COLOUR}"/>'
+    )
+    tip = ""
+    if not children:  # the skin: its mass, and a capsule of about its shape
+        x, _, z = MOUNTS[0 if number >= JOINTS["thumb"] else 1]
+        x += AXIS
+        tip = (
+            f'<geom type="capsule" fromto="{x:.6g} 0 {z + TIP_BEGIN:.6g} {x:.6g} 0 '
+            f'{z + TIP_END:.6g}" size="{TIP_RADIUS}" mass="{TIP_MASS}" rgba="{SKIN_COLOUR}"/>'
+        )
     return f"""<body name="{row["link"]}" pos="{row["x"]} {row["y"]} {row["z"]}"
       euler="{row["roll"]} {row["pitch"]} {row["yaw"]}">
       <joint name="joint_{number}" axis="{row["axis_x"]} {row["axis_y"]} {row["axis_z"]}"
         range="{row["lower"]} {row["upper"]}"/>
-      {_box_xml(sides, middle, float(row["mass"]))}{_motor_xml(row)}{tip}{children}</body>"""
-
-
-def _motor_xml(row: dict[str, str]) -> str:
-    """Return the motor of a joint, which is only drawn."""
-    x, y, z = (MOTOR_SIZE[1] * float(row[f"axis_{a}"]) for a in "xyz")
-    ends = f"{-x:.6g} {-y:.6g} {-z:.6g} {x:.6g} {y:.6g} {z:.6g}"
-    size = MOTOR_SIZE[0]
-    return f'<geom type="cylinder" fromto="{ends}" size="{size}" mass="0" rgba="{FRAME_COLOUR}"/>'
-
-
-def _tip_xml(number: int) -> str:
-    """Return the skin: its mass, and a capsule of about its shape."""
-    x, _, z = MOUNTS[0 if number >= JOINTS["thumb"] else 1]
-    x += AXIS
-    return (
-        f'<geom type="capsule" fromto="{x:.6g} 0 {z + TIP_BEGIN:.6g} {x:.6g} 0 {z + TIP_END:.6g}" '
-        f'size="{TIP_RADIUS}" mass="{TIP_MASS}" rgba="{SKIN_COLOUR}"/>'
-    )
+      {_box_xml(sides, middle, float(row["mass"]))}{motor}{tip}{children}</body>"""
 
 
 def _box_xml(sides: tuple[float, ...], middle: tuple[float, ...], mass: float) -> str:

@@ -89,20 +89,18 @@ def load_state(loads: Sequence[Load], held_for: float) -> LoadState:
         if elapsed < 0:
             continue
         along = np.array(load.direction)
+        # How much of a load that stays acts: without the rise it would be a blow.
+        risen = 0.5 - 0.5 * np.cos(np.pi * min(elapsed / RISE_TIME, 1.0))
         if load.kind is LoadKind.WEIGHT:
-            force += [0.0, 0.0, -GRAVITY * load.size * _risen(elapsed)]
+            force += [0.0, 0.0, -GRAVITY * load.size * float(risen)]
         elif load.kind is LoadKind.FRICTION:
-            friction *= 1.0 - (1.0 - load.size) * _risen(elapsed)
+            friction *= 1.0 - (1.0 - load.size) * float(risen)
         elif elapsed < load.duration and load.kind is LoadKind.PULL:
             force += load.size * np.sin(np.pi * elapsed / load.duration) ** 2 * along
         elif elapsed < load.duration and load.kind is LoadKind.SHAKE:
+            # A shake swells over a quarter of its time, and fades over the last one.
             swell = min(1.0, 4 * min(elapsed, load.duration - elapsed) / load.duration)
             acceleration += load.size * swell * np.sin(2 * np.pi * load.rate * elapsed) * along
-        elif elapsed < load.duration:
+        elif elapsed < load.duration:  # transport: one period, so that the hand is at rest again
             acceleration += load.size * np.sin(2 * np.pi * elapsed / load.duration) * along
     return LoadState(force, acceleration, friction)
-
-
-def _risen(elapsed: float) -> float:
-    """Return how much of a load that stays acts, from 0 to 1."""
-    return float(0.5 - 0.5 * np.cos(np.pi * min(elapsed / RISE_TIME, 1.0)))

@@ -208,20 +208,21 @@ def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
         "friction": ("static", "kinetic"),
         "texture": ("amplitude", "wavelength"),
     }
-    return shape, {key: _numbers(row, key, names.get(key, ("",))) for key in COLUMN_LIMITS}
-
-
-def _numbers(row: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[float, ...]:
-    values = row[key] if isinstance(row[key], list) else [row[key]]
-    low, high = COLUMN_LIMITS[key]
-    if len(values) != len(names):
-        expected = ", ".join(names) or "one number"
-        raise ValueError(f"{key}: {expected} expected, {len(values)} numbers given")
-    for value in values:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (number and low <= value <= high):
-            raise ValueError(f"{key}: numbers from {low:g} to {high:g} expected, {value!r} given")
-    return tuple(float(value) for value in values)
+    numbers = {}
+    for key, (low, high) in COLUMN_LIMITS.items():
+        values = row[key] if isinstance(row[key], list) else [row[key]]
+        expected = names.get(key, ("",))
+        if len(values) != len(expected):
+            what = ", ".join(expected) or "one number"
+            raise ValueError(f"{key}: {what} expected, {len(values)} numbers given")
+        for value in values:  # in Python, True is a number
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number and low <= value <= high):
+                raise ValueError(
+                    f"{key}: numbers from {low:g} to {high:g} expected, {value!r} given"
+                )
+        numbers[key] = tuple(map(float, values))
+    return shape, numbers
 
 
 def _check(
@@ -254,16 +255,12 @@ def _height(shape: str) -> int:
     return {"sphere": 0, "capsule": 1, "cylinder": 1, "hexagon": 1}.get(shape, 2)
 
 
-def shape_code(shape: str) -> int:
-    """Return the core of a shape: REVOLVED, BOX, HEXAGON or CAPSULE."""
-    codes = {"box": BOX, "hexagon": HEXAGON, "sphere": CAPSULE, "capsule": CAPSULE}
-    return codes.get(shape, REVOLVED)
-
-
 def _core(shape: str, size: tuple[float, ...]) -> Array:
     """Pack the smooth shape, (N_OBJECT_NUMBERS,), with its centre of mass at the middle."""
     core = np.zeros(N_OBJECT_NUMBERS)
-    core[CODE] = shape_code(shape)
+    # What is neither box nor hexagon is turned about its axis: a side, or a capsule's core.
+    codes = {"box": BOX, "hexagon": HEXAGON, "sphere": CAPSULE, "capsule": CAPSULE}
+    core[CODE] = codes.get(shape, REVOLVED)
     if shape in ("sphere", "capsule"):
         core[1], core[EXTENSION] = size[_height(shape)] - size[0], size[0]
         return core
@@ -297,17 +294,14 @@ def solid(item: GraspObject) -> Array:
     """
     packed = _core(item.shape, item.size)
     packed[CENTRE] = -item.half_height - item.foot[2]
-    packed[TEXTURE_AMPLITUDE : AROUND_2 + 1] = _texture(item)
-    packed[MU_STATIC], packed[MU_KINETIC] = item.mu_static, item.mu_kinetic
-    return packed
-
-
-def _texture(item: GraspObject) -> list[float]:
-    """Return the texture, with a whole number of waves about the axis, so that it has no seam."""
+    # Two waves, the second 0.37 times as long; about the axis a whole number of each, so that the
+    # surface has no seam.
     wave = 2 * math.pi / item.texture_wavelength
     short = wave / 0.37
     around = [round(wave * item.radius), round(short * item.radius)]
-    return [item.texture_amplitude, wave, 0.6 * short, *around]
+    packed[TEXTURE_AMPLITUDE : AROUND_2 + 1] = [item.texture_amplitude, wave, 0.6 * short, *around]
+    packed[MU_STATIC], packed[MU_KINETIC] = item.mu_static, item.mu_kinetic
+    return packed
 
 
 def distance_to(item: GraspObject, points: npt.ArrayLike) -> Array:
@@ -359,7 +353,14 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
     The grid covers a quarter of the body, because all shapes are symmetric in x and y. A cell on
     the surface counts by the part of it that is inside.
     """
-    wide, tall = _extent(core)
+    code, rounding = int(core[CODE]), float(core[EXTENSION])
+    # Half width and half height of the box around the core and its rounding [m].
+    if code == CAPSULE:
+        wide, tall = rounding, float(core[1]) + rounding
+    elif code == HEXAGON:
+        wide, tall = float(core[1]) * 2 / math.sqrt(3) + rounding, float(core[2]) + rounding
+    else:
+        wide, tall = float(max(core[1], core[2])) + rounding, float(core[3]) + rounding
     step = max(wide, 2 * tall) / N_GRID
     across = (np.arange(math.ceil(wide / step)) + 0.5) * step
     up = (np.arange(2 * math.ceil(tall / step)) + 0.5) * step - math.ceil(tall / step) * step
@@ -370,13 +371,3 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
     centre = float((cell * z).sum()) / volume
     xx, yy, zz = ((cell * c * c).sum() for c in (x, y, z - centre))
     return volume, centre, np.array([yy + zz, xx + zz, xx + yy])
-
-
-def _extent(core: Array) -> tuple[float, float]:
-    """Return half width and half height of the box around a core and its rounding [m]."""
-    code, rounding = int(core[CODE]), float(core[EXTENSION])
-    if code == CAPSULE:
-        return rounding, float(core[1]) + rounding
-    if code == HEXAGON:
-        return float(core[1]) * 2 / math.sqrt(3) + rounding, float(core[2]) + rounding
-    return float(max(core[1], core[2])) + rounding, float(core[3]) + rounding

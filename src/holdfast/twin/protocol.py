@@ -107,12 +107,14 @@ class Protocol:
         self.anchor = np.zeros(12)
         self._period = period
         n_fingers = len(plan.grips)
+        # Of each finger: its set-point, which closing and release move; how long its load has been
+        # over its grip; and whether it has stopped for good. `_close` changes the last two.
         self._depths = np.full(n_fingers, OPEN_GAP)
         self._over_grip_for = np.zeros(n_fingers)
         self._stopped = np.zeros(n_fingers, dtype=np.bool_)
         self._all_stopped_at = np.inf
-        self._released_at = np.inf
-        self._untouched_for = 0.0
+        self._released_at = np.inf  # from the end of the hold, a time-out, or `release`
+        self._untouched_for = 0.0  # with fewer than two fingertips, while it is held
         self._locked_place = np.zeros(3)
 
     @property
@@ -144,7 +146,9 @@ class Protocol:
         if time == 0.0:
             self.anchor[:] = body[:12]
         if time >= self._released_at:
-            return self._release(time, loads)
+            self._depths = np.minimum(self._depths + OPENING_SPEED * self._period, OPEN_GAP)
+            phase = Phase.RELEASED if (loads > MIN_TOUCH_LOAD).any() else Phase.FREE
+            return self._new_command(1.0 if self.lost_at is None else 0.0, phase)
         if self.locked_at is not None:
             return self._hold(time, loads, slip, body)
         if time < self.plan.before:
@@ -170,37 +174,27 @@ class Protocol:
 
     def _hold(self, time: float, loads: Array, slip: float, body: Array) -> Command:
         held_for = time - float(self.locked_at or 0.0)
-        if self.lost_at is None and self._is_lost(loads, body):
+        n_touching = sum(load > MIN_TOUCH_LOAD for load in loads.tolist())
+        self._untouched_for = self._untouched_for + self._period if n_touching < 2 else 0.0
+        away = body[:3] - self._locked_place
+        is_far = math.sqrt(away.dot(away)) > LOST_DISTANCE
+        if self.lost_at is None and (is_far or self._untouched_for >= LOST_CONTACT_TIME):
             self.lost_at = time
         if held_for >= self.plan.profile.hold and self._released_at == np.inf:
             self._released_at = time + HAND_OVER_TIME
             self.anchor[:] = body[:12]
         if self.lost_at is not None:
             return self._new_command(0.0, Phase.FREE)
-        disturbance, elapsed = self._disturbance_at(held_for)
-        phase = Phase.LOCKED
-        if disturbance >= 0:
-            phase = touched_phase(slip)
+        phase, disturbance, elapsed = Phase.LOCKED, -1, 0.0
+        for index, planned in enumerate(self.plan.disturbances):
+            if planned.start <= held_for < planned.start + planned.duration:
+                phase, disturbance = touched_phase(slip), index
+                elapsed = held_for - planned.start
+                break
+        # The operator lets go after the lock, and takes the object again before the release.
         releasing = 1.0 - held_for / HAND_OVER_TIME
         taking = 1.0 - (self._released_at - time) / HAND_OVER_TIME
         return self._new_command(max(0.0, releasing, taking), phase, disturbance, elapsed)
-
-    def _release(self, time: float, loads: Array) -> Command:
-        self._depths = np.minimum(self._depths + OPENING_SPEED * self._period, OPEN_GAP)
-        phase = Phase.RELEASED if (loads > MIN_TOUCH_LOAD).any() else Phase.FREE
-        return self._new_command(1.0 if self.lost_at is None else 0.0, phase)
-
-    def _is_lost(self, loads: Array, body: Array) -> bool:
-        n_touching = sum(load > MIN_TOUCH_LOAD for load in loads.tolist())
-        self._untouched_for = self._untouched_for + self._period if n_touching < 2 else 0.0
-        away = body[:3] - self._locked_place
-        return math.sqrt(away.dot(away)) > LOST_DISTANCE or self._untouched_for >= LOST_CONTACT_TIME
-
-    def _disturbance_at(self, held_for: float) -> tuple[int, float]:
-        for place, disturbance in enumerate(self.plan.disturbances):
-            if disturbance.start <= held_for < disturbance.start + disturbance.duration:
-                return place, held_for - disturbance.start
-        return -1, 0.0
 
     def _new_command(
         self, hold: float, phase: Phase, disturbance: int = -1, elapsed: float = 0.0

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from collections.abc import Iterable
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import IO, NamedTuple, cast
@@ -78,9 +79,26 @@ class Renderer:
         height: int = 480,
         camera: Camera | None = None,
     ) -> None:
-        _check_size(model, width, height)
-        self._renderer = _start(model, width, height)
-        self._camera = _aimed(camera or Camera())
+        most = model.vis.global_.offwidth, model.vis.global_.offheight
+        if not (0 < width <= most[0] and 0 < height <= most[1]):
+            raise ValueError(
+                f"a picture of 1 x 1 to {most[0]} x {most[1]} pixels expected, {width} x {height} "
+                "given"
+            )
+        try:
+            self._renderer = mujoco.Renderer(model, height, width, MAX_SHAPES)
+        except Exception as cause:  # each back end raises its own exceptions
+            reason = str(cause).strip().split("\n")[0] or type(cause).__name__
+            raise OutputError(
+                f"cannot render: MuJoCo's back end {BACK_END!r} does not start ({reason}); install "
+                "libegl1 or libosmesa6, or choose one with MUJOCO_GL=egl, osmesa or glfw"
+            ) from cause
+        view = camera or Camera()
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE.value
+        self._camera.lookat = np.array(view.target)
+        self._camera.distance = view.distance
+        self._camera.azimuth, self._camera.elevation = view.azimuth, view.elevation
 
     def __enter__(self) -> "Renderer":
         return self
@@ -134,9 +152,15 @@ def save_video(frames: Iterable[Picture], path: str | Path, fps: float) -> None:
         raise ValueError("a film of at least one picture expected, none given")
     frames = chain([first], pictures)
     if path.suffix.lower() == ".mp4":
-        _save_mp4(frames, path, fps)
-    else:
-        _save_animation(frames, path, fps)
+        _save_mp4(first.shape, frames, path, fps)
+        return
+    from PIL import Image
+
+    images = (Image.fromarray(frame) for frame in frames)
+    if path.suffix.lower() != ".webp":  # 256 colours need less space and memory
+        images = (image.quantize(256, dither=Image.Dither.NONE) for image in images)
+    start, *others = images
+    start.save(path, save_all=True, append_images=others, duration=1000 / fps, loop=0)
 
 
 def check_film(path: str | Path) -> None:
@@ -193,24 +217,6 @@ def film(grasp: Grasp, path: Path) -> None:
     save_video(frames, path, RATE / SAMPLES_PER_PICTURE)
 
 
-def _check_size(model: mujoco.MjModel, width: int, height: int) -> None:
-    most = model.vis.global_.offwidth, model.vis.global_.offheight
-    if not (0 < width <= most[0] and 0 < height <= most[1]):
-        raise ValueError(
-            f"a picture of 1 x 1 to {most[0]} x {most[1]} pixels expected, {width} x {height} given"
-        )
-
-
-def _aimed(camera: Camera) -> mujoco.MjvCamera:
-    aimed = mujoco.MjvCamera()
-    aimed.type = mujoco.mjtCamera.mjCAMERA_FREE.value
-    aimed.lookat = np.array(camera.target)
-    aimed.distance = camera.distance
-    aimed.azimuth = camera.azimuth
-    aimed.elevation = camera.elevation
-    return aimed
-
-
 def _draw_arrow(
     scene: mujoco.MjvScene,
     begin: Array,
@@ -228,52 +234,18 @@ def _draw_arrow(
     scene.ngeom += 1
 
 
-def _start(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
-    try:
-        return mujoco.Renderer(model, height, width, MAX_SHAPES)
-    except Exception as cause:  # each back end raises its own exceptions
-        reason = str(cause).strip().split("\n")[0] or type(cause).__name__
-        raise OutputError(
-            f"cannot render: MuJoCo's back end {BACK_END!r} does not start ({reason}); install "
-            "libegl1 or libosmesa6, or choose one with MUJOCO_GL=egl, osmesa or glfw"
-        ) from cause
-
-
-def _save_animation(frames: Iterable[Picture], path: Path, fps: float) -> None:
-    from PIL import Image
-
-    images = (Image.fromarray(frame) for frame in frames)
-    if path.suffix.lower() != ".webp":  # 256 colours need less space and memory
-        images = (image.quantize(256, dither=Image.Dither.NONE) for image in images)
-    first, *others = images
-    first.save(path, save_all=True, append_images=others, duration=1000 / fps, loop=0)
-
-
-def _save_mp4(frames: Iterable[Picture], path: Path, fps: float) -> None:
-    pictures = iter(frames)
-    first = next(pictures)
-    command = _ffmpeg(first.shape, path, fps)
+def _save_mp4(shape: tuple[int, ...], frames: Iterable[Picture], path: Path, fps: float) -> None:
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{shape[1]}x{shape[0]}"]
+    # Players expect half the resolution in colours, and so even sides.
+    even = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
+    program = ["ffmpeg", "-y", "-loglevel", "error"]
+    command = [*program, *source, "-r", f"{fps:g}", "-i", "-", *even, str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        messages = _feed(process, chain([first], pictures))
+        pipe = cast("IO[bytes]", process.stdin)
+        with suppress(BrokenPipeError):  # it may stop before the last picture, and says why
+            for frame in frames:
+                pipe.write(frame.tobytes())
+        messages = process.communicate()[1]
     if process.returncode:
         last_line = messages.decode(errors="replace").strip().split("\n")[-1]
         raise OutputError(f"cannot write {path.name}: ffmpeg reports {last_line or 'nothing'}")
-
-
-def _ffmpeg(shape: tuple[int, ...], path: Path, fps: float) -> list[str]:
-    """Return the command that makes a film of raw pictures."""
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{shape[1]}x{shape[0]}"]
-    even = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
-    program = ["ffmpeg", "-y", "-loglevel", "error"]
-    return [*program, *source, "-r", f"{fps:g}", "-i", "-", *even, str(path)]
-
-
-def _feed(process: "subprocess.Popen[bytes]", frames: Iterable[Picture]) -> bytes:
-    """Write pictures to ffmpeg and return its messages. It may stop before the last picture."""
-    pipe = cast("IO[bytes]", process.stdin)
-    try:
-        for frame in frames:
-            pipe.write(frame.tobytes())
-    except BrokenPipeError:
-        pass
-    return process.communicate()[1]

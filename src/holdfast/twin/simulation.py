@@ -3,7 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.loads import Load, LoadState, load_state
+from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.plant import MILD, plant_named
@@ -118,6 +119,7 @@ class Simulation:
     Args:
         grasp: the grasp.
         parameters: parameters of the skin; by default `UskinParameters()`.
+        faults: troubles of the skins; by default none.
         plan: plan of the grasp; by default the one that is drawn for it.
         loads: loads on the held object, in addition to the disturbances of the plan.
 
@@ -137,6 +139,7 @@ class Simulation:
         self,
         grasp: Grasp,
         parameters: UskinParameters | None = None,
+        faults: MagneticFaults | None = None,
         *,
         plan: Plan | None = None,
         loads: Sequence[Load] = (),
@@ -151,6 +154,7 @@ class Simulation:
         self.plan = plan or _draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
+        self._faults = faults or MagneticFaults()
         if grasp.noise is not None:
             skin = replace(skin, noise_counts=grasp.noise)
         self.uskins = {finger: _skin(grasp.seed, finger, skin) for finger in FINGERS}
@@ -159,6 +163,7 @@ class Simulation:
         self.n_samples = 0
         self._pressing: Pressing | None = None
         lag = plant.motor_time * RATE
+        # Share of the way to a command that a force goes in a sample: 1 without a lag.
         self._motor_part = -math.expm1(-1.0 / lag) if lag > 0 else 1.0
         self._forces = np.ones(len(FINGERS))  # scales that act, behind those of the commands
         self._slip_events = SlipEvents(self.plan.slip_events, grasp.item, 1 / RATE)
@@ -197,8 +202,10 @@ class Simulation:
         if protocol.locked_at is not None and not was_locked:
             joints = world.hand.data.qpos[:N_JOINTS]
             self._pressing = Pressing(world.path, command.depths, joints)
-        slipping = self._slip_state() if was_locked else NO_SLIP
-        if self._is_loaded and was_locked:
+        slipping, events = NO_SLIP, self.plan.slip_events
+        if was_locked and events and protocol.lost_at is None:
+            slipping = self._slip_events.step(self.held_for, world.slip, world.bodies[-1])
+        if was_locked and (self._loads or events or self._profile.arm_tremor):
             world.set_load(self._load(slipping))
         if slipping.touching:
             command = command._replace(phase=touched_phase(world.slip))
@@ -206,8 +213,16 @@ class Simulation:
             scales = slipping.grip_scale * (np.ones(len(FINGERS)) if scales is None else scales)
         moved, released = None, protocol.is_released(self.time)
         if scales is not None and self._pressing is not None and not released:
-            moved = self._pressing.displacement(self._followed(scales))
+            moved = self._pressing.displacement(self.followed(scales))
         world.advance(command, self.plan, protocol.anchor, moved)
+        slip_truth: dict[str, Array | float] = {}  # of what only slip events change
+        if self._profile.slips is not None:
+            slip_truth = {
+                "outside_torque": world.outside[3:],
+                "added_mass": slipping.load.added_mass,
+                "grip_scale": slipping.grip_scale,
+                "friction_scale": slipping.load.friction,
+            }
         self._truth_log.add(
             command.phase,
             world.contact,
@@ -215,30 +230,13 @@ class Simulation:
             object_pose=world.object_pose,
             joints=world.hand.data.qpos[:N_JOINTS],
             set_point_error=world.set_point_error,
-            **self._slip_truth(slipping),
+            **slip_truth,
         )
         self._bodies.append(world.bodies[:-1].copy())
         skin = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
         self._taxel_forces.append(skin.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
-
-    def _followed(self, scales: Array) -> Array:
-        """Return the scales that act, which follow those of the commands as the motors do."""
-        if self._motor_part < 1.0:
-            self._forces = self._forces + self._motor_part * (scales - self._forces)
-            return self._forces
-        return scales
-
-    @property
-    def _is_loaded(self) -> bool:
-        return bool(self._loads or self.plan.slip_events or self._profile.arm_tremor)
-
-    def _slip_state(self) -> SlipState:
-        """Return what the slip events do until the next sample; nothing after a loss."""
-        if self.protocol.lost_at is not None or not self.plan.slip_events:
-            return NO_SLIP
-        return self._slip_events.step(self.held_for, self.world.slip, self.world.bodies[-1])
 
     def _load(self, slipping: SlipState) -> LoadState:
         """Return the sum of loads, slip events and tremor of the arm."""
@@ -251,16 +249,12 @@ class Simulation:
             friction=load.friction * state.friction,
         )
 
-    def _slip_truth(self, slipping: SlipState) -> dict[str, Array | float]:
-        """Return the truth of what the slip events change, if there are any."""
-        if self._profile.slips is None:
-            return {}
-        return {
-            "outside_torque": self.world.outside[3:],
-            "added_mass": slipping.load.added_mass,
-            "grip_scale": slipping.grip_scale,
-            "friction_scale": slipping.load.friction,
-        }
+    def followed(self, scales: Array) -> Array:
+        """Return the scales that act, which follow those of the commands as the motors do."""
+        if self._motor_part < 1.0:
+            self._forces = self._forces + self._motor_part * (scales - self._forces)
+            return self._forces
+        return scales
 
     def joint_angles(self) -> Array:
         """Return the joint angles (16,) that the hand's driver publishes now [rad]."""
@@ -275,48 +269,64 @@ class Simulation:
         ):
             if finger not in self._readouts:
                 self._readouts[finger] = uskin.readout(self.grasp.generator(f"skin {finger}"))
-            counts[finger] = self._readouts[finger].counts(forces[None], time)[0]
-        return counts
+            counts[finger] = self._readouts[finger].counts(forces[None], time)
+        return {finger: own[0] for finger, own in self._with_faults(counts, time).items()}
+
+    def _with_faults(self, counts: dict[str, Counts], times: Array) -> dict[str, Counts]:
+        """Return the counts (n, n_taxels, 3) of each finger with the troubles of the skins."""
+        if self._faults.changes_nothing:
+            return counts
+        sensors = {finger: uskin.sensor for finger, uskin in self.uskins.items()}
+        rest = {finger: uskin.taxels.baseline for finger, uskin in self.uskins.items()}
+        return self._faults.apply(sensors, counts, times, rest, self.grasp.seed)
 
     def recording(self) -> Recording:
         """Return the recording so far, with truth and labels."""
         grasp, times = self.grasp, np.arange(self.n_samples) / RATE
         truth = self._truth(times)
         taxel_forces = np.array(self._taxel_forces)
+        glitch = LabelRule.glitch if self._profile.label_glitches else None
+        rule = LabelRule(margin=self._profile.label_margin, glitch=glitch)
         modules = {}
-        for place, (finger, uskin) in enumerate(self.uskins.items()):
-            generator = grasp.generator(f"skin {finger}")
-            counts = uskin.counts(taxel_forces[:, place], times, generator)
-            stamps = times
+        read = {
+            finger: uskin.counts(taxel_forces[:, place], times, grasp.generator(f"skin {finger}"))
+            for place, (finger, uskin) in enumerate(self.uskins.items())
+        }
+        read = self._with_faults(read, times)
+        for finger, uskin in self.uskins.items():
+            counts, stamps = read[finger], times
             if grasp.server:
                 server = grasp.generator(f"server {finger}")
                 stamps, counts = with_server_effects(times, counts, server)
-            labels = labels_from_truth(truth, finger, label_rule(self._profile))
+            labels = labels_from_truth(truth, finger, rule)
             modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
         name = grasp.failed_name if self.protocol.failed else grasp.name
-        metadata = {**_metadata(grasp, self.protocol), **self._slip_metadata()}
+        metadata = _metadata(grasp, self.protocol)
+        if self._profile.slips is not None:  # in the time of the recording
+            lock = self.protocol.locked_at or 0.0
+            metadata["slip_events"] = [
+                {**record, **{key: lock + record[key] for key in ("start", "end")}}
+                for record in self._slip_events.records
+            ]
+        if not self._faults.changes_nothing:
+            metadata["magnetic_faults"] = asdict(self._faults)
         return Recording(name, modules, metadata, truth)
-
-    def _slip_metadata(self) -> dict[str, object]:
-        """Return the slip events in the time of the recording, if the profile has any."""
-        if self._profile.slips is None:
-            return {}
-        locked_at = self.protocol.locked_at or 0.0
-        records = self._slip_events.records
-        times = ({key: locked_at + record[key] for key in ("start", "end")} for record in records)
-        return {"slip_events": [{**r, **t} for r, t in zip(records, times, strict=True)]}
 
     def _truth(self, times: Array) -> Truth:
         """Return the truth of all samples, in which disturbances last from touch to touch."""
+        from scipy.spatial.transform import Rotation
+
         truth, bodies = self._truth_log.truth(times), np.array(self._bodies)
         push = np.linalg.norm(truth.hand["outside_force"], axis=1)  # the only other contact then
         if "outside_torque" in truth.hand:
             push += np.linalg.norm(truth.hand["outside_torque"], axis=1) / TOUCH_LEVER
         phase = phases_from_touch(truth.hand["phase"], push, MIN_TOUCH_LOAD)
-        fingers = {
-            finger: {**truth.fingers[finger], "tip_pose": _poses(bodies[:, place])}
-            for place, finger in enumerate(FINGERS)
-        }
+        fingers = {}
+        for place, finger in enumerate(FINGERS):
+            body = bodies[:, place]
+            turns = Rotation.from_matrix(body[:, 3:12].reshape(-1, 3, 3)).as_quat()  # x y z w
+            pose = np.column_stack([body[:, :3], turns[:, 3], turns[:, :3]])
+            fingers[finger] = {**truth.fingers[finger], "tip_pose": pose}
         return Truth(times, {**truth.hand, "phase": phase}, fingers)
 
 
@@ -324,6 +334,7 @@ def simulate(
     grasp: Grasp,
     parameters: UskinParameters | None = None,
     on_sample: SampleCallback | None = None,
+    faults: MagneticFaults | None = None,
 ) -> Recording:
     """Simulate one grasp and return its recording with truth and labels.
 
@@ -331,6 +342,7 @@ def simulate(
         grasp: the grasp.
         parameters: parameters of the skin; by default `UskinParameters()`.
         on_sample: function that is called after each sample, for instance to draw a picture.
+        faults: troubles of the skins; by default none.
 
     Returns:
         Recording of four fingertips in counts at 150 Hz. The metadata of a grasp that was never
@@ -339,19 +351,12 @@ def simulate(
     Raises:
         ValueError: object, profile or case is unknown, or the object cannot be grasped.
     """
-    simulation = Simulation(grasp, parameters)
+    simulation = Simulation(grasp, parameters, faults)
     while not simulation.is_over:
         simulation.step()
         if on_sample is not None and simulation.command is not None:
             on_sample(simulation.world, simulation.command)
     return simulation.recording()
-
-
-def label_rule(chosen: Profile) -> LabelRule:
-    """Return the rule that labels the recordings of a profile."""
-    return LabelRule(
-        margin=chosen.label_margin, glitch=LabelRule.glitch if chosen.label_glitches else None
-    )
 
 
 def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
@@ -378,6 +383,7 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
 def _world(grasp: Grasp, chosen: Profile) -> World:
     item = grasp.item
     generator = grasp.generator("world")
+    # The order of the draws is part of the seed.
     duration = max(MAX_DURATION, chosen.hold + MAX_UNHELD_DURATION)
     period = STEPS_PER_CONTROL * TIMESTEP
     plant = plant_named(grasp.plant)
@@ -389,14 +395,6 @@ def _world(grasp: Grasp, chosen: Profile) -> World:
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     hand = HandModel.build(item, plant.joint_friction)
     return World(hand, item, _path(grasp.object, grasp.table), controller, tremors, start)
-
-
-def _poses(bodies: Array) -> Array:
-    """Return positions [m] and quaternions w, x, y, z, (n, 7)."""
-    from scipy.spatial.transform import Rotation
-
-    turns = Rotation.from_matrix(bodies[:, 3:12].reshape(-1, 3, 3)).as_quat()
-    return np.column_stack([bodies[:, :3], turns[:, 3], turns[:, :3]])
 
 
 @cache

@@ -193,8 +193,14 @@ def draw_slip_event(
         start: time after the lock [s].
         scale: factor of the sliding distance.
     """
+    # The order of the draws is part of the seed: every kind draws all numbers, used or not.
     rate = _log_uniform(generator, getattr(ranges, RATE_FIELDS[kind]))
-    size = _draw_size(generator, ranges, kind)
+    spans = {
+        SlipKind.FRICTION: ranges.friction_factor,
+        SlipKind.CREEP: (0.0, 2 * math.pi),
+        SlipKind.ROLL: ranges.roll_angle,
+    }
+    size = float(generator.uniform(*spans.get(kind, (0.0, 0.0))))
     event = SlipEvent(
         kind,
         start,
@@ -208,30 +214,17 @@ def draw_slip_event(
         pull_rate=_log_uniform(generator, ranges.pull_rate),
         tremor=ranges.hand_tremor,
     )
-    return event._replace(duration=min(_natural_duration(event), ranges.longest))
-
-
-def _draw_size(generator: np.random.Generator, ranges: SlipRanges, kind: SlipKind) -> float:
-    spans = {
-        SlipKind.FRICTION: ranges.friction_factor,
-        SlipKind.CREEP: (0.0, 2 * math.pi),
-        SlipKind.ROLL: ranges.roll_angle,
-    }
-    return float(generator.uniform(*spans.get(kind, (0.0, 0.0))))
-
-
-def _natural_duration(event: SlipEvent) -> float:
-    """Return the time after which an event has no further effect [s]; infinite for a weight."""
+    # The time after which an event has no further effect [s].
     durations = {
         SlipKind.WEIGHT: math.inf,
-        SlipKind.GRIP: (1.0 - MIN_GRIP_SCALE) / event.rate,
-        SlipKind.FRICTION: (1.0 - event.size) / event.rate + SLIPPERY_TIME,
-        SlipKind.CREEP: PULL_TIME + event.distance / event.rate,
-        SlipKind.TWIST: MAX_TWIST / event.rate,
-        SlipKind.TURN: PULL_TIME + event.distance / (event.rate * GUIDE_LEVER),
-        SlipKind.ROLL: RECLOSING_TIME + 2 * event.size / event.rate,
+        SlipKind.GRIP: (1.0 - MIN_GRIP_SCALE) / rate,
+        SlipKind.FRICTION: (1.0 - size) / rate + SLIPPERY_TIME,
+        SlipKind.CREEP: PULL_TIME + event.distance / rate,
+        SlipKind.TWIST: MAX_TWIST / rate,
+        SlipKind.TURN: PULL_TIME + event.distance / (rate * GUIDE_LEVER),
+        SlipKind.ROLL: RECLOSING_TIME + 2 * size / rate,
     }
-    return durations[event.kind]
+    return event._replace(duration=min(durations[kind], ranges.longest))
 
 
 def _log_uniform(generator: np.random.Generator, span: Span) -> float:
@@ -255,12 +248,12 @@ class SlipEvents:
     def __init__(self, events: Sequence[SlipEvent], item: GraspObject, period: float) -> None:
         self._coming = list(reversed(events))
         self._item, self._period = item, period
-        self._locked_pose: Array | None = None
+        self._locked_pose: Array | None = None  # of the first step
+        # The event that acts, since when it recovers (in its own time), how far a fingertip slid
+        # in it, its direction or axis, and the hand that guides the object.
         self._event: SlipEvent | None = None
-        self._slid = 0.0
-        self._ended_at = math.inf
-        self._axis = np.zeros(3)
-        self._guide = NO_GUIDE.copy()
+        self._slid, self._ended_at = 0.0, math.inf
+        self._axis, self._guide = np.zeros(3), NO_GUIDE.copy()
         self.records: list[dict[str, Any]] = []
 
     def step(self, held_for: float, slip: float, body: Array) -> SlipState:
@@ -278,7 +271,10 @@ class SlipEvents:
             self._event = event = None
         if self._coming and held_for >= self._coming[-1].start:
             self._event = event = self._coming.pop()
-            self._begin(event, body, self._locked_pose)
+            self._slid, self._ended_at = 0.0, math.inf
+            self._axis = _axis(event, body, self._locked_pose)
+            self._guide[:12], self._guide[12:] = body[:12], 0.0  # it grips the object where it is
+            self.records.append({"kind": str(event.kind), "start": event.start})
         if event is None:
             return NO_SLIP
         elapsed = held_for - event.start
@@ -288,13 +284,6 @@ class SlipEvents:
             self._ended_at = elapsed
         self.records[-1].update(end=held_for + self._period, slid=self._slid)
         return self._state(event, elapsed)
-
-    def _begin(self, event: SlipEvent, body: Array, locked_pose: Array) -> None:
-        self._slid, self._ended_at = 0.0, math.inf
-        self._axis = _axis(event, body, locked_pose)
-        self._guide[:12] = body[:12]
-        self._guide[12:] = 0.0
-        self.records.append({"kind": str(event.kind), "start": event.start})
 
     def _state(self, event: SlipEvent, elapsed: float) -> SlipState:
         """Return what acts: a change that grows until the event ends, and then goes away."""
@@ -327,7 +316,13 @@ class SlipEvents:
         guide[12:18] = 0.0
         motion = slice(12, 15) if event.kind is SlipKind.CREEP else slice(15, 18)
         guide[motion] = self._speed(event, elapsed) * self._axis
-        guide[GUIDE_STIFFNESS:-1] = closed * _impedance(event.stiffness, self._item)
+        # Stiffness and damping of the hand, and both in rotation, by the inertia that is least.
+        turning = event.stiffness * GUIDE_LEVER**2
+        moments = [event.stiffness * self._item.mass, turning * float(self._item.inertia.min())]
+        damping = 2 * GUIDE_DAMPING_RATIO * np.sqrt(moments)
+        guide[GUIDE_STIFFNESS:-1] = closed * np.array(
+            [event.stiffness, damping[0], turning, damping[1]]
+        )
         guide[-1] = event.tremor
         return guide
 
@@ -341,14 +336,6 @@ class SlipEvents:
             return event.rate
         lever = GUIDE_LEVER if event.kind is SlipKind.TURN else 1.0
         return max(event.rate, event.pull_rate / (event.stiffness * lever))
-
-
-def _impedance(stiffness: float, item: GraspObject) -> Array:
-    """Return stiffness and damping of a hand, and both in rotation, (4,)."""
-    turning = stiffness * GUIDE_LEVER**2
-    inertia = float(item.inertia.min())
-    damping = 2 * GUIDE_DAMPING_RATIO * np.sqrt([stiffness * item.mass, turning * inertia])
-    return np.array([stiffness, damping[0], turning, damping[1]])
 
 
 def _axis(event: SlipEvent, body: Array, locked_pose: Array) -> Array:

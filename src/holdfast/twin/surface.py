@@ -62,9 +62,20 @@ def curved_fingertip() -> Surface:
         >>> len(skin.nodes), round(skin.areas.sum() * 1e6)
         (158, 1643)
     """
-    radius = _radius()
-    rows = [_row(radius, *edges) for edges in _edges()]
-    nodes, vectors = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+    # The distance from the capsule's axis, by thin-plate splines on the unit capsule: it has no
+    # singular point, while a pair of angles has one at the dome's pole.
+    offsets = sensor("uskin-curved").positions - [AXIS, 0.0, 0.0]
+    foot = np.zeros_like(offsets)
+    foot[:, 2] = offsets[:, 2].clip(max=SHOULDER)
+    distances = np.linalg.norm(offsets - foot, axis=1)
+    unit = (offsets - foot) / distances[:, None] * _RADIUS + foot
+    radius = RBFInterpolator(unit / _RADIUS, distances, kernel="thin_plate_spline")
+    # Rows begin and end at lengths along the skin, from the base to the pole [m].
+    straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
+    parts = round((straight + bent) / NODE_PITCH)
+    edges = np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()
+    rows = [_row(radius, begin, end) for begin, end in pairwise(edges)]
+    nodes, vectors = (np.concatenate(arrays) for arrays in zip(*rows, strict=True))
     areas = np.linalg.norm(vectors, axis=1)
     surface = Surface(
         np.round(nodes, _DIGITS),
@@ -74,26 +85,6 @@ def curved_fingertip() -> Surface:
     for array in surface:
         array.flags.writeable = False
     return surface
-
-
-def _radius() -> RBFInterpolator:
-    """Interpolate the distance from the capsule's axis by thin-plate splines on the unit capsule.
-
-    The unit capsule has no singular point, while a pair of angles has one at the dome's pole.
-    """
-    offsets = sensor("uskin-curved").positions - [AXIS, 0.0, 0.0]
-    foot = np.zeros_like(offsets)
-    foot[:, 2] = offsets[:, 2].clip(max=SHOULDER)
-    distances = np.linalg.norm(offsets - foot, axis=1)
-    unit = (offsets - foot) / distances[:, None] * _RADIUS + foot
-    return RBFInterpolator(unit / _RADIUS, distances, kernel="thin_plate_spline")
-
-
-def _edges() -> list[tuple[float, float]]:
-    """Return begin and end of each row, as length along the skin from the base to the pole [m]."""
-    straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
-    parts = round((straight + bent) / NODE_PITCH)
-    return list(pairwise(np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()))
 
 
 def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Array]:

@@ -126,9 +126,12 @@ class World(ContactWorld):
             steps, hand.arrays, self.contact, self.constants, controller, self.bodies,
             Wrenches(self.outside, np.zeros(6)),
         )  # fmt: skip
+        # What `set_load` sets; of the current disturbance its parameters, and the pose of the
+        # object when it began, which C reads in place.
         self._pull, self._guide = np.zeros(6), NO_GUIDE
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
+        # Mass and inertia of the object alone, from which those with an added mass are computed.
         body = hand.object_body
         self._inertia = np.array([hand.model.body_mass[body], *hand.model.body_inertia[body]])
         first = hand.model.body_dofadr[body]
@@ -137,7 +140,16 @@ class World(ContactWorld):
         self._added_mass = 0.0
         self._disturbance = -1
         self._tick = 0
-        self._place(start)
+        # The hand is open, and the object where a person puts it.
+        place, turn = object_pose(self.item)
+        model, data = hand.model, hand.data
+        mujoco.mj_resetData(model, data)
+        data.qpos[:N_JOINTS] = path.targets(np.full(len(FINGERS), OPEN_GAP))
+        data.qpos[N_JOINTS : N_JOINTS + 3] = place + start[:3]
+        half = 0.5 * (turn + start[3])
+        data.qpos[N_JOINTS + 3 :] = (np.cos(half), 0.0, 0.0, np.sin(half))
+        mujoco.mj_forward(model, data)
+        fill_bodies(hand.arrays, self.bodies)
 
     def set_load(self, load: LoadState) -> None:
         """Set all loads and the hand's acceleration until they are set again.
@@ -148,15 +160,12 @@ class World(ContactWorld):
         self._guide = load.guide
         self.hand.model.opt.gravity[:] = [0.0, 0.0, -GRAVITY] - load.acceleration
         self.scale_friction(load.friction, load.steady)
-        self._add_mass(load.added_mass)
-
-    def _add_mass(self, mass: float) -> None:
-        """Set mass and inertia of the object, as if the added mass were spread over it."""
-        if mass == self._added_mass:
+        if load.added_mass == self._added_mass:
             return
-        self._added_mass = mass
+        # Mass and inertia grow alike, as if the added mass were spread over the object.
+        self._added_mass = load.added_mass
         model, body = self.hand.model, self.hand.object_body
-        factor = (self.item.mass + mass) / self.item.mass
+        factor = (self.item.mass + load.added_mass) / self.item.mass
         model.body_mass[body] = model.body_subtreemass[body] = factor * self._inertia[0]
         model.body_inertia[body] = factor * self._inertia[1:]
         model.dof_M0[self._freedom] = factor * self._constant_inertia  # of a body that is alone
@@ -175,15 +184,7 @@ class World(ContactWorld):
         target = self.path.targets(command.depths)
         if displacement is not None:
             target = target + displacement
-        self.set_point_error = self._advance(
-            self._physics, self._tick, target, self._action(command, plan, anchor)
-        )
-        self._tick += SUBSTEPS
-        if self.bodies[-1, 2] < MIN_HEIGHT:
-            self._freeze()
-
-    def _action(self, command: Command, plan: Plan, anchor: Array) -> Action:
-        if command.disturbance != self._disturbance:
+        if command.disturbance != self._disturbance:  # it is carried out from where the object is
             self._disturbance = command.disturbance
             self._origin[:] = self.bodies[-1, :12]
         style, duration = -1, 1.0
@@ -191,26 +192,16 @@ class World(ContactWorld):
             disturbance = plan.disturbances[command.disturbance]
             style, duration = disturbance.style, disturbance.duration
             self._parameters[:] = disturbance.parameters
-        return Action(
+        action = Action(
             anchor, command.hold, GRAVITY * self.item.mass, self.tremors, plan.profile.tremor,
             self.hand.data.time, self._parameters, self._origin, style, duration,
             command.elapsed, self._pull, self._guide,
         )  # fmt: skip
-
-    def _place(self, start: Array) -> None:
-        place, turn = object_pose(self.item)
-        model, data = self.hand.model, self.hand.data
-        mujoco.mj_resetData(model, data)
-        data.qpos[:N_JOINTS] = self.path.targets(np.full(len(FINGERS), OPEN_GAP))
-        data.qpos[N_JOINTS : N_JOINTS + 3] = place + start[:3]
-        half = 0.5 * (turn + start[3])
-        data.qpos[N_JOINTS + 3 :] = (np.cos(half), 0.0, 0.0, np.sin(half))
-        mujoco.mj_forward(model, data)
-        fill_bodies(self.hand.arrays, self.bodies)
-
-    def _freeze(self) -> None:
-        self.hand.data.qvel[N_JOINTS:] = 0.0
-        self.hand.data.qpos[N_JOINTS + 2] = MIN_HEIGHT - 0.1
+        self.set_point_error = self._advance(self._physics, self._tick, target, action)
+        self._tick += SUBSTEPS
+        if self.bodies[-1, 2] < MIN_HEIGHT:
+            self.hand.data.qvel[N_JOINTS:] = 0.0
+            self.hand.data.qpos[N_JOINTS + 2] = MIN_HEIGHT - 0.1
 
 
 class TruthLog:

@@ -55,6 +55,8 @@ class BodyReader:
             raise json_error(web.HTTPBadRequest, text) from cause
 
     async def _bytes(self, request: web.Request) -> bytes:
+        # By its stated length first, so that nothing is read of a body that is too large; a body
+        # without one is checked as it arrives.
         data = bytearray()
         self._check(request, request.content_length or 0)
         try:

@@ -67,7 +67,7 @@ class ConnectionLimit:
     @classmethod
     def of_process(cls) -> "ConnectionLimit":
         """Return limits that leave the process enough file descriptors."""
-        total = min(MAX_CONNECTIONS, (_max_descriptors() - RESERVED_DESCRIPTORS) // 2)
+        total = min(MAX_CONNECTIONS, (max_descriptors() - RESERVED_DESCRIPTORS) // 2)
         total = max(total, MIN_CONNECTIONS)
         return cls(total, min(MAX_CONNECTIONS_PER_ADDRESS, max(total // 2, MIN_CONNECTIONS)))
 
@@ -81,6 +81,7 @@ class ConnectionLimit:
         address = str(peer[0]) if isinstance(peer, tuple) else ""
         self._open[transport] = _Connection(address)
         same = [one for one, known in self._open.items() if known.address == address]
+        # The limit of an address first: one client then loses its own connections, not others'.
         if len(same) > self._max_per_address:
             self._replace(same)
         elif len(self._open) > self._max_total:
@@ -111,6 +112,7 @@ class ConnectionLimit:
 
     def _replace(self, transports: list[asyncio.BaseTransport]) -> None:
         """Close one of these connections, of which the last is the new one."""
+        # Of equal use the oldest: `min` returns the first.
         *others, new = transports
         oldest = min(others, key=lambda one: self._open[one].use, default=new)
         chosen = new if self._open[oldest].use is Use.STREAM else oldest
@@ -160,7 +162,7 @@ def log_exceptions_briefly(loop: asyncio.AbstractEventLoop) -> None:
     loop.set_exception_handler(log)
 
 
-def _max_descriptors() -> int:
+def max_descriptors() -> int:
     """Return how many files the process may open."""
     with suppress(ImportError, OSError, ValueError):  # Windows has no such limit
         from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit
@@ -192,15 +194,9 @@ def refusal(host: str, origin: str | None, *, only_local: bool) -> str | None:
         >>> refusal("evil.example", None, only_local=True)
         "host 'evil.example' refused: this machine expected"
     """
-    if only_local and not is_local(_without_port(host)):
+    name = host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]
+    if only_local and not is_local(name):  # another name, though it leads here: DNS rebinding
         return f"host {host!r} refused: this machine expected"
     if origin is not None and origin.partition("://")[2] != host:
         return f"origin {origin!r} refused: {host!r} expected"
     return None
-
-
-def _without_port(host: str) -> str:
-    """Return a host without its port."""
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.partition(":")[0]

@@ -40,8 +40,12 @@ class Guard:
     """
 
     def __init__(self, host: str, token: str | None = None) -> None:
-        if token is not None:
-            _check_token(token)
+        if token is not None and not token.strip():
+            raise ValueError("--token: some text expected, none given")
+        if token is not None and len(token) < MIN_TOKEN_LENGTH:
+            raise ValueError(
+                f"--token: at least {MIN_TOKEN_LENGTH} characters expected, {len(token)} given"
+            )
         self._local = is_local(host)
         if not self._local and token is None:
             raise ValueError(
@@ -54,7 +58,15 @@ class Guard:
     async def middleware(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Check a request, and add the security headers to its response or error."""
         try:
-            self._check(request)
+            # Host and origin first: a page of another site learns nothing about the token.
+            why = refusal(request.host, request.headers.get("Origin"), only_local=self._local)
+            if why is not None:
+                raise web.HTTPForbidden(text=why)
+            if request.path.startswith(TOKEN_PATHS) and not self._has_token(request):
+                raise web.HTTPUnauthorized(
+                    text="token expected: Authorization: Bearer TOKEN, or ?token=TOKEN",
+                    headers={"WWW-Authenticate": "Bearer"},
+                )
             response = await handler(request)
         except web.HTTPException as error:
             error.headers.update(SECURITY_HEADERS)
@@ -63,31 +75,13 @@ class Guard:
             response.headers.update(SECURITY_HEADERS)
         return response
 
-    def _check(self, request: web.Request) -> None:
-        why = refusal(request.host, request.headers.get("Origin"), only_local=self._local)
-        if why is not None:
-            raise web.HTTPForbidden(text=why)
-        if request.path.startswith(TOKEN_PATHS) and not self._has_token(request):
-            raise web.HTTPUnauthorized(
-                text="token expected: Authorization: Bearer TOKEN, or ?token=TOKEN",
-                headers={"WWW-Authenticate": "Bearer"},
-            )
-
     def _has_token(self, request: web.Request) -> bool:
         if self._token is None:
             return True
         bearer = request.headers.get("Authorization", "").removeprefix("Bearer ")
+        # A browser sends no header of ours with a video or a WebSocket: they have it in the query.
         given = bearer or request.query.get("token", "")
         return hmac.compare_digest(_bytes(given), _bytes(self._token))
-
-
-def _check_token(token: str) -> None:
-    if not token.strip():
-        raise ValueError("--token: some text expected, none given")
-    if len(token) < MIN_TOKEN_LENGTH:
-        raise ValueError(
-            f"--token: at least {MIN_TOKEN_LENGTH} characters expected, {len(token)} given"
-        )
 
 
 def _bytes(token: str) -> bytes:

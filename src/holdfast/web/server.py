@@ -7,7 +7,6 @@ from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 from aiohttp import web
-from aiohttp.typedefs import Middleware
 
 from holdfast.errors import listen_error
 from holdfast.web.connections import (
@@ -60,8 +59,13 @@ async def _serve(
     log_exceptions_briefly(asyncio.get_running_loop())
     async with listening(app, host, port) as url:
         announce(url)
-        stopped = asyncio.Event()
-        _stop_by_signal(stopped)
+        stopped, loop = asyncio.Event(), asyncio.get_running_loop()
+        for name in ("SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)
+            # A process under nohup ignores SIGHUP, and goes on.
+            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+                with suppress(NotImplementedError):  # Windows has no signal handlers in event loops
+                    loop.add_signal_handler(number, stopped.set)
         while not stopped.is_set() and not is_over():
             with suppress(TimeoutError):
                 await asyncio.wait_for(stopped.wait(), STOP_POLL_INTERVAL)
@@ -78,13 +82,21 @@ async def listening(app: web.Application, host: str, port: int) -> AsyncIterator
         OutputError: the address is in use or cannot be bound.
     """
     limit = ConnectionLimit.of_process()
-    app.middlewares.insert(0, _mark_requests(limit))
+
+    @web.middleware
+    async def mark(request: web.Request, handler: Handler) -> web.StreamResponse:
+        with limit.request(request.transport):
+            return await handler(request)
+
+    app.middlewares.insert(0, mark)  # the first: a request that is refused is one too
     runner = web.AppRunner(app, shutdown_timeout=SHUTDOWN_TIMEOUT)
     await runner.setup()
     try:
         server = await _listen(runner, limit, host, port)
         try:
-            yield _address(server, host)
+            shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+            shown = f"[{shown}]" if ":" in shown else shown
+            yield f"http://{shown}:{server.sockets[0].getsockname()[1]}/"
         finally:
             server.close()
     finally:
@@ -133,25 +145,6 @@ class _LimitedConnection(web.RequestHandler):
         return response
 
 
-def _mark_requests(limit: ConnectionLimit) -> Middleware:
-    @web.middleware
-    async def mark(request: web.Request, handler: Handler) -> web.StreamResponse:
-        with limit.request(request.transport):
-            return await handler(request)
-
-    return mark
-
-
-def _stop_by_signal(stopped: asyncio.Event) -> None:
-    """Set `stopped` on SIGTERM, and on SIGHUP unless the process ignores it."""
-    loop = asyncio.get_running_loop()
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            with suppress(NotImplementedError):  # Windows has no signal handlers in event loops
-                loop.add_signal_handler(number, stopped.set)
-
-
 async def _listen(
     runner: web.AppRunner, limit: ConnectionLimit, host: str, port: int
 ) -> asyncio.Server:
@@ -164,9 +157,3 @@ async def _listen(
         )
     except (OSError, OverflowError) as cause:
         raise listen_error(host, port, cause) from cause
-
-
-def _address(server: asyncio.Server, host: str) -> str:
-    port = server.sockets[0].getsockname()[1]
-    shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
-    return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"

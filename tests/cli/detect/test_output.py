@@ -2,13 +2,8 @@ import tracemalloc
 
 import pytest
 
-from holdfast.cli.detect.output import (
-    DetectionSummary,
-    EstimateChunk,
-    chunk_from_detection,
-    chunk_from_stream,
-    json_lines,
-)
+from holdfast.cli.detect.estimates import EstimateChunk, chunk_from_detection, chunk_from_stream
+from holdfast.cli.detect.output import DetectionSummary, json_lines
 from holdfast.contact import ContactState
 from holdfast.detector import Detector, detect
 from holdfast.live.stream_detector import StreamEstimate

@@ -12,7 +12,7 @@ import pytest
 from command_line import Verb
 from holdfast.classifiers import Linear
 from holdfast.cli import main
-from holdfast.cli.detect.verb import CHUNK_SIZE
+from holdfast.cli.detect.estimates import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.devices.sources import open_source

@@ -19,7 +19,10 @@ def test_poses_of_a_bag(monkeypatch):
         lambda *words: given.append(words) or "poses",
     )
     options = RuleOptions(
-        "0.5", Path("run.bag"), ["object = /aruco/pose", "thumb=tip"], ["speed=0.01"]
+        "0.5",
+        Path("run.bag"),
+        tracks=["object = /aruco/pose", "thumb=tip"],
+        parameters=["speed=0.01"],
     )
     assert options.arguments("tracking") == {"tare": "0.5", "speed": 0.01, "tracking": "poses"}
     assert given == [(Path("run.bag"), "/aruco/pose", {"thumb": "tip"})]

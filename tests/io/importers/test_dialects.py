@@ -7,7 +7,9 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
+from holdfast.io.importers import generic_csv, table
 from holdfast.io.importers.csv_times import clock_seconds
+from holdfast.io.importers.table import read_head
 from holdfast.sensors import sensor
 
 ANYSKIN = {"*": sensor("anyskin")}
@@ -43,6 +45,7 @@ DIALECTS = {
     "semicolon": [";".join(HEAD), *rows(";", ",")],
     "sep line": ["sep=;", ";".join(HEAD), *rows(";", ",")],
     "tab": ["\t".join(HEAD), *rows("\t")],
+    "bar": ["|".join(HEAD), *rows("|")],
     "blanks": ["  ".join(["t", *(name.split()[0] for name in NAMES)]), *rows("   ")],
     "header of numpy": ["# " + ",".join(HEAD), *rows(",")],
     "comma within a name": [";".join([*HEAD[:-1], "Bz4, [uT]"]), *rows(";", ",")],
@@ -85,6 +88,7 @@ CLOCKS = {
     "clock": [f"23:59:59.{n:03d}" for n in range(700, 1000, 10)]
     + [f"00:00:00.{n:03d}" for n in range(0, 300, 10)],
     "iso": [f"2026-11-21T10:00:00.{n:03d}" for n in range(0, 600, 10)],
+    "day": [f"21.11.2026 10:00:00.{n:03d}" for n in range(0, 600, 10)],
     "date": [f"2026-11-21 10:00:00.{n:03d}+01:00" for n in range(0, 600, 10)],
 }
 
@@ -163,3 +167,69 @@ def test_rows_of_several_modules(tmp_path):
         np.testing.assert_allclose(module.readings.reshape(N, 15), READINGS + which, atol=1e-9)
     with pytest.raises(RecordingError, match=r"columns in N and mm fit: give --columns 'taxels=p"):
         list(import_recordings(path, sensors=ANYSKIN))
+
+
+def test_a_column_of_episodes_that_is_given_always_counts(tmp_path):
+    """Also where the times go on: without it, the file is one recording."""
+    text = [",".join([*HEAD, "run"]), *(f"{row},{k // 20}" for k, row in enumerate(rows(",")))]
+    assert [one.name for one in imported(tmp_path / "a.csv", text)] == ["a"]
+    recordings = imported(tmp_path / "a.csv", text, columns="episode=run")
+    assert [recording.name for recording in recordings] == ["a-0", "a-1", "a-2"]
+    parts = [one.modules["finger1"].readings.reshape(20, 15) for one in recordings]
+    np.testing.assert_array_equal(np.concatenate(parts), READINGS)
+
+
+@pytest.mark.parametrize("field", ["time", "label", "cause", "module", "episode"])
+def test_a_column_that_is_given_must_exist(tmp_path, field):
+    with pytest.raises(RecordingError, match=r"column 'no' is missing; it has 'Zeit \[s\]', 'Bx0"):
+        imported(tmp_path / "a.csv", DIALECTS["comma"], columns=f"{field}=no")
+
+
+FEW_AXES = {
+    "in the plane": [f"m{k}_d{axis}" for k in range(20) for axis in "xy"],
+    "normal force": [f"fz{k}" for k in range(1, 17)],
+    "one number for each taxel": [f"p{k}" for k in range(5)],
+    "two numbers for each taxel": [f"s{k}" for k in range(10)],
+}
+
+
+@pytest.mark.parametrize("names", FEW_AXES.values(), ids=FEW_AXES)
+def test_data_of_one_or_two_axes_have_an_answer(tmp_path, names):
+    text = [",".join(["time", *names]), *(",".join([f"{t}", *["1.5"] * len(names)]) for t in TIMES)]
+    with pytest.raises(RecordingError) as caught:
+        imported(tmp_path / "a.csv", text)
+    assert str(caught.value).endswith(
+        "three axes (x, y, z) of each taxel are needed: normal force and shear"
+    )
+
+
+def test_the_head_of_a_file_is_read_once(tmp_path, monkeypatch):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(DIALECTS["comma"]) + "\n")
+    heads = []
+    for module in (table, generic_csv):
+        monkeypatch.setattr(module, "read_head", lambda file: heads.append(file) or read_head(file))
+    check(list(generic_csv.read(path, ANYSKIN)))
+    assert heads == [path]
+
+
+LONG = {
+    "no time": ([",".join(f"{'name' * 9}{k}" for k in range(40)), *rows(",")], None),
+    "no taxels": ([",".join(["time", *(f"{'q' * 39}{k}" for k in range(40))]), *rows(",")], None),
+    "another column": (DIALECTS["comma"], "time=stamp"),
+    "another pattern": (DIALECTS["comma"], "taxels=F{axis}{taxel}"),
+    "a longer row": ([*DIALECTS["comma"], "1,2"], None),
+    "text": ([*DIALECTS["comma"][:3], "9.0," + ",".join(["x" * 999] * 15)], None),
+    "another unit": ([DIALECTS["comma"][0].replace("[s]", "[ns]"), *rows(",")], None),
+    "restarts": ([*DIALECTS["comma"], *DIALECTS["comma"][3:6]], None),
+}
+
+
+@pytest.mark.parametrize(("text", "columns"), LONG.values(), ids=LONG)
+def test_refusals_are_short(tmp_path, monkeypatch, text, columns):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("\n".join(text) + "\n")
+    with pytest.raises(RecordingError) as caught:
+        list(import_recordings("a.csv", sensors=ANYSKIN, columns=columns))
+    assert len(str(caught.value)) <= 300
+    assert "\n" not in str(caught.value)

@@ -23,9 +23,9 @@ def test_a_file_of_no_known_format(tmp_path):
         with pytest.raises(RecordingError) as caught:
             import_recordings(path)
         assert str(caught.value) == (
-            f"{path} is of no supported format; supported are {', '.join(FORMATS)}"
-            f"{IMPORTER_PLUGINS.text()} (choose one with --format; for a CSV file of any other "
-            "logger give --sensor and --columns)"
+            f"{path} is of no supported format; there are {', '.join(FORMATS)}"
+            f"{IMPORTER_PLUGINS.text()} (--format); for a table or arrays of any other logger give "
+            "--sensor"
         )
 
 

@@ -52,6 +52,7 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tried: whether recordings of the set went from a server to a decision in the tests.
         address: of the files, ends with a slash.
         starts_loaded: whether the object is held at the first sample.
+        test: names of the recordings that the published split tests on; empty without one.
         files: files to download; empty if holdfast does not download them.
         reason: why it does not.
     """
@@ -69,6 +70,7 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     size: _Size | None = None
     address: _Address = "https://none/"
     starts_loaded: bool = False
+    test: tuple[str, ...] = ()
     files: tuple[PublicFile, ...] = ()
     reason: str = ""
 

@@ -37,10 +37,11 @@ class DatasetAction(StrEnum):
 
     LIST = "list"
     GET = "get"
+    SCORE = "score"
 
 
 def datasets(
-    action: Annotated[DatasetAction, typer.Argument(help="list, or get NAME.")] = (
+    action: Annotated[DatasetAction, typer.Argument(help="list, get NAME, or score NAME.")] = (
         DatasetAction.LIST
     ),
     name: Annotated[str | None, typer.Argument(help="Name of a data set.")] = None,
@@ -71,7 +72,8 @@ def datasets(
     list NAME shows one set, with its page and licence: read both before you use it. Only get
     opens a connection. It downloads to the folder HOLDFAST_DATASETS (by default the cache of the
     user), checks each sha256 that is known, and continues what was interrupted. Then it imports
-    the files into OUT. docs/datasets.md says what was tried.
+    the files into OUT. docs/datasets.md says what was tried. score trains on the recordings in OUT
+    that the published split trains on, and tests on the others, sample by sample.
 
     Example:
       holdfast datasets
@@ -79,7 +81,9 @@ def datasets(
       holdfast detect builtin:any \
         uskin-pick-move/data_sample_2022-02-22-08-10-01.parquet
     """
-    if action is DatasetAction.GET:
+    if action is DatasetAction.SCORE:
+        _score(name, out, as_json)
+    elif action is DatasetAction.GET:
         public, files = _selected(name, only or [], with_checksum)
         _confirm(public, files, yes)
         result = _get(public, files, out or Path(public.name), mirror, force)
@@ -88,6 +92,28 @@ def datasets(
         _list(as_json)
     else:
         _show(name, as_json)
+
+
+def _score(name: str | None, folder: Path | None, as_json: bool) -> None:
+    """Print how well a model orders the samples of the published split of a set."""
+    from holdfast_interop.datasets import find_set
+    from holdfast_interop.datasets.score import score_split
+
+    require_extras("train")
+    public = find_set(str(name))
+    if not public.test:
+        raise ValueError(f"{name} has no published split")
+    scores = score_split(folder or Path(public.name), public.test)
+    if as_json:
+        print_json({"name": name, "test": public.test, **scores})
+        return
+    print_table(
+        ("slip by sample", "accuracy [%]", "AP", "AUC"),
+        [
+            (row, f"{100 * one['accuracy']:.1f}", f"{one['ap']:.3f}", f"{one['auc']:.3f}")
+            for row, one in scores.items()
+        ],
+    )
 
 
 def _selected(

@@ -8,14 +8,14 @@ the arm in motion; 5 slip with the arm in motion; 6 anything else.
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.importers.array_tables import StoredArrays, listed
+from holdfast.io.importers.arrays import HDF5_MAGIC, arrays_of_hdf5
 from holdfast.io.importers.table import errors_named, natural_order, with_integer_type
 from holdfast.io.safe_reading import one_line
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
@@ -25,7 +25,6 @@ from holdfast.sensors.types import Array
 EXTRA = "hdf5"
 HINT = IF_IN_CONTACT
 HDF5_SUFFIXES = (".h5", ".hdf5")
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SOURCE = "ARQ-CRISP"
 RAW_DATA, TIMES_NAME, LABELS_NAME = (
     "tactile_data_raw",
@@ -33,8 +32,6 @@ RAW_DATA, TIMES_NAME, LABELS_NAME = (
     "tactile_slips_label",
 )
 MILLISECOND = 1e-3
-MAX_GROUP_DEPTH = 16
-"""Maximum depth of groups inside groups; the data sets have four."""
 PATCH_PITCH = (7.24e-3, 7.17e-3)
 """Distances between the taxels of the 4 x 6 patch [m]; those of the 3 x 6 patch are unknown, and
 the same are assumed."""
@@ -86,19 +83,20 @@ def read(path: Path) -> Iterator[Recording]:
     Raises:
         RecordingError: it has another form.
     """
-    import h5py
-
     if not _is_hdf5(path):
         raise RecordingError(f"{path} is not an HDF5 file")
     try:
-        with h5py.File(path, "r") as file:
-            names = _names_of_recordings(path, file, h5py)
-            seen: set[int] = set()
-            if not names:
-                raise RecordingError(f"{path}: no group with {RAW_DATA} in it")
-            for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
-                arrays = _Arrays(path, file[name], h5py, seen)
-                yield _recording(f"{path}: {name}", name.split("/"), arrays)
+        arrays = arrays_of_hdf5(path)
+        places = {name: name.rpartition("/") for name in arrays}
+        groups = {group for group, _, last in places.values() if group and last == RAW_DATA}
+        if not groups:
+            raise RecordingError(
+                f"{path}: no group with {RAW_DATA} in it, but {listed(arrays)}; of another data "
+                "set give --array PATH=SENSOR"
+            )
+        for name in sorted(groups, key=lambda name: natural_order(Path(name.replace("/", "_")))):
+            inside = {last: arrays[of] for of, (group, _, last) in places.items() if group == name}
+            yield _recording(f"{path}: {name}", name.split("/"), inside)
     except RecordingError:
         raise
     except Exception as cause:  # h5py raises errors of any type for a damaged file
@@ -107,121 +105,16 @@ def read(path: Path) -> Iterator[Recording]:
         ) from cause
 
 
-def _names_of_recordings(path: Path, file: Any, h5py: ModuleType) -> list[str]:  # noqa: ANN401
-    """Return the names of the groups with data; a group with many names is visited once.
-
-    Raises:
-        RecordingError: groups are nested too deep, or there are too many.
-    """
-    names: list[str] = []
-    seen: set[int] = set()
-    waiting = [("", file["/"])]
-    while waiting:
-        name, group = waiting.pop()
-        address = h5py.h5o.get_info(group.id).addr
-        if address in seen:
-            continue
-        seen.add(address)
-        if name.count("/") >= MAX_GROUP_DEPTH:
-            raise RecordingError(
-                f"{path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
-            )
-        if name and RAW_DATA in group:
-            names.append(name)
-            continue
-        waiting += [
-            (f"{name}/{key}".lstrip("/"), group[key])
-            for key in group
-            if _is_group(group, key, h5py)
-        ]
-    return names
-
-
-def _is_group(group: Any, key: str, h5py: ModuleType) -> bool:  # noqa: ANN401 (h5py.Group)
-    """Return whether a name in a group is a group inside the same file."""
-    is_inside = isinstance(group.get(key, getlink=True), h5py.HardLink)
-    return is_inside and group.get(key, getclass=True) is h5py.Group
-
-
-class _Arrays:
-    """Arrays of numbers in a group of an HDF5 file, by name.
-
-    Only arrays inside of the file itself are read. HDF5 can also store the names of other files
-    (external links, external storage, virtual arrays), and would read any file of the user.
-
-    Args:
-        path: path of the file.
-        group: the group.
-        h5py: the module.
-        seen: addresses of the arrays that were read.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        group: Any,  # noqa: ANN401 (h5py.Group)
-        h5py: ModuleType,
-        seen: set[int],
-    ) -> None:
-        self._path = path
-        self._group = group
-        self._h5py = h5py
-        self._seen = seen
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.names()
-
-    def names(self) -> list[str]:
-        """Return the names in the group."""
-        return list(self._group)
-
-    def __getitem__(self, name: str) -> Array:
-        """Return an array as float64.
-
-        Raises:
-            RecordingError: it is not stored in the file, is not of numbers, or is too large.
-        """
-        h5py = self._h5py
-        link = self._group.get(name, getlink=True)
-        item = self._group[name] if isinstance(link, h5py.HardLink) else None
-        if not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
-            raise RecordingError(
-                f"{self._path}: {self._group.name}/{name} is no array stored in this file; "
-                "links to other places and files are refused"
-            )
-        if item.dtype.kind not in "biuf":
-            raise RecordingError(f"{self._path}: numbers expected in {name}, {item.dtype} given")
-        if (address := h5py.h5o.get_info(item.id).addr) in self._seen:
-            raise RecordingError(
-                f"{self._path}: {self._group.name}/{name} is an array of another group too; each "
-                "group is a recording and has arrays of its own"
-            )
-        self._seen.add(address)
-        self._check_filters(name, item)
-        return np.asarray(item[()], dtype=np.float64)
-
-    def _check_filters(self, name: str, item: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
-        """Check that an array is packed by deflate only; other filters are loaded as plug-ins.
-
-        Raises:
-            RecordingError: it is packed in another way.
-        """
-        filters = item.id.get_create_plist()
-        kinds = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
-        h5z = self._h5py.h5z
-        known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
-        if not known.issuperset(kinds) or len(set(kinds)) < len(kinds):
-            raise RecordingError(
-                f"{self._path}: {name} is packed by the filters {kinds}; gzip, shuffle and "
-                "fletcher32 expected, each once"
-            )
-
-
-def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
+def _recording(place: str, parts: list[str], group: StoredArrays) -> Recording:
     if TIMES_NAME not in group:
-        raise RecordingError(f"{place} has no {TIMES_NAME}; it has {', '.join(group.names())}")
-    raw = group[RAW_DATA]
-    times = group[TIMES_NAME].ravel() * MILLISECOND
+        raise RecordingError(f"{place} has no {TIMES_NAME}; it has {', '.join(group)}")
+    wanted = {name: group[name] for name in (RAW_DATA, TIMES_NAME, LABELS_NAME) if name in group}
+    arrays = {name: np.asarray(array.read()) for name, array in wanted.items()}
+    for name, values in arrays.items():
+        if values.dtype.kind not in "biuf":
+            raise RecordingError(f"{place}: numbers expected in {name}, {values.dtype} given")
+    raw = arrays[RAW_DATA].astype(np.float64)
+    times = arrays[TIMES_NAME].ravel() * MILLISECOND
     if raw.ndim != 3 or raw.shape[1:] != (3, len(times)):
         raise RecordingError(
             f"{place}: {RAW_DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
@@ -229,8 +122,8 @@ def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
     readings = with_integer_type(raw.transpose(2, 0, 1))
     with errors_named(place):
         module = Tactile(_sensor(readings.shape[1]), times, readings)
-        if LABELS_NAME in group:
-            labels = _labels(group[LABELS_NAME].ravel(), module)
+        if LABELS_NAME in arrays:
+            labels = _labels(arrays[LABELS_NAME].ravel(), module)
             module = replace(module, labels=labels)
         return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
 

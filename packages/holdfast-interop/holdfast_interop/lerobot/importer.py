@@ -1,6 +1,6 @@
 """Import of LeRobot data sets (v3.0) that `holdfast export` wrote, without loss."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +13,7 @@ from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.header import Header, decode_header
 from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -21,6 +22,8 @@ from holdfast.io.timed_arrays import (
     recording_from,
 )
 from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+from holdfast_interop.lerobot.foreign_sets import MAX_INFO_SIZE, read_foreign_set
 from holdfast_interop.lerobot.layout import (
     DATA_PATH,
     EPISODES_PATH,
@@ -38,9 +41,8 @@ from holdfast_interop.lerobot.layout import (
 )
 
 EXTRA = "parquet"
+TAKES_SENSORS = True
 HINT = f"metadata say how the recordings begin; {IF_IN_CONTACT}"
-MAX_INFO_SIZE = 1 << 24
-"""Maximum size of the description of a data set [bytes]."""
 EPISODES_AT_ONCE = 64
 """Number of headers of recordings that are in memory at a time."""
 
@@ -83,15 +85,44 @@ def parts(path: Path) -> list[Path]:
     return [path]
 
 
-def read(path: Path) -> Iterator[Recording]:
+def read(
+    path: Path,
+    sensors: Mapping[str, Sensor] | None = None,
+    columns: Columns | None = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> Iterator[Recording]:
     """Yield the recording of each episode.
 
+    Args:
+        path: folder of the data set.
+        sensors: as in `read_foreign_set`, for a set that holdfast did not write.
+        columns: the same.
+        report: the same.
+
     Raises:
-        RecordingError: the data set is of another version, was not written by holdfast, or is
-            damaged.
+        RecordingError: the data set is damaged, or no feature fits a sensor.
     """
+    if sensors or columns or not _has_headers(path):
+        yield from read_foreign_set(path, sensors or {}, columns, report)
+        return
     for episode in _episodes(path, _info(path)):
         yield _recording(path, episode)
+
+
+def _has_headers(path: Path) -> bool:
+    """Return whether holdfast wrote the data set: its episodes have headers of recordings."""
+    import pyarrow.parquet as pq
+
+    files = _episode_files(path)
+    return bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
+
+
+def _episode_files(path: Path) -> list[Path]:
+    pattern = EPISODES_PATH.replace("{chunk_index:03d}", "*").replace("{file_index:03d}", "*")
+    files = sorted(path.glob(pattern))
+    for file in files:
+        check_regular(file)
+    return files
 
 
 def _info(path: Path) -> _Info:
@@ -115,9 +146,7 @@ def _episodes(path: Path, info: _Info) -> Iterator[_Episode]:
     import pyarrow.parquet as pq
 
     n_episodes = 0
-    pattern = EPISODES_PATH.replace("{chunk_index:03d}", "*").replace("{file_index:03d}", "*")
-    for file in sorted(path.glob(pattern)):
-        check_regular(file)
+    for file in _episode_files(path):
         parquet = pq.ParquetFile(file)
         if missing := [name for name in _EPISODE_COLUMNS if name not in parquet.schema_arrow.names]:
             raise RecordingError(

@@ -188,7 +188,7 @@ def test_only_arrays_in_the_file_itself_are_read(tmp_path, store, name):
     write(tmp_path / "a.h5", [4, 5, 4, 4], **{name: None})
     with h5py.File(tmp_path / "a.h5", "a") as file:
         store(file[GROUP], name, other)
-    with pytest.raises(RecordingError, match=f"/{GROUP}/{name} is no array stored in this file"):
+    with pytest.raises(RecordingError, match=f"{GROUP}/{name} is no array stored in this file"):
         list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
 
 
@@ -202,13 +202,13 @@ def test_a_group_in_another_file_is_not_found(tmp_path):
 
 def test_texts_and_huge_arrays_are_refused(tmp_path):
     write(tmp_path / "a.h5", [4, 5, 4, 4], tactile_timestamps=["a", "b", "c", "d"])
-    with pytest.raises(RecordingError, match="numbers expected in tactile_timestamps, object giv"):
+    with pytest.raises(RecordingError, match="numbers expected in tactile_timestamps, <U1 given"):
         list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
     write(tmp_path / "b.h5", [4, 5, 4, 4], tactile_data_raw=None)
     with h5py.File(tmp_path / "b.h5", "a") as file:
         shape = (18, 3, 10**8)
         file[GROUP].create_dataset("tactile_data_raw", shape, "f8", chunks=(18, 3, 100))
-    with pytest.raises(RecordingError, match="needs more memory than the"):
+    with pytest.raises(RecordingError, match=r"in memory, .* are allowed for a file of"):
         list(import_recordings(tmp_path / "b.h5", "arq-crisp"))
 
 

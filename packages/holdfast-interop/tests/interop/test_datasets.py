@@ -2,6 +2,8 @@ import json
 import shutil
 import sys
 
+import msgspec
+import numpy as np
 import pytest
 
 from holdfast.cli import main
@@ -203,3 +205,48 @@ def test_real_recordings_from_a_server_to_a_decision(name, capsys, data_folder, 
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "STABLE" in {json.loads(line)["state"] for line in lines}
+
+
+def skin_csv(seed, n=500):
+    """A file of the columns of `anyskin-slip`, 231 Hz: the readings tremble while it slips."""
+    draw = np.random.default_rng(seed)
+    slips = (np.arange(n) % 100 >= 70) & (np.arange(n) > 150)
+    values = draw.normal(0, 1, (n, 15)) + 300 * (np.arange(n) > 130)[:, None]
+    values += slips[:, None] * draw.normal(0, 12, (n, 15))
+    names = [f"mag{node}_{axis}" for node in range(1, 6) for axis in "xyz"]
+    rows = [
+        ",".join([f"{1738576800 + k / 231:.6f}", *(f"{x:.3f}" for x in row), str(int(slips[k]))])
+        for k, row in enumerate(values)
+    ]
+    return "\n".join([",".join(["log_time", *names, "slip"]), *rows]) + "\n"
+
+
+def test_the_published_split_is_one_command(capsys, tmp_path, monkeypatch):
+    public = find_set("anyskin-slip")
+    assert len(public.files) == 17
+    assert all(file.size and file.sha256 for file in public.files)
+    assert set(public.test) < {file.path.removesuffix(".csv") for file in public.files}
+    (tmp_path / "remote" / "anyskin-slip").mkdir(parents=True)
+    for seed, file in enumerate(public.files):
+        (tmp_path / "remote" / "anyskin-slip" / file.path).write_text(skin_csv(seed))
+    files = tuple(PublicFile(file.path) for file in public.files)
+    with serving(tmp_path / "remote") as server:
+        address = f"{server.url}/anyskin-slip/"
+        monkeypatch.setitem(
+            public_sets(),
+            public.name,
+            msgspec.structs.replace(public, address=address, files=files),
+        )
+        document = json.loads(run(capsys, "get", public.name, "--json"))
+    assert document["n_recordings"] == 17
+    scores = json.loads(run(capsys, "score", public.name, "--json"))
+    assert scores["test"] == ["grappe", "socks", "tissues"]
+    assert scores["always no slip"]["auc"] == scores["chance"]["auc"] == 0.5
+    assert scores["model"]["auc"] > 0.8
+    assert scores["model"]["ap"] > 2 * scores["chance"]["ap"]
+    out = run(capsys, "score", public.name)
+    assert [line.split()[0] for line in out.splitlines()] == ["slip", "model", "always", "chance"]
+    (tmp_path / public.name / "socks.parquet").unlink()
+    text = refused(capsys, "score", public.name)
+    assert text == "anyskin-slip has no recording 'socks', which the split tests on"
+    assert refused(capsys, "score", "eflesh-tugs") == "eflesh-tugs has no published split"

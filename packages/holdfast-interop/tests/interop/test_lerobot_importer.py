@@ -125,7 +125,8 @@ def test_a_changed_reading_is_found(data_set):
 @pytest.mark.parametrize(
     ("path", "change", "message"),
     [
-        (EPISODES, lambda t: t.drop_columns(["holdfast.header"]), "no column 'holdfast.header'"),
+        (EPISODES, lambda t: t.drop_columns(["holdfast.texts"]), "no column 'holdfast.texts'"),
+        (EPISODES, lambda t: t.drop_columns(["holdfast.header"]), "and its sensor, as --array"),
         (EPISODES, lambda t: t.slice(0, 0), "0 episodes, its meta/info.json names 1"),
         (DATA, lambda t: t.slice(1), "frames of episode 0"),
         (DATA, lambda t: t.drop_columns(["truth.new"]), "column 'truth.new' is missing"),

@@ -4,16 +4,16 @@ import pytest
 
 from holdfast.io.cdr import MessageEncoder
 from holdfast.io.definitions import parse_definition
+from holdfast_ros.bags import standard_definition
 from holdfast_ros.pose_messages import (
     PoseDecoder,
     StampedPose,
     has_poses,
-    known_pose_definition,
 )
 
 
 def test_a_stamped_pose():
-    definition = known_pose_definition("geometry_msgs/msg/PoseStamped", ros2=True)
+    definition = standard_definition("geometry_msgs/msg/PoseStamped")
     data = MessageEncoder(definition)(
         {
             "header": {"stamp": {"sec": 12, "nanosec": 500_000_000}, "frame_id": "/camera"},
@@ -29,7 +29,7 @@ def test_a_stamped_pose():
 
 
 def test_frames():
-    definition = known_pose_definition("tf2_msgs/TFMessage", ros2=True)
+    definition = standard_definition("tf2_msgs/TFMessage")
     frames = [
         {
             "header": {"stamp": {"sec": k, "nanosec": 0}, "frame_id": "world"},
@@ -49,14 +49,13 @@ def test_frames():
     ]
 
 
-@pytest.mark.parametrize("ros2", [False, True])
 @pytest.mark.parametrize("name", ["geometry_msgs/PoseStamped", "tf2_msgs/TFMessage"])
-def test_known_definitions_have_poses(name, ros2):
-    assert has_poses(known_pose_definition(name, ros2=ros2))
+def test_known_definitions_have_poses(name):
+    assert has_poses(standard_definition(name))
 
 
 def test_other_messages():
-    assert known_pose_definition("std_msgs/String", ros2=True) is None
+    assert standard_definition("pkg/String") is None
     text = parse_definition("pkg/Text", "string text")
     assert not has_poses(text)
     expected = (

@@ -1,15 +1,23 @@
 """Output of `holdfast detect`: JSON lines, a summary, or lines of changes, from estimates."""
 
+import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from math import isnan, nan
 from operator import attrgetter, itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 from msgspec.json import Encoder
 
-from holdfast.cli.terminal.console import print_line, print_table, visible_json
+from holdfast.cli.detect.estimates import EstimateChunk
+from holdfast.cli.terminal.console import (
+    print_json,
+    print_line,
+    print_message,
+    print_table,
+    visible_json,
+)
 from holdfast.contact import (
     LASTING_DURATION,
     ContactEstimate,
@@ -25,10 +33,6 @@ from holdfast.live.documents import estimate_line
 from holdfast.live.fault_notices import FAULT_TEXTS
 from holdfast.recordings import shown_origin
 
-if TYPE_CHECKING:
-    from holdfast.detector import Detection
-    from holdfast.live.stream_detector import StreamEstimate
-
 HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
 REASON_WORDS = {
     Reason.NONE: "",
@@ -41,42 +45,6 @@ REASON_WORDS = {
 LINES_PER_BLOCK = 8192
 MAX_EVENTS_SHOWN = 40
 """Maximum number of events in the table; JSON has all of them."""
-
-
-class EstimateChunk(NamedTuple):
-    """Estimates of consecutive samples, oldest first.
-
-    Attributes:
-        name: of the recording or source.
-        fingers: estimates of each finger.
-        hand: time [s] and state of the hand at each instant.
-    """
-
-    name: str
-    fingers: Mapping[str, Sequence[ContactEstimate]]
-    hand: Sequence[tuple[float, ContactState]]
-
-
-def chunk_from_detection(detection: "Detection") -> EstimateChunk:
-    """Convert the arrays of a detection."""
-    states = tuple(ContactState)
-    hand = zip(detection.times.tolist(), detection.hand.tolist(), strict=True)
-    return EstimateChunk(
-        detection.name,
-        {finger: trace.estimates() for finger, trace in detection.fingers.items()},
-        [(time, states[code]) for time, code in hand],
-    )
-
-
-def chunk_from_stream(name: str, estimates: Iterable["StreamEstimate"]) -> EstimateChunk:
-    """Collect the new estimates of a live source."""
-    fingers: dict[str, list[ContactEstimate]] = {}
-    hand = []
-    for estimate, updated_fingers in estimates:
-        hand.append((estimate.time, estimate.state))
-        for finger in updated_fingers:
-            fingers.setdefault(finger, []).append(estimate.fingers[finger])
-    return EstimateChunk(name, fingers, hand)
 
 
 def json_lines(chunk: EstimateChunk) -> Iterator[str]:
@@ -326,3 +294,41 @@ def why(estimate: ContactEstimate) -> str:
     percent = 100 * estimate.stable_probability
     cause = f"{estimate.cause}, " if estimate.cause else ""
     return f"{cause}P(stable) {percent:.0f} %, sigma {estimate.instability:.4g}"
+
+
+def print_estimates(chunks: Iterator[EstimateChunk], *, live: bool) -> None:
+    """Print JSON lines: of a live source each chunk at once."""
+    for chunk in chunks:
+        for text in json_lines(chunk):
+            sys.stdout.write(text)
+        if live:
+            sys.stdout.flush()
+
+
+def print_changes(chunks: Iterator[EstimateChunk], *, live: bool) -> None:
+    """Print the changes that lasted: of a live source at once, else below the progress bar."""
+    changes = ChangeLines(from_first=live)
+    if live:
+        print_message("times since the first sample; --json prints every estimate; Ctrl-C stops")
+        print_line(HEADER)
+        for chunk in chunks:
+            for line in changes.add(chunk):
+                print_line(line)
+                sys.stdout.flush()
+        return
+    lines = [line for chunk in chunks for line in changes.add(chunk)]
+    if changes.origin:
+        print_message(f"times since the first sample, at {changes.origin:.3f} s")
+    for line in (HEADER, *lines):
+        print_line(line)
+
+
+def print_summary(chunks: Iterator[EstimateChunk], model: str, *, as_json: bool) -> None:
+    """Print the summary of all chunks."""
+    summary = DetectionSummary()
+    for chunk in chunks:
+        summary.add(chunk)
+    if as_json:
+        print_json({"model": model, **summary.to_dict()})
+    else:
+        summary.print()

@@ -24,6 +24,7 @@ from holdfast.io.importers.csv_columns import (
     THREE_AXES,
     Columns,
     column_of_rows,
+    guessed_taxels,
     guessed_time,
 )
 from holdfast.io.importers.generic_csv import (
@@ -33,13 +34,11 @@ from holdfast.io.importers.generic_csv import (
     ReportOnce,
     recordings_of_table,
 )
-from holdfast.io.importers.table import Table, errors_named, natural_order
+from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
-MAX_LISTED_LENGTH = 110
-"""Length from which on arrays are left out of a message [characters]."""
 RATE_NAMES = (
     "fs", "rate", "fps", "hz", "frequency", "samplerate", "samplingrate", "samplingfrequency"
 )  # fmt: skip
@@ -78,13 +77,11 @@ class _Layout(NamedTuple):
     Attributes:
         axis: of the samples.
         inner: order of the other axes.
-        n_modules: number of sensors side by side.
         is_episodes: whether the axis before that of the samples counts recordings.
     """
 
     axis: int
     inner: tuple[int, ...]
-    n_modules: int
     is_episodes: bool = False
 
 
@@ -129,9 +126,10 @@ def recordings_of_arrays(
     if single := choice.single_columns(sensors):
         n = prod(next(iter(single.values())).shape)
         table = _table(choice, (), np.empty((n, 0)), single)
+        of_all = dict.fromkeys([ANY_MODULE], next(iter(sensors.values())))
         with errors_named(path):
             yield from recordings_of_table(
-                table[0].names, lambda *_: table, path.name, sensors, columns, report_once
+                table[0].names, lambda *_: table, path.name, of_all, columns, report_once
             )
         return
     for group, wanted in choice.by_group(sensors).items():
@@ -155,16 +153,14 @@ def recordings_of_arrays(
 
 def listed(arrays: StoredArrays) -> str:
     """Return the paths and shapes of arrays for a message: larger ones first, one of a kind."""
-    kinds = {_DIGITS.sub("0", name): name for name in reversed(arrays)}
-    order = sorted(
-        kinds.values(), key=lambda name: (-len(arrays[name].shape), -prod(arrays[name].shape))
-    )
-    shown = [f"{name[-60:]} {arrays[name].shape}" for name in order]
-    n_shown = len(shown)
-    while n_shown > 1 and sum(map(len, shown[:n_shown])) > MAX_LISTED_LENGTH:
-        n_shown -= 1
-    more = f" and {len(shown) - n_shown} more" if n_shown < len(shown) else ""
-    return (", ".join(shown[:n_shown]) or "no array of numbers") + more
+    return first_texts([f"{name[-60:]} {arrays[name].shape}" for name in _by_size(arrays)])
+
+
+def _by_size(arrays: StoredArrays) -> list[str]:
+    """Return the first path of each kind of paths, those of larger arrays first."""
+    kinds = {_DIGITS.sub("0", name): name for name in reversed([*arrays])}
+    shapes = {name: arrays[name].shape for name in kinds.values()}
+    return sorted(shapes, key=lambda name: (-len(shapes[name]), -prod(shapes[name])))
 
 
 class _Choice:
@@ -186,7 +182,7 @@ class _Choice:
             RecordingError: no array fits, or several that are no recordings of one kind.
         """
         if not sensors:
-            first = next(iter(sorted(self.arrays, key=self._size, reverse=True)), "PATH")
+            first, *_ = [*_by_size(self.arrays), "PATH"]
             raise RecordingError(
                 f"{self.path} has {self.listed}: give the array and its sensor, as "
                 f"{self._option} {first}=SENSOR"
@@ -201,34 +197,27 @@ class _Choice:
 
     def single_columns(self, sensors: Mapping[str, Sensor]) -> StoredArrays:
         """Return the arrays that are the columns of a table, if no array fits a sensor for all."""
-        one = sensors.get(ANY_MODULE)
-        if one is None or any(self.layout(name, one) for name in self.arrays):
+        if len(sensors) != 1:
             return {}
-        lengths = Counter(max(array.shape, default=1) for array in self.arrays.values())
-        n_rows, n_columns = max(lengths.items(), key=lambda pair: (pair[0] > 1) * pair[1])
-        found = {
-            name: array
-            for name, array in self.arrays.items()
-            if n_rows == prod(array.shape) and array.kind in "biufU"
-        }
-        return found if min(n_rows - 1, n_columns - 3) > 0 and len(found) > 3 else {}
-
-    def _size(self, name: str) -> tuple[int, int]:
-        return len(self.arrays[name].shape), prod(self.arrays[name].shape)
+        ((key, one),) = sensors.items()
+        named = self._named(key.strip("/"))
+        if key in self.arrays or not named or any(self.layout(name, one) for name in named):
+            return {}
+        lengths = Counter(prod(self.arrays[name].shape) for name in named)
+        n_rows = max(lengths, key=lambda n: (n > 1, lengths[n]))
+        places = [name for name in named if self.arrays[name].shape == (n_rows,)]
+        return {name: self.arrays[name] for name in places} if len(places) > 3 else {}
 
     def _places(self, key: str, one: Sensor) -> list[str]:
         """Return the paths of the arrays that a key means."""
         if key in self.arrays:
             return [key]
-        named = [
+        named = self._named(key)
+        fitting = [
             name
-            for name in self.arrays
-            if key == ANY_MODULE
-            or fnmatchcase(name, key)
-            or f"/{name}".endswith(f"/{key}")
-            or name.startswith(f"{key}/")
+            for name in named
+            if self.layout(name, one) and not guessed_time([name.rpartition("/")[2]])
         ]
-        fitting = [name for name in named if self.layout(name, one) is not None]
         if not named:
             raise RecordingError(f"{self.path} has no array {key!r}; it has {self.listed}")
         if not fitting and len(named) == 1:
@@ -236,33 +225,47 @@ class _Choice:
         if not fitting:
             raise RecordingError(
                 f"{self.path} has {self.listed}; none has {one.n_taxels} taxels x 3 axes a sample "
-                f"({one.name}): give another sensor, or {self._option} ARRAY={one.name}; "
-                f"{THREE_AXES}"
+                f"({one.name}): give another sensor; {THREE_AXES}"
             )
         alike = {_DIGITS.sub("0", name) for name in fitting}
         parents = {name.rpartition("/")[0] for name in fitting}
         if len(fitting) > 1 and (
             len(alike) > 1 or len(parents) < len(fitting) or _PART_OF_HAND.search(min(parents))
         ):
-            options = " ".join(f"{self._option} {name}={one.name}" for name in fitting[:2])
+            slash = "/" if self._option == "--topic" else ""
+            options = " ".join(f"{self._option} {slash}{name}={one.name}" for name in fitting[:2])
             raise RecordingError(
                 f"{self.path}: {len(fitting)} arrays fit {one.name}: give the one, or several for "
                 f"one hand, as {options}"
             )
         return fitting
 
+    def _named(self, key: str) -> list[str]:
+        """Return the paths of the arrays that a key may mean: also those in a group of its name."""
+        return [
+            name
+            for name in self.arrays
+            if key == ANY_MODULE
+            or fnmatchcase(name, key)
+            or f"/{name}".endswith(f"/{key}")
+            or name.startswith(f"{key}/")
+        ]
+
     def layout(self, name: str, one: Sensor) -> _Layout | None:
         """Return how the axes of an array are understood; None if it does not fit a sensor.
 
-        Of several axes that could be that of the samples, it is the one with as many values as the
-        times, or else the longest.
+        The axis of the samples is the one with as many values as the times. Where there are no
+        such times, it is the longest, or else the first.
         """
         array = self.arrays[name]
         shape, size = array.shape, 3 * one.n_taxels
         if array.kind not in "biuf" or len(shape) < 2:
             return None
-        found: list[_Layout] = []
-        for axis in range(len(shape)):
+        beside = self.beside(name)
+        time = beside.get(self.columns.time or guessed_time(list(beside)) or "")
+        n_times = 0 if time is None else prod(self.arrays[time].shape)
+        timed = [axis for axis, n in enumerate(shape) if n == n_times]
+        for axis in timed or [int(np.argmax(shape)), *([0] if shape[0] > 1 else [])]:
             inner = [other for other in range(len(shape)) if other != axis]
             threes = [other for other in inner if shape[other] == 3]
             is_flat = len(inner) == 1 or shape[inner[-1]] == size
@@ -275,18 +278,12 @@ class _Choice:
             n_values = prod(shape[other] for other in inner)
             is_table = self.columns.taxels or n_values == size + 1  # the first is the time
             if is_table and len(shape) == 2:
-                found.append(_Layout(axis, tuple(inner), 1))
-            elif n_values % size == 0 and (len(inner) == 1 or size in products):
-                n_modules = n_values // size
-                is_episodes = n_modules > 1 and len(shape) > 2 and axis == 1
-                if n_modules <= MAX_MODULES or is_episodes:
-                    found.append(_Layout(axis, tuple(inner), n_modules, is_episodes))
-        beside = self.beside(name)
-        time = beside.get(self.columns.time or guessed_time(list(beside)) or "")
-        n_times = 0 if time is None else prod(self.arrays[time].shape)
-        return max(
-            found, key=lambda one: (shape[one.axis] == n_times, shape[one.axis]), default=None
-        )
+                return _Layout(axis, tuple(inner))
+            if n_values % size == 0 and (len(inner) == 1 or size in products):
+                is_episodes = n_values > size and len(shape) > 2 and axis == 1
+                if size <= n_values <= MAX_MODULES * size or is_episodes:
+                    return _Layout(axis, tuple(inner), is_episodes)
+        return None
 
     def beside(self, name: str) -> dict[str, str]:
         """Return the paths of the single columns beside an array, by their last names.
@@ -333,6 +330,8 @@ def _recordings(
     """Return the recordings in an array, with the columns beside it."""
     array, layout = choice.arrays[place], choice.layout(place, one)
     if layout is None:
+        if array.kind == "O":
+            array.read()  # which gives the reason
         few = array.shape[-1:] in ((1,), (2,), (one.n_taxels,), (2 * one.n_taxels,))
         raise RecordingError(
             f"{place!r} has shape {array.shape}; (samples, {one.n_taxels}, 3) or (samples, "
@@ -368,7 +367,8 @@ def _of_rows(
     names = stored.columns if len(stored.columns) == width else numbered
     time = given.time or guessed_time(list(beside)) or choice.rate(place)
     taxels = given.taxels
-    if taxels is None and names is numbered and width % (3 * one.n_taxels) == 0:
+    is_named = guessed_taxels(names, {one.n_taxels}, {one.unit}) is not None
+    if taxels is None and not is_named and width % (3 * one.n_taxels) == 0:
         taxels = f"{names[0]}{RUN}{names[-1]}"
     if time is None and width == 3 * one.n_taxels + 1:  # the first is the time
         beside = {}

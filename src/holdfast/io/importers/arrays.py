@@ -38,6 +38,7 @@ TEXT_SUFFIXES = (".txt", ".log", "")
 HEAD_SIZE = 4096
 """Size of the start of a text in which the first line of JSON must be [bytes]."""
 
+_NOT_STORED = "is no array stored in this file; links to other places and files are refused"
 _JSON_LINE = re.compile(rb'^(?:\xef\xbb\xbf)?\{\s*"', re.MULTILINE)
 
 
@@ -156,6 +157,8 @@ def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, Stor
         budget.step()
         address = h5py.h5o.get_info(group.id).addr
         if address in seen:
+            if isinstance(group, h5py.Dataset):
+                found[name] = _refused(f"{path}: {name} is an array of another group too")
             continue
         seen.add(address)
         if name.count("/") >= MAX_GROUP_DEPTH or len(found) > MAX_ARRAYS:
@@ -170,9 +173,20 @@ def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, Stor
             continue
         for key in group:
             inside = f"{name}/{key}".lstrip("/")
-            if isinstance(group.get(key, getlink=True), h5py.HardLink) and not key.startswith("#"):
+            if not isinstance(group.get(key, getlink=True), h5py.HardLink):
+                found[inside] = _refused(f"{path}: {inside} {_NOT_STORED}")
+            elif not key.startswith("#"):  # what MATLAB refers to
                 waiting.append((inside, group[key]))
     return found
+
+
+def _refused(text: str) -> StoredArray:
+    """Return an array that cannot be read."""
+
+    def refuse() -> npt.NDArray[Any]:
+        raise RecordingError(text)
+
+    return StoredArray((), "O", refuse)
 
 
 def _of_dataset(
@@ -190,7 +204,7 @@ def _of_dataset(
 
     def values(field: str | None) -> npt.NDArray[Any]:
         if dataset.is_virtual or dataset.external:
-            raise RecordingError(f"{path}: {name} is stored in another file, which is not read")
+            raise RecordingError(f"{path}: {name} {_NOT_STORED}")
         check_filters(path, name, dataset)
         budget.keep(dataset.size * dataset.dtype.itemsize)
         array = np.asarray(dataset[()] if field is None else dataset[()][field])

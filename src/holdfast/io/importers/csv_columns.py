@@ -147,9 +147,9 @@ class Columns:
         time = given.get("time", self.time)
         time = time or guessed_time(names) or _first_of_run(names, n_taxels)
         others = [name for name in names if name != time]
-        taxels = self.taxels or _guessed_taxels(others, n_taxels, units)
+        taxels = self.taxels or guessed_taxels(others, n_taxels, units)
         taxels = taxels or _few_axes(others) or _guessed_run(others, n_taxels)
-        taxels = taxels or _guessed_taxels(others, (), units)
+        taxels = taxels or guessed_taxels(others, (), units)
         given = {name: name for name in ("label", "cause") if name in names} | given
         if time is None:
             raise RecordingError(
@@ -284,7 +284,7 @@ def _few_axes(names: Sequence[str]) -> str | None:
     return None
 
 
-def _guessed_taxels(
+def guessed_taxels(
     names: Sequence[str], n_taxels: Collection[int], units: Collection[str]
 ) -> str | None:
     """Return the pattern of the taxel columns: the one that most columns fit completely.

@@ -25,6 +25,7 @@ MAX_EQUAL_SHARE = 90.0
 """Share of equal times from which they were written with too few digits [%]."""
 
 _CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:\.\d*)?)")
+_DAY = re.compile(r"(?:\d{1,4}[./]\d{1,2}[./]\d{1,4})?")
 _UNIT_WORDS = {
     **dict.fromkeys(("s", "sec", "secs", "seconds"), "s"),
     **dict.fromkeys(("ms", "millis", "milliseconds"), "ms"),
@@ -104,7 +105,8 @@ def clock_seconds(cells: Sequence[str]) -> Array | None:
 def _clock_time(cell: str) -> float | None:
     """Return the seconds of a date with a time, or since midnight; None if it is neither."""
     text = cell.strip().replace(",", ".")
-    if match := _CLOCK.fullmatch(text):
+    day, _, clock = text.rpartition(" ")  # of a day such as 21.11.2026 only its midnight counts
+    if (match := _CLOCK.fullmatch(clock)) and _DAY.fullmatch(day):
         return 3600 * int(match["h"]) + 60 * int(match["m"]) + float(match["s"])
     try:
         date = datetime.fromisoformat(text) if "-" in text[1:] else None

@@ -27,7 +27,7 @@ COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
 MAX_SHOWN_LENGTH = 80
 """Length from which on names of columns are left out of a message [characters]."""
-SEPARATORS = ",;\t "
+SEPARATORS = ",;\t| "
 """Characters between the cells of a row, of which a file has one; any number of blanks is one."""
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
@@ -473,8 +473,18 @@ def _text(problem: Exception) -> str:
 
 def some_names(names: Sequence[str]) -> str:
     """Return the first names of columns, and the starts of long ones, for a message."""
-    shown = [_start(name) for name in names[:6]]
-    while len(shown) > 1 and sum(map(len, shown)) > MAX_SHOWN_LENGTH:
-        shown.pop()
-    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
-    return ", ".join(shown) + more
+    return first_texts([*map(_start, names)])
+
+
+def first_texts(texts: Sequence[str]) -> str:
+    """Return the first of some texts for a message, and how many more there are.
+
+    Example:
+        >>> first_texts([20 * "a", 20 * "b", 50 * "c"])
+        'aaaaaaaaaaaaaaaaaaaa, bbbbbbbbbbbbbbbbbbbb and 1 more'
+    """
+    n = min(len(texts), 6)
+    while n > 1 and sum(map(len, texts[:n])) > MAX_SHOWN_LENGTH:
+        n -= 1
+    more = f" and {len(texts) - n} more" if n < len(texts) else ""
+    return (", ".join(texts[:n]) or "none") + more

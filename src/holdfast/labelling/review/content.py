@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,12 @@ from holdfast.detector import Detector
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.io import read_chunks
-from holdfast.labelling.review.findings import findings_of_scan, hidden_labels
+from holdfast.labelling.review.findings import (
+    findings_of_scan,
+    hidden_labels,
+    invalid_readings,
+)
+from holdfast.labelling.review.oddities import with_oddities
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.model import Model
@@ -40,7 +46,12 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
         faults.add(part)
         truth = part.truth
     found, hidden = scan.recording, hidden_labels(path)
-    findings = findings_of_scan(scan) + ([] if hidden is None else [hidden])
+    invalid = [
+        invalid_readings(name, dict(faults.of(name)).get(Fault.INVALID, 0), module.force.n_samples)
+        for name, module in scan.modules.items()
+    ]
+    findings = [*findings_of_scan(scan), *(each for each in [*invalid, hidden] if each)]
+    findings = with_oddities(findings, scan, path)
     return {
         "name": found.name,
         "modules": {
@@ -52,6 +63,7 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
                 "rate": module.force.rate,
                 "gaps": module.force.n_gaps,
                 "repeats": int(module.repeats.sum()),
+                "drift": None if isnan(module.drift.per_minute) else module.drift.per_minute,
                 "labels": label_seconds(module.labels),
                 "faults": {fault.value: n for fault, n in faults.of(name) if n},
             }

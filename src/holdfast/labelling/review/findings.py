@@ -17,6 +17,8 @@ from holdfast.recordings import Recording
 CONSTANT_SECONDS = 0.5
 """Shortest stretch without any change of the readings that is reported [s]."""
 AXES = "xyz"
+INVALID_SHARE = 0.002
+"""Share of samples with an invalid reading above which a person should see it."""
 MAX_TAXEL_FORCE = 100.0
 """Force on one taxel above which the unit of the readings is in doubt [N]."""
 
@@ -30,6 +32,13 @@ FindingKind = Literal[
     "starts_loaded",
     "no_contact",
     "hidden_labels",
+    "unlikely_rate",
+    "gaps",
+    "clock_drift",
+    "no_labels",
+    "copy",
+    "cross_talk",
+    "invalid",
 ]
 
 
@@ -68,6 +77,10 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         if module.force.n_samples > 1
         for kind, text in _of_module(module)
     ]
+    found += [
+        Finding(each.module, "copy" if each.share == 1 else "cross_talk", each.text)
+        for each in scan.alike
+    ]
     if reason := evidence_of_contact(scan.recording):
         text = f"begins in contact ({reason}): the first samples are load (give --in-contact); or "
         text += "z of the sensor points inwards (docs/sensors.md)"
@@ -77,6 +90,21 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
             text = "no finger is in contact in the whole recording"
             found.append(Finding("", "no_contact", text))
     return found
+
+
+def invalid_readings(name: str, n_invalid: int, n_samples: int) -> Finding | None:
+    """Return a finding if many samples of a module have readings that cannot be true.
+
+    Args:
+        name: of the module.
+        n_invalid: number of samples with the fault `invalid`.
+        n_samples: number of samples.
+    """
+    if n_invalid <= INVALID_SHARE * n_samples:
+        return None
+    text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that cannot "
+    text += "be true, of one taxel, which is left out: is a magnetometer read before it is ready?"
+    return Finding(name, "invalid", text)
 
 
 def hidden_labels(path: Path) -> Finding | None:

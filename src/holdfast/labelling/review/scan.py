@@ -8,6 +8,7 @@ import numpy as np
 from holdfast.features.tare import first_finite
 from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.labelling.server.long_recordings import force_sensor
+from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array, Flags
 
@@ -88,6 +89,15 @@ class ModuleScan:
         forces = np.concatenate(self._forces)[:, None]
         return Tactile(force_sensor(self.sensor), np.concatenate(self._times), forces)
 
+    @cached_property
+    def drift(self) -> HoldDrift:
+        """Drift of the force in the longest hold."""
+        drift, force = HoldDrift(), self.force
+        stride = max(1, int(CHECK_INTERVAL * force.rate)) if force.n_samples > 1 else 1
+        for time, value in zip(force.times[::stride], force.readings[::stride, 0], strict=True):
+            drift.update(value, float(time))
+        return drift
+
 
 class FindingsScan:
     """What is kept of a recording.
@@ -95,11 +105,14 @@ class FindingsScan:
     Attributes:
         modules: by name.
         n_truth: number of samples of the truth.
+        alike: modules with the same readings, or with cross-talk.
     """
 
     def __init__(self) -> None:
         self.modules: dict[str, ModuleScan] = {}
         self.n_truth = 0
+        self.alike: list[Likeness] = []
+        self._comparison = ModuleComparison()
         self._markers: list[tuple[float, str]] = []
         self._last: Recording | None = None
 
@@ -110,8 +123,24 @@ class FindingsScan:
                 self.modules[name] = ModuleScan(module)
             self.modules[name].add(module)
         self.n_truth += 0 if part.truth is None else len(part.truth.times)
+        self._compare([(n, m) for n, m in part.modules.items() if m.n_samples])
         self._markers += part.markers
         self._last = replace(part, modules={n: m.slice(0, 1) for n, m in part.modules.items()})
+
+    def _compare(self, modules: list[tuple[str, Tactile]]) -> None:
+        """Compare the modules' latest samples, every 0.05 s."""
+        if len(modules) < 2:
+            return
+        end = min(module.times[-1] for _, module in modules)
+        times = np.arange(max(m.times[0] for _, m in modules), end, CHECK_INTERVAL)
+        rows = [np.searchsorted(m.times, times, side="right") - 1 for _, m in modules]
+        for k, time in enumerate(times.tolist()):
+            samples = {
+                name: module.readings[own[k]]
+                for (name, module), own in zip(modules, rows, strict=True)
+                if time - module.times[own[k]] < CHECK_INTERVAL
+            }
+            self.alike += self._comparison.update(samples, time)
 
     @cached_property
     def recording(self) -> Recording:

@@ -1,0 +1,130 @@
+"""Arrays of numbers in the messages of any topic of a bag, by path: `topic/field`."""
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.io.cdr import MessageDecoder
+from holdfast.io.importers.array_tables import (
+    StoredArray,
+    arrays_of_records,
+    joined_axes,
+)
+from holdfast.io.importers.table import first_texts
+from holdfast_ros.bags import Bag, BagTopic
+
+IMAGE_KINDS = re.compile(r"sensor_msgs/(Compressed)?Image|.*Video.*|.*/Marker(Array)?")
+"""Types of messages that are left out unless their topic is named."""
+STAMPS = (("secs", "nsecs", 1e-9), ("sec", "nanosec", 1e-9))
+"""Fields of a time in ROS 1 and 2."""
+
+_POINT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""Number types of the fields of a PointCloud2."""
+
+
+def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, StoredArray]:
+    """Return the arrays in the messages of topics, with their times [s] as `topic/time`.
+
+    A time is that of the header, if all of a topic have one and increase, else that of the bag.
+
+    Args:
+        path: of the bag, for messages.
+        bag: the bag.
+        names: paths that begin with the names of topics; all topics if it is empty.
+
+    Raises:
+        RecordingError: no topic has one of these names.
+    """
+    topics = {topic.number: topic for topic in bag.topics if _is_wanted(topic, names)}
+    if not topics:
+        shown = first_texts(list(dict.fromkeys(topic.name for topic in bag.topics)))
+        raise RecordingError(f"{path} has no topic {', '.join(names)}; it has {shown}")
+    decoders = {
+        n: MessageDecoder(topic.definition, ros2=bag.ros2)
+        for n, topic in topics.items()
+        if topic.definition is not None
+    }
+    if not decoders:
+        first = next(iter(topics.values()))
+        raise RecordingError(
+            f"{path} has no definition of {first.kind} ({first.name}): write the bag as mcap where "
+            "its package is installed (ros2 bag convert)"
+        )
+    records: dict[str, list[dict[str, Any]]] = {}
+    for topic, time, data in bag.messages(topics[n] for n in decoders):
+        bag.keep(2 * len(data))
+        message = dict(_fields(decoders[topic.number](data)))
+        records.setdefault(topic.name, []).append({**message, "bag_time": time})
+    found: dict[str, StoredArray] = {}
+    for name, own in records.items():
+        arrays = arrays_of_records(own)
+        for place in [place for place in arrays if place.endswith("bag_time")]:
+            start = place.removesuffix("bag_time")
+            header = arrays.get(f"{start}stamp")
+            times = arrays.pop(place)
+            is_good = header is not None and bool((np.diff(header.read(), prepend=0) > 0).all())
+            arrays[f"{start}time"] = header if header is not None and is_good else times
+        arrays = {place: one for place, one in arrays.items() if not place.endswith("stamp")}
+        found |= {f"{name}/{place}": one for place, one in arrays.items()}
+    return found
+
+
+def _is_wanted(topic: BagTopic, names: Collection[str]) -> bool:
+    if not names:
+        return IMAGE_KINDS.fullmatch(topic.kind) is None
+    name = topic.name.strip("/")
+    return any(f"{one.strip('/')}/".startswith(f"{name}/") for one in names)
+
+
+def _fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the fields of a message; points and arrays with a layout in their shape."""
+    if {"point_step", "data", "fields"} <= message.keys():
+        yield from _points(message).items()
+        message = {"header": message.get("header", {})}
+    for name, value in message.items():
+        if name == "header" and isinstance(value, Mapping):
+            yield from ((n, one) for n, one in _fields(value) if n == "stamp")
+        elif isinstance(value, Mapping) and (stamp := _stamp(value)) is not None:
+            yield name, stamp
+        elif name == "data" and isinstance(value, np.ndarray) and "layout" in message:
+            sizes = [int(one["size"]) for one in message["layout"].get("dim", ())]
+            yield name, value.reshape(sizes) if prod(sizes) == value.size else value
+        elif name != "layout":
+            yield name, value
+
+
+def _stamp(value: Mapping[str, Any]) -> float | None:
+    for seconds, nanoseconds, size in STAMPS:
+        if value.keys() == {seconds, nanoseconds}:
+            return float(value[seconds] + size * value[nanoseconds])
+    return None
+
+
+def _points(message: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a PointCloud2; positions are left out where there is another vector.
+
+    Raises:
+        ValueError: its fields contradict its data.
+    """
+    n, step = message["width"] * message["height"], message["point_step"]
+    order = ">" if message["is_bigendian"] else "<"
+    fields = [one for one in message["fields"] if one["datatype"] in _POINT_TYPES]
+    kind = np.dtype(
+        {
+            "names": [one["name"] for one in fields],
+            "formats": [order + _POINT_TYPES[one["datatype"]] for one in fields],
+            "offsets": [one["offset"] for one in fields],
+            "itemsize": step,
+        }
+    )
+    points = np.frombuffer(message["data"].tobytes(), kind, n)
+    joined = joined_axes({name: points[name] for name in kind.names or ()})
+    vectors = [name for name, values in joined.items() if values.ndim > 1]
+    if len(vectors) > 1:
+        joined.pop("xyz", None)
+    return joined

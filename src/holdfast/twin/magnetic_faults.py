@@ -1,0 +1,114 @@
+"""Troubles of magnetic skins, added to what the twin's fingertips read: fields, zeros, drift.
+
+A function of the time and of the number of a sample: batches and single samples are the same.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
+
+COUNTS_END = 65535
+STILL_SECONDS_AT_START = 1.0
+"""Time for which the hand is still at first: for the tare, and for the noise [s]."""
+AGEING_OF_GAIN, AGEING_OF_NOISE = 0.03, 0.1
+"""Loss of gain, and rise of the noise, in a month, as shares. Invented: no data sheet was found."""
+UNIT_SPREAD = 0.5
+"""Standard deviation over units and taxels of how fast they age, as a share. Invented."""
+
+
+@dataclass(frozen=True)
+class MagneticFaults:
+    """Troubles of all fingertips of a hand; with the default values there are none.
+
+    Attributes:
+        field: size of a field in which the hand turns [count].
+        turn_time: time of a turn by 360 degrees about one axis [s]; about another it takes 1.6
+            times as long.
+        zero_share: share of samples in which one taxel, another each time, reads zero.
+        drift: standard deviation over taxels and axes of a steady drift [count/h].
+        cross_talk: share of the load of a finger that the next finger reads.
+        invented_months: age of the skin: gains fall, and noise rises, by invented numbers.
+
+    Raises:
+        ValueError: a number is negative or not finite, the turn time is 0, or a share is over 1.
+
+    Example:
+        >>> MagneticFaults(field=-1)
+        Traceback (most recent call last):
+        ValueError: field: at least 0 expected, -1 given
+    """
+
+    field: float = 0.0
+    turn_time: float = 8.0
+    zero_share: float = 0.0
+    drift: float = 0.0
+    cross_talk: float = 0.0
+    invented_months: float = 0.0
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            value = getattr(self, part.name)
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"{part.name}: at least 0 expected, {value} given")
+        if self.turn_time == 0 or max(self.zero_share, self.cross_talk) > 1:
+            raise ValueError("a turn time above 0, and shares of at most 1 expected")
+
+    @property
+    def changes_nothing(self) -> bool:
+        """Whether there are no troubles."""
+        return self == MagneticFaults(turn_time=self.turn_time)
+
+    def field_at(self, times: npt.ArrayLike) -> Array:
+        """Return (n, 3) the field beyond that at time 0, in the frame of all fingertips [count]."""
+        turned_for = np.maximum(np.asarray(times, dtype=np.float64) - STILL_SECONDS_AT_START, 0)
+        angle = 2 * np.pi * turned_for / self.turn_time
+        other = angle / 1.6
+        # From the start (1, 0, 0): turns about two axes, one after the other.
+        turned = np.stack(
+            [np.cos(angle) * np.cos(other), np.sin(angle), np.cos(angle) * np.sin(other)], axis=-1
+        )
+        return self.field * (turned - [1.0, 0.0, 0.0])
+
+    def apply(
+        self,
+        sensors: Mapping[str, Sensor],
+        counts: Mapping[str, npt.NDArray[np.uint16]],
+        times: npt.NDArray[np.float64],
+        rest: Mapping[str, npt.ArrayLike],
+        seed: int,
+    ) -> dict[str, npt.NDArray[np.uint16]]:
+        """Return the counts with these troubles.
+
+        Args:
+            sensors: sensor of each finger.
+            counts: (n, n_taxels, 3) of each finger without them.
+            times: (n,) times since the start [s].
+            rest: (n_taxels, 3) readings of each finger without load [count].
+            seed: of the units; another one is another hand.
+        """
+        field, found, load = self.field_at(times), {}, None
+        numbers = np.rint(np.asarray(times) * 1e6).astype(np.int64)
+        for place, (name, sensor) in enumerate(sensors.items()):
+            unit = np.random.default_rng([seed, place])
+            zero, shape = np.asarray(rest[name], dtype=np.float64), (sensor.n_taxels, 3)
+            age = self.invented_months * np.exp(UNIT_SPREAD * unit.standard_normal(shape))
+            drift = self.drift * unit.standard_normal(shape)
+            own = (counts[name] - zero) * np.exp(-AGEING_OF_GAIN * age)
+            values = zero + own + drift * times[:, None, None] / 3600
+            values += np.einsum("ikj,nk->nij", sensor.rotations, field)
+            if load is not None and load.shape == own.shape:
+                values += self.cross_talk * load
+            load = own
+            for k, number in enumerate(numbers.tolist()):
+                if self.zero_share or self.invented_months:
+                    drawn = np.random.default_rng([seed, place, number + (1 << 40)])
+                    values[k] += AGEING_OF_NOISE * age * drawn.standard_normal(shape)
+                    if drawn.random() < self.zero_share:
+                        values[k, drawn.integers(sensor.n_taxels)] = 0
+            found[name] = np.clip(np.rint(values), 0, COUNTS_END).astype(np.uint16)
+        return found

@@ -1,0 +1,126 @@
+"""Health of modules: ten seconds of an open hand, and what is worse than at the last check."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast import open_source, save_recording
+from holdfast.errors import SourceError
+from holdfast.live.health import (
+    HealthCheck,
+    ModuleHealth,
+    changes_since,
+    check_health,
+    history_path,
+    keep,
+    module_health,
+    read_history,
+)
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+
+PATCH = sensor("uskin-4x4")
+TIMES = np.arange(1000) / 100
+
+
+def open_hand(seed=0):
+    """Readings (n, 16, 3) of an open hand that turns in a field of 78 counts."""
+    rng = np.random.default_rng(seed)
+    turn = np.interp(TIMES, [3, 6], [0, 1])[:, None, None] * [60, -40, 30]
+    return 33_000 + np.rint(rng.normal(0, 3, (1000, 16, 3)) + turn)
+
+
+def health(readings, which=PATCH, times=TIMES):
+    return module_health("index", which, times, readings)
+
+
+def check(day, **modules):
+    return HealthCheck(day, 0, modules)
+
+
+def test_an_open_hand_that_turns():
+    found = health(open_hand())
+    assert (found.rate, found.n_samples) == (pytest.approx(100), 1000)
+    assert np.allclose(found.noise, 3, rtol=0.15)
+    assert (found.dead, found.stuck, found.n_zeros, found.n_gaps) == ([], [], 0, 0)
+    assert found.field == pytest.approx(78 / 1.5, rel=0.1)  # from the middle of the readings
+    assert changes_since(check("2026-11-26", index=found), None) == []
+
+
+def test_faulty_taxels_gaps_and_jitter():
+    readings = open_hand()
+    readings[:, 2] = 5
+    readings[:, 4, 1] = 33_000
+    readings[::50, 7] = 0
+    times = TIMES + np.random.default_rng(1).normal(0, 1e-3, 1000)
+    times[500:] += 0.5
+    found = health(readings, times=times)
+    assert (found.dead, found.stuck, found.n_zeros, found.n_gaps) == ([3], ["5 y"], 20, 1)
+    assert found.jitter == pytest.approx(1.4e-3, rel=0.1)
+    assert changes_since(check("2026-11-26", index=found), None) == [
+        "taxel 3 of index is dead",
+        "axis y of taxel 5 of index never changes",
+        "index reads zeros in one taxel in 2 % of its samples",
+    ]
+
+
+def test_a_taxel_that_is_noisier_than_at_the_last_check():
+    before, readings = health(open_hand()), open_hand(1)
+    readings[:, 6] += np.rint(np.random.default_rng(2).normal(0, 15, (1000, 3)))
+    now = check("2026-11-26", index=health(readings))
+    slow = msgspec.structs.replace(before, rate=50.0)
+    last = check("2026-11-12", index=slow, thumb=before)
+    assert changes_since(now, last) == [
+        "index sends 100 Hz, 50 Hz on 12 November",
+        "taxel 7 of index is five times noisier than on 12 November",
+    ]
+    other = check("2026-11-12", index=msgspec.structs.replace(before, sensor="anyskin"))
+    assert changes_since(now, other) == []
+
+
+def test_a_touched_hand_is_refused():
+    readings = open_hand()
+    readings[520:700, 5, 2] += 200
+    message = "index was touched at 5.3 s: open the hand, let nothing touch it, and try again"
+    with pytest.raises(SourceError, match=message):
+        health(readings)
+    turned = open_hand() + np.interp(TIMES, [3, 6], [0, 1])[:, None, None] * [300, 0, 0]
+    assert health(turned).field > 150
+    with pytest.raises(SourceError, match="index was touched at "):  # a field moves no other sensor
+        health(turned, replace(PATCH, magnetic=False))
+
+
+def test_too_few_samples_are_refused():
+    with pytest.raises(SourceError, match="index: 5 samples given, at least 20 expected"):
+        health(open_hand()[:5], times=TIMES[:5])
+
+
+def test_one_taxel_is_said():
+    one = type(PATCH)("one", PATCH.positions[:1], PATCH.rotations[:1], PATCH.normal, 100.0)
+    readings = 500 + np.random.default_rng(0).normal(0, 3, (1000, 1, 3))
+    found = changes_since(check("2026-11-26", index=health(readings, one)), None)
+    assert found == ["index has one taxel: no field or touch can be told apart"]
+
+
+def test_a_source_is_read_for_some_seconds(tmp_path):
+    path = tmp_path / "open.parquet"
+    save_recording(Recording("open", {"index": Tactile(PATCH, TIMES, open_hand())}), path)
+    with open_source(str(path), speed=0) as source:
+        found = check_health(source, 4.0)
+    assert found.modules["index"].n_samples == 401
+
+
+def test_checks_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    path = history_path("xela://127.0.0.1:5000")
+    assert path == tmp_path / "holdfast/health/xela_127.0.0.1_5000.json"
+    assert read_history(path) == []
+    first = check("2026-11-12", index=health(open_hand()))
+    keep(path, [first] * 60, first)
+    assert read_history(path) == [first] * 50
+    assert isinstance(read_history(path)[0].modules["index"], ModuleHealth)
+    path.write_text("{")
+    with pytest.raises(SourceError, match=r"xela_127.0.0.1_5000.json is no history of checks: "):
+        read_history(path)

@@ -1,0 +1,120 @@
+"""Troubles of magnetic skins in the twin: each shows as what it is, and none changes nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.contact import Fault
+from holdfast.detector import detect
+from holdfast.live.module_checks import HoldDrift, ModuleComparison
+from holdfast.model import Model
+from holdfast.synthetic import synthetic_recording
+from holdfast.twin.magnetic_faults import STILL_SECONDS_AT_START, MagneticFaults
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    return synthetic_recording("made", 0, ("thumb", "index"))
+
+
+def spoiled(recording, rows=slice(None), **faults):
+    times = np.asarray(recording.modules["thumb"].times)
+    modules = recording.modules
+    counts = MagneticFaults(**faults).apply(
+        {name: module.sensor for name, module in modules.items()},
+        {name: np.asarray(module.readings)[rows] for name, module in modules.items()},
+        times[rows],
+        {name: np.asarray(module.readings[:60]).mean(axis=0) for name, module in modules.items()},
+        seed=5,
+    )
+    return {name: np.asarray(own) for name, own in counts.items()}
+
+
+def recorded(recording, counts):
+    modules = {n: replace(m, readings=counts[n]) for n, m in recording.modules.items()}
+    return replace(recording, modules=modules)
+
+
+def test_without_troubles_nothing_changes(grasp):
+    assert MagneticFaults().changes_nothing and not MagneticFaults(field=1).changes_nothing
+    for name, counts in spoiled(grasp).items():
+        assert (counts == grasp.modules[name].readings).all()
+
+
+def test_samples_one_by_one_are_those_of_a_batch(grasp):
+    options = {"field": 50, "zero_share": 0.1, "drift": 5e3, "invented_months": 4}
+    whole, last = spoiled(grasp, **options), spoiled(grasp, slice(700, 701), **options)
+    for name in whole:
+        assert (whole[name][700] == last[name][0]).all()
+
+
+def test_a_field_is_common_to_all_taxels(grasp):
+    faults, times = MagneticFaults(field=400), np.asarray(grasp.modules["thumb"].times)
+    field = faults.field_at(times)
+    assert (field[times <= STILL_SECONDS_AT_START] == 0).all()
+    assert np.linalg.norm(field, axis=1).max() == pytest.approx(800, rel=0.1)
+    for name, counts in spoiled(grasp, field=400).items():
+        change = counts - np.asarray(grasp.modules[name].readings, dtype=float)
+        turned = np.einsum("ijk,nik->nij", grasp.modules[name].sensor.rotations, change)
+        assert np.abs(turned - field[:, None]).max() < 1  # rounding
+
+
+def test_zeros_are_invalid_readings(grasp):
+    share, bit = 0.03, list(Fault).index(Fault.INVALID)
+    estimates = detect(Model.load("builtin:any"), recorded(grasp, spoiled(grasp, zero_share=share)))
+    for trace in estimates.fingers.values():
+        assert (trace.faults >> bit & 1).mean() == pytest.approx(share, rel=0.3)
+
+
+def test_a_drift_shows_in_a_hold(grasp):
+    """With 30 taxels of random sign: 3600 counts an hour are 60 a minute in each of them."""
+    times = np.arange(0, 60, 0.1)
+    still = {"thumb": np.full((600, 30, 3), 33_000, dtype=np.uint16)}
+    thumb = grasp.modules["thumb"].sensor
+    rest = {"thumb": np.full((30, 3), 32_000.0)}
+    counts = MagneticFaults(drift=36_000).apply({"thumb": thumb}, still, times, rest, 5)["thumb"]
+    drift = HoldDrift()
+    for time, sample in zip(times, counts, strict=True):
+        drift.update(np.einsum("ijk,ik->j", thumb.rotations, sample - rest["thumb"]), time)
+    assert drift.seconds > 50 and abs(drift.per_minute) > 100
+
+
+def test_cross_talk_is_found():
+    times = np.arange(0, 9, 0.05)
+    rng, thumb = np.random.default_rng(0), synthetic_recording("made", 0).modules["thumb"].sensor
+    grip = np.interp(times, [1.5, 2, 7, 7.4], [0, 1, 1, 0])[:, None, None]
+    load = grip * rng.uniform(0.1, 1, (30, 1)) * [50, 20, 900]
+    noise = 33_000 + rng.normal(0, 2, (2, len(times), 30, 3))
+    counts = {"thumb": np.rint(noise[0] + load), "index": np.rint(noise[1])}
+    rest = dict.fromkeys(counts, np.full((30, 3), 33_000.0))
+    sensors = dict.fromkeys(counts, thumb)
+    found = MagneticFaults(cross_talk=0.1).apply(sensors, counts, times, rest, 5)
+    comparison = ModuleComparison()
+    (alike,) = [
+        each
+        for k, time in enumerate(times)
+        for each in comparison.update({name: own[k] for name, own in found.items()}, time)
+    ]
+    assert (alike.module, alike.other) == ("index", "thumb")
+    assert alike.share == pytest.approx(0.1, rel=0.1)
+
+
+def test_an_aged_skin_is_weaker_and_noisier(grasp):
+    aged = spoiled(grasp, invented_months=4)["thumb"]
+    fresh = np.asarray(grasp.modules["thumb"].readings, dtype=float)
+    assert np.ptp(aged.astype(float).mean(axis=1)[:, 2]) < np.ptp(fresh.mean(axis=1)[:, 2])
+    assert np.diff(aged[:60].astype(float), axis=0).std() > np.diff(fresh[:60], axis=0).std()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"drift": np.inf}, "drift: at least 0 expected, inf given"),
+        ({"zero_share": 2}, "a turn time above 0, and shares of at most 1 expected"),
+        ({"turn_time": 0}, "a turn time above 0, and shares of at most 1 expected"),
+    ],
+)
+def test_troubles_that_cannot_be(options, message):
+    with pytest.raises(ValueError, match=message):
+        MagneticFaults(**options)
