@@ -15,6 +15,7 @@ from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.cdr import MessageEncoder
 from holdfast.io.definitions import parse_definition
+from holdfast.io.foreign import read_stickers
 from holdfast.sensors import sensor
 from holdfast_ros.sensor_messages import SENS_STREAM
 
@@ -40,6 +41,28 @@ def attack_imports(n_tried: int) -> Iterator[CpuResult]:
             data_set = Path(folder) / "set"
             whole = data_set if data_set.is_dir() else original.with_stem("damaged")
             yield _attack(name, original, whole, n_tried)
+
+
+def attack_videos(n_tried: int) -> CpuResult:
+    """Look for stickers in damaged copies of a film."""
+    import cv2
+
+    result, chance = CpuResult("videos, .mp4"), Random(7)
+    book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    sticker = np.pad(cv2.aruco.generateImageMarker(book, 0, 48), 16, constant_values=255)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (160, 120))
+        for k in range(12):
+            grey = np.full((120, 160), 120, np.uint8)
+            grey[20:100, 20 + k : 100 + k] = sticker
+            film.write(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR))
+        film.release()
+        data = path.read_bytes()
+        for k in range(n_tried):
+            path.write_bytes(damaged(data, chance) if k % 4 else cut(data, chance))
+            result.timed(lambda: bool(read_stickers(path)[1]), RecordingError)
+    return result
 
 
 def _attack(name: str, original: Path, whole: Path, n_tried: int) -> CpuResult:
