@@ -283,6 +283,7 @@ C_FEATURES = (
 
 CHECK_FEATURES = """
 import sys
+from dataclasses import replace
 import numpy as np
 from holdfast import Detector, Model, detect, fingertip_force, load_recording
 from holdfast.features.stream import extract
@@ -293,8 +294,10 @@ assert Model.load(sys.argv[3]).digest == model.digest
 names = [str(spec) for spec in model.finger("thumb").features]
 assert names == ["F_a", "shear", "range[14]"], names
 
-# The values of the kernel are those of NumPy.
+# The values of the kernel are those of NumPy, of a skin from which no field of the earth is taken.
 plan = model.plan(model.fingers_of({n: m.sensor for n, m in recording.modules.items()}), 150.0)
+sensors = {n: replace(sensor, magnetic=False) for n, sensor in plan.sensors.items()}
+plan = replace(plan, sensors=sensors)
 features = extract(plan, recording)
 for finger, module in recording.modules.items():
     force = fingertip_force(module.readings, module.sensor, model.tare, module.times)
