@@ -11,7 +11,7 @@ from attack.documents import (
     attack_others,
 )
 from attack.expansions import attack_expansions
-from attack.imports import attack_imports
+from attack.imports import attack_imports, attack_videos
 from attack.recordings import (
     DAMAGES,
     attack_damage,
@@ -39,6 +39,7 @@ def attacks(scale: float) -> Iterator[Result]:
     yield from attack_others(n(5_000))
     yield attack_definitions(n(10_000))
     yield from attack_imports(n(3_000))
+    yield attack_videos(n(3_000))
     yield attack_kills(n(200))
     yield from attack_expansions()
     yield _memory()

@@ -1,5 +1,6 @@
-"""Attacks on the import of other formats: damaged CSV, HDF5, bags of ROS and LeRobot."""
+"""Attacks on the import of other formats: damaged CSV, arrays, bags of ROS and LeRobot."""
 
+import json
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,8 @@ from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.cdr import MessageEncoder
 from holdfast.io.definitions import parse_definition
+from holdfast.io.foreign import read_stickers
+from holdfast.sensors import sensor
 from holdfast_ros.sensor_messages import SENS_STREAM
 
 KIND = "xela_server_ros2/msg/SensStream"
@@ -28,6 +31,7 @@ def attack_imports(n_tried: int) -> Iterator[CpuResult]:
         ("csv", _csv), ("gtac", _gtac), ("eflesh", _eflesh), ("arq-crisp", _hdf5),
         ("rosbag", _db3), ("rosbag", _bag),
         ("lerobot", _lerobot_data), ("lerobot", _lerobot_episodes),
+        ("arrays", _npz), ("arrays", _mat), ("arrays", _parquet), ("arrays", _lines),
     ):  # fmt: skip
         with TemporaryDirectory() as folder:
             try:
@@ -39,17 +43,43 @@ def attack_imports(n_tried: int) -> Iterator[CpuResult]:
             yield _attack(name, original, whole, n_tried)
 
 
+def attack_videos(n_tried: int) -> CpuResult:
+    """Look for stickers in damaged copies of a film."""
+    import cv2
+
+    result, chance = CpuResult("videos, .mp4"), Random(7)
+    book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    sticker = np.pad(cv2.aruco.generateImageMarker(book, 0, 48), 16, constant_values=255)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (160, 120))
+        for k in range(12):
+            grey = np.full((120, 160), 120, np.uint8)
+            grey[20:100, 20 + k : 100 + k] = sticker
+            film.write(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR))
+        film.release()
+        data = path.read_bytes()
+        for k in range(n_tried):
+            path.write_bytes(damaged(data, chance) if k % 4 else cut(data, chance))
+            result.timed(lambda: bool(read_stickers(path)[1]), RecordingError)
+    return result
+
+
 def _attack(name: str, original: Path, whole: Path, n_tried: int) -> CpuResult:
     """Import damaged copies of a file; `whole` is the copy, or the folder with the file."""
     of_folder = f" {original.parent.parent.name}" if whole.is_dir() else ""
     result = CpuResult(f"import {name}{of_folder}, {original.suffix}")
     chance, data = Random(7), original.read_bytes()
-    if not list(import_recordings(whole if whole.is_dir() else original, name)):
+    sensors = {"*": sensor("anyskin")} if name == "arrays" else None
+    undamaged = whole if whole.is_dir() else original
+    if not list(import_recordings(undamaged, name, sensors=sensors)):
         raise ValueError(f"{name}: the undamaged file has no recording")
     path = original if whole.is_dir() else whole
     for k in range(n_tried):
         path.write_bytes(damaged(data, chance) if k % 4 else cut(data, chance))
-        result.timed(lambda: bool(list(import_recordings(whole, name))), RecordingError)
+        result.timed(
+            lambda: bool(list(import_recordings(whole, name, sensors=sensors))), RecordingError
+        )
     return result
 
 
@@ -88,6 +118,38 @@ def _hdf5(folder: Path) -> Path:
         group["tactile_timestamps"] = 5.5 * np.arange(8)
         group["tactile_slips_label"] = np.array([0, 3, 4, 5, 4, 2, 0, 0])
     return path
+
+
+def _skin() -> dict[str, np.ndarray]:
+    return {"t": np.arange(8) / 100, "tactile": np.arange(8.0 * 15).reshape(8, 5, 3)}
+
+
+def _npz(folder: Path) -> Path:
+    np.savez(folder / "a.npz", **_skin())
+    return folder / "a.npz"
+
+
+def _mat(folder: Path) -> Path:
+    from scipy.io import savemat
+
+    savemat(folder / "a.mat", _skin())
+    return folder / "a.mat"
+
+
+def _parquet(folder: Path) -> Path:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = {name: values.tolist() for name, values in _skin().items()}
+    pq.write_table(pa.table(columns), folder / "a.parquet")
+    return folder / "a.parquet"
+
+
+def _lines(folder: Path) -> Path:
+    rows = zip(*(values.tolist() for values in _skin().values()), strict=True)
+    lines = [json.dumps({"t": time, "tactile": sample}) for time, sample in rows]
+    (folder / "a.jsonl").write_text("\n".join(lines))
+    return folder / "a.jsonl"
 
 
 def _lerobot(folder: Path) -> Path:

@@ -13,11 +13,11 @@ from holdfast.errors import OutputError
 from holdfast.files import file_stem, whole_file
 from holdfast.io import load_recording, save_recording
 from holdfast.parallel import Engine
+from holdfast.twin import simulation
 from holdfast.twin.objects import load_objects
 from holdfast.twin.profile import GRASP_ATTEMPTS
 from holdfast.twin.profile import profile as check_profile
 from holdfast.twin.simulation import GRASP_CASES, Grasp
-from holdfast.twin.simulation import simulate as run
 
 T = TypeVar("T")
 GraspSteps = Callable[[Iterable[T], str, float], Iterable[T]]
@@ -146,7 +146,7 @@ def simulate_grasp(grasp: Grasp, out: Path, force: bool) -> list[str]:
         trial = replace(grasp, attempt=attempt)
         if not force and _exists(trial, path_of(trial.failed_name, out)):
             continue
-        recording = run(trial)
+        recording = simulation.simulate(trial)
         save_recording(recording, path_of(recording.name, out), force=force)
         names.append(recording.name)
         if recording.metadata["case"] != "failed":

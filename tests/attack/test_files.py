@@ -22,6 +22,7 @@ results += [documents.attack_models(60), documents.attack_labels(60)]
 results += [documents.attack_label_bits(200), documents.attack_definitions(200)]
 results += documents.attack_others(40)
 results += imports.attack_imports(40)
+results += [imports.attack_videos(30)]
 for result in results:
     print(json.dumps(result.document()))
 """
@@ -51,7 +52,10 @@ def test_no_file_gives_a_wrong_value_or_an_exception_that_is_not_documented(resu
         "labels, CSV",
         "ROS definitions, and messages by them",
         "import lerobot data, .parquet",
+        "videos, .mp4",
         "import lerobot episodes, .parquet",
+        "import arrays, .mat",
+        "import arrays, .jsonl",
     ],
 )
 def test_some_files_are_accepted_and_some_refused(results, name):

@@ -111,7 +111,7 @@ def test_help_names_every_verb_and_loads_nothing_heavy():
         (["fly"], "holdfast: No such command 'fly'"),
         (["--fast"], "holdfast: No such option: --fast"),
         (["doctor", "--fast"], "holdfast: No such option: --fast"),
-        (["doctor", "now"], "holdfast: Got unexpected extra argument"),
+        (["doctor", "now", "then"], "holdfast: Got unexpected extra argument"),
         (["sensors", "--plot"], "holdfast: Option '--plot' requires an argument"),
     ],
 )

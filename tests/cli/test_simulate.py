@@ -108,6 +108,25 @@ def test_recordings_with_other_settings_are_refused(capsys, out, words, text):
     assert "--force" in line
 
 
+def test_a_video_is_written_beside_each_recording_once(capsys, out, monkeypatch):
+    pytest.importorskip("cv2")
+    from holdfast.twin import webcam
+
+    filmed = []
+
+    def film(recording, path, camera):
+        filmed.append((recording.name, camera.fps))
+        path.write_bytes(b"film")
+
+    monkeypatch.setattr(webcam, "film_stickers", film)
+    assert run(capsys, out, *ONE, "--video")[0] == 0
+    assert names(out) == ["flask-case1-1.mp4", "flask-case1-1.parquet"]
+    assert run(capsys, out, *ONE, "--video")[0] == 0
+    assert filmed == [("flask-case1-1", 60.0)]
+    assert run(capsys, out, *ONE, "--video", "--fps", 30, "--force")[0] == 0
+    assert filmed[1:] == [("flask-case1-1", 30.0)]
+
+
 def test_force_simulates_all_again(capsys, out):
     run(capsys, out, *ONE)
     code, printed, _ = run(capsys, out, *ONE, "--seed", 1, "--force", "--json")

@@ -186,16 +186,15 @@ def test_a_killed_search_goes_on_to_the_same_end(capsys, data, model, tmp_path):
 def test_an_interrupt_names_resume(capsys, data, model, monkeypatch):
     from holdfast.training import tuning
 
-    losses = tuning._loss
-    n_trials = []
+    add, n_trials = tuning.Journal.add, []
 
     def stops(*given):
         n_trials.append(1)
         if len(n_trials) == 3:
             raise KeyboardInterrupt
-        return losses(*given)
+        add(*given)
 
-    monkeypatch.setattr(tuning, "_loss", stops)
+    monkeypatch.setattr(tuning.Journal, "add", stops)
     code, out, err = run(capsys, data, "-o", model, "--trials", 4)
     assert (code, out) == (130, "")
     assert err == (

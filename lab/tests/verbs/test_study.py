@@ -5,7 +5,7 @@ import msgspec
 import pytest
 
 from command_line import Verb
-from holdfast import cluster
+from holdfast import cluster, twin_recordings
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
@@ -98,8 +98,10 @@ def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
     monkeypatch.setattr(verb, "QUICK_CORPORA", {"main": verb.TwinCorpus()})
     monkeypatch.setattr(verb, "QUICK_REPEATS", {"main": 1})
-    known = verb.plan_grasps
-    monkeypatch.setattr(verb, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more))
+    known = twin_recordings.plan_grasps
+    monkeypatch.setattr(
+        twin_recordings, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
+    )
     out = tmp_path / "out"
     words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
     code, printed, err = run(capsys, *words)
@@ -224,7 +226,7 @@ def test_corpora_of_three_rates_of_glitches():
 def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
     given = []
     monkeypatch.setattr(
-        "holdfast.twin_recordings.simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
+        twin_recordings, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
     )
     verb._simulate(tmp_path / "one", verb.TWIN_CORPORA["glitch-1"], 5, 1, 1)
     assert {grasp.glitch_rate for grasp in given} == {1 / 60}

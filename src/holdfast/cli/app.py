@@ -47,7 +47,7 @@ VERB_GROUPS = {
         "export": "Export a model as C or ONNX, or recordings to other tools.",
         "datasets": "List public recordings, download them and import them.",
         "sensors": "List the known sensors and hands, or show one of them.",
-        "doctor": "Check the installation and the reachable sources.",
+        "doctor": "Check the installation and the sources, or the modules of one.",
     },
     "Laboratory": {
         "trial": "Compare laws of grip force on the twin, all on the same trials.",

@@ -32,7 +32,7 @@ def doctor(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check the installation and the reachable sources, or the modules of a source.
+    """Check the installation and the sources, or the modules of one.
 
     Report Python, the packages, the extras and how to install them, the kernel, the
     live sources that can be reached, which limits hold for imports (time, time of the processor,

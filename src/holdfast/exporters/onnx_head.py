@@ -13,7 +13,7 @@ import numpy as np
 from holdfast.classifiers import Linear, Onnx
 from holdfast.classifiers.linear import MAX_DEVIATION
 from holdfast.errors import MissingExtra, ModelError
-from holdfast.model import FingerModel, Model
+from holdfast.model import Model
 from holdfast.sensors.types import Array
 
 OPSET, IR_VERSION = 13, 8
@@ -45,6 +45,36 @@ class _Graph:
         self.nodes.append(self.onnx.helper.make_node(operator, inputs, [output]))
         return output
 
+    def linear(self, name: str, rule: Linear) -> str:
+        """Add w . phi + w_0 with its input, and return its name."""
+        # Scale and calibration are inside the weights: the input is features as they are computed.
+        weights = rule.raw_weights()[0]
+        self.inputs.append(self.value(f"{name}_features", rule.n_features))
+        factors = self.constant(f"{name}_weights", weights[1:, None])
+        product = self.node("MatMul", [f"{name}_features", factors], f"{name}_product")
+        offset = self.constant(f"{name}_offset", weights[:1])
+        return self.node("Add", [product, offset], f"{name}_log_odds")
+
+    def with_squares(self, name: str, value: str, rule: Linear) -> str:
+        """Add sum_j q_j min(|u_j|, 5)^2 with u_j = (phi_j - mean_j) / scale_j; return its name."""
+        mean, scale, weight = rule.raw_squares()
+        means = self.constant(f"{name}_mean", mean)
+        apart = self.node("Sub", [f"{name}_features", means], f"{name}_apart")
+        scales = self.constant(f"{name}_scale", scale)
+        deviation = self.node("Mul", [apart, scales], f"{name}_deviation")
+        size = self.node("Abs", [deviation], f"{name}_size")
+        limit = self.constant(f"{name}_limit", np.array([MAX_DEVIATION]))
+        bounded = self.node("Min", [size, limit], f"{name}_bounded")
+        square = self.node("Mul", [bounded, bounded], f"{name}_square")
+        weights = self.constant(f"{name}_square_weights", weight[:, None])
+        squares = self.node("MatMul", [square, weights], f"{name}_squares")
+        return self.node("Add", [value, squares], f"{name}_with_squares")
+
+    def finish(self, name: str, value: str) -> None:
+        """Add the logistic function as an output."""
+        self.node("Sigmoid", [value], name)
+        self.outputs.append(self.value(name, 1))
+
     def value(self, name: str, width: int) -> Any:  # noqa: ANN401 (of onnx)
         """Return the description of (n, width) numbers."""
         double = self.onnx.TensorProto.DOUBLE
@@ -67,8 +97,23 @@ def onnx_of(model: Model) -> tuple[bytes, tuple[str, ...]]:
     except ImportError as cause:
         raise MissingExtra("onnx", "onnx") from cause
     graph = _Graph(onnx)
-    for name, part in model.fingers.items():
-        _add_finger(graph, "any" if name == "*" else name, part)
+    for finger, part in model.fingers.items():
+        name = "any" if finger == "*" else finger
+        if isinstance(part.stable.rule, Onnx):
+            raise ModelError(
+                f"the classifier of {name} is the ONNX file {part.stable.rule.file!r} beside the "
+                "model already; linear classifiers are exported"
+            )
+        if part.handling:
+            raise ModelError(
+                f"the model has own handling of {', '.join(part.handling)}; a recording of the "
+                "hand (--like) or its sensor and fingers expected, so that one of them is used"
+            )
+        graph.finish(f"{name}_stable", graph.linear(name, part.stable.linear))
+        if part.slip is not None:
+            rule, slip = part.slip.linear, f"{name}_slip"
+            value = graph.linear(slip, rule)
+            graph.finish(slip, graph.with_squares(slip, value, rule) if rule.squares else value)
     made = onnx.helper.make_graph(
         graph.nodes, "holdfast", graph.inputs, graph.outputs, graph.constants
     )
@@ -79,56 +124,3 @@ def onnx_of(model: Model) -> tuple[bytes, tuple[str, ...]]:
     onnx.checker.check_model(file)
     content: bytes = file.SerializeToString()
     return content, tuple(output.name for output in graph.outputs)
-
-
-def _add_finger(graph: _Graph, name: str, part: FingerModel) -> None:
-    if isinstance(part.stable.rule, Onnx):
-        raise ModelError(
-            f"the classifier of {name} is the ONNX file {part.stable.rule.file!r} beside the model "
-            "already; linear classifiers are exported"
-        )
-    if part.handling:
-        raise ModelError(
-            f"the model has own handling of {', '.join(part.handling)}; a recording of the "
-            "hand (--like) or its sensor and fingers expected, so that one of them is used"
-        )
-    value = _linear(graph, name, part.stable.linear)
-    _finish(graph, f"{name}_stable", value)
-    if part.slip is not None:
-        value = _linear(graph, f"{name}_slip", part.slip.linear)
-        if part.slip.linear.squares:
-            value = _with_squares(graph, f"{name}_slip", value, part.slip.linear)
-        _finish(graph, f"{name}_slip", value)
-
-
-def _linear(graph: _Graph, name: str, rule: Linear) -> str:
-    """Add w . phi + w_0, and return its name."""
-    # Scale and calibration are inside the weights: the input is features as they are computed.
-    weights = rule.raw_weights()[0]
-    graph.inputs.append(graph.value(f"{name}_features", rule.n_features))
-    factors = graph.constant(f"{name}_weights", weights[1:, None])
-    product = graph.node("MatMul", [f"{name}_features", factors], f"{name}_product")
-    offset = graph.constant(f"{name}_offset", weights[:1])
-    return graph.node("Add", [product, offset], f"{name}_log_odds")
-
-
-def _with_squares(graph: _Graph, name: str, value: str, rule: Linear) -> str:
-    """Add sum_j q_j min(|u_j|, 5)^2 with u_j = (phi_j - mean_j) / scale_j; return its name."""
-    mean, scale, weight = rule.raw_squares()
-    means = graph.constant(f"{name}_mean", mean)
-    apart = graph.node("Sub", [f"{name}_features", means], f"{name}_apart")
-    scales = graph.constant(f"{name}_scale", scale)
-    deviation = graph.node("Mul", [apart, scales], f"{name}_deviation")
-    size = graph.node("Abs", [deviation], f"{name}_size")
-    limit = graph.constant(f"{name}_limit", np.array([MAX_DEVIATION]))
-    bounded = graph.node("Min", [size, limit], f"{name}_bounded")
-    square = graph.node("Mul", [bounded, bounded], f"{name}_square")
-    weights = graph.constant(f"{name}_square_weights", weight[:, None])
-    squares = graph.node("MatMul", [square, weights], f"{name}_squares")
-    return graph.node("Add", [value, squares], f"{name}_with_squares")
-
-
-def _finish(graph: _Graph, name: str, value: str) -> None:
-    """Add the logistic function as an output."""
-    graph.node("Sigmoid", [value], name)
-    graph.outputs.append(graph.value(name, 1))

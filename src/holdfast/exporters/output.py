@@ -32,21 +32,16 @@ def whole_folder(
         )
     with _staging_beside(out) as staging:
         yield staging
-        _replace(out, staging)
-
-
-def _replace(out: Path, staging: Path) -> None:
-    """Move a folder to `out`; what is there goes beside it, and comes back after an error."""
-    before = staging.with_name(f"{staging.name}.before")
-    existed = out.exists()
-    if existed:
-        out.replace(before)
-    try:
-        staging.replace(out)
-    except OSError:
+        # What is there goes beside the new folder; it is removed with it, or comes back.
+        before, existed = staging.with_name(f"{staging.name}.before"), out.exists()
         if existed:
-            before.replace(out)
-        raise
+            out.replace(before)
+        try:
+            staging.replace(out)
+        except OSError:
+            if existed:
+                before.replace(out)
+            raise
 
 
 @contextmanager

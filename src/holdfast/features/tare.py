@@ -109,7 +109,7 @@ def baseline_of(
     start = first_finite(readings)
     if tare.kind == "first":
         return readings[start].astype(np.float64), start
-    # From the first finite sample on: a device may begin with samples that it has not filled yet.
+    # From the first finite sample on, as in a stream.
     inside = times - times[start] + 0.5 * period < tare.seconds
     inside[: start + 1] = True  # one sample at least
     return _mean(readings[inside], tare), int(inside.sum())

@@ -50,7 +50,7 @@ def recording_errors(path: Path) -> Iterator[None]:
     except HoldfastError:
         raise
     except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
+        raise RecordingError(f"cannot read {path}: {cause.strerror or one_line(cause)}") from cause
     except MemoryError as cause:
         raise RecordingError(f"{path} does not fit into memory: {one_line(cause)}") from cause
     except Exception as cause:

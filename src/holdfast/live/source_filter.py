@@ -266,6 +266,8 @@ class SourceFilter:
 
     def _hidden(self) -> tuple[tuple[FingerFaults, Reason], ...]:
         """Return the faults that hold now; a silent finger is rather a gap than a fault."""
+        if not (self._faults or self._silent):  # nearly always
+            return ()
         gap = dict.fromkeys(self._silent, (Fault.PACKET_GAP,))
         both = ((self._faults, Reason.FAULT), (gap, Reason.GAP))
         return tuple((dict(faults), reason) for faults, reason in both if faults)

@@ -253,7 +253,7 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     alarms = alarm_indices(state)
     first = first_alarms(time, alarms, windows)[0]
     others = alarms[outside(time, windows)[alarms]]
-    # Where nothing is labelled nobody can say that an alarm is wrong.
+    # An alarm where nothing is labelled is neither right nor wrong.
     false = others[label[others] != UNKNOWN]
     return AlarmMatch(
         tuple(

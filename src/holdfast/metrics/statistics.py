@@ -73,7 +73,7 @@ def quantile(ordered: Array, q: float) -> float | None:
     """
     if not len(ordered):
         return None
-    # Rounded: 0.95 * 20 is a little more than 19, and would give an infinite neighbour a weight.
+    # Rounded: a product a little above a whole number would give an infinite neighbour a weight.
     position = round(q * (len(ordered) - 1), 9)
     lower = math.floor(position)
     fraction = position - lower

@@ -18,6 +18,7 @@ def upgraded(model: Document) -> Document:
     try:
         tuning = model.get("tuning")
         fingers = {name: _finger(part, tuning) for name, part in model["fingers"].items()}
+        # One tuning for the whole model, which now is the choice of each head `stable`.
         kept = {key: value for key, value in model.items() if key != "tuning"}
         return {**kept, "fingers": fingers, "schema": "holdfast.model/2"}
     except (KeyError, TypeError, AttributeError, IndexError) as cause:
@@ -28,9 +29,12 @@ def _finger(part: Document, tuning: Document | None) -> Document:
     part = dict(part)
     features, classifier = part.pop("features"), part.pop("classifier")
     causes, slip = part.pop("causes", None), part.pop("slip", None)
+    # In the order of `HEAD_NAMES`, as models of the present schema are written.
     heads = [_head("stable", features, classifier, choice=_tuned(tuning))]
     if slip is not None:
-        slip = dict(slip)
+        slip = dict(
+            slip
+        )  # a copy, as each part of it is taken out; the rest are fields of the head
         own, speed = slip.pop("features", features), slip.pop("speed", None)
         rule = {**slip.pop("classifier"), "squares": slip.pop("squares", None)}
         choice = _chosen(slip.pop("thresholds", None))
@@ -54,6 +58,7 @@ def _head(name: Any, features: list[str], rule: Document, **fields: Any) -> Docu
     if "coefficients" in rule:
         rule.setdefault("type", "linear")
         rows = rule.pop("coefficients")
+        # Causes had a row of weights for each; the other heads had one row without a table.
         is_table = "intercepts" in rule
         rule["weights"] = rows if is_table else [rows]
         rule["intercepts"] = rule["intercepts"] if is_table else [rule.pop("intercept")]

@@ -108,6 +108,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 field, another shape, a number that is not finite, or another schema; an ONNX
                 file that it names is missing, too large or another.
         """
+        # Fields, not the object: a subclass that loads a built-in model gets its own type.
         if str(path).startswith("builtin:"):
             return cls(**msgspec.structs.asdict(built_in(str(path))))
         return read_model(path, cls)
@@ -144,6 +145,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         def changed(part: FingerModel) -> FingerModel:
             head = part.head(name)
+            # Own handling would win over the threshold that is set here.
             part = part.without_thresholds(name)
             return part if head is None else part.with_heads(head.at(threshold, choice))
 
@@ -160,6 +162,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             ModelError: the model does not have that finger.
         """
+        # A model of any finger has no others.
         part = self.fingers.get(ANY_FINGER) or self.fingers.get(name)
         if part is None:
             raise ModelError(f"the model has no finger {name!r}; it has {', '.join(self.fingers)}")
@@ -275,6 +278,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         features = {name: self.finger(name).features for name in sensors}
         relative = any(spec.seconds for specs in features.values() for spec in specs)
         low, high = RELATIVE_RATES
+        # The model's rate where it has one: the source is resampled to it.
         rate = self.rate or source_rate
         if relative and not low * (1 - EXACT_RATE) <= rate <= high * (1 + EXACT_RATE):
             raise ModelError(

@@ -139,6 +139,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     @property
     def features(self) -> tuple[FeatureSpec, ...]:
         """Features of all heads: those of `stable` in their order, then others of the rest."""
+        # By the name of the head: a model file may list them in any order.
         ordered = sorted(self.heads, key=lambda head: HEAD_NAMES.index(head.name))
         return tuple(dict.fromkeys(spec for head in ordered for spec in head.features))
 
@@ -161,6 +162,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     def default_handling(self) -> tuple[Array, Array]:
         """Location and scale of `features` without own handling: those of `stable`, else `slip`."""
         location, scale = np.zeros(len(self.features)), np.ones(len(self.features))
+        # `stable` last: where both use a feature, its moments count.
         for head in (self.slip, self.stable):
             if head is not None and isinstance(head.rule, Linear):
                 location[self.indices(head)], scale[self.indices(head)] = head.rule.moments
@@ -185,7 +187,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             if isinstance(head.rule, Linear):
                 columns = self.indices(head)
                 location, scale = after[0][columns], after[1][columns]
-                if head.name not in ("stable", "slip"):
+                if head.name not in ("stable", "slip"):  # the shift and stretch of the handling
                     mean, own_scale = head.rule.moments
                     ratio = scale / before[1][columns]
                     location = location + ratio * (mean - before[0][columns])

@@ -238,7 +238,7 @@ def location_and_scale(features: Array) -> tuple[Array, Array]:
     tails = math.erfc(c / math.sqrt(2))
     density = math.exp(-0.5 * c * c) / math.sqrt(2 * math.pi)
     shrinkage = math.sqrt(1 - tails * (1 - c * c) - 2 * c * density)
-    # From the median, which half of the samples may not move, and a scale that is rather too large.
+    # From the median, which few samples cannot move, and a scale that they make too large.
     location, scale = np.median(features, axis=0), features.std(axis=0)
     for _ in range(MAX_CLIP_STEPS):
         before = location, scale

@@ -71,7 +71,20 @@ class Uskin:
         self.parameters = parameters
         self.sensor = sensor
         self.shares = taxel_shares(nodes, sensor.positions, parameters.spread)
-        self.taxels = _draw_taxels(parameters, sensor.n_taxels, generator)
+        # The order of the draws is part of the seed; still taxels have a generator of their own, so
+        # that they leave it as it is. Gains have the median 1.
+        n = sensor.n_taxels
+        gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
+        axes = parameters.cross_talk * generator.standard_normal((n, 3, 3))
+        axes[:, range(3), range(3)] = 1.0
+        rest, warm = generator.standard_normal((2, n, 3))
+        still = generator.spawn(1)[0].random(n) < parameters.still_share
+        self.taxels = Taxels(
+            gains[:, None, None] * axes,
+            parameters.baseline + rest * parameters.baseline_spread,
+            parameters.thermal_counts + warm * parameters.thermal_spread,
+            np.where(still, 0.0, 1.0),
+        )
         self._generator = generator
 
     def taxel_forces(self, node_forces: npt.ArrayLike) -> Array:
@@ -132,21 +145,6 @@ class Uskin:
                 not increase.
         """
         return self.readout(generator).counts(taxel_forces, times)
-
-
-def _draw_taxels(parameters: UskinParameters, n: int, generator: np.random.Generator) -> Taxels:
-    """Draw the fixed properties of `n` taxels, with gains of median 1."""
-    gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
-    axes = parameters.cross_talk * generator.standard_normal((n, 3, 3))
-    axes[:, range(3), range(3)] = 1.0
-    rest, warm = generator.standard_normal((2, n, 3))
-    still = generator.spawn(1)[0].random(n) < parameters.still_share
-    return Taxels(
-        gains[:, None, None] * axes,
-        parameters.baseline + rest * parameters.baseline_spread,
-        parameters.thermal_counts + warm * parameters.thermal_spread,
-        np.where(still, 0.0, 1.0),
-    )
 
 
 def last_updates(times: npt.ArrayLike, rate: float, phase: float) -> Integers:

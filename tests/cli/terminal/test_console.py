@@ -6,7 +6,7 @@ from contextlib import redirect_stdout
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from holdfast.cli.terminal.console import (
@@ -127,6 +127,7 @@ class TestWidth:
         st.lists(st.text("ab-_/. ", max_size=300), min_size=1, max_size=5),
         st.lists(st.integers(0, 10**6), min_size=1, max_size=4),
     )
+    @example(["_" * 25], [0, 0, 0])  # each column is as narrow as it can be
     def test_every_table_of_few_columns_fits(self, names, numbers):
         header = ("name", "notes of a person", *("number of samples",) * len(numbers))
         text = printed_table(header, [(name, name[::-1], *numbers) for name in names])

@@ -280,3 +280,14 @@ def test_a_folder_with_tables_is_one_of_tables(tmp_path):
         tmp_path / "b.csv", np.column_stack([TIMES, FLAT]), "%.3f", ",", header=names, comments=""
     )
     assert list(imported(tmp_path, {"*": SKIN})) == ["b"]
+
+
+def test_only_the_last_line_of_json_may_be_cut(tmp_path):
+    file = lines(tmp_path / "a", ({"t": t, "data": x} for t, x in samples()))
+    text = file.read_text()
+    file.write_text(text[:-30])
+    module = imported(file, {"*": SKIN})["a"]["finger1"]
+    np.testing.assert_array_equal(module.readings, READINGS[:-1])
+    file.write_text(text.replace('"data"', '"data', 1))
+    with pytest.raises(RecordingError, match=r"a\.jsonl: record 1 is damaged: "):
+        imported(file, {"*": SKIN})

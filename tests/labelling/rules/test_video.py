@@ -109,6 +109,12 @@ def test_irregular_stamps_and_short_gaps_are_no_hindrance(film):
     assert starts == pytest.approx([s for s, _ in SLIPS], abs=0.03)
 
 
+def test_thirty_pictures_a_second_are_enough(film):
+    film(*places(fps=30.0))
+    found = slips_of(propose("tracking", recording(), video="run.mp4")["index"])
+    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.04)
+
+
 def test_an_offset_and_numbers_of_stickers_can_be_given(film):
     times, found = places(tip=7)
     film(times, found)

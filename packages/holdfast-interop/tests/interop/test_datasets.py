@@ -160,7 +160,7 @@ def test_bad_input(capsys, made_up):
     assert text == (
         "arq-slip-2023 is not downloaded: its data are not in the repository: ask its authors "
         "(https://github.com/ARQ-CRISP); there are also uskin-pick-move, eflesh-tugs, gtac-grasps, "
-        "gtac-manipulation, arq-slip-2021, made-up"
+        "gtac-manipulation, arq-slip-2021, anyskin-slip, made-up"
     )
     text = refused(capsys, "get", "made-up", "out", "--mirror", "ftp://x")
     assert text == "--mirror: an address such as http://HOST:8000 expected, 'ftp://x' given"
@@ -211,7 +211,8 @@ def skin_csv(seed, n=500):
     """A file of the columns of `anyskin-slip`, 231 Hz: the readings tremble while it slips."""
     draw = np.random.default_rng(seed)
     slips = (np.arange(n) % 100 >= 70) & (np.arange(n) > 150)
-    values = draw.normal(0, 1, (n, 15)) + 300 * (np.arange(n) > 130)[:, None]
+    press = np.tile([20, 5, 300], 5) * np.repeat([0.35, 0.8, 1, 0.6, 0.2], 3)
+    values = draw.normal(0, 1, (n, 15)) + press * np.clip(np.arange(n) / 20 - 6, 0, 1)[:, None]
     values += slips[:, None] * draw.normal(0, 12, (n, 15))
     names = [f"mag{node}_{axis}" for node in range(1, 6) for axis in "xyz"]
     rows = [

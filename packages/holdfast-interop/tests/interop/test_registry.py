@@ -36,7 +36,7 @@ def test_what_the_facts_say():
     counts = {name: len(public.files) for name, public in public_sets().items() if public.files}
     assert counts == {
         "uskin-pick-move": 42, "eflesh-tugs": 138, "gtac-grasps": 39, "gtac-manipulation": 10,
-        "arq-slip-2021": 3,
+        "arq-slip-2021": 3, "anyskin-slip": 17,
     }  # fmt: skip
     first_digits = [file.sha256[:8] for file in find_set("arq-slip-2021").files]
     assert first_digits == ["a2aef56b", "c8124b29", "a8c4f14e"]

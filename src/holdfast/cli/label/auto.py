@@ -31,7 +31,8 @@ def auto(
     Labels are written to NAME.labels.json beside each recording, and those with low confidence
     are printed. They outrank labels that came with the recording; --dry-run only shows them.
     Labels of a person are overwritten only with --force. The tare is 0.5 s by default; of a
-    recording that begins in contact it is the first sample. See docs/labels.md.
+    recording that begins in contact it is the first sample. The rule tracking reads the video of
+    stickers beside a recording, if there is one. See docs/labels.md.
 
     Example:
       holdfast label auto signal recordings/ --dry-run --json

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.options import ForceOption
-from holdfast.cli.terminal.console import print_line
+from holdfast.cli.options import ForceOption, JsonOption
+from holdfast.cli.terminal.console import print_json, print_line
 from holdfast.errors import require_extras
 
 
@@ -14,6 +14,7 @@ def markers(
     sheet: Annotated[Path, typer.Argument(help="The PDF that is written.")],
     *,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Print stickers by which a camera sees slips.
 
@@ -30,4 +31,7 @@ def markers(
     if sheet.suffix.lower() != ".pdf":
         raise ValueError(f"a file with the suffix .pdf expected, {sheet.name!r} given")
     write_whole(sheet, sticker_sheet(), force=force)
-    print_line(f"{sheet}: print it at 100 %, without scaling to the page")
+    if as_json:
+        print_json({"sheet": sheet})
+    else:
+        print_line(f"{sheet}: print it at 100 %, without scaling to the page")

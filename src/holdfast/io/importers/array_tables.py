@@ -33,6 +33,7 @@ from holdfast.io.importers.generic_csv import (
     Report,
     ReportOnce,
     recordings_of_table,
+    reported_once,
 )
 from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
 from holdfast.recordings import Recording
@@ -114,14 +115,7 @@ def recordings_of_arrays(
     Raises:
         RecordingError: no array fits a sensor, several do, or there are no times.
     """
-    reported: set[str] = set()
-
-    def report_once(guess: str, lines: tuple[str, ...]) -> None:
-        if guess not in reported:
-            reported.add(guess)
-            for line in lines:
-                report(line)
-
+    once = reported_once(report)
     choice = _Choice(path, arrays, columns or Columns(), option)
     if single := choice.single_columns(sensors):
         n = prod(next(iter(single.values())).shape)
@@ -129,7 +123,7 @@ def recordings_of_arrays(
         of_all = dict.fromkeys([ANY_MODULE], next(iter(sensors.values())))
         with errors_named(path):
             yield from recordings_of_table(
-                table[0].names, lambda *_: table, path.name, of_all, columns, report_once
+                table[0].names, lambda *_: table, path.name, of_all, columns, once
             )
         return
     for group, wanted in choice.by_group(sensors).items():
@@ -137,7 +131,7 @@ def recordings_of_arrays(
         found: dict[str, Recording] = {}
         for (place, one), module in zip(wanted.items(), names, strict=True):
             with errors_named(path):
-                parts = _recordings(choice, place, one, report_once)
+                parts = _recordings(choice, place, one, once)
             for recording in parts:
                 several = len(recording.modules) > 1
                 modules = {
@@ -206,7 +200,9 @@ class _Choice:
         lengths = Counter(prod(self.arrays[name].shape) for name in named)
         n_rows = max(lengths, key=lambda n: (n > 1, lengths[n]))
         places = [name for name in named if self.arrays[name].shape == (n_rows,)]
-        return {name: self.arrays[name] for name in places} if len(places) > 3 else {}
+        return (
+            {name: self.arrays[name] for name in places} if len(places) >= 3 * one.n_taxels else {}
+        )
 
     def _places(self, key: str, one: Sensor) -> list[str]:
         """Return the paths of the arrays that a key means."""

@@ -127,10 +127,6 @@ def _of_matlab(path: Path) -> StoredArrays:
     return _flat({name: one for name, one in content.items() if not name.startswith("__")})
 
 
-def _of_hdf5(path: Path) -> StoredArrays:
-    return arrays_of_hdf5(path)
-
-
 def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, StoredArray]:
     """Return the arrays of numbers in an HDF5 file, and the numbers in attributes, by path.
 
@@ -311,11 +307,25 @@ def _of_json(path: Path) -> StoredArrays:
     try:
         document = json.loads(text)
     except json.JSONDecodeError:
-        lines = [line for line in text.splitlines() if line.startswith("{")]
-        return arrays_of_records(json.loads(line) for line in lines)
+        return arrays_of_records(_records(path, text))
     if isinstance(document, list):
         return arrays_of_records(one for one in document if isinstance(one, dict))
     return _flat(document)
+
+
+def _records(path: Path, text: str) -> Iterator[dict[str, Any]]:
+    """Yield the lines of JSON in a text; the last one may be cut, as a killed logger leaves it.
+
+    Raises:
+        RecordingError: another line is damaged.
+    """
+    lines = [line for line in text.splitlines() if line.startswith("{")]
+    for number, line in enumerate(lines, start=1):
+        try:
+            yield json.loads(line)
+        except json.JSONDecodeError as cause:
+            if number < len(lines):
+                raise RecordingError(f"{path}: record {number} is damaged: {cause}") from cause
 
 
 def _of_pickle(path: Path) -> StoredArrays:
@@ -353,7 +363,7 @@ _READERS: dict[str, Callable[[Path], StoredArrays]] = {
     ".npy": _of_npy,
     ".npz": _of_npz,
     ".mat": _of_matlab,
-    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), _of_hdf5),
+    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), arrays_of_hdf5),
     **dict.fromkeys((".parquet", ".pq"), _of_parquet),
     **dict.fromkeys((".jsonl", ".ndjson", ".json"), _of_json),
     **dict.fromkeys((".pkl", ".pickle", ".joblib"), _of_pickle),

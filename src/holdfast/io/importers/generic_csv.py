@@ -95,19 +95,25 @@ def read(
     Raises:
         RecordingError: there is no CSV file, or one has another form.
     """
+    once = reported_once(report)
+    return (
+        replace(recording, name=f"{prefix}{recording.name}")
+        for file, prefix in name_prefixes(parts(path, columns, sensors)).items()
+        for recording in _recordings(file, sensors or {}, columns, once)
+    )
+
+
+def reported_once(report: Report) -> ReportOnce:
+    """Return a function that reports the lines about a guess once."""
     reported: set[str] = set()
 
-    def report_once(guess: str, lines: tuple[str, ...]) -> None:
+    def once(guess: str, lines: tuple[str, ...]) -> None:
         if guess not in reported:
             reported.add(guess)
             for line in lines:
                 report(line)
 
-    return (
-        replace(recording, name=f"{prefix}{recording.name}")
-        for file, prefix in name_prefixes(parts(path, columns, sensors)).items()
-        for recording in _recordings(file, sensors or {}, columns, report_once)
-    )
+    return once
 
 
 def parts(

@@ -69,8 +69,8 @@ class FingerForce:
             return self.known
         n = self._n(MIN_CONTACT_DURATION)
         touching = self.known & (self.amplitude > max(self.threshold, VISIBLE_SHARE * self._grip))
-        # A released elastomer keeps a load for seconds, far over the noise: a finger that was
-        # loaded, and whose small force hardly changes, touches nothing any more.
+        # A released elastomer may keep a load over the threshold: a finger that was loaded, and
+        # whose small force hardly changes, touches nothing any more.
         loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
         rate = np.abs(np.gradient(self.amplitude, self.period))
         slow = _moving_mean(rate, n) < CREEP_RATE * self._grip

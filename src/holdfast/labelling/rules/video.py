@@ -12,7 +12,7 @@ has slid.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,6 +48,8 @@ ALIKE_SIZES = 1.6
 """Ratio by which the stickers may look larger or smaller than their sizes: one is nearer."""
 MAX_CLOCK_ERROR = 0.010
 """Largest standard error of the offset of the clocks with which onsets are labelled [s]."""
+EXPOSURE_TIME = 1 / 60
+"""Longest time over which the force is averaged for a picture [s]."""
 FINE_REACH, FINE_STEP = 0.06, 0.0025
 """Offsets around the coarse one that are tried, and their step [s]."""
 CLEAR_PEAK = 2.0
@@ -331,12 +333,12 @@ def video_clock(
 
 
 def force_at(recording: Recording, finger: str, tare: Tare, times: Array) -> Array:
-    """Return the force of a finger, (n, 3), averaged over each picture's time, of usual size 1."""
+    """Return the force of a finger, (n, 3), averaged over each exposure, of usual size 1."""
     module = recording.modules[finger]
     force = np.nan_to_num(tared_force(module, tare, offline=True).force)
     lasting = np.diff(module.times)[:, None] * (force[1:] + force[:-1]) / 2
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(lasting, axis=0)])
-    half = float(np.median(np.diff(times))) / 2
+    half = min(float(np.median(np.diff(times))), EXPOSURE_TIME) / 2
     ends = [
         np.stack([np.interp(times + side, module.times, column) for column in total.T], axis=1)
         for side in (-half, half)
@@ -477,7 +479,7 @@ def with_slips(
             if start >= end:
                 continue
             if start > at:
-                made.append(_part(label, at, start))
+                made.append(replace(label, end=start, start=at))
             text = (
                 f"slides {1e3 * slip.distance:.2f} mm (+/- {1e3 * slip.distance_error:.2f}), "
                 f"onset +/- {1e3 * slip.onset_error:.0f} ms; {note}"
@@ -491,12 +493,8 @@ def with_slips(
             )
             at = end
         if label.end > at:
-            made.append(_part(label, at, label.end))
+            made.append(replace(label, start=at))
     return tuple(made)
-
-
-def _part(label: Label, start: float, end: float) -> Label:
-    return Label(start, end, label.state, label.cause, label.evidence, label.confidence, VIDEO_RULE)
 
 
 def _coarse_offset(
