@@ -26,6 +26,7 @@ from holdfast.errors import ModelError
 from holdfast.exporters import header_of
 from holdfast.exporters.c_tables import structs_of
 from holdfast.io.importers import import_recordings
+from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import calibrate
 
@@ -173,6 +174,23 @@ def run_recording(python, c, recording):
         hand = compare(python, c, samples, time)
         seen |= {finger.state for finger in hand.fingers.values()}
     return seen
+
+
+def test_a_field_and_invalid_readings_give_the_same():
+    anyskin = sensor("anyskin")
+    rng, times = np.random.default_rng(4), np.arange(1200) / 100
+    turn = np.interp(times, [1, 3], [0, 1])[:, None, None] * [35, -40, 30]
+    press = np.interp(times, [5, 5.5, 9, 9.4], [0, 1, 1, 0])[:, None, None] * [20, 5, 300]
+    readings = rng.uniform(-300, 300, (5, 3)) + rng.normal(size=(1200, 5, 3)) + turn
+    readings += press * np.array([0.35, 0.8, 1.0, 0.6, 0.2])[:, None]
+    readings[20::40, 2] = 0
+    python, c = both(built_in("any"), {"thumb": anyskin}, 100.0)
+    hands = [
+        compare(python, c, {"thumb": x}, float(t)) for x, t in zip(readings, times, strict=True)
+    ]
+    seen = Counter(fault for hand in hands for fault in hand.fingers["thumb"].faults)
+    assert seen == {Fault.INVALID: 30}
+    assert {hand.state for hand in hands[300:490]} == {ContactState.NO_CONTACT}
 
 
 def test_a_calibrated_model_gives_the_same():
