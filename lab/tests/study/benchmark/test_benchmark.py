@@ -15,7 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from holdfast.cli import main, simulate
+from holdfast import twin_recordings
+from holdfast.cli import main
 from holdfast.contact import STABLE
 from holdfast.io import load_dataset, save_recording
 from holdfast.twin import simulation
@@ -302,9 +303,9 @@ def test_the_recordings_are_simulated_and_compared(capsys, monkeypatch, tmp_path
     monkeypatch.setattr(protocol_module, "protocol", lambda: BenchmarkProtocol(7, splits))
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
-    known = simulate.plan_grasps
+    known = twin_recordings.plan_grasps
     monkeypatch.setattr(
-        simulate, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
+        twin_recordings, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
     )
     words = ["study", "data", str(tmp_path / "b"), "--jobs", "1", "--json"]
     assert main(words) == 0
