@@ -115,7 +115,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _run(words)
         sys.stdout.flush()
     except BrokenPipeError:
-        return _close_stdout()
+        # The reader has closed the pipe, as `| head` does, which is no error. Python flushes
+        # stdout once more at its end, and would report the pipe then.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except BaseException as failure:
         return _report(failure)
     return code
@@ -123,7 +126,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     if COMPLETE_VARIABLE in os.environ:
-        return _complete()
+        # The script of the shell has set the typed words in the environment.
+        typed = [os.environ.get(name, "") for name in ("COMP_WORDS", "_TYPER_COMPLETE_ARGS")]
+        command = get_command(_app(" ".join(typed).split()))
+        command.main([], prog_name="holdfast", complete_var=COMPLETE_VARIABLE)
+        return 0
     command = get_command(_app(words))
     try:
         with command.make_context("holdfast", words) as context:
@@ -171,7 +178,9 @@ def _add(app: typer.Typer, name: str, *, hidden: bool = False) -> None:
     options = [*shared.values(), own["help_all"]]
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
-    app.command(name, cls=_Verb, help=_help(verb), hidden=hidden)(run)
+    # `\b` keeps click from wrapping the lines of the example.
+    text = (inspect.getdoc(verb) or "").replace("\nExample", "\n\b\nExample")
+    app.command(name, cls=_Verb, help=text, hidden=hidden)(run)
 
 
 class _Verb(TyperCommand):
@@ -233,14 +242,6 @@ class _GroupedVerbs(TyperGroup):
                     formatter.write_dl(rows)
 
 
-def _complete() -> int:
-    """Print the completions for a shell; its script set the words in the environment."""
-    typed = [os.environ.get(name, "") for name in ("COMP_WORDS", "_TYPER_COMPLETE_ARGS")]
-    command = get_command(_app(" ".join(typed).split()))
-    command.main([], prog_name="holdfast", complete_var=COMPLETE_VARIABLE)
-    return 0
-
-
 def _version(value: bool) -> None:
     if value:
         from importlib.metadata import version
@@ -299,11 +300,15 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
     parameters: list[inspect.Parameter] = []
     groups: dict[str, tuple[Callable[[Values], object], list[str]]] = {}
     for name, parameter in inspect.signature(verb, eval_str=True).parameters.items():
-        kind, is_rare = _unmarked(parameter.annotation)
-        if _is_group(kind):
+        kind = parameter.annotation
+        is_rare = RARE in getattr(kind, "__metadata__", ())
+        kind = get_args(kind)[0] if is_rare else kind
+        if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, PluginOptions)):
             options = _options_of(kind, parameter.default)
             groups[name] = _maker_of(kind), [option.name for option in options]
-            parameters += [_marked(option) for option in options] if is_rare else options
+            if is_rare:
+                options = [x.replace(annotation=Annotated[x.annotation, RARE]) for x in options]
+            parameters += options
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 
@@ -319,20 +324,6 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
 
 Values = dict[str, Any]
 """Values of options, by name."""
-
-
-def _unmarked(annotation: Any) -> tuple[Any, bool]:  # noqa: ANN401
-    """Return the type of a parameter, and whether it is marked as rare."""
-    is_rare = RARE in getattr(annotation, "__metadata__", ())
-    return (get_args(annotation)[0] if is_rare else annotation), is_rare
-
-
-def _marked(option: inspect.Parameter) -> inspect.Parameter:
-    return option.replace(annotation=Annotated[option.annotation, RARE])
-
-
-def _is_group(kind: object) -> bool:
-    return isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, PluginOptions))
 
 
 def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[inspect.Parameter]:
@@ -406,17 +397,6 @@ def _placeholder() -> None:
     """Do nothing; in place of a verb that is not imported."""
 
 
-def _help(verb: Callable[..., None]) -> str:
-    r"""Return the docstring; `\b` keeps click from wrapping the lines of the example."""
-    return (inspect.getdoc(verb) or "").replace("\nExample", "\n\b\nExample")
-
-
-def _close_stdout() -> int:
-    """Handle a reader that has closed the pipe, as `| head` does; this is no error."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
-
-
 def _report(failure: BaseException) -> int:
     if os.environ.get("HOLDFAST_DEBUG"):
         traceback.print_exception(failure)
@@ -429,26 +409,19 @@ def _report(failure: BaseException) -> int:
             print_error("interrupted")
             return EXIT_INTERRUPTED
         case _ if isinstance(failure, _UsageError):
-            print_error(_usage_text(failure))
+            context, option = getattr(failure, "ctx", None), getattr(failure, "option_name", "")
+            verb = getattr(context, "info_name", "")
+            # The option of a package that is not installed is unknown to click.
+            missing = missing_part("options", f"{verb} {option}", f"the option {option}")
+            text = failure.format_message().rstrip(".")  # type: ignore[attr-defined]
+            path = getattr(context, "command_path", "holdfast")
+            print_error(str(missing) if missing else f"{text} (see {path} --help)")
             return EXIT_BAD_INPUT
         case _ if isinstance(failure, _EXPECTED_ERRORS):
-            print_error(_error_text(failure))
+            text = str(failure) or type(failure).__name__
+            if isinstance(failure, OSError) and failure.filename and failure.strerror:
+                text = f"{failure.filename}: {failure.strerror}"  # without "[Errno 2]"
+            print_error(text)
             return EXIT_BAD_INPUT
     print_error(f"internal error ({type(failure).__name__}: {failure}): please report it")
     return 1
-
-
-def _usage_text(failure: BaseException) -> str:
-    option = getattr(failure, "option_name", "")
-    verb = getattr(getattr(failure, "ctx", None), "info_name", "")
-    if missing := missing_part("options", f"{verb} {option}", f"the option {option}"):
-        return str(missing)
-    text: str = failure.format_message()  # type: ignore[attr-defined]
-    path = getattr(getattr(failure, "ctx", None), "command_path", "holdfast")
-    return f"{text.rstrip('.')} (see {path} --help)"
-
-
-def _error_text(failure: BaseException) -> str:
-    if isinstance(failure, OSError) and failure.filename and failure.strerror:
-        return f"{failure.filename}: {failure.strerror}"
-    return str(failure) or type(failure).__name__

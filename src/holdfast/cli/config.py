@@ -49,9 +49,14 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return source
         scheme, address = parse(source)
         known = getattr(source_module(scheme), "PARAMETERS", ())
+        fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items())
         missing = {
             key: value
-            for key, value in self._parameters().items()
+            for key, value in (
+                ("fingers", fingers or None),
+                ("sensor", self.sensor),
+                ("values", self.values),
+            )
             if key in known and key not in address.parameters and value is not None
         }
         if not missing:
@@ -67,10 +72,6 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             taxels = (f"{finger}:{k}" for finger, ks in self.ignore.items() for k in ks)
             defaults["ignore"] = ",".join(taxels)
         return defaults
-
-    def _parameters(self) -> dict[str, str | None]:
-        fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items()) or None
-        return {"fingers": fingers, "sensor": self.sensor, "values": self.values}
 
 
 def find_config(option: Path | None = None) -> Path | None:
@@ -95,6 +96,8 @@ def load_config(path: Path) -> Config:
     Raises:
         ValueError: it is not TOML, or has an unknown key or a value of another type.
     """
+    from holdfast.sensors.taxel_numbers import FIRST_TAXEL
+
     try:
         content = read_toml(path)
     except OSError as cause:
@@ -110,9 +113,21 @@ def load_config(path: Path) -> Config:
         config = msgspec.convert(content, Config)
     except msgspec.ValidationError as cause:
         raise ValueError(f"{path}: {cause}") from cause
-    _check(config, path)
-    files = {
-        key: _beside(path, value)
+    if config.source is not None and config.host is not None:
+        raise ValueError(f"{path}: source or host expected, both given")
+    if wrong := [number for number in config.fingers if not number.isdecimal()]:
+        raise ValueError(
+            f'{path}: fingers: 1 = "thumb" expected, the number of a module, {wrong[0]!r} given'
+        )
+    for finger, taxels in config.ignore.items():
+        for taxel in taxels:
+            if taxel < FIRST_TAXEL:
+                raise ValueError(
+                    f"{path}: ignore: taxels from {FIRST_TAXEL} expected, {taxel} given for "
+                    f"{finger}"
+                )
+    files = {  # a name without .json is that of a built-in model or sensor, and no path
+        key: (str(path.parent / value) if value.endswith(".json") else value)
         for key in ("model", "sensor")
         if (value := getattr(config, key)) is not None
     }
@@ -137,31 +152,3 @@ def config_state(config: Config | None) -> dict[str, Any]:
         "content": {key: value for key, value in content.items() if value},
         "error": error,
     }
-
-
-def _check(config: Config, path: Path) -> None:
-    if config.source is not None and config.host is not None:
-        raise ValueError(f"{path}: source or host expected, both given")
-    if wrong := [number for number in config.fingers if not number.isdecimal()]:
-        raise ValueError(
-            f'{path}: fingers: 1 = "thumb" expected, the number of a module, {wrong[0]!r} given'
-        )
-    if config.ignore:
-        _check_ignored(config.ignore, path)
-
-
-def _check_ignored(ignored: dict[str, list[int]], path: Path) -> None:
-    from holdfast.sensors.taxel_numbers import FIRST_TAXEL
-
-    for finger, taxels in ignored.items():
-        for taxel in taxels:
-            if taxel < FIRST_TAXEL:
-                raise ValueError(
-                    f"{path}: ignore: taxels from {FIRST_TAXEL} expected, {taxel} given for "
-                    f"{finger}"
-                )
-
-
-def _beside(path: Path, value: str) -> str:
-    """Return the path of a .json file that is named relative to the configuration file."""
-    return str(path.parent / value) if value.endswith(".json") else value

@@ -13,7 +13,6 @@ from holdfast.cli import serve
 from holdfast.cli.terminal.console import print_message
 from holdfast.contact import (
     Cause,
-    ContactEstimate,
     ContactEvent,
     HandEstimate,
     StateChanges,
@@ -151,17 +150,22 @@ class TrueEvents(NamedTuple):
         """Return what happens when the state of the hand changes."""
         if change.state != "UNSTABLE":
             return STATES[change.state]
-        for start, end, words in self.causes:
-            if start - CAUSE_TOLERANCE <= change.time < end + CAUSE_TOLERANCE:
-                return words + self._delay(change.time)
-        return STATES[change.state]
-
-    def _delay(self, instant: float) -> str:
+        reasons = (
+            words
+            for start, end, words in self.causes
+            if start - CAUSE_TOLERANCE <= change.time < end + CAUSE_TOLERANCE
+        )
+        words = next(reasons, None)
+        if words is None:
+            return STATES[change.state]
         for event in self.events:
-            if event.onset - CAUSE_TOLERANCE <= instant <= event.end and event.alarm is not None:
+            during = event.onset - CAUSE_TOLERANCE <= change.time <= event.end
+            if during and event.alarm is not None:
                 delay = round(1000 * event.delay)
-                return f"; detected after {delay} ms" if delay > 0 else "; detected at once"
-        return ""
+                return words + (
+                    f"; detected after {delay} ms" if delay > 0 else "; detected at once"
+                )
+        return words
 
 
 def replay(model: Model, path: Path, speed: float, true_events: TrueEvents) -> int:
@@ -181,7 +185,20 @@ def replay(model: Model, path: Path, speed: float, true_events: TrueEvents) -> i
     """
     with open_source(str(path), speed=speed) as source:
         if speed and sys.stderr.isatty():
-            return _show_table(model, source, true_events)
+            from rich.console import Console
+            from rich.live import Live
+
+            updated_at, n_updates = 0.0, 0
+            console = Console(stderr=True, highlight=False)
+            with Live(
+                console=console, auto_refresh=False, transient=True, redirect_stdout=False
+            ) as screen:
+                for estimate in print_changes(model, source, true_events, console.print):
+                    n_updates += 1
+                    if time.monotonic() - updated_at > SCREEN_INTERVAL:
+                        updated_at = time.monotonic()
+                        screen.update(finger_table(estimate), refresh=True)
+            return n_updates
         estimates = print_changes(model, source, true_events, print_message)
         return sum(1 for _ in estimates)
 
@@ -217,21 +234,6 @@ def print_changes(
         yield estimate
 
 
-def _show_table(model: Model, source: Source, true_events: TrueEvents) -> int:
-    from rich.console import Console
-    from rich.live import Live
-
-    updated_at, n_updates = 0.0, 0
-    console = Console(stderr=True, highlight=False)
-    with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False) as screen:
-        for estimate in print_changes(model, source, true_events, console.print):
-            n_updates += 1
-            if time.monotonic() - updated_at > SCREEN_INTERVAL:
-                updated_at = time.monotonic()
-                screen.update(finger_table(estimate), refresh=True)
-    return n_updates
-
-
 def finger_table(estimate: HandEstimate) -> "Table":
     """Return a table of the fingers, at most 80 columns wide."""
     from rich.table import Table
@@ -243,21 +245,16 @@ def finger_table(estimate: HandEstimate) -> "Table":
     table.add_column("instability", width=11, justify="right")
     table.add_column(r"force \[counts]", width=14, justify="right")
     for name, finger in estimate.fingers.items():
-        table.add_row(name, *_cells(finger))
+        known = finger.state != "UNKNOWN"  # without an estimate, the probability means nothing
+        table.add_row(
+            name,
+            _coloured(finger.state) + (f" {finger.reason}" if finger.reason else ""),
+            _number(finger.stable_probability, 2) if known else "-",
+            "#" * round(BAR_WIDTH * finger.stable_probability) if known else "",
+            _number(finger.instability, 1),
+            _number(sum(value * value for value in finger.force) ** 0.5, 0),
+        )
     return table
-
-
-def _cells(finger: ContactEstimate) -> tuple[str, ...]:
-    probability = finger.stable_probability
-    known = finger.state != "UNKNOWN"
-    amplitude = sum(value * value for value in finger.force) ** 0.5
-    return (
-        _coloured(finger.state) + (f" {finger.reason}" if finger.reason else ""),
-        _number(probability, 2) if known else "-",
-        "#" * round(BAR_WIDTH * probability) if known else "",
-        _number(finger.instability, 1),
-        _number(amplitude, 0),
-    )
 
 
 def _number(value: float, digits: int) -> str:

@@ -1,7 +1,7 @@
 """`holdfast import`: recordings from other formats, and from files that were cut off."""
 
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -141,6 +141,8 @@ def import_all(
         RecordingError: the input cannot be read.
         OutputError: a recording exists already, or cannot be written.
     """
+    from holdfast.io.importers import import_hint
+
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
     prefixes, task = _parts(started.path(path), options.task(started.path(out), force=force))
@@ -152,7 +154,8 @@ def import_all(
             (folder / recording.file_name).replace(task.out / recording.file_name)
     for recording in imported:
         recording.document["path"] = out / recording.file_name
-    return ImportResult(imported, out, _hint(task))
+    hint = None if task.data_format is None else import_hint(task.data_format)
+    return ImportResult(imported, out, hint)
 
 
 class ImportResult(NamedTuple):
@@ -187,7 +190,8 @@ class ImportResult(NamedTuple):
         )  # fmt: skip
         print_line()
         n_recordings, n_modules, n_samples = (
-            _count(document[f"n_{what}s"], what) for what in ("recording", "module", "sample")
+            f"{(n := document[f'n_{what}s'])} {what}{'' if n == 1 else 's'}"
+            for what in ("recording", "module", "sample")
         )
         print_line(f"{n_recordings} with {n_modules} and {n_samples} in {self.out}")
 
@@ -216,12 +220,20 @@ def _parts(path: Path, task: _ImportTask) -> tuple[dict[Path, str], _ImportTask]
 
     The parts are imported one by one.
     """
+    from holdfast.errors import RecordingError
+    from holdfast.io.dataset import load_dataset
     from holdfast.io.importers import import_parts
     from holdfast.io.importers.table import name_prefixes
+    from holdfast.io.recording_files import is_recording
 
     foreign = task.data_format is not None or task.sensors or task.columns is not None
-    if not foreign and (files := _own_files(path)):
-        return dict.fromkeys(files, ""), task
+    if not foreign:
+        files: Sequence[Path] = [path] if is_recording(path) else []
+        if path.is_dir():
+            with suppress(RecordingError):  # a folder of other files
+                files = load_dataset(path).paths
+        if files:
+            return dict.fromkeys(files, ""), task
     name, parts = import_parts(path, task.data_format, sensors=task.sensors, columns=task.columns)
     return name_prefixes(parts), replace(task, data_format=name)
 
@@ -233,13 +245,28 @@ def _import_part(
 
     Each message is a text, by the same text without the name of the part.
     """
+    from holdfast.io import import_recordings, load_recording
+
     messages: dict[str, str] = {}
 
     def report(text: str) -> None:
         messages[text.replace(part.name, "")] = text
 
+    recordings: Iterable[Recording]
+    if task.data_format is None:
+        recording = load_recording(part, labels=task.labels)
+        recordings = [recording if task.labels else recording.with_labels({})]
+    else:
+        recordings = import_recordings(
+            part,
+            task.data_format,
+            labels=task.labels,
+            sensors=task.sensors,
+            columns=task.columns,
+            report=report,
+        )
     written: list[_Imported] = []
-    for recording in _recordings(part, task, report):
+    for recording in recordings:
         if not recording.complete:
             report(f"{part} is cut off: {recording.duration:.2f} s recovered")
         named = replace(recording, name=f"{prefix}{recording.name}")
@@ -275,43 +302,6 @@ def _check_new(name: str, known: bool) -> None:
 
     if known:
         raise RecordingError(f"two recordings have the name {name!r}: import them one by one")
-
-
-def _recordings(
-    part: Path, task: _ImportTask, report: Callable[[str], None]
-) -> Iterator["Recording"]:
-    from holdfast.io import import_recordings
-
-    if task.data_format is None:
-        return iter([_load(part, labels=task.labels)])
-    return import_recordings(
-        part,
-        task.data_format,
-        labels=task.labels,
-        sensors=task.sensors,
-        columns=task.columns,
-        report=report,
-    )
-
-
-def _own_files(path: Path) -> list[Path]:
-    """Return the recordings of holdfast at this path: the file, or the files in the folder."""
-    from holdfast.errors import RecordingError
-    from holdfast.io.dataset import load_dataset
-    from holdfast.io.recording_files import is_recording
-
-    if path.is_dir():
-        with suppress(RecordingError):
-            return list(load_dataset(path).paths)
-        return []
-    return [path] if is_recording(path) else []
-
-
-def _load(file: Path, *, labels: bool) -> "Recording":
-    from holdfast.io import load_recording
-
-    recording = load_recording(file, labels=labels)
-    return recording if labels else recording.with_labels({})
 
 
 @contextmanager
@@ -355,14 +345,3 @@ def _write(recording: "Recording", folder: Path, task: _ImportTask) -> _Imported
         "complete": recording.complete,
     }
     return _Imported(document, tuple(findings_of(recording)))
-
-
-def _hint(task: _ImportTask) -> str | None:
-    """Return the option that helps with the recordings of the format; None for our own."""
-    from holdfast.io.importers import import_hint
-
-    return None if task.data_format is None else import_hint(task.data_format)
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'' if n == 1 else 's'}"

@@ -409,7 +409,7 @@ def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[
         >>> parse_taxels("index:7,index:12,thumb:1", {"index": sensor("uskin-4x4")})
         {'index': (6, 11), 'thumb': (0,)}
     """
-    from holdfast.sensors import taxel_index
+    from holdfast.sensors import taxel_index, taxel_number
 
     taxels: dict[str, tuple[int, ...]] = {}
     for part in filter(None, text.split(",")):
@@ -417,19 +417,14 @@ def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[
         if not (finger and number.isdecimal()):
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
         if finger in sensors:
-            _check_taxel(finger, int(number), sensors[finger].n_taxels)
+            first, last = taxel_number(0), taxel_number(sensors[finger].n_taxels - 1)
+            if not first <= int(number) <= last:
+                raise ValueError(
+                    f"{finger}: taxel {int(number)} to be ignored; it has the taxels {first} to "
+                    f"{last}"
+                )
         taxels[finger] = (*taxels.get(finger, ()), taxel_index(int(number)))
     return taxels
-
-
-def _check_taxel(finger: str, number: int, n_taxels: int) -> None:
-    from holdfast.sensors import taxel_number
-
-    first, last = taxel_number(0), taxel_number(n_taxels - 1)
-    if not first <= number <= last:
-        raise ValueError(
-            f"{finger}: taxel {number} to be ignored; it has the taxels {first} to {last}"
-        )
 
 
 def check_seconds(seconds: float | None) -> None:

@@ -24,7 +24,7 @@ from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Arrival, Source
-    from holdfast.live.recorder import Recorder, RecorderStatus
+    from holdfast.live.recorder import Recorder
 
 READ_TIMEOUT = 0.1
 """Time to wait for the source before keys and signals are checked [s]."""
@@ -77,6 +77,7 @@ def record(
       holdfast record twin:?object=can can.mcap --seconds 10
       (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
+    from holdfast.cli.terminal.progress import format_size
     from holdfast.devices.sources import open_source
 
     check_seconds(seconds)
@@ -89,7 +90,24 @@ def record(
             opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
         )
         _record(opened, recorder, stop, _read(opened, seconds, speed))
-    _print_result(recorder.path, recorder.status, as_json)
+    path, status = recorder.path, recorder.status
+    if as_json:
+        mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
+        fields = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
+        counts = {field: getattr(status, field) for field in fields}
+        known = {"path": path, "seconds": status.seconds, "n_samples": status.modules}
+        print_json({**known, "rate": mean, **counts, "complete": True})
+        return
+    print_line(
+        f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "
+        f"in {path} ({format_size(status.n_bytes)})"
+    )
+    if status.n_dropped:
+        print_message(
+            f"{status.n_dropped} samples were dropped: the disk is too slow, "
+            "or the file cannot store them"
+        )
+    print_message(f"next: holdfast info {path}")
 
 
 def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Arrival | None]":
@@ -225,26 +243,3 @@ def _value(text: str) -> float | str:
     if re.fullmatch(r"-?\d+\.\d+", text, re.ASCII):
         return float(text)
     return text
-
-
-def _print_result(path: Path, status: "RecorderStatus", as_json: bool) -> None:
-    """Print what was recorded, and the next command."""
-    from holdfast.cli.terminal.progress import format_size
-
-    if as_json:
-        mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
-        fields = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
-        counts = {field: getattr(status, field) for field in fields}
-        known = {"path": path, "seconds": status.seconds, "n_samples": status.modules}
-        print_json({**known, "rate": mean, **counts, "complete": True})
-        return
-    print_line(
-        f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "
-        f"in {path} ({format_size(status.n_bytes)})"
-    )
-    if status.n_dropped:
-        print_message(
-            f"{status.n_dropped} samples were dropped: the disk is too slow, "
-            "or the file cannot store them"
-        )
-    print_message(f"next: holdfast info {path}")

@@ -18,7 +18,7 @@ from holdfast.cli.options import (
     report_other_handling,
 )
 from holdfast.cli.terminal.console import print_message
-from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.contact import ContactEstimate, ContactState
 from holdfast.detector import Detection, Detector
 from holdfast.devices.sources import open_source
@@ -27,7 +27,7 @@ from holdfast.features import Tare
 from holdfast.io import load_recording, read_chunks
 from holdfast.live.fault_notices import FaultWatch
 from holdfast.live.readings_monitor import ReadingsMonitor
-from holdfast.live.stream_detector import StreamDetector, StreamEstimate, StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample, true_updates
@@ -145,22 +145,14 @@ def detect_live(
         stream = options.create_stream(model, source, start)
         report_missing_slip_rules(model)
         stop.graceful = True
-        for update in _read_updates(stream, seconds, stop):
+        end = math.inf if seconds is None else monotonic() + seconds
+        faults = FaultWatch()
+        while not (source.ended or stop.requested) and monotonic() < end:
+            update = stream.read()
+            for notice in update.arrival.notices if update.arrival else ():
+                print_message(notice)
+            for estimate in update.estimates:
+                for problem in faults.update(estimate.estimate):
+                    print_message(problem.text)
             yield chunk_from_stream(source.name, update.estimates)
-
-
-def _read_updates(
-    stream: StreamDetector, seconds: float | None, stop: StopRequest
-) -> Iterator[StreamUpdate]:
-
-    end = math.inf if seconds is None else monotonic() + seconds
-    faults = FaultWatch()
-    while not (stream.source.ended or stop.requested) and monotonic() < end:
-        update = stream.read()
-        for notice in update.arrival.notices if update.arrival else ():
-            print_message(notice)
-        for estimate in update.estimates:
-            for problem in faults.update(estimate.estimate):
-                print_message(problem.text)
-        yield update
-    yield stream.finish()
+        yield chunk_from_stream(source.name, stream.finish().estimates)

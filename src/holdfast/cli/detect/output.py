@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from math import isnan, nan
 from operator import attrgetter, itemgetter
@@ -124,11 +124,6 @@ class DetectionSummary:
             [(name, *self._counts[name].causes()) for name in names if name != HAND],
         )
         origin = shown_origin(self._start or 0.0)
-        self._print_events(origin)
-        if self._watch.has_rule:
-            self._print_slips(origin)
-
-    def _print_events(self, origin: float) -> None:
         events = self._sorted_events()
         print_line()
         if origin:
@@ -142,6 +137,8 @@ class DetectionSummary:
         )
         if len(events) > MAX_EVENTS_SHOWN:
             print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
+        if self._watch.has_rule:
+            self._print_slips(origin)
 
     def _print_slips(self, origin: float) -> None:
         slips = self._sorted_slips()
@@ -149,10 +146,17 @@ class DetectionSummary:
         if not slips:
             print_line("no slips")
             return
-        print_table(
-            ("slip from [s]", "to [s]", "finger", "largest P(slip) %", "slid [mm]"),
-            [_slip_cells(slip, origin) for slip in slips[:MAX_EVENTS_SHOWN]],
-        )
+        rows = [
+            (
+                f"{slip.begin - origin:.3f}",
+                "-" if slip.end is None else f"{slip.end - origin:.3f}",
+                slip.finger,
+                f"{100 * slip.max_probability:.0f}",
+                "-" if slip.distance is None else f"{slip.distance:.1f}",
+            )
+            for slip in slips[:MAX_EVENTS_SHOWN]
+        ]
+        print_table(("slip from [s]", "to [s]", "finger", "largest P(slip) %", "slid [mm]"), rows)
         if len(slips) > MAX_EVENTS_SHOWN:
             print_line(f"and {len(slips) - MAX_EVENTS_SHOWN} more slips (--json prints all)")
 
@@ -167,14 +171,6 @@ class DetectionSummary:
 
     def _sorted_slips(self) -> list[DetectedSlip]:
         return sorted([*self._ended_slips, *self._watch.running], key=attrgetter("begin"))
-
-
-def _slip_cells(slip: DetectedSlip, origin: float) -> tuple[object, ...]:
-    """Return a slip as cells of a table."""
-    end = "-" if slip.end is None else f"{slip.end - origin:.3f}"
-    distance = "-" if slip.distance is None else f"{slip.distance:.1f}"
-    percent = f"{100 * slip.max_probability:.0f}"
-    return f"{slip.begin - origin:.3f}", end, slip.finger, percent, distance
 
 
 class _StateCounts:
@@ -239,22 +235,17 @@ class ChangeLines:
             self.origin = first if self._from_first else shown_origin(first)
         lines: list[tuple[float, str]] = []
         for finger, estimates in chunk.fingers.items():
-            lines += self._finger_changes(finger, estimates)
+            for estimate in estimates:
+                # The reason at the change, not that of the sample at which it has lasted.
+                if self._why.get(finger, (None,))[0] is not estimate.state:
+                    self._why[finger] = estimate.state, why(estimate)
+                events = self._lasting(finger, estimate.state, estimate.time)
+                lines += [self._line(event, self._why[finger][1]) for event in events]
             lines += map(self._slip_line, self._watch.update(finger, estimates))
         for time, state in chunk.hand:
             lines += [self._line(event, "") for event in self._lasting(HAND, state, time)]
         lines.sort(key=itemgetter(0))
         return [line for _, line in lines]
-
-    def _finger_changes(
-        self, finger: str, estimates: Sequence[ContactEstimate]
-    ) -> Iterator[tuple[float, str]]:
-        """Yield the time and the line of each change of a finger."""
-        for estimate in estimates:
-            if self._why.get(finger, (None,))[0] is not estimate.state:
-                self._why[finger] = estimate.state, why(estimate)
-            for event in self._lasting(finger, estimate.state, estimate.time):
-                yield self._line(event, self._why[finger][1])
 
     def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
         changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))

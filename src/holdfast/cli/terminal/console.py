@@ -145,11 +145,11 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
         if k == 0 and any(numeric):  # a heading stands directly above its numbers
             cells = [[""] * (height - len(cell)) + cell for cell in cells]
         for parts in zip_longest(*cells, fillvalue=""):
-            print_line(_GAP.join(map(_align, parts, widths, numeric)).rstrip())
-
-
-def _align(cell: str, width: int, numeric: bool) -> str:
-    return cell.rjust(width) if numeric else cell.ljust(width)
+            padded = [
+                part.rjust(width) if is_number else part.ljust(width)
+                for part, width, is_number in zip(parts, widths, numeric, strict=True)
+            ]
+            print_line(_GAP.join(padded).rstrip())
 
 
 def _width_range(column: Sequence[str], numeric: bool) -> tuple[int, int]:

@@ -67,7 +67,11 @@ class MarkerKeys:
         """Return the markers since the last call."""
         data = self._read()
         if not self.interactive:
-            return self._split_lines(data)
+            *lines, self._unfinished_line = (self._unfinished_line + data).split(b"\n")
+            if len(self._unfinished_line) > _MAX_LINE_LENGTH:
+                lines, self._unfinished_line = [*lines, self._unfinished_line], b""
+            texts = (line.decode(errors="replace").strip() for line in lines)
+            return [text for text in texts if text]
         keys = data.decode(errors="replace").lower()
         self.stop_pressed |= STOP_KEY in keys
         return [MARKER_KEYS[key] for key in keys if key in MARKER_KEYS]
@@ -105,13 +109,6 @@ class MarkerKeys:
             return b"\n"
         return data
 
-    def _split_lines(self, data: bytes) -> list[str]:
-        *lines, self._unfinished_line = (self._unfinished_line + data).split(b"\n")
-        if len(self._unfinished_line) > _MAX_LINE_LENGTH:
-            lines, self._unfinished_line = [*lines, self._unfinished_line], b""
-        texts = (line.decode(errors="replace").strip() for line in lines)
-        return [text for text in texts if text]
-
 
 @dataclass
 class StopRequest:
@@ -137,19 +134,16 @@ class StopRequest:
 def handle_stop_signals() -> Iterator[StopRequest]:
     """Handle the stop signals inside a `with` block; only in the main thread."""
     stop = StopRequest()
-    numbers = _stop_signals() if threading.current_thread() is threading.main_thread() else []
+    numbers = []
+    if threading.current_thread() is threading.main_thread():  # the only one that may set handlers
+        numbers = [signal.SIGINT, signal.SIGTERM]
+        hang_up = getattr(signal, "SIGHUP", None)  # Windows has none
+        # Under nohup, SIGHUP is ignored: the command goes on when the terminal is closed.
+        if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
+            numbers.append(hang_up)
     previous = [(number, signal.signal(number, stop)) for number in numbers]
     try:
         yield stop
     finally:
         for number, handler in previous:
             signal.signal(number, handler)
-
-
-def _stop_signals() -> list[signal.Signals]:
-    """Return the stop signals; without SIGHUP if it is ignored, as under nohup."""
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    hang_up = getattr(signal, "SIGHUP", None)
-    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
-        numbers.append(hang_up)
-    return numbers

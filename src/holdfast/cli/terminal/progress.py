@@ -85,7 +85,12 @@ class ProgressBar:
         """Add the cost of a finished step."""
         self._done += cost
         if not sys.stderr.isatty():
-            self._print_sometimes()
+            now = time.monotonic()
+            if self._total and now - self._last_message_at > PROGRESS_INTERVAL:
+                self._last_message_at = now
+                left = self._expected_duration() - (now - self._started_at)
+                text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"
+                print_message(f"{self._description}: {self._done / self._total:.0%}{text}")
         elif time.monotonic() - self._started_at > DISPLAY_DELAY:
             self._display()
 
@@ -108,14 +113,6 @@ class ProgressBar:
                 completed=self._done,
                 ends=self._started_at + self._expected_duration(),
             )
-
-    def _print_sometimes(self) -> None:
-        now = time.monotonic()
-        if self._total and now - self._last_message_at > PROGRESS_INTERVAL:
-            self._last_message_at = now
-            left = self._expected_duration() - (now - self._started_at)
-            text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"
-            print_message(f"{self._description}: {self._done / self._total:.0%}{text}")
 
     def _expected_duration(self) -> float:
         """Return the expected time from start to end [s]; NaN if it is not known yet."""
