@@ -98,6 +98,7 @@ EXIT_INTERRUPTED = 130
 _UsageError = typer.BadParameter.__mro__[2]
 """Base class of usage errors, from click or from the copy of click within typer."""
 
+# Failures of the input, of files or of memory; any other is an error of holdfast.
 _EXPECTED_ERRORS = (HoldfastError, ValueError, TypeError, OSError, MemoryError)
 
 
@@ -113,12 +114,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         code = _run(words)
-        sys.stdout.flush()
+        sys.stdout.flush()  # a closed pipe fails here, inside the `try`
     except BrokenPipeError:
         # The reader has closed the pipe, as `| head` does, which is no error. Python flushes
         # stdout once more at its end, and would report the pipe then.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    # Also SystemExit and KeyboardInterrupt: `_report` has the exit code of each.
     except BaseException as failure:
         return _report(failure)
     return code
@@ -152,6 +154,7 @@ def _app(words: list[str]) -> typer.Typer:
     app.callback()(_root)
     others = {
         name: "A verb of a plug-in."
+        # Without a report: a plug-in whose name is taken must not print a line at every verb.
         for name in VERB_PLUGINS.names(report=False)
         if name not in VERBS
     }
@@ -159,8 +162,10 @@ def _app(words: list[str]) -> typer.Typer:
         if name in words:
             _add(app, name)
         else:
+            # The help needs the name and one line; importing all verbs would make it slow.
             app.command(name, help=summary)(_placeholder)
     for name in SUB_VERBS:
+        # A subset: options of holdfast itself, as --config, may stand before the words.
         if set(name.split()) <= set(words):
             _add(app, name, hidden=True)
     return app
@@ -176,6 +181,7 @@ def _add(app: typer.Typer, name: str, *, hidden: bool = False) -> None:
 
     own, shared = (inspect.signature(x).parameters for x in (run, spread))
     options = [*shared.values(), own["help_all"]]
+    # Typer reads the options from the signature and the annotations.
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     # `\b` keeps click from wrapping the lines of the example.
@@ -212,6 +218,7 @@ def _show_all(context: typer.Context, value: bool) -> None:
         raise typer.Exit
 
 
+# Eager: typer calls it before it reports that an argument is missing.
 HelpAllOption = Annotated[
     bool,
     typer.Option(
@@ -232,10 +239,13 @@ class _GroupedVerbs(TyperGroup):
         """Write a section for each group, and one for verbs of plug-ins."""
         others = {name: "" for name in self.commands if name not in {**VERBS, **SUB_VERBS}}
         width = max(map(len, (*VERBS, *others)))
+        # 6 as in click: three times the spacing of its columns
         limit = formatter.width - 6 - width
         for title, verbs in {**VERB_GROUPS, "Plug-ins": others}.items():
             rows = [
-                (name.ljust(width), self.commands[name].get_short_help_str(limit)) for name in verbs
+                # Equal columns in all sections.
+                (name.ljust(width), self.commands[name].get_short_help_str(limit))
+                for name in verbs
             ]
             if rows:
                 with formatter.section(title):
@@ -269,6 +279,7 @@ def load_verb(name: str) -> Callable[..., None]:
     """
     if name not in (*OWN_VERBS, *SUB_VERBS):
         return VERB_PLUGINS.require(name, f"the verb {name}")
+    # import_.py: a module has no keyword as its name
     names = [f"{word}_" if keyword.iskeyword(word) else word for word in name.split()]
     module = import_module(".".join(("holdfast.cli", *names)))
     verb: Callable[..., None] = getattr(module, names[-1])
@@ -313,6 +324,7 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 
     def run(**values: Any) -> None:  # noqa: ANN401
+        # The values of a group's options become one value, that of the group.
         for name, (make, options) in groups.items():
             values[name] = make({option: values.pop(option) for option in options})
         verb(**values)
@@ -373,12 +385,14 @@ def _root(
 ) -> None:
     """Read the configuration file, for the verbs that use it."""
     verb = context.invoked_subcommand or ""
+    # A file that is named by --config is checked, even if the verb does not use it.
     if _is_configured(verb) or config is not None:
         from holdfast.cli.config import find_config, load_config
 
         path = find_config(config)
         if path is not None:
             context.obj = load_config(path)
+            # Defaults only: what is typed wins.
             context.default_map = {verb: context.obj.defaults()} if _is_configured(verb) else {}
 
 
@@ -398,8 +412,9 @@ def _placeholder() -> None:
 
 
 def _report(failure: BaseException) -> int:
-    if os.environ.get("HOLDFAST_DEBUG"):
+    if os.environ.get("HOLDFAST_DEBUG"):  # the traceback, before the line for users
         traceback.print_exception(failure)
+    # The message then names the extra, and the command that installs it.
     if isinstance(failure, ModuleNotFoundError):
         failure = missing_extra(failure) or failure
     match failure:

@@ -43,6 +43,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         from holdfast.devices.uri import is_uri, parse, source_module
 
+        # A recording of this name is meant, if there is one.
         if source == HAND and not Path(HAND).exists():
             source = self.source or f"xela://{self.host or 'auto'}"
         if not is_uri(source):
@@ -57,6 +58,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 ("sensor", self.sensor),
                 ("values", self.values),
             )
+            # A scheme refuses parameters that it does not have.
             if key in known and key not in address.parameters and value is not None
         }
         if not missing:
@@ -81,6 +83,7 @@ def find_config(option: Path | None = None) -> Path | None:
         ValueError: the file of the option or the variable does not exist.
     """
     variable = os.environ.get(CONFIG_VARIABLE)
+    # --config outranks the variable, and both outrank the file in this folder
     for path, where in ((option, "--config"), (variable and Path(variable), CONFIG_VARIABLE)):
         if path:
             if not path.is_file():
@@ -105,6 +108,7 @@ def load_config(path: Path) -> Config:
     except ValueError as cause:
         raise ValueError(f"{path} is not TOML: {cause}") from cause
     known = Config.__struct_fields__
+    # Msgspec names one unknown key, and not those that exist.
     if unknown := sorted(set(content) - set(known)):
         raise ValueError(
             f"{path}: unknown key {', '.join(unknown)}; there are {', '.join(sorted(known))}"

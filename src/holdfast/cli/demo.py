@@ -75,7 +75,7 @@ def demo(
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
-    refuse_overwrite(model, force=force)
+    refuse_overwrite(model, force=force)  # before minutes of simulation
     grasps = plan_grasps(
         DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
     )
@@ -88,7 +88,7 @@ def demo(
     shown = recordings[-1]
     if browser is None:
         browser = has_browser() and sys.stdin.isatty()
-    page = bool(browser and speed and not as_json)
+    page = bool(browser and speed and not as_json)  # at speed 0 a page would show only the end
     n_updates = _replay(ours, shown, out, speed, page=page)
     if as_json:
         print_json(

@@ -95,6 +95,7 @@ def show_clip(speed: float, write: Callable[[str], None]) -> list[ClipEvent]:
         The events.
     """
     write("1/5  a real recording: a robot carries a box between two uSkin sensors")
+    # Changes, slips and labels come one kind after the other.
     events = sorted(_events())
     start = time.monotonic()
     for event in events:
@@ -183,6 +184,7 @@ def replay(model: Model, path: Path, speed: float, true_events: TrueEvents) -> i
     Returns:
         Number of estimates.
     """
+    # At a terminal that is watched in real time, the table; else only the lines.
     with open_source(str(path), speed=speed) as source:
         if speed and sys.stderr.isatty():
             from rich.console import Console
@@ -200,13 +202,14 @@ def replay(model: Model, path: Path, speed: float, true_events: TrueEvents) -> i
                         screen.update(finger_table(estimate), refresh=True)
             return n_updates
         estimates = print_changes(model, source, true_events, print_message)
-        return sum(1 for _ in estimates)
+        return sum(1 for _ in estimates)  # the lines are printed while it is consumed
 
 
 def replay_on_page(model: Model, path: Path, folder: Path, speed: float) -> None:
     """Replay on a web page; at a terminal the page stays open until Ctrl-C."""
     stay = sys.stdin.isatty()
     with (
+        # It begins again as long as the page stays.
         open_source(str(path), speed=speed, loop=stay) as source,
         Session(StreamDetector(model, source)) as session,
     ):
@@ -218,6 +221,7 @@ def replay_on_page(model: Model, path: Path, folder: Path, speed: float) -> None
                 "     Ctrl-C stops it" if stay else "     it stops at the end of the recording"
             )
 
+        # Port 0: a free one, as 8080 may be taken.
         serve.run_page(session, announce, port=0, folder=folder, stay=stay)
 
 
@@ -243,6 +247,7 @@ def finger_table(estimate: HandEstimate) -> "Table":
     for heading, width in (("finger", 8), ("state", 18), ("stable", 6), ("", BAR_WIDTH)):
         table.add_column(heading, width=width)
     table.add_column("instability", width=11, justify="right")
+    # `\[` is a bracket, not a style of rich
     table.add_column(r"force \[counts]", width=14, justify="right")
     for name, finger in estimate.fingers.items():
         known = finger.state != "UNKNOWN"  # without an estimate, the probability means nothing
@@ -264,6 +269,7 @@ def _number(value: float, digits: int) -> str:
         >>> _number(-0.001, 1), _number(float("nan"), 1), _number(12.34, 1)
         ('0.0', '-', '12.3')
     """
+    # Value - value is NaN for NaN and infinity; + 0.0 makes 0.0 of -0.0.
     return "-" if value - value != 0 else f"{round(value, digits) + 0.0:.{digits}f}"
 
 

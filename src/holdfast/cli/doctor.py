@@ -65,7 +65,7 @@ def doctor(
         "python": platform.python_version(),
         "platform": platform.platform(),
         "cpus": usable_processors(),
-        "packages": packages.pop("", {}),
+        "packages": packages.pop("", {}),  # those that every installation needs
         "extras": {
             extra: {
                 "purpose": EXTRA_PURPOSES.get(extra, ""),
@@ -107,7 +107,7 @@ def _check_modules(
         return plot_noise({name: module.noise for name, module in check.modules.items()})
 
     check_seconds(seconds)
-    figure.check()
+    figure.check()  # before ten seconds are read
     path = history_path(uri) if history is None else history
     earlier = read_history(path)
     with open_source(uri, speed=0) as source:

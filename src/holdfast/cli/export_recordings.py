@@ -87,9 +87,9 @@ def export_recordings(
         print_json({"out": out, "format": name, **document})
         return
     counts = [
-        f"{n} {what.removesuffix('s') if n == 1 and what != 'fps' else what}"
+        f"{n} {what.removesuffix('s') if n == 1 and what != 'fps' else what}"  # fps is no plural
         for what, n in document.items()
-        if isinstance(n, int)
+        if isinstance(n, int)  # lists of files are for JSON
     ]
     print_line(f"{out}: {', '.join(counts)}")
 

@@ -1,5 +1,6 @@
 """`holdfast import`: recordings from other formats, and from files that were cut off."""
 
+import errno
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -144,14 +145,16 @@ def import_all(
     from holdfast.io.importers import import_hint
 
     if out.exists() and not out.is_dir():
-        raise NotADirectoryError(20, "is a file; a folder expected", str(out))
+        raise NotADirectoryError(errno.ENOTDIR, "is a file; a folder expected", str(out))
     prefixes, task = _parts(started.path(path), options.task(started.path(out), force=force))
     with _staging_folder(task.out) as folder:
         results = started.map_ordered(_import_part, prefixes.items(), shared=(task, folder))
         results = progress(results, "importing", len(prefixes))
         imported = list(_collect(results, folder, started))
+        # All parts were read without an error: only now do the recordings get their names.
         for recording in imported:
             (folder / recording.file_name).replace(task.out / recording.file_name)
+    # The path as the user gave it; that of the task is absolute on a cluster.
     for recording in imported:
         recording.document["path"] = out / recording.file_name
     hint = None if task.data_format is None else import_hint(task.data_format)
@@ -250,6 +253,7 @@ def _import_part(
     messages: dict[str, str] = {}
 
     def report(text: str) -> None:
+        # One text for all parts: a message about a hundred files is printed once.
         messages[text.replace(part.name, "")] = text
 
     recordings: Iterable[Recording]
@@ -292,6 +296,7 @@ def _collect(
         printed |= messages.keys()
         for recording in recordings:
             engine.check_written(folder / recording.file_name)
+            # Parts are imported in different processes: only here are all names known.
             _check_new(recording.document["name"], recording.file_name in names)
             names.add(recording.file_name)
             yield recording
@@ -312,6 +317,7 @@ def _staging_folder(out: Path) -> Iterator[Path]:
     created = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         out.mkdir(parents=True, exist_ok=True)
+        # In `out`, on its file system: the files need only be renamed at the end.
         staging = tempfile.TemporaryDirectory(prefix=".import.", dir=out)
     except OSError as cause:
         raise OutputError(f"cannot write to {out}: {cause.strerror}") from cause
@@ -319,9 +325,11 @@ def _staging_folder(out: Path) -> Iterator[Path]:
         with staging as name:
             yield Path(name)
     except OutputError as cause:
+        # The user knows `out` and not the temporary folder.
         raise OutputError(str(cause).replace(staging.name, str(out))) from cause
     finally:
         for folder in created:
+            # A folder with recordings is not removed.
             with suppress(OSError):
                 folder.rmdir()
 

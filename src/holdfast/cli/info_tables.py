@@ -38,6 +38,7 @@ def print_recording(content: Mapping[str, Any]) -> None:
     if content["markers"]:
         from holdfast.recordings import shown_origin
 
+        # Times since 1970 are shown from the first sample on.
         origin = shown_origin(content["start"])
         print_line()
         if origin:
@@ -112,7 +113,7 @@ def print_folder(documents: list[dict[str, Any]]) -> None:
                 x["name"],
                 len(modules),
                 sum(m["n_samples"] for m in modules),
-                f"{rates[len(rates) // 2]:.1f}",
+                f"{rates[len(rates) // 2]:.1f}",  # the median of the modules
                 f"{x['duration']:.2f}",
                 sum(m["gaps"] for m in modules),
                 ", ".join(([] if x["complete"] else ["cut off"]) + [*faults, *findings]) or "ok",

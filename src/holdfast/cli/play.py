@@ -83,6 +83,7 @@ def play(
         require_extras("twin", "parquet")
     once = once or bool(players.chosen())
     with ExitStack() as stack:
+        # The imports are inside: they are part of the wait.
         with message_if_slow(awaited(source)):
             from holdfast.devices.sources.xela.encoder import is_part_of_hand
             from holdfast.live.publishers.xela_server import XelaServer
@@ -93,7 +94,7 @@ def play(
             opened, version=version, host=host, port=port, whole_hand=whole,
             wait=once, restart=not once,
         )  # fmt: skip
-        with suppress(KeyboardInterrupt), handle_stop_signals(), server:
+        with suppress(KeyboardInterrupt), handle_stop_signals(), server:  # Ctrl-C is the usual end
             if as_json:
                 modules = {
                     str(number): list(names) for number, names in server.encoder.modules.items()
@@ -112,13 +113,14 @@ def play(
                 if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
                     rate = (server.n_packets - n_sent) / (now - updated_at)
                     clients = _clients(server.n_clients, server.port)
+                    # \033[K erases the rest of a longer line
                     sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
                     updated_at, n_sent = now, server.n_packets
                 elif not sys.stderr.isatty() and server.n_clients != n_clients:
                     n_clients = server.n_clients
                     print_message(_clients(n_clients, server.port))
             if sys.stderr.isatty():
-                print_message("")
+                print_message("")  # ends the line that was overwritten
     if server.failure is not None:
         raise server.failure
     if as_json:

@@ -83,9 +83,9 @@ def record(
     check_seconds(seconds)
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
-    path = _output_path(source, out, object_name, force=force)
+    path = _output_path(source, out, object_name, force=force)  # before a device is awaited
     with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
-        stop.graceful = True
+        stop.graceful = True  # Ctrl-C from here on closes the file; before, it ends the wait
         recorder = _create_recorder(
             opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
         )
@@ -119,6 +119,7 @@ def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Ar
         arrival = source.read(READ_TIMEOUT)
         if arrival is not None and arrival.samples:
             first = arrival.time if math.isnan(first) else first
+            # The source's own clock counts; the other one only if it falls silent.
             if arrival.time - first >= duration:
                 return
         yield arrival
@@ -144,6 +145,7 @@ def _record(
             line.print(KEY_HELP if keys.interactive else "Ctrl-C stops")
             for arrival in arrivals:
                 if arrival is not None:
+                    # A recording can wait for a slow disk; a device cannot, and samples are dropped
                     recorder.put(arrival, wait=not source.paced)
                     line.print(*map(marker_text, arrival.notices))
                 for text in keys.poll():
@@ -152,7 +154,7 @@ def _record(
                 if stop.requested or keys.stop_pressed or recorder.failed:
                     break
     except OutputError as failure:
-        if not recorder.status.n_samples:
+        if not recorder.status.n_samples:  # a file without samples is of no use
             recorder.path.unlink(missing_ok=True)
         kept = recorder.path.exists()
         hint = f"; see the recorded part with: holdfast info {recorder.path}" if kept else ""
@@ -174,6 +176,7 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
     if out.is_dir() or not out.suffix:
         name = file_stem(Path(source).stem)
         if is_uri(source):
+            # The name of an object becomes part of the file name, which does not begin with a dot.
             what = re.sub(r"[^\w.-]+", "_", object_name or source.partition(":")[0]).strip("._")
             name = f"{file_stem(what or 'grasp')}-{time.strftime('%Y%m%d-%H%M%S')}"
         path = out / f"{name}{_SUFFIX}"
@@ -213,6 +216,7 @@ def _create_recorder(
     except OSError as cause:
         raise OutputError(f"cannot write to {path.parent}: {cause.strerror}") from cause
     recorded_at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    # What was typed outranks what the source says of itself.
     metadata = {**source.metadata, "recorded_at": recorded_at, **metadata}
     return Recorder(path, sensors, metadata=metadata, force=force, fsync=fsync)
 
@@ -238,6 +242,7 @@ def _value(text: str) -> float | str:
         >>> _value("3"), _value("0.25"), _value("can")
         (3, 0.25, 'can')
     """
+    # re.ASCII: `\d` would match digits of other scripts
     if re.fullmatch(r"-?\d{1,15}", text, re.ASCII):
         return int(text)
     if re.fullmatch(r"-?\d+\.\d+", text, re.ASCII):

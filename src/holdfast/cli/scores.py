@@ -105,6 +105,7 @@ def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
 def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:
     missed = (format_number(share, 1) for share in metrics.missed.values())
     delays = (
+        # Events without any delay: all were missed.
         format_number(delay, 3) if delay is not None or not metrics.n_events else "never"
         for delay in (metrics.delay_median, metrics.delay_p95)
     )
@@ -177,6 +178,7 @@ def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
 
 
 def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
+    # A label says when a finger slides, not how far.
     n_over = "-" if metrics.onsets in ("labels", "rule") else str(metrics.n_over_1mm)
     return (
         name, str(metrics.n), n_over, *share_cells(metrics), format_number(metrics.auc, 3)

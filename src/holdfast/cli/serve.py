@@ -83,7 +83,7 @@ def serve(
         plugin.panel(chosen, source, speed=speed, loop=not once)
         for _, plugin, chosen in panels.chosen()
     ]
-    token = access.find_token()
+    token = access.find_token()  # a wrong token is refused before anything is loaded
     guard = Guard(access.host, token)
     check_speed(source, speed)
     with message_if_slow(f"loading the detector for {source}" if awaited(source) else ""):
@@ -188,6 +188,7 @@ def run_page(
     session.start()
     run_server(
         service.app, host, port, announce,
+        # A page that stays still ends when the session fails.
         lambda: session.ended and not (stay and session.failure is None),
     )  # fmt: skip
     if session.failure is not None:

@@ -138,6 +138,7 @@ class TrainingOptions:
             return Setting.adapting(replace(Model.load(init), name=init), **chosen)
         names = chosen.get("features", ",".join(DEPLOYED_FEATURES))
         chosen["features"] = parse_features(names, chosen.get("window", Setting.window))
+        # Windows in seconds: the features of `any`, whose model decides without hysteresis.
         relative = all(spec.seconds for spec in chosen["features"])
         steady = {"hold": DEFAULT_HOLD, "hysteresis": 0.0 if relative else DEFAULT_HYSTERESIS}
         return Setting(**(steady | chosen))

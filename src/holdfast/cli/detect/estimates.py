@@ -112,6 +112,7 @@ def _read_parts(
     first = next(parts, None)
     if first is None:
         raise RecordingError(f"{path} has no samples; at least one expected")
+    # A sensor that the model does not know is refused before any other message.
     model.fingers_of({name: module.sensor for name, module in first.modules.items()})
     if not first.complete:
         print_message(f"{path} is cut off: only its readable part is used")
@@ -124,7 +125,7 @@ def _read_parts(
         first, parts = whole(), iter(())
     if model.rate is None or model.rate_fits(first.rate):
         if Tare.parse(model.tare).kind == "interval":
-            return iter([whole()])
+            return iter([whole()])  # the interval may lie after the first part
         return chain([first], parts)
     given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
     if rate is RatePolicy.STRICT:
@@ -144,6 +145,7 @@ def detect_live(
     with handle_stop_signals() as stop, open_source(uri) as source:
         stream = options.create_stream(model, source, start)
         report_missing_slip_rules(model)
+        # Ctrl-C before ends the wait; from here on the summary is still printed
         stop.graceful = True
         end = math.inf if seconds is None else monotonic() + seconds
         faults = FaultWatch()
@@ -155,4 +157,5 @@ def detect_live(
                 for problem in faults.update(estimate.estimate):
                     print_message(problem.text)
             yield chunk_from_stream(source.name, update.estimates)
+        # Samples that a short source sent before its rate was known.
         yield chunk_from_stream(source.name, stream.finish().estimates)

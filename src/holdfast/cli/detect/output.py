@@ -54,7 +54,7 @@ def json_lines(chunk: EstimateChunk) -> Iterator[str]:
         for finger, estimates in chunk.fingers.items()
         for estimate in estimates
     ]
-    lines.sort(key=attrgetter("time"))
+    lines.sort(key=attrgetter("time"))  # each finger has times of its own
     encoder = Encoder()
     for start in range(0, len(lines), LINES_PER_BLOCK):
         # A list, because msgspec 0.22 leaks the items of an iterator.
@@ -69,12 +69,12 @@ class DetectionSummary:
 
     def __init__(self) -> None:
         self._name = ""
-        self._counts: dict[str, _StateCounts] = {}
+        self._counts: dict[str, _StateCounts] = {}  # of each finger and of the hand
         self._changes: dict[str, StateChanges] = {}
         self._events: dict[str, list[ContactEvent]] = {}
-        self._start: float | None = None
+        self._start: float | None = None  # time of the first instant of the hand [s]
         self._watch = SlipWatch()
-        self._ended_slips: list[DetectedSlip] = []
+        self._ended_slips: list[DetectedSlip] = []  # `_watch` keeps only those that have not ended
 
     def add(self, chunk: EstimateChunk) -> None:
         """Add the next chunk of the same recording or source."""
@@ -225,6 +225,7 @@ class ChangeLines:
         self.origin = nan
         self._from_first = from_first
         self._changes: dict[str, StateChanges] = {}
+        # State of each finger, and why it began.
         self._why: dict[str, tuple[ContactState, str]] = {}
         self._watch = SlipWatch()
 
@@ -293,7 +294,7 @@ def print_estimates(chunks: Iterator[EstimateChunk], *, live: bool) -> None:
         for text in json_lines(chunk):
             sys.stdout.write(text)
         if live:
-            sys.stdout.flush()
+            sys.stdout.flush()  # a program that reads the pipe acts on each estimate
 
 
 def print_changes(chunks: Iterator[EstimateChunk], *, live: bool) -> None:

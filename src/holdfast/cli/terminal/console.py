@@ -38,12 +38,13 @@ def visible_json(text: str) -> str:
 
     JSON itself escapes only the first 32 characters, and terminals have further control characters.
     """
-    if text.isascii() and "\x7f" not in text:
+    if text.isascii() and "\x7f" not in text:  # nothing to escape, as in nearly all texts
         return text
     return "".join(c if c.isprintable() or c == "\n" else _json_escape(c) for c in text)
 
 
 def _json_escape(character: str) -> str:
+    # Escapes of JSON are units of UTF-16; file names that are not UTF-8 have lone surrogates.
     units = character.encode("utf-16-be", "surrogatepass").hex()
     return "".join(f"\\u{units[place : place + 4]}" for place in range(0, len(units), 4))
 
@@ -57,6 +58,7 @@ def print_message(text: str) -> None:
 def message_if_slow(text: str, after: float = SLOW_AFTER) -> Iterator[None]:
     """Print a message if the body takes longer than `after` [s]; an empty message never."""
     timer = Timer(after, print_message, (text,))
+    # A process that ends while it waits does not wait for the timer.
     timer.daemon = True
     if text:
         timer.start()
@@ -167,6 +169,7 @@ def _fit(ranges: Sequence[tuple[int, int]], numeric: Sequence[bool]) -> list[int
     """
     available = get_terminal_size().columns
     widths = [max(least, min(widest, available)) for least, widest in ranges]
+    # Each round takes one character from the column with most room, headings of numbers first.
     for _ in range(sum(widths) + len(_GAP) * (len(widths) - 1) - available):
         room = [
             (width > least and is_number, width - least)
@@ -203,11 +206,12 @@ def _is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:
-        return text in ("", "-")
+        return text in ("", "-")  # a dash stands for a number that is not known
     return True
 
 
 def _to_json_value(value: object) -> object:
+    # Arrays and scalars of NumPy, without an import of it.
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Mapping):
