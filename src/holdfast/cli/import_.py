@@ -139,8 +139,9 @@ def import_all(
         force: replace existing files.
 
     Raises:
-        RecordingError: the input cannot be read.
-        OutputError: a recording exists already, or cannot be written.
+        RecordingError: the input cannot be read, or two recordings have the same name.
+        OutputError: a recording exists already, or cannot be written, or a worker does not share
+            the folder.
     """
     from holdfast.io.importers import import_hint
 
@@ -150,7 +151,20 @@ def import_all(
     with _staging_folder(task.out) as folder:
         results = started.map_ordered(_import_part, prefixes.items(), shared=(task, folder))
         results = progress(results, "importing", len(prefixes))
-        imported = list(_collect(results, folder, started))
+        imported: list[_Imported] = []
+        names: set[str] = set()
+        printed: set[str] = set()
+        for recordings, messages in results:
+            for key, text in messages.items():
+                if key not in printed:
+                    print_message(text)
+            printed |= messages.keys()
+            for recording in recordings:
+                started.check_written(folder / recording.file_name)
+                # Parts are imported in different processes: only here are all names known.
+                _check_new(recording.document["name"], recording.file_name in names)
+                names.add(recording.file_name)
+            imported += recordings
         # All parts were read without an error: only now do the recordings get their names.
         for recording in imported:
             (folder / recording.file_name).replace(task.out / recording.file_name)
@@ -276,30 +290,6 @@ def _import_part(
         named = replace(recording, name=f"{prefix}{recording.name}")
         written.append(_write(named, folder, task))
     return written, messages
-
-
-def _collect(
-    results: "Iterable[tuple[list[_Imported], dict[str, str]]]", folder: Path, engine: "Engine"
-) -> Iterator[_Imported]:
-    """Yield the imported recordings; print each message once.
-
-    Raises:
-        RecordingError: two recordings have the same name.
-        OutputError: a worker does not share the folder.
-    """
-    names: set[str] = set()
-    printed: set[str] = set()
-    for recordings, messages in results:
-        for key, text in messages.items():
-            if key not in printed:
-                print_message(text)
-        printed |= messages.keys()
-        for recording in recordings:
-            engine.check_written(folder / recording.file_name)
-            # Parts are imported in different processes: only here are all names known.
-            _check_new(recording.document["name"], recording.file_name in names)
-            names.add(recording.file_name)
-            yield recording
 
 
 def _check_new(name: str, known: bool) -> None:

@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from math import isnan, nan
 from operator import attrgetter, itemgetter
@@ -186,8 +186,8 @@ class _StateCounts:
         return {
             "n_samples": n,
             "states": {state.value: self.states[state] / n if n else 0.0 for state in ContactState},
-            "reasons": _ordered(self.reasons, Reason),
-            "faults": _ordered(self.faults, Fault),
+            "reasons": {x.value: self.reasons[x] for x in Reason if self.reasons[x]},
+            "faults": {x.value: self.faults[x] for x in Fault if self.faults[x]},
         }
 
     def shares(self) -> tuple[object, ...]:
@@ -198,16 +198,11 @@ class _StateCounts:
     def causes(self) -> tuple[str, str]:
         """Return the counts of reasons and of faults as cells of a table."""
         counts = self.to_dict()
-        return _text(counts["reasons"]), _text(counts["faults"])
-
-
-def _ordered(counts: Counter[Any], members: Iterable[Any]) -> dict[str, int]:
-    """Return the counts that are not zero, in the order of the members."""
-    return {member.value: counts[member] for member in members if counts[member]}
-
-
-def _text(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{name} {n}" for name, n in counts.items()) or "-"
+        reasons, faults = (
+            ", ".join(f"{name} {n}" for name, n in counts[key].items()) or "-"
+            for key in ("reasons", "faults")
+        )
+        return reasons, faults
 
 
 class ChangeLines:

@@ -139,7 +139,12 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
     lines = [[visible(str(cell)) for cell in row] for row in (header, *rows)]
     columns = list(zip(*lines, strict=True))
     numeric = [all(_is_number(cell) for cell in column[1:]) for column in columns]
-    ranges = [_width_range(*both) for both in zip(columns, numeric, strict=True)]
+    ranges = []  # smallest and natural width of each column; its first cell is its heading
+    for column, is_number in zip(columns, numeric, strict=True):
+        widest, least = max(map(len, column)), MIN_TEXT_WIDTH
+        if is_number:  # the words of the heading may stand below each other, a number is whole
+            least = max(map(len, (*column[0].split(), *column[1:], "")))
+        ranges.append((min(widest, least), widest))
     widths = _fit(ranges, numeric)
     for k, row in enumerate(lines):
         cells = [_wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
@@ -152,14 +157,6 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
                 for part, width, is_number in zip(parts, widths, numeric, strict=True)
             ]
             print_line(_GAP.join(padded).rstrip())
-
-
-def _width_range(column: Sequence[str], numeric: bool) -> tuple[int, int]:
-    """Return the smallest and the natural width of a column whose first cell is its heading."""
-    widest = max(map(len, column))
-    if not numeric:
-        return min(widest, MIN_TEXT_WIDTH), widest
-    return max(map(len, (*column[0].split(), *column[1:], ""))), widest
 
 
 def _fit(ranges: Sequence[tuple[int, int]], numeric: Sequence[bool]) -> list[int]:
@@ -188,18 +185,16 @@ def _wrap(text: str, width: int) -> list[str]:
     """
     if len(text) <= width:
         return [text]
-    parts = (part for word in text.split(" ") for part in _split(word, width))
+    parts = []
+    for word in text.split(" "):
+        start = 0
+        while len(word) - start > width:
+            marks = (word.rfind(mark, start, start + width) for mark in "_-/.")
+            end = max(marks) + 1 or start + width
+            parts.append(word[start:end])
+            start = end
+        parts.append(word[start:])
     return wrap(" ".join(parts), width, break_on_hyphens=False)
-
-
-def _split(word: str, width: int) -> Iterator[str]:
-    """Yield the parts of a word, each at most `width` long."""
-    start = 0
-    while len(word) - start > width:
-        end = max(word.rfind(mark, start, start + width) for mark in "_-/.") + 1 or start + width
-        yield word[start:end]
-        start = end
-    yield word[start:]
 
 
 def _is_number(text: str) -> bool:
