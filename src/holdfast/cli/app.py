@@ -239,11 +239,11 @@ class _GroupedVerbs(TyperGroup):
         """Write a section for each group, and one for verbs of plug-ins."""
         others = {name: "" for name in self.commands if name not in {**VERBS, **SUB_VERBS}}
         width = max(map(len, (*VERBS, *others)))
-        # 6 as in click: three times the spacing of its columns
+        # 6 as in click: three times the spacing of its columns.
         limit = formatter.width - 6 - width
         for title, verbs in {**VERB_GROUPS, "Plug-ins": others}.items():
             rows = [
-                # Equal columns in all sections.
+                # All sections have columns of equal width.
                 (name.ljust(width), self.commands[name].get_short_help_str(limit))
                 for name in verbs
             ]
@@ -279,7 +279,7 @@ def load_verb(name: str) -> Callable[..., None]:
     """
     if name not in (*OWN_VERBS, *SUB_VERBS):
         return VERB_PLUGINS.require(name, f"the verb {name}")
-    # import_.py: a module has no keyword as its name
+    # `import` is a keyword, so its module is import_.py.
     names = [f"{word}_" if keyword.iskeyword(word) else word for word in name.split()]
     module = import_module(".".join(("holdfast.cli", *names)))
     verb: Callable[..., None] = getattr(module, names[-1])

@@ -149,7 +149,7 @@ def _recorded(
     from holdfast.training.own_handling import ENOUGH_HANDLING
 
     with handle_stop_signals() as stop, sources.open_source(data, speed=speed) as source:
-        # Ctrl-C before ends the wait for the source; from here on it ends the recording
+        # Ctrl-C before ends the wait for the source; from here on it ends the recording.
         stop.graceful = True
         print_message(f"recording {source.name} for {seconds:g} s; Ctrl-C stops")
         stream = start.create_stream(model, source)

@@ -83,7 +83,7 @@ def find_config(option: Path | None = None) -> Path | None:
         ValueError: the file of the option or the variable does not exist.
     """
     variable = os.environ.get(CONFIG_VARIABLE)
-    # --config outranks the variable, and both outrank the file in this folder
+    # --config outranks the variable, and both outrank the file in this folder.
     for path, where in ((option, "--config"), (variable and Path(variable), CONFIG_VARIABLE)):
         if path:
             if not path.is_file():
@@ -108,7 +108,7 @@ def load_config(path: Path) -> Config:
     except ValueError as cause:
         raise ValueError(f"{path} is not TOML: {cause}") from cause
     known = Config.__struct_fields__
-    # Msgspec names one unknown key, and not those that exist.
+    # msgspec names one unknown key, and not those that exist.
     if unknown := sorted(set(content) - set(known)):
         raise ValueError(
             f"{path}: unknown key {', '.join(unknown)}; there are {', '.join(sorted(known))}"

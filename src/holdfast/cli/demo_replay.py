@@ -209,7 +209,7 @@ def replay_on_page(model: Model, path: Path, folder: Path, speed: float) -> None
     """Replay on a web page; at a terminal the page stays open until Ctrl-C."""
     stay = sys.stdin.isatty()
     with (
-        # It begins again as long as the page stays.
+        # A page that stays shows the recording again and again.
         open_source(str(path), speed=speed, loop=stay) as source,
         Session(StreamDetector(model, source)) as session,
     ):
@@ -247,7 +247,7 @@ def finger_table(estimate: HandEstimate) -> "Table":
     for heading, width in (("finger", 8), ("state", 18), ("stable", 6), ("", BAR_WIDTH)):
         table.add_column(heading, width=width)
     table.add_column("instability", width=11, justify="right")
-    # `\[` is a bracket, not a style of rich
+    # `\[` is a bracket, not a style of rich.
     table.add_column(r"force \[counts]", width=14, justify="right")
     for name, finger in estimate.fingers.items():
         known = finger.state != "UNKNOWN"  # without an estimate, the probability means nothing
@@ -269,7 +269,7 @@ def _number(value: float, digits: int) -> str:
         >>> _number(-0.001, 1), _number(float("nan"), 1), _number(12.34, 1)
         ('0.0', '-', '12.3')
     """
-    # Value - value is NaN for NaN and infinity; + 0.0 makes 0.0 of -0.0.
+    # `value - value` is NaN for NaN and for infinity; `+ 0.0` makes 0.0 of -0.0.
     return "-" if value - value != 0 else f"{round(value, digits) + 0.0:.{digits}f}"
 
 

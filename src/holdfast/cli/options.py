@@ -161,7 +161,7 @@ class StartOptions:
 
     def of(self, recording: "Recording") -> "Recording":
         """Return a recording with this start."""
-        # None, and not False: without the option, what the recording says of its start counts
+        # None, and not False: without the option, what the recording says of its start counts.
         return recording.with_start(loaded=self.in_contact or None)
 
     def create_stream(
@@ -220,7 +220,7 @@ class DetectorOptions:
         from holdfast.devices.uri import is_uri
         from holdfast.model import Debounce, Model
 
-        # builtin:any has the form of a URI; a forgotten MODEL is the usual mistake
+        # builtin:any has the form of a URI; a forgotten MODEL is the usual mistake.
         is_source = is_uri(name) and not name.startswith("builtin:")
         if is_source or name.endswith((".parquet", ".mcap", ".csv")):
             raise ValueError(

@@ -113,7 +113,7 @@ def play(
                 if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
                     rate = (server.n_packets - n_sent) / (now - updated_at)
                     clients = _clients(server.n_clients, server.port)
-                    # \033[K erases the rest of a longer line
+                    # `\033[K` erases the rest of a longer line.
                     sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
                     updated_at, n_sent = now, server.n_packets
                 elif not sys.stderr.isatty() and server.n_clients != n_clients:

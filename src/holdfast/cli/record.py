@@ -145,7 +145,7 @@ def _record(
             line.print(KEY_HELP if keys.interactive else "Ctrl-C stops")
             for arrival in arrivals:
                 if arrival is not None:
-                    # A recording can wait for a slow disk; a device cannot, and samples are dropped
+                    # A recording can wait for a slow disk; a device drops samples.
                     recorder.put(arrival, wait=not source.paced)
                     line.print(*map(marker_text, arrival.notices))
                 for text in keys.poll():
@@ -242,7 +242,7 @@ def _value(text: str) -> float | str:
         >>> _value("3"), _value("0.25"), _value("can")
         (3, 0.25, 'can')
     """
-    # re.ASCII: `\d` would match digits of other scripts
+    # `re.ASCII`, because `\d` matches digits of other scripts as well.
     if re.fullmatch(r"-?\d{1,15}", text, re.ASCII):
         return int(text)
     if re.fullmatch(r"-?\d+\.\d+", text, re.ASCII):

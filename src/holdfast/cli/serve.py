@@ -97,7 +97,7 @@ def serve(
             sys.stdout.flush()  # a program that reads the pipe waits for the address
         print_message(f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it")
 
-    # A panel may make the source, as that of a simulated hand, which feels its own commands.
+    # A panel may make the source, as the twin whose hand it commands.
     made = [opener.source() for opener in openers]
     own = next((one for one in made if one is not None), None)
     unopened = own or open_source(source, speed=speed, loop=not once)

@@ -145,7 +145,7 @@ def detect_live(
     with handle_stop_signals() as stop, open_source(uri) as source:
         stream = options.create_stream(model, source, start)
         report_missing_slip_rules(model)
-        # Ctrl-C before ends the wait; from here on the summary is still printed
+        # Ctrl-C before ends the wait; from here on the summary is still printed.
         stop.graceful = True
         end = math.inf if seconds is None else monotonic() + seconds
         faults = FaultWatch()
