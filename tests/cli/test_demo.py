@@ -109,11 +109,11 @@ def test_without_a_graphical_browser_the_replay_is_in_the_terminal(monkeypatch):
         monkeypatch.setattr("sys.platform", "linux")
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
         monkeypatch.setenv("DISPLAY", display)
-        assert verb._on_page(None, 1.0, as_json=False) is expected
-        assert verb._on_page(True, 1.0, as_json=False)
-        assert not verb._on_page(False, 1.0, as_json=False)
-    assert not verb._on_page(True, 0.0, as_json=False)
-    assert not verb._on_page(True, 1.0, as_json=True)
+        assert verb.replays_on_page(None, 1.0, as_json=False) is expected
+        assert verb.replays_on_page(True, 1.0, as_json=False)
+        assert not verb.replays_on_page(False, 1.0, as_json=False)
+    assert not verb.replays_on_page(True, 0.0, as_json=False)
+    assert not verb.replays_on_page(True, 1.0, as_json=True)
 
 
 def test_the_objects_are_not_those_of_the_training():
