@@ -161,11 +161,13 @@ class _Sticker:
             step = self._solve @ (now - self._template)
             change = np.eye(3)
             change[:2] += step.reshape(2, 3)
+            # The step is that of the template: its inverse moves the place.
             place = place @ np.linalg.inv(change)
             if np.abs(step).max() < SETTLED:
                 break
         likeness = float(now @ self._template) / len(now)
         size = abs(np.linalg.det(place[:, :2]))
+        # In 8 x 8 pixels, the 6 x 6 cells of a pattern are hardly seen.
         self.is_seen = likeness > MIN_LIKENESS and 64 < size < grey.size / 4
         if self.is_seen:
             self.place = place
@@ -181,4 +183,5 @@ class _Sticker:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         seen = cv2.warpAffine(grey, place @ grid, (N_POINTS, N_POINTS), flags=flags)
         values = seen.astype(np.float64).ravel()
+        # A plain patch has no variance to divide by.
         return np.asarray((values - values.mean()) / max(values.std(), 1.0))
