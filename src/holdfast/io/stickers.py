@@ -169,6 +169,7 @@ class _Sticker:
                 break
         likeness = float(now @ self._template) / len(now)
         size = abs(np.linalg.det(place[:, :2]))
+        # In 8 x 8 pixels, the 6 x 6 cells of a pattern are hardly seen.
         self.is_seen = likeness > MIN_LIKENESS and 64 < size < grey.size / 4
         if self.is_seen:
             self.place = place

@@ -47,21 +47,18 @@ def _drawing() -> Iterator[str]:
     for side, numbers in SHEET_STICKERS * N_ROWS:
         x = 20.0
         for number in numbers * (4 if len(numbers) == 1 else 1):
-            rim = side / 6
+            rim = cell = side / 6  # a cell of white around the pattern lets OpenCV find its edge
             yield f"{x} {y} {side + 2 * rim} {side + 2 * rim} re S"
             for row, column in np.argwhere(_is_black(number)):
-                cell = side / 6
                 yield f"{x + rim + column * cell:.3f} {y + rim + row * cell:.3f} {cell} {cell} re f"
-            yield _words(x, y + side + 2 * rim + 3, 2.5, f"{_owner(number)}, {side:g} mm")
+            owner = f"finger {number}" if number else "object"
+            yield _words(x, y + side + 2 * rim + 3, 2.5, f"{number}: {owner}, {side:g} mm")
             x += side + 2 * rim + 6
         y += side + side / 3 + 10
 
 
-def _owner(number: int) -> str:
-    return "0: object" if number == 0 else f"{number}: finger {number}"
-
-
 def _words(x: float, y: float, size: float, text: str) -> str:
+    # y points down on this page: letters are mirrored back.
     return f"BT /F {size} Tf 1 0 0 -1 {x} {y} Tm ({text}) Tj ET"
 
 

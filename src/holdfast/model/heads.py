@@ -121,7 +121,25 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         if len(set(self.features)) < len(self.features):
             raise ModelError(f"{self.name}: a feature is given twice")
         self._check_rule()
-        self._check_numbers()
+        if not 0 <= self.threshold <= 1:
+            raise ModelError(
+                f"{self.name}: a threshold from 0 to 1 expected, {self.threshold} given"
+            )
+        if self.link != "square":
+            if self.highest is not None:
+                raise ModelError(f"{self.name}: no highest value expected, {self.highest} given")
+        elif self.highest is None or not 0 < self.highest < math.inf:
+            raise ModelError(
+                f"{self.name}: a finite highest value above 0 expected, {self.highest} given"
+            )
+        for field in ("smoothing", "hold"):
+            seconds = getattr(self, field)
+            # Only slips have them: stability has its own filter and debouncing.
+            most = MAX_HEAD_DURATION if self.name == "slip" else 0.0
+            if not 0 <= seconds <= most:
+                raise ModelError(
+                    f"{self.name}: a {field} from 0 to {most:g} s expected, {seconds} given"
+                )
 
     def _check_rule(self) -> None:
         n_classes = len(self.classes)
@@ -146,27 +164,6 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             )
         if self.rule.squares and self.name not in ("slip", "slip_speed"):
             raise ModelError(f"{self.name}: a rule without squares expected")
-
-    def _check_numbers(self) -> None:
-        if not 0 <= self.threshold <= 1:
-            raise ModelError(
-                f"{self.name}: a threshold from 0 to 1 expected, {self.threshold} given"
-            )
-        if self.link != "square":
-            if self.highest is not None:
-                raise ModelError(f"{self.name}: no highest value expected, {self.highest} given")
-        elif self.highest is None or not 0 < self.highest < math.inf:
-            raise ModelError(
-                f"{self.name}: a finite highest value above 0 expected, {self.highest} given"
-            )
-        for field in ("smoothing", "hold"):
-            seconds = getattr(self, field)
-            # Only slips have them: stability has its own filter and debouncing.
-            most = MAX_HEAD_DURATION if self.name == "slip" else 0.0
-            if not 0 <= seconds <= most:
-                raise ModelError(
-                    f"{self.name}: a {field} from 0 to {most:g} s expected, {seconds} given"
-                )
 
     @property
     def linear(self) -> Linear:

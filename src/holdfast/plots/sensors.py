@@ -12,7 +12,7 @@ from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from holdfast.plots.style import PageFigure, literal
-from holdfast.sensors import Hand, HandModule, Sensor, taxel_number
+from holdfast.sensors import Hand, Sensor, taxel_number
 from holdfast.sensors.types import Array
 
 MM_PER_M = 1e3
@@ -88,7 +88,22 @@ def plot_hand(hand: Hand) -> Figure:
         fontsize=8,
     )
     for name, module in hand.modules.items():
-        _draw_module(axes, name, module)
+        colour = PART_COLOURS.get(name.split("/", maxsplit=1)[0], "#777777")
+        # Fingertips stand out against the pads of the same finger.
+        strength = 0.55 if "/" not in name else 0.28
+        for k, (row, column) in enumerate(module.grid):
+            cell = FancyBboxPatch(
+                (column + 0.1, row + 0.1), 0.8, 0.8, boxstyle="round,pad=0,rounding_size=0.2",
+                facecolor=(colour, strength), edgecolor=colour, linewidth=0.6,
+            )  # fmt: skip
+            axes.add_patch(cell)
+            number = str(taxel_number(k))
+            axes.text(column + 0.5, row + 0.52, number, ha="center", va="center", fontsize=4.6)
+        (top, left), (_, right) = module.grid.min(axis=0), module.grid.max(axis=0)
+        axes.text(
+            (left + right + 1) / 2, top - 0.12, literal(name),
+            ha="center", va="bottom", fontsize=6.5, color=colour, fontweight="bold",
+        )  # fmt: skip
     axes.set_xlim(-1.1, n_columns + 0.1)
     axes.set_ylim(n_rows + 0.1, -1.1)
     axes.set_aspect("equal")
@@ -143,25 +158,6 @@ def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, A
     axes.tick_params(labelsize=6)
     axes.set_title("seen from outside: taxel z grey, taxel x red", fontsize=8)
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
-    colour = PART_COLOURS.get(name.split("/", maxsplit=1)[0], "#777777")
-    # Fingertips stand out against the pads of the same finger.
-    strength = 0.55 if "/" not in name else 0.28
-    for k, (row, column) in enumerate(module.grid):
-        cell = FancyBboxPatch(
-            (column + 0.1, row + 0.1), 0.8, 0.8, boxstyle="round,pad=0,rounding_size=0.2",
-            facecolor=(colour, strength), edgecolor=colour, linewidth=0.6,
-        )  # fmt: skip
-        axes.add_patch(cell)
-        number = str(taxel_number(k))
-        axes.text(column + 0.5, row + 0.52, number, ha="center", va="center", fontsize=4.6)
-    (top, left), (_, right) = module.grid.min(axis=0), module.grid.max(axis=0)
-    axes.text(
-        (left + right + 1) / 2, top - 0.12, literal(name),
-        ha="center", va="bottom", fontsize=6.5, color=colour, fontweight="bold",
-    )  # fmt: skip
 
 
 def _axis_name(direction: Array) -> str:

@@ -246,7 +246,7 @@ class SlipEvents:
     """
 
     def __init__(self, events: Sequence[SlipEvent], item: GraspObject, period: float) -> None:
-        self._coming = list(reversed(events))
+        self._coming = list(reversed(events))  # the next one is the last, which pop() takes
         self._item, self._period = item, period
         self._locked_pose: Array | None = None  # of the first step
         # The event that acts, since when it recovers (in its own time), how far a fingertip slid
@@ -302,6 +302,7 @@ class SlipEvents:
             case SlipKind.TWIST:
                 torque = left * change * self._axis
                 return SlipState(rest._replace(torque=torque), touching=True)
+        # The other kinds are a hand that guides the object.
         closed = left * min(elapsed / RECLOSING_TIME, 1.0)
         steady = closed if event.kind is SlipKind.CREEP else 0.0
         guide = self._guided(event, elapsed, closed)
@@ -334,6 +335,7 @@ class SlipEvents:
             return event.rate if elapsed - RECLOSING_TIME < event.size / event.rate else -event.rate
         if self._slid >= MIN_SLIDE:
             return event.rate
+        # Before the object slides, the force rises by the stiffness of the hand times its way.
         lever = GUIDE_LEVER if event.kind is SlipKind.TURN else 1.0
         return max(event.rate, event.pull_rate / (event.stiffness * lever))
 

@@ -119,6 +119,7 @@ def film_stickers(recording: Recording, path: Path, camera: Webcam = Webcam()) -
     size = (camera.height, camera.width)
     wall = cv2.GaussianBlur(generator.normal(0, 1, size).astype("f4"), (0, 0), 9)
     wall = 125 + 12 * wall / wall.std()
+    # Noise is drawn once, with room to cut it at another place for each picture.
     noise = generator.normal(0, camera.noise, (camera.height + 64, camera.width + 64)).astype("f4")
     film = cv2.VideoWriter(
         str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), camera.fps, size[::-1]
@@ -192,6 +193,7 @@ def _square(side: float, right: npt.ArrayLike, up: npt.ArrayLike) -> Array:
 def _matrices(pose: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
+    # SciPy has the scalar of a quaternion last, a pose has it first.
     return np.asarray(Rotation.from_quat(np.roll(pose[:, 3:], -1, axis=1)).as_matrix())
 
 
@@ -225,6 +227,7 @@ def _draw(
     import cv2
 
     at = _at(time, times, corners)
+    # The rows of one sticker are exposed at nearly the same time: that of its middle.
     time += camera.row_time * at[:, 1].mean() / camera.height
     low = np.floor(at.min(axis=0) - 0.4 * np.ptp(at, axis=0)).astype(int)
     high = np.ceil(at.max(axis=0) + 0.4 * np.ptp(at, axis=0)).astype(int)
@@ -234,6 +237,7 @@ def _draw(
     below = cv2.resize(part, None, fx=N_SUBPIXELS, fy=N_SUBPIXELS, interpolation=cv2.INTER_NEAREST)
     rim = texture.shape[0] * RIM / (1 + 2 * RIM)
     far = texture.shape[0] - rim
+    # OpenCV counts pixels from the middle of the first.
     source = np.array([[rim, rim], [far, rim], [far, far], [rim, far]], "f4") - 0.5
     total = np.zeros_like(part)
     for k in range(N_INSTANTS):

@@ -68,6 +68,7 @@ def _drifts(modules: dict[str, Tactile], of_bag: object) -> list[Finding]:
     for (first, one), (second, other) in combinations(modules.items(), 2):
         lengths = np.array([module.times[-1] - module.times[0] for module in (one, other)])
         drift = lengths[1] / lengths[0] - 1
+        # Only modules that have lost nothing last equally long by the same clock.
         is_whole = one.n_samples == other.n_samples and not one.n_gaps + other.n_gaps
         if is_whole and abs(drift) >= MIN_CLOCK_DIFFERENCE:
             text = f"as many samples as {first} in {lengths[1]:.5g} s, where that has "

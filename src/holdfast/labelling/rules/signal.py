@@ -178,6 +178,7 @@ class _GraspLabeller:
         touching = finger.contact & self._inside
         if not touching.any():
             return
+        # What is set later replaces what was set before: the ends of a grasp go last.
         timeline.set_state(touching, STABLE, None, evidence_ratio(1.0, ratio))
         timeline.set_state(touching & self._changing[name], UNSTABLE, Cause.DISTURBANCE, ratio)
         before = np.arange(len(touching)) < self._locked

@@ -193,6 +193,7 @@ class _FingerLabeller:
     ) -> None:
         self._finger, self._times, self._rule = finger, times, rule
         self._contact = finger.contact.copy()
+        # With a threshold, the force itself says when contact ends.
         self._drop = None if finger.threshold is not None else drop
         if self._drop is not None:
             self._contact[self._drop :] = False
@@ -274,7 +275,7 @@ class _FingerLabeller:
     def _label_ends(self, timeline: StateTimeline, start: int, end: int) -> None:
         """Set the cause of motion at the start of a contact to closing, at its end to released."""
         if self._finger.threshold is None:
-            return
+            return  # it begins in contact: the recording does not show how it closed
         unstable = timeline.codes[start:end] == UNSTABLE
         still = np.flatnonzero(timeline.codes[start:end] == STABLE)
         first, last = (still[0], still[-1] + 1) if len(still) else (end - start, end - start)
@@ -294,6 +295,7 @@ class _FingerLabeller:
         unseen = np.zeros(len(known), dtype=bool)
         unseen[max(start + seen[-1] + 1, end - n) : end] = True
         timeline.set_state(unseen & self._finger.known, UNSTABLE, Cause.LOST, LOSS_RATIO)
+        # The time without contact that follows at once has the same cause.
         after = timeline.codes[end:] != NO_CONTACT
         unseen[:] = False
         unseen[end : end + int(np.argmax(after)) if after.any() else len(known)] = True

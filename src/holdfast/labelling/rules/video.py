@@ -181,16 +181,18 @@ def propose(
         else VideoClock(offset, 0.0)
     )
     base = signal.propose(recording, how)
-    labels = {}
+    labels, at = {}, grid + clock.offset
     for finger, tip in tips.items():
-        held = held_at(base[finger], grid + clock.offset) & tip.seen
-        force = force_at(recording, finger, how, grid + clock.offset)
+        held = held_at(base[finger], at) & tip.seen
+        force = force_at(recording, finger, how, at)
         slips, stuck = [], held
         for time in FIT_TIMES:
             n = n_samples_of(time, grid[1] - grid[0])
             rest = unexplained(tip, force, stuck, n)
-            slips = seen_slips(grid + clock.offset, rest, held, rule)
-            stuck = held & ~_during(slips, grid + clock.offset)
+            slips = seen_slips(at, rest, held, rule)
+            stuck = held.copy()
+            for slip in slips:
+                stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
         note = f"video {video.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
         labels[finger] = with_slips(base[finger], slips, note)
     return labels
@@ -272,11 +274,13 @@ def tip_motions(
                 f"{1e3 * rule.tip_size:g} mm beside the {1e3 * rule.object_size:g} mm of the "
                 "object; give the sides of the black squares as tip_size and object_size [m]"
             )
+        # The side of a sticker in the picture tells how long a pixel is at its distance.
         away = 1e3 * (
             rule.tip_size * track[:, :, 2] / scales[body][:, None]
             - rule.object_size * base[:, :, 2] / scales[OBJECT][:, None]
         )
         tip_turn, tip_tilt = _turns(track)
+        # In the axes of the object, which turn with it.
         upright = np.column_stack(
             [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
         )
@@ -322,6 +326,7 @@ def video_clock(
     if not whole.any():
         raise RecordingError(f"{video}: no finger with a sticker is loaded while it is filmed")
     parts = np.array([_lowest(offsets, whole - costs[:, k]) for k in range(N_CLOCK_PARTS)])
+    # The variance of a jackknife is n - 1 times that of the results without one part.
     error = float(np.sqrt((N_CLOCK_PARTS - 1) * parts.var() + step**2 / 144))
     if error > MAX_CLOCK_ERROR:
         raise RecordingError(
@@ -337,6 +342,7 @@ def force_at(recording: Recording, finger: str, tare: Tare, times: Array) -> Arr
     module = recording.modules[finger]
     force = np.nan_to_num(tared_force(module, tare, offline=True).force)
     lasting = np.diff(module.times)[:, None] * (force[1:] + force[:-1]) / 2
+    # The mean over any exposure is a difference of the integral.
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(lasting, axis=0)])
     half = min(float(np.median(np.diff(times))), EXPOSURE_TIME) / 2
     ends = [
@@ -368,6 +374,7 @@ def unexplained(tip: TipMotion, force: Array, held: Mask, n: int) -> Array:
     known = np.column_stack([force, tip.turns])
     both = held[n:] & held[:-n]
     if both.sum() < 4 * known.shape[1]:
+        # Too few for a fit: no motion remains, and so no slip.
         return tip.place - tip.place
     change = known[n:] - known[:-n]
     fit, _ = _robust_fit(change[both], (tip.place[n:] - tip.place[:-n])[both])
@@ -390,6 +397,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
     moved, noise = _step_size(rest, n), 0.0
     if held.any():
         noise = float(np.median(moved[held])) / 1.18  # of a component of two
+    # A step is the difference of two means of n values: the noise of one value is larger.
     single = noise * np.sqrt(n / 2)
     least = max(1e3 * rule.step, 6 * noise)
     slips: list[SeenSlip] = []
@@ -400,6 +408,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         before = np.median(rest[max(first - n_rest, 0) : first + 1], axis=0)
         after = np.median(rest[last - 1 : last - 1 + n_rest], axis=0)
         away = np.linalg.norm(after - before)
+        # What is fitted as stuck must not reach into the slip before.
         start, free = max(first - round(rule.before / step), free), last - n
         if away < max(1e3 * rule.slid, 6 * noise):
             continue  # it came back: nothing slid
@@ -412,6 +421,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         onset, error = change_point(times[start : end + 1], line, max(single, 0.005))
         path = np.linalg.norm(np.diff(_mean(rest[first:last], 3), axis=0), axis=1).sum()
         distance = max(float(path), float(away))
+        # The means smear the end of a motion over their window.
         until = max(float(times[last - 1]) - rule.window / 2, onset + step)
         ratio = away / max(1e3 * rule.slid, 6 * noise)
         slips.append(SeenSlip(onset, error, until, 1e-3 * distance, 2e-3 * noise, float(ratio)))
@@ -427,13 +437,6 @@ def _for_good(rest: Array, moving: Mask, n: int, slid: float, step: float) -> Ma
         if np.linalg.norm(after - before) < slid:
             kept[first:last] = False
     return kept
-
-
-def _during(slips: list[SeenSlip], times: Array) -> Mask:
-    mask = np.zeros(len(times), dtype=bool)
-    for slip in slips:
-        mask |= (times > slip.onset - SLIP_MARGIN) & (times < slip.end + SLIP_MARGIN)
-    return mask
 
 
 def change_point(times: Array, values: Array, noise: float) -> tuple[float, float]:
@@ -453,6 +456,7 @@ def change_point(times: Array, values: Array, noise: float) -> tuple[float, floa
     step = times[1] - times[0]
     tried = np.linspace(times[0] + 0.2 * step, times[-1] - 0.3 * step, 6 * len(times))
     ramps = np.maximum(times - tried[:, None], 0.0)
+    # Ramps and values are centred: then the level needs no fit of its own.
     ramps -= ramps.mean(axis=1, keepdims=True)
     centred = values - values.mean()
     slope = ramps @ centred / np.maximum((ramps**2).sum(axis=1), 1e-18)
@@ -521,8 +525,10 @@ def _coarse_offset(
         inverse = np.linalg.pinv(felt.T @ felt)
         shares += np.einsum("ijl,jk,ikl->l", products, inverse, products) / (moved**2).sum()
     best = int(np.argmax(shares))
+    # Motion is smooth, so the offsets beside the best one are nearly as good: they do not count.
     near = round(FINE_REACH / step) + 10
     others = np.delete(shares, slice(max(best - near, 0), best + near + 1))
+    # The correlation begins with the largest shift; there is none at the last index of `moved`.
     shift = best - (len(grid) - n - 1)
     clear = shares[best] / max(others.max(initial=0.0), 1e-12)
     return float(own[0] - grid[0] + shift * step), float(clear)
@@ -547,9 +553,11 @@ def _lowest(offsets: Array, costs: Array) -> float:
 
 def _robust_fit(known: Array, change: Array) -> tuple[Array, Array]:
     """Return the (k, 2) map of least distances, and the (n,) distances that it leaves [mm]."""
+    # Squares weighted by 1 / distance make a fit of least distances, which outliers hardly move.
     weights = np.ones(len(known))
     for _ in range(15):
         weighted = known * weights[:, None]
+        # Where nothing turns, the columns of the turns are 0 and the equations singular.
         ridge = 1e-5 * len(known) * np.median(weights) * np.eye(known.shape[1])
         fit = np.linalg.solve(weighted.T @ known + ridge, weighted.T @ change)
         distances = np.linalg.norm(change - known @ fit, axis=1)
@@ -588,6 +596,7 @@ def _turns(track: Array) -> tuple[Array, Array]:
     """Return the turn in the picture (n,) [rad], and the stretch (n, 3) that tilts cause."""
     usual = np.median(track[:, :, :2], axis=0)
     change = track[:, :, :2] @ np.linalg.inv(usual)
+    # Turned back by this angle, the change is symmetric: a stretch.
     turn = np.arctan2(change[:, 1, 0] - change[:, 0, 1], change[:, 0, 0] + change[:, 1, 1])
     cos, sin = np.cos(turn), np.sin(turn)
     stretch = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], -2) @ change
@@ -598,4 +607,4 @@ def _turns(track: Array) -> tuple[Array, Array]:
 def _mean(values: Array, n: int) -> Array:
     from scipy.ndimage import uniform_filter1d
 
-    return np.asarray(uniform_filter1d(values, n | 1, axis=0, mode="nearest"))
+    return np.asarray(uniform_filter1d(values, n | 1, axis=0, mode="nearest"))  # odd: centred
