@@ -104,6 +104,7 @@ def predict_examples(
         for example in examples:
             states = _predict(training, corpora, example)
             example.states[name] = states.tolist()
+    # The first figures show what the paper does, so a recording with disturbances.
     first = _first(main, finger, EXPERIMENT_CASES["disturbed"]) or main.recordings[0]
     return [ExampleRecording("protocol", "main", first, finger), *examples]
 

@@ -136,6 +136,7 @@ def evaluate_labels(
         for tested, of_recording in decided.items():
             ordered = [of_recording[index] for index in sorted(of_recording)]
             metrics[f"{trained}/{tested}"] = summarise(ordered, seed=seed)
+    # The sources are in order: exact, then drawn.
     rule = [_confusion(exact, drawn) for exact, drawn in zip(*by_source.values(), strict=True)]
     return LabelEvaluation(metrics, rule)
 
@@ -173,6 +174,7 @@ def _label_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
                 if tested == "exact":
                     rows += _event_rows(keys, metrics)
     keys = {"method": "the drawn labels themselves", "trained on": "–", "tested on": "exact truth"}
+    # The heads of the other lines, so that the rule stands in the same columns.
     names = {"accuracy": "accuracy [%]", "FDR": "FDR [%]", "FNR": "FNR [%]"}
     rows += [
         Row(keys | {"figure": names[name]}, row.ours, None, row.n, row.interval)
@@ -241,6 +243,7 @@ def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Itera
     if "stable" in all_kinds:
         n = [count.samples.get("stable", 0) for count in counts]
         hidden = [count.hidden.get("stable", 0) for count in counts]
+        # Without the ceiling, which is one of unstable samples.
         yield from list(_cause_rows(keys | {"cause": "stable"}, hidden, n, seed))[:2]
 
 
