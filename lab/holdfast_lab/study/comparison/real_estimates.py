@@ -107,7 +107,23 @@ class RecordingLabels(msgspec.Struct, frozen=True):
 
 def recording_labels(real: Corpus) -> list[RecordingLabels]:
     """Return the labels of every recording that has one of the fingers of the corpus."""
-    return [_labels(load_finger) for load_finger in load_fingers(real)]
+    labels = []
+    for recording in load_fingers(real):
+        times, codes, slip = {}, {}, {}
+        for name, module in recording.modules.items():
+            times[name] = module.times
+            codes[name] = label_states(module.labels, module.times)
+            # An unstable label without a cause counts as slip.
+            slips = [label for label in module.labels if label.cause in (Cause.SLIP, None)]
+            slip[name] = np.asarray(label_states(slips, module.times) == UNSTABLE)
+        hand = label_hand(times, codes)
+        # The hand slips where a finger does: the rule of the hand, with slip as the only cause.
+        sliding = {name: np.where(mask, UNSTABLE, STABLE) for name, mask in slip.items()}
+        hand_slip = label_hand(times, sliding).labels == UNSTABLE
+        fingers = {name: _unit_labels(times[name], codes[name], slip[name]) for name in times}
+        of_hand = _unit_labels(hand.times, hand.labels, hand_slip)
+        labels.append(RecordingLabels(recording.name, fingers, of_hand))
+    return labels
 
 
 def load_fingers(real: Corpus) -> list[Recording]:
@@ -167,26 +183,6 @@ def _estimates(scored: ScoredRecording) -> RecordingEstimates:
 def unit_estimates(probability: Array, states: Codes) -> UnitEstimates:
     """Return the estimates of a finger or a hand from (n,) arrays."""
     return UnitEstimates(Column.of(probability), Column.of(states))
-
-
-def _labels(recording: Recording) -> RecordingLabels:
-    modules = recording.modules
-    codes = {name: label_states(module.labels, module.times) for name, module in modules.items()}
-    slip = {name: _slip_samples(module) for name, module in modules.items()}
-    times = {name: module.times for name, module in modules.items()}
-    hand = label_hand(times, codes)
-    sliding = {name: np.where(mask, UNSTABLE, STABLE) for name, mask in slip.items()}
-    hand_slip = label_hand(times, sliding).labels == UNSTABLE
-    fingers = {n: _unit_labels(m.times, codes[n], slip[n]) for n, m in modules.items()}
-    return RecordingLabels(
-        recording.name, fingers, _unit_labels(hand.times, hand.labels, hand_slip)
-    )
-
-
-def _slip_samples(module: Tactile) -> Mask:
-    """Return the (n,) samples that are labelled as slip; an unstable label without cause counts."""
-    slips = [label for label in module.labels if label.cause in (Cause.SLIP, None)]
-    return np.asarray(label_states(slips, module.times) == UNSTABLE)
 
 
 def _unit_labels(times: Array, codes: Codes, slip: Mask) -> UnitLabels:
