@@ -9,7 +9,6 @@ import numpy as np
 
 from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.metrics.samples import score_samples
-from holdfast.recordings import Recording
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.rows import DIGITS, ratio_row, sample_rows
@@ -114,13 +113,12 @@ def evaluate_labels(
     # The features with each kind of labels.
     features = corpus_features(method, corpus)
     by_name = {recording.name: recording for recording in corpus.load()}
-    by_source = {
-        source: [
-            _with_labels(feature, by_name[feature.name], source, corpus.tare)
-            for feature in features
-        ]
-        for source in SOURCES
-    }
+    by_source: dict[LabelSource, list[RecordingFeatures]] = {source: [] for source in SOURCES}
+    for source, labelled in by_source.items():
+        for each in features:
+            modules = relabelled(by_name[each.name], source, corpus.tare).modules
+            labels = {finger: modules[finger].label_states for finger in each.times}
+            labelled.append(replace(each, labels=labels))
     metrics = {}
     for trained in SOURCES:
         training = MethodTraining.of(method, by_source[trained], max_samples, seed)
@@ -139,13 +137,6 @@ def evaluate_labels(
     # The sources are in order: exact, then drawn.
     rule = [_confusion(exact, drawn) for exact, drawn in zip(*by_source.values(), strict=True)]
     return LabelEvaluation(metrics, rule)
-
-
-def _with_labels(
-    features: RecordingFeatures, recording: Recording, source: LabelSource, tare: str
-) -> RecordingFeatures:
-    modules = relabelled(recording, source, tare).modules
-    return replace(features, labels={name: modules[name].label_states for name in features.times})
 
 
 def _confusion(exact: RecordingFeatures, drawn: RecordingFeatures) -> list[int]:

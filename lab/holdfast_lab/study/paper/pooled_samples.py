@@ -131,9 +131,9 @@ def _corpus_forces(
         fingers = {}
         for name, signal in hand.fingers.items():
             # Without its readings, which are most of the memory: the features need forces alone.
-            none = np.empty((len(signal.times), 0, 3))
-            few = replace(signal, with_baseline=none, baseline=np.empty((0, 3)))
-            fingers[name] = few, recording.modules[name].label_states
+            no_taxels = np.empty((len(signal.times), 0, 3))
+            bare = replace(signal, with_baseline=no_taxels, baseline=np.empty((0, 3)))
+            fingers[name] = bare, recording.modules[name].label_states
         held_object = recording.metadata.get("object")
         name_of_object = None if held_object is None else str(held_object)
         forces.append(_RecordingForces(fingers, name_of_object))

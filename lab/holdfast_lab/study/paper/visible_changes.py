@@ -71,6 +71,7 @@ def count_hidden(corpus: Corpus, window: int) -> list[HiddenCounts]:
         rest.setdefault(change.finger, []).append(change.values[change.at_rest])
     limits = {}
     for finger, parts in rest.items():
+        # Nothing at rest says what noise is, so nothing can be called hidden in it.
         limit = noise_limits(parts)
         if limit is None:
             return []
