@@ -22,7 +22,6 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationJob,
     score_splits,
 )
-from holdfast_lab.study.evaluation.fitted_method import ScoredRecording
 from holdfast_lab.study.evaluation.recording_features import label_hand
 from holdfast_lab.study.methods import HAND
 from holdfast_lab.study.plan import Corpus
@@ -161,23 +160,24 @@ def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEsti
     """
     effort = EvaluationEffort(folds=n_folds(real), inner=1)
     job = EvaluationJob(method, real, ("recording",), effort=effort, seed=seed)
-    return [_estimates(each) for _, scored in score_splits(job) for each in scored]
-
-
-def _estimates(scored: ScoredRecording) -> RecordingEstimates:
-    recording = scored.recording
-    decided, hand = scored.decide(recording.labels), scored.hand
-    return RecordingEstimates(
-        recording.name,
-        {
+    estimates = []
+    for scored in (each for _, split in score_splits(job) for each in split):
+        recording, hand = scored.recording, scored.hand
+        fingers = {
             name: unit_estimates(f.stable_probability, f.states)
-            for name, f in decided.fingers.items()
+            for name, f in scored.decide(recording.labels).fingers.items()
             if name != HAND
-        },
-        unit_estimates(hand.probability, hand.states()),
-        Column.of(hand.hold(HOLD_TIME).states()),
-        Column.of(hand.known),
-    )
+        }
+        estimates.append(
+            RecordingEstimates(
+                recording.name,
+                fingers,
+                unit_estimates(hand.probability, hand.states()),
+                Column.of(hand.hold(HOLD_TIME).states()),
+                Column.of(hand.known),
+            )
+        )
+    return estimates
 
 
 def unit_estimates(probability: Array, states: Codes) -> UnitEstimates:
