@@ -138,7 +138,7 @@ def normal_energy(hand: HandSignal, window: int = DEFAULT_WINDOW) -> dict[str, A
     return stretchwise(hand, lambda finger: detail_energy(finger.normal_force, window)[:, None])
 
 
-def _log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
+def log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
     """Return log10 of F_a and of sigma of every finger, (n, 2)."""
     return {
         name: np.log10(np.maximum(rows, MIN_LOG_ARGUMENT))
@@ -146,12 +146,12 @@ def _log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
     }
 
 
-def _log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
+def log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
     """Return log10 of F_a, of sigma and of the largest sigma of all fingers, (n, 3).
 
     Fingers without a sigma at the time are left out of the largest.
     """
-    own = _log_force_and_sigma(hand)
+    own = log_force_and_sigma(hand)
     sigmas = {name: rows[:, 1:] for name, rows in own.items()}
     # fmax, not max, because it passes over the NaN of a finger.
     return {
@@ -179,11 +179,11 @@ SVM_UNWEIGHTED = Method(
 )  # fmt: skip
 LOG_TWO = Method(
     "log_two", "LogReg of log F_a and log sigma", "paper", LOG_TWO_SOURCE,
-    _log_force_and_sigma, recipe("logreg"),
+    log_force_and_sigma, recipe("logreg"),
 )  # fmt: skip
 LOG_HAND = Method(
     "log_hand", "LogReg of log F_a, log sigma and the hand's largest", "paper", LOG_HAND_SOURCE,
-    _log_force_and_sigmas, recipe("logreg"),
+    log_force_and_sigmas, recipe("logreg"),
 )  # fmt: skip
 TREES = Method(
     "trees", "Boosted trees, 6 features", "learning", TREES_SOURCE,
@@ -195,7 +195,7 @@ ZHANG = Method(
 )  # fmt: skip
 
 
-def _log_feature(
+def log_feature(
     signal: Callable[[FingerSignal], Array], measure: Callable[[Array], Array], hand: HandSignal
 ) -> Mapping[str, Array]:
     """Return log10 of a measure of a signal of every finger, (n, 1).
@@ -211,7 +211,7 @@ def _log_feature(
 
 ENERGY = Method(
     "energy", "Haar energy of F_a", "paper", ENERGY_SOURCE,
-    partial(_log_feature, attrgetter("amplitude"), detail_energy), Threshold("below"),
+    partial(log_feature, attrgetter("amplitude"), detail_energy), Threshold("below"),
 )  # fmt: skip
 CUTS = {
     name: Method(
@@ -219,7 +219,7 @@ CUTS = {
         title,
         "vibration",
         CUTS_SOURCE,
-        partial(_log_feature, attrgetter(signal), measure),
+        partial(log_feature, attrgetter(signal), measure),
         Threshold("below"),
     )
     for name, title, signal, measure in (
