@@ -55,6 +55,7 @@ def answer_of_child(module: str, function: str, *words: str) -> str:
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return f"its import takes longer than {CHILD_TIMEOUT:.0f} s"
+    # The answer comes last, after all that the plug-in prints.
     _, answered, answer = done.stdout.rpartition(ANSWER_PREFIX)
     return answer if answered else f"its import ends the process (exit code {done.returncode})"
 

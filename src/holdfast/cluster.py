@@ -56,7 +56,20 @@ def call_on_cluster(
         MissingExtra: dask is not installed.
     """
     with _client(scheduler) as client:
-        _check_workers(client)
+        from distributed import TimeoutError as NoWorker
+
+        try:
+            _watched(client, lambda: client.wait_for_workers(1, timeout=NO_WORKER_TIMEOUT))
+        except NoWorker:
+            raise _without_workers(client) from None
+        # Other versions give other results, which would be kept under the digest of this one.
+        expected = package_digest()
+        digests = _watched(client, lambda: client.run(package_digest, on_error="return"))
+        for address, digest in digests.items():
+            if isinstance(digest, Exception) and ModuleNotFoundError.__name__ in repr(digest):
+                raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from digest
+            if not isinstance(digest, OSError) and digest != expected:  # OSError: it died meanwhile
+                raise EngineError(_OTHER_VERSION.format(f"the worker at {address}"))
         copies: list[Future] = []
         if shared:
             copies = _watched(
@@ -223,23 +236,6 @@ def _watched(client: "Client", call: Callable[[], T]) -> T:
 
 def _n_threads(client: "Client") -> int:
     return sum(_watched(client, client.nthreads).values())
-
-
-def _check_workers(client: "Client") -> None:
-    """Wait for a worker, and check the version of holdfast of all workers."""
-    from distributed import TimeoutError as NoWorker
-
-    try:
-        _watched(client, lambda: client.wait_for_workers(1, timeout=NO_WORKER_TIMEOUT))
-    except NoWorker:
-        raise _without_workers(client) from None
-    expected = package_digest()
-    digests = _watched(client, lambda: client.run(package_digest, on_error="return"))
-    for address, digest in digests.items():
-        if isinstance(digest, Exception) and ModuleNotFoundError.__name__ in repr(digest):
-            raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from digest
-        if not isinstance(digest, OSError) and digest != expected:  # OSError: it died meanwhile
-            raise EngineError(_OTHER_VERSION.format(f"the worker at {address}"))
 
 
 def _without_workers(client: "Client") -> EngineError:

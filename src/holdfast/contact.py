@@ -471,26 +471,21 @@ def with_faults(
     named = estimate.fingers.keys() & faults.keys()
     if not named:
         return estimate
-    fingers = {
-        name: _with_faults(finger, faults[name], reason) if name in named else finger
-        for name, finger in estimate.fingers.items()
-    }
+    fingers = dict(estimate.fingers)
+    for name in named:
+        finger = fingers[name]
+        both = {*finger.faults, *faults[name]}
+        # All values of an UNKNOWN state are NaN; None stays, as the model has no such rule.
+        fingers[name] = msgspec.structs.replace(
+            finger,
+            state=ContactState.UNKNOWN,
+            reason=reason,
+            stable_probability=math.nan,
+            slip_probability=None if finger.slip_probability is None else math.nan,
+            slip_speed=None if finger.slip_speed is None else math.nan,
+            slip_distance=None if finger.slip_distance is None else math.nan,
+            cause=None,
+            faults=tuple(fault for fault in Fault if fault in both),
+        )
     codes = np.array([finger.state.code for finger in fingers.values()], dtype=np.int64)
     return HandEstimate(estimate.time, _STATES[hand_state(codes, n_model_fingers)], fingers)
-
-
-def _with_faults(
-    finger: ContactEstimate, faults: tuple[Fault, ...], reason: Reason
-) -> ContactEstimate:
-    both = {*finger.faults, *faults}
-    return msgspec.structs.replace(
-        finger,
-        state=ContactState.UNKNOWN,
-        reason=reason,
-        stable_probability=math.nan,
-        slip_probability=None if finger.slip_probability is None else math.nan,
-        slip_speed=None if finger.slip_speed is None else math.nan,
-        slip_distance=None if finger.slip_distance is None else math.nan,
-        cause=None,
-        faults=tuple(fault for fault in Fault if fault in both),
-    )

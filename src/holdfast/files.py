@@ -44,9 +44,11 @@ def file_stem(name: str) -> str:
         ('can-case1-1', '_.._can-7f7bd239')
     """
     kept = "".join("_" if c in _FORBIDDEN or not c.isprintable() else c for c in name)
+    # A command would take a leading dash as an option; Windows drops dots and blanks at the end.
     kept = kept.strip(" .").lstrip("-")
     if len(encoded := kept.encode()) > MAX_STEM_SIZE:
         kept = encoded[: MAX_STEM_SIZE - 9].decode(errors="ignore")
+    # Windows would open the device.
     if _RESERVED.fullmatch(kept):
         kept = f"_{kept}"
     if kept and kept == name:

@@ -18,6 +18,7 @@ SETTINGS_FILE = "matplotlibrc"
 def ignore_settings_of_folder() -> None:
     """Ignore the settings in the working folder in all later imports of this process."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
+        # First, as the finders of Python would find matplotlib before it.
         sys.meta_path.insert(0, _Finder())
 
 

@@ -154,6 +154,7 @@ class PluginGroup(Generic[T]):
         from importlib.metadata import entry_points  # it takes as long as all of `--help`
 
         points = list(entry_points(group=f"{GROUP_PREFIX}{self.kind}"))
+        # Of two with one name the first counts, whatever the order of folders on the path.
         points.sort(key=lambda point: (point.name, _package(point)))
         first: dict[str, EntryPoint] = {}
         for point in points:

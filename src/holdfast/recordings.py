@@ -101,7 +101,34 @@ class Tactile:
     def __post_init__(self) -> None:
         times = _read_only(np.asarray(self.times, dtype=np.float64))
         readings = _read_only(np.asarray(self.readings))
-        _check_samples(times, readings, self.sensor)
+        sensor = self.sensor
+        if times.ndim != 1:
+            raise RecordingError(f"times of shape (n,) expected, {times.shape} given")
+        if readings.ndim != 3 or readings.shape[2] != 3:
+            raise RecordingError(
+                f"readings of shape (n, {sensor.n_taxels}, 3) expected for {sensor.name}, "
+                f"{readings.shape} given"
+            )
+        if readings.shape[1] != sensor.n_taxels:
+            raise RecordingError(
+                f"{readings.shape[1]} taxels given, {sensor.n_taxels} expected ({sensor.name})"
+            )
+        if len(readings) != len(times):
+            raise RecordingError(f"{len(readings)} samples given with {len(times)} times")
+        if not (
+            np.issubdtype(readings.dtype, np.integer) or np.issubdtype(readings.dtype, np.floating)
+        ):
+            raise RecordingError(f"readings must be numbers; {readings.dtype} given")
+        if not np.isfinite(times).all():
+            raise RecordingError("a time is not finite; seconds expected")
+        steps = np.diff(times)
+        if (steps <= 0).any():  # windows by time, and the search for a sample, rest on their order
+            k = int(np.flatnonzero(steps <= 0)[0])
+            what = "stand still" if steps[k] == 0 else "go back"
+            raise RecordingError(
+                f"times {what} at sample {k + 1}: {times[k + 1]:.15g} s after {times[k]:.15g} s; "
+                "strictly increasing times expected"
+            )
         labels = tuple(sorted(self.labels, key=lambda label: label.start))
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
@@ -124,6 +151,7 @@ class Tactile:
     @cached_property
     def readings_digest(self) -> str:
         """Hash of the readings alone, whatever their times, number type and file format."""
+        # In parts: as float64, counts of 16 bits take four times their memory.
         state = hashlib.blake2b(repr(self.readings.shape).encode(), digest_size=16)
         for first in range(0, self.n_samples, HASHED_SAMPLES):
             part = self.readings[first : first + HASHED_SAMPLES]
@@ -403,6 +431,7 @@ def label_states(labels: Sequence[Label], times: Array) -> npt.NDArray[np.int8]:
     Returns:
         (n,) codes as in `holdfast.contact`.
     """
+    # 0 is the code of UNKNOWN.
     codes = np.zeros(len(times), dtype=np.int8)
     for label in labels:
         first, last = np.searchsorted(times, (label.start, label.end))
@@ -443,36 +472,6 @@ def labels_from_samples(
             labels.append(Label(*span, *state, evidence=evidence, author=author))
         first = k + 1
     return tuple(labels)
-
-
-def _check_samples(times: Array, readings: npt.NDArray[Any], sensor: Sensor) -> None:
-    if times.ndim != 1:
-        raise RecordingError(f"times of shape (n,) expected, {times.shape} given")
-    if readings.ndim != 3 or readings.shape[2] != 3:
-        raise RecordingError(
-            f"readings of shape (n, {sensor.n_taxels}, 3) expected for {sensor.name}, "
-            f"{readings.shape} given"
-        )
-    if readings.shape[1] != sensor.n_taxels:
-        raise RecordingError(
-            f"{readings.shape[1]} taxels given, {sensor.n_taxels} expected ({sensor.name})"
-        )
-    if len(readings) != len(times):
-        raise RecordingError(f"{len(readings)} samples given with {len(times)} times")
-    if not (
-        np.issubdtype(readings.dtype, np.integer) or np.issubdtype(readings.dtype, np.floating)
-    ):
-        raise RecordingError(f"readings must be numbers; {readings.dtype} given")
-    if not np.isfinite(times).all():
-        raise RecordingError("a time is not finite; seconds expected")
-    steps = np.diff(times)
-    if (steps <= 0).any():  # windows by time, and the search for a sample, rest on their order
-        k = int(np.flatnonzero(steps <= 0)[0])
-        what = "stand still" if steps[k] == 0 else "go back"
-        raise RecordingError(
-            f"times {what} at sample {k + 1}: {times[k + 1]:.15g} s after {times[k]:.15g} s; "
-            "strictly increasing times expected"
-        )
 
 
 def _check_labels(labels: tuple[Label, ...], times: Array, period: float) -> None:

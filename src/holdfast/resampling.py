@@ -249,6 +249,7 @@ class Resampler:
             after = "" if self._last == -np.inf else f" after {self._last:.15g} s"
             raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
         values = np.array(reading, dtype=np.float64)
+        # The first sample of a stretch is a new sample; nothing is interpolated over a gap.
         if time - self._last > self._gap:
             self._start, self._step, self._n_summed = time, 1, 0
             self._last, self._reading = time, values

@@ -11,7 +11,7 @@ import numpy as np
 
 from holdfast.contact import Cause, ContactState
 from holdfast.recordings import Label, Recording, Tactile
-from holdfast.sensors import Sensor, sensor
+from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 SYNTHETIC_RATE = 150.0
@@ -56,7 +56,15 @@ def _finger(generator: np.random.Generator, grip: float) -> Tactile:
     )
     times = np.arange(round(ends[-1] * SYNTHETIC_RATE)) / SYNTHETIC_RATE
     force = _force(generator, times, ends, grip * generator.uniform(0.7, 1.3))
-    readings = _readings(generator, tip, force)
+    # A bell of pressure over the middle taxels, with a standard deviation of 6 mm; noise on top.
+    middle = tip.positions[np.abs(tip.positions @ [0.0, 1.0, 0.0]).argmin()]
+    distance = np.linalg.norm(tip.positions - middle, axis=1)
+    share = np.exp(-0.5 * (distance / 6e-3) ** 2)
+    share /= share.sum()
+    in_taxels = np.einsum("tji,nj->nti", tip.rotations, force) * share[:, None]
+    rest = np.array(READING_BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
+    noise = generator.normal(0.0, READING_NOISE, size=in_taxels.shape)
+    readings = np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
     return Tactile(tip, times, readings, labels=_labels(ends))
 
 
@@ -72,19 +80,6 @@ def _force(generator: np.random.Generator, times: Array, ends: Array, grip: floa
     shaking = 0.05 * np.sin(angle).sum(axis=1) * shaken[:, None]
     direction = np.array([1.0, *generator.normal(0.0, 0.2, size=2)])
     return np.asarray(level[:, None] * (direction + shaking))
-
-
-def _readings(generator: np.random.Generator, tip: Sensor, force: Array) -> Array:
-    """Return (n, n_taxels, 3) readings [count]: the force over the middle taxels, and noise."""
-    middle = tip.positions[np.abs(tip.positions @ [0.0, 1.0, 0.0]).argmin()]
-    distance = np.linalg.norm(tip.positions - middle, axis=1)
-    share = np.exp(-0.5 * (distance / 6e-3) ** 2)
-    share /= share.sum()
-    in_taxels = np.einsum("tji,nj->nti", tip.rotations, force) * share[:, None]
-    rest = np.array(READING_BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
-    noise = generator.normal(0.0, READING_NOISE, size=in_taxels.shape)
-    counts: Array = np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
-    return counts
 
 
 def _labels(ends: Array) -> tuple[Label, ...]:

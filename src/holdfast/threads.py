@@ -29,6 +29,7 @@ def in_thread(call: Callable[[], T]) -> Future[T]:
 
 def usable_processors() -> int:
     """Return the number of processors that this process may use."""
+    # A container or `taskset` may allow fewer than the machine has.
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

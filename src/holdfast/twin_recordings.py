@@ -132,6 +132,7 @@ def simulate_all(
 
     def checked() -> Iterator[list[str]]:
         for names in engine.map_ordered(simulate_one, tasks):
+            # At the first result: a cluster that writes to other disks is found early.
             engine.check_written(path_of(names[-1], out))
             yield names
 
@@ -144,6 +145,7 @@ def simulate_grasp(grasp: Grasp, out: Path, force: bool) -> list[str]:
     names = []
     for attempt in range(GRASP_ATTEMPTS):
         trial = replace(grasp, attempt=attempt)
+        # A failed attempt is kept, so that a run that was stopped does not simulate it again.
         if not force and _exists(trial, path_of(trial.failed_name, out)):
             continue
         recording = simulation.simulate(trial)

@@ -7,7 +7,7 @@ import pytest
 from holdfast.cli import app, main
 
 SHOWN = {
-    "detect": "--summary --in-contact --seconds --json",
+    "detect": "--summary --in-contact --sensor --seconds --json",
     "serve": "--host --port --token-file --record-to --speed --once --in-contact --ros1 --ros2 "
     "--json",
     "record": "--seconds --object --case --note --force --json",
@@ -17,7 +17,7 @@ SHOWN = {
     "label": "--tare --poses --video --author --browser --json",
     "train": "--output --classifier --features --split --trials --own-slip-features --init "
     "--force --in-contact --json",
-    "evaluate": "--plot --force --in-contact --json",
+    "evaluate": "--sensor --plot --force --in-contact --json",
     "calibrate": "--output --false-alarms --seconds --in-contact --force --json",
     "demo": "--speed --browser --force --json",
     "simulate": "--objects --cases --repeats --video --force --json",

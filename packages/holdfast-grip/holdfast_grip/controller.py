@@ -87,6 +87,7 @@ class GripController:
         self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
         self._normals = {name: _three(one.normal) for name, one in sensors.items()}
         rates = [sensor.rate for sensor in sensors.values()]
+        # The slowest sensor decides: its sample is late only after its period.
         self._max_age = 1 / min(rates, default=DETECTOR_RATE) + limits.stale_after
         self._thumb = thumb
         ceiling = math.inf if limits.max_force is None else limits.max_force
@@ -100,21 +101,33 @@ class GripController:
         """Return to IDLE: forget the grip and its faults."""
         self.state = LoopState.IDLE
         self._waiting.reset()
+        # Fingers of the grip, set by `_begin`; empty without a grip.
         self._touches: list[Touch] = []
+        # Set by `observe`, cleared when the law has got it.
         self._jerked = False
         self._jerks.reset()
+        # When each finger, and last the whole grip, became bad; infinite while good.
         self._bad_since: list[float] = []
+        # Highest scale of each finger, from its force when the grip began.
         self._highest: list[float] = []
         self._commands: dict[str, FingerCommand] = {}
+        # A latched fault and a stop end by `resume` or `reset` only.
         self._latched = self._stopped = False
+        # UNKNOWN never lowers a force: forces fall only while this is True.
         self._all_known = False
+        # Those of `_monitors` in the grip; `reset` keeps the noise that these have measured.
         self._repeats: list[RepeatMonitor] = []
+        # Times of the last update that counted and of its estimate; NaN before the first.
         self._time = self._estimated_at = math.nan
         self._shift = 0.0  # of the law's clock, which continues where that of the source jumped
+        # Set by `resume`: the next update may have any time.
         self._clock_is_new = False
+        # NaN is in no order with a time, so what has not begun never lasts long enough.
         self._stable_since = self._calm_since = math.nan
         self._valid_since = math.nan
+        # On the law's clock, so that a cooldown goes on over a jump of the source's.
         self._raised_at = -math.inf
+        # The present fault, and that of `report`, which the next update takes.
         self._fault = self._reported = GripReason.NONE
         self._events: deque[GripEvent] = deque(maxlen=MAX_EVENTS)
 
@@ -139,6 +152,7 @@ class GripController:
             return
         self._latched = self._stopped = False
         self._fault = _NONE
+        # What was bad before does not count again at once.
         self._bad_since = [math.inf] * len(self._bad_since)
         self._change(_HOLD, self._time)
 
@@ -194,7 +208,11 @@ class GripController:
         Raises:
             ValueError: the law breaks its contract, as with a scale of NaN; no estimate raises it.
         """
-        is_new = self._is_new(estimate)
+        is_new = estimate.time != self._estimated_at
+        if is_new:  # the last estimate, given again, is no repeated reading
+            self._estimated_at = estimate.time
+            for name, finger in estimate.fingers.items():
+                self._monitors[name].update(finger)
         fault, self._reported = self._reported, _NONE
         if self._clock_is_new and math.isfinite(time):
             # Continue at another time; that of the law goes on as if none had passed.
@@ -211,23 +229,17 @@ class GripController:
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
+        # After a jump of the clock no age and no duration is right, so it comes first.
         if problem is not GripReason.CLOCK:
             problem = fault or problem
         if problem is not _NONE or self._fault is not _NONE:
             return self._in_fault(problem, time)
+        # No force changes without a new sample, and a repeated reading is none.
         if not is_new or any(monitor.repeating for monitor in self._repeats):
             return GripCommand(self._time, self.state, self._commands.copy())
         self._time = time
+        # After a pause, a scale moves no further than in the longest pause without a fault.
         return self._control(time, min(dt, self.limits.stale_after))
-
-    def _is_new(self, estimate: HandEstimate) -> bool:
-        """Return whether an estimate is not the last one again; update the monitors if so."""
-        if estimate.time == self._estimated_at:
-            return False
-        self._estimated_at = estimate.time
-        for name, finger in estimate.fingers.items():
-            self._monitors[name].update(finger)
-        return True
 
     def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
@@ -247,12 +259,14 @@ class GripController:
 
     def _is_calm(self, estimate: HandEstimate) -> bool:
         """Return whether the fingers that are STABLE carry nearly all of an UNSTABLE hand."""
+        # A hand that is UNKNOWN or without contact holds nothing.
         if estimate.state is not ContactState.UNSTABLE:
             return False
         total = calm = 0.0
         n_stable = 0
         for name, finger in estimate.fingers.items():
             touch = self._new_touch(name)
+            # Without the force of one finger, the share of the others is not known.
             if finger.state is _UNKNOWN or not touch.read(finger):
                 return False
             total += touch.normal
@@ -271,6 +285,7 @@ class GripController:
             if finger.state in held
         ]
         finite = all(touch.read(estimate.fingers[touch.finger]) for touch in touches)
+        # A hand with a single sensor begins with one finger.
         if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
             return
         self._touches, self._time, self._jerked = touches, time, False
@@ -292,11 +307,14 @@ class GripController:
         touching, known, problem = False, True, _NONE
         for k, touch in enumerate(self._touches):
             finger = fingers.get(touch.finger)
+            # First whether the numbers are new and known, then their values. `not >=`: NaN is late.
             if finger is None or not finger.time >= due:
                 problem = GripReason.STALE
             elif finger.state is _UNKNOWN:
                 touch.known = known = False
-                problem = self._unknown(k, finger.reason, time)
+                if self._lasts(k, time):
+                    is_gap = finger.reason is Reason.GAP  # samples are missing, no sensor is faulty
+                    problem = GripReason.STALE if is_gap else GripReason.FINGER_FAULT
             elif not touch.read(finger):
                 problem = GripReason.NOT_FINITE
             elif touch.normal > self._ceiling:
@@ -312,13 +330,8 @@ class GripController:
         if touching:
             self._bad_since[-1] = math.inf
             return _NONE
+        # A contact may be missed for a moment; an object that is lost stays lost.
         return GripReason.LOST if self._lasts(-1, time) else _NONE
-
-    def _unknown(self, k: int, reason: Reason, time: float) -> GripReason:
-        """Return the fault of a finger without an estimate; NONE as long as it is short."""
-        if not self._lasts(k, time):
-            return _NONE
-        return GripReason.STALE if reason is Reason.GAP else GripReason.FINGER_FAULT
 
     def _lasts(self, k: int, time: float) -> bool:
         """Return whether what is bad now has been bad for `fault_after`."""
@@ -332,10 +345,12 @@ class GripController:
         if problem is not GripReason.NONE:
             self._valid_since = math.nan
             lasting = problem in LASTING_FAULTS
+            # The first fault stays the reason, unless one that lasts follows it.
             if self._fault is GripReason.NONE or (lasting and self._fault not in LASTING_FAULTS):
                 self._fault = problem
                 self._change(LoopState.FAULT, time, problem)
             self._latched |= self.limits.on_fault == "open" or lasting
+        # The first valid sample, or a clock that went back: count again from here.
         elif not self._valid_since <= time:
             self._valid_since = time
         if not self._latched and time - self._valid_since >= self.limits.recovery:
@@ -359,6 +374,7 @@ class GripController:
         wishes = self.law.wishes(self._touches, clock, dt)
         if len(wishes) != len(self._touches):
             raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))
+        # A rise shakes the contacts, and an UNKNOWN finger may slip: nothing falls then.
         may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
         rising = falling = False
         for k, touch in enumerate(self._touches):

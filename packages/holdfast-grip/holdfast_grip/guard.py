@@ -39,6 +39,7 @@ class CommandGuard:
         self.resume()
         self._scales: dict[str, float] = {}
         self._checked_at = -math.inf
+        # State and reason sent last; only a new FAULT is never held back.
         self._sent = LoopState.IDLE, GripReason.NONE
 
     def stop(self) -> None:
@@ -78,8 +79,10 @@ class CommandGuard:
 
     def check(self, command: GripCommand) -> GripCommand:
         """Return a command that is not sent, or the safe command in its place."""
+        # The first violation stays: later ones may only follow from it.
         self.violation = self.violation or self._violation(command)
         if self.stopped or self.violation:
+            # Before the first good command the hand has its own force, a scale of 1.
             names: Mapping[str, object] = self._scales or command.fingers
             fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
             release = self.limits.on_fault == "open"
@@ -87,6 +90,7 @@ class CommandGuard:
             command = GripCommand(command.time, LoopState.FAULT, fingers, release, reason)
         self._scales = {name: one.scale for name, one in command.fingers.items()}
         if math.isfinite(command.time):
+            # Never back: the time until the next command would allow a larger rise.
             self._checked_at = max(self._checked_at, command.time)
         return command
 
@@ -96,6 +100,7 @@ class CommandGuard:
     def _violation(self, command: GripCommand) -> str:
         limits = self.limits
         elapsed = command.time - self._checked_at
+        # After a reset, or at a time of NaN, no rise is allowed.
         elapsed = max(elapsed, 0.0) if math.isfinite(elapsed) else 0.0
         for name, one in command.fingers.items():
             if not limits.min_scale - SLACK <= one.scale <= limits.max_scale + SLACK:

@@ -44,9 +44,11 @@ class JerkMonitor:
     def reset(self) -> None:
         """Forget all reports."""
         self.jerked = False
+        # Angles and speeds of the newest report, with which the next one is compared.
         self._last: Array | None = None
         self._speed: Array | None = None
         self._n_changes = 0
+        # Running mean square of the changes of speed.
         self._square = 0.0
 
     def update(self, angles: Array) -> None:
@@ -66,15 +68,15 @@ class JerkMonitor:
             self._last = angles
             return
         self._last, self._speed = angles, angles - last
-        if before is not None:
-            change = np.abs(self._speed - before)
-            self._compare(float(change.max()), float(change @ change) / len(change))
-
-    def _compare(self, largest: float, square: float) -> None:
-        """Compare the largest change of speed with the spread, then follow the mean square."""
+        if before is None:
+            return
+        change = np.abs(self._speed - before)
+        square = float(change @ change) / len(change)
+        # Compare before the spread follows, so that a jerk is not part of its own measure.
         spread = math.sqrt(self._square)
+        # A hand whose joints rest exactly has no spread to compare with.
         is_known = self._n_changes >= MIN_SPREAD_REPORTS and spread > 0.0
-        self.jerked = is_known and largest > JERK_RATIO * spread
+        self.jerked = is_known and float(change.max()) > JERK_RATIO * spread
         self._n_changes += 1
         if self.jerked:  # the spread is that of the hold
             square = min(square, JERK_RATIO * self._square)

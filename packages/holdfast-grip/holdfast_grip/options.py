@@ -163,6 +163,7 @@ def connect_hand(stack: ExitStack, settings: GripSettings, hand: "HandDevice") -
     stack.enter_context(Claim(hand.resource))
     stack.enter_context(hand)
     watchdog = Watchdog(hand.name, settings.on_fault.value)
+    # If the source cannot be opened, the watchdog ends without a command.
     stack.callback(watchdog.kill)
     watchdog.start()
     return watchdog

@@ -76,6 +76,7 @@ class GripPanel:
         return self._answer()
 
     async def _post_stop(self, request: web.Request) -> web.Response:
+        # Before the report, so that nothing delays it.
         stopped = self._grip.stop()
         self._report(f"emergency stop by {request.remote}")
         return await self._wait(

@@ -59,21 +59,17 @@ class RepeatMonitor:
         if estimate.time == self._time:
             return
         self._time = estimate.time
-        if estimate.force == self._force:
-            self.n_repeats += 1
-            self._judge(estimate)
+        if estimate.force != self._force:
+            self._force, self._changed_at = estimate.force, estimate.time
+            self.n_repeats = 0
+            self.repeating = self.frozen = False
+            self._n_free += estimate.state is ContactState.NO_CONTACT
             return
-        self._force, self._changed_at = estimate.force, estimate.time
-        self.n_repeats = 0
-        self.repeating = self.frozen = False
-        self._n_free += estimate.state is ContactState.NO_CONTACT
-
-    def _judge(self, estimate: ContactEstimate) -> None:
-        """Judge a repeat."""
-        n = self.n_repeats
+        self.n_repeats = n = self.n_repeats + 1
         if estimate.state is ContactState.NO_CONTACT:
             self._n_free += 1
             self._longest = max(self._longest, n)
+        # Only a finger that was noisy without contact can freeze in a grip.
         noisy = self._n_free >= MIN_FREE_SAMPLES and self._longest <= MAX_FREE_REPEATS
         self.repeating = noisy and n >= REPEATING_RATIO * (1 + self._longest)
         lasting = estimate.time - self._changed_at >= FROZEN_TIME - SLACK

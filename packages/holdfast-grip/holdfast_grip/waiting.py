@@ -35,7 +35,10 @@ class GripWait:
         """Conditions with the seconds for which each one lasts, the longest first."""
         begun, time = self._begun, self._time  # both are replaced, in another thread
         longest_first = sorted(begun.items(), key=lambda condition: condition[1])
-        parts = [_with_time(words, time - since) for words, since in longest_first]
+        parts = [
+            f"{words}: {int(time - since)} s" if time - since >= 1.0 else words
+            for words, since in longest_first
+        ]
         return "; ".join(parts) or NO_SAMPLES
 
     def update(self, estimate: HandEstimate, time: float) -> None:
@@ -44,7 +47,9 @@ class GripWait:
             return
         before = self._begun
         self._begun = {
-            words: min(before.get(words, time), time) for words in self._conditions(estimate)
+            # The smaller one, where the clock went back.
+            words: min(before.get(words, time), time)
+            for words in self._conditions(estimate)
         }
         self._time = time
 
@@ -77,8 +82,3 @@ def _named(finger: str) -> str:
     if finger in HUMAN_FINGERS:
         return f"the {finger} finger"
     return "the thumb" if finger == "thumb" else finger
-
-
-def _with_time(words: str, seconds: float) -> str:
-    """Return a condition with its whole seconds, if it lasts for one at least."""
-    return f"{words}: {int(seconds)} s" if seconds >= 1.0 else words

@@ -69,7 +69,12 @@ class Bag:
         self.ros2 = ros2
         self.complete = storage.complete
         connections = sorted(storage.connections, key=lambda one: one.topic)
-        self.topics = [self._topic(connection) for connection in connections]
+        self.topics = [
+            BagTopic(
+                one.topic, short_name(one.kind), self._definition(one), one.n_messages, one.number
+            )
+            for one in connections
+        ]
 
     def messages(self, topics: Iterable[BagTopic]) -> Iterator[tuple[BagTopic, float, bytes]]:
         """Yield topic, time of recording [s] and bytes of each message, in the order of time.
@@ -98,13 +103,9 @@ class Bag:
         """
         self._budget.keep(n_bytes, 1)
 
-    def _topic(self, one: BagConnection) -> BagTopic:
-        return BagTopic(
-            one.topic, short_name(one.kind), self._definition(one), one.n_messages, one.number
-        )
-
     def _definition(self, one: BagConnection) -> Definition | None:
         """Return the definition in the bag; if there is none, the one of a known type."""
+        # Publishers of a type send the same definition, which is parsed once.
         key = (one.kind, one.definition)
         if key not in self._definitions:
             self._definitions[key] = self._parsed(*key)
@@ -114,6 +115,7 @@ class Bag:
         if text.strip():
             try:
                 return parse_definition(kind, text)
+            # A topic that cannot be read does not hide the others.
             except ValueError:
                 return None
         standard = standard_definition(kind) if self.ros2 else None

@@ -59,6 +59,7 @@ LOCALHOST_CONFIGURATION = (
 _PRIMITIVES = {
     "bool": bool,
     "string": str,
+    # Both are one octet in ROS 2.
     "byte": idl.uint8,
     "char": idl.uint8,
     **{
@@ -67,6 +68,7 @@ _PRIMITIVES = {
         if hasattr(idl, name) and name[-1].isdigit()
     },
 }
+# Domains with an own configuration, which a process can set once for each.
 _domains: dict[int, Domain] = {}
 
 
@@ -82,7 +84,9 @@ class Node:
 
     def __init__(self, domain: int) -> None:
         try:
-            if _is_local() and domain not in _domains:
+            # A configuration that the user has set takes precedence over ROS_LOCALHOST_ONLY.
+            is_local = os.environ.get("ROS_LOCALHOST_ONLY") == "1"
+            if is_local and not os.environ.get("CYCLONEDDS_URI") and domain not in _domains:
                 _domains[domain] = Domain(domain, LOCALHOST_CONFIGURATION)
             self._participant = DomainParticipant(domain)
             self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
@@ -182,6 +186,7 @@ class TopicWriter:
 
 def _endpoints(reader: BuiltinDataReader) -> list[Any]:
     """Return the publishers or subscribers of all topics of ROS."""
+    # Publishers that have left stay in the reader, as not alive.
     alive = InstanceState.Alive | ViewState.Any | SampleState.Any
     found = reader.read(MAX_ENDPOINTS, ReadCondition(reader, alive))
     return [
@@ -193,21 +198,18 @@ def _endpoints(reader: BuiltinDataReader) -> list[Any]:
 
 def _ros_topic(endpoint: Any) -> str:  # noqa: ANN401 (cyclonedds has no types)
     name: str = endpoint.topic_name
+    # The slash stays: `rt/name` is `/name` in ROS.
     return name.removeprefix(TOPIC_PREFIX[:-1])
 
 
 def _qos(reliability: object, depth: int) -> Qos:
     return Qos(
+        # ROS 2 encodes messages in XCDR1; Cyclone DDS would also offer XCDR2.
         Policy.DataRepresentation(use_cdrv0_representation=True),
         reliability,
         Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
     )
-
-
-def _is_local() -> bool:
-    """Return whether ROS is limited to this machine and no other configuration is set."""
-    return os.environ.get("ROS_LOCALHOST_ONLY") == "1" and not os.environ.get("CYCLONEDDS_URI")
 
 
 def domain_number(given: str | None) -> int:

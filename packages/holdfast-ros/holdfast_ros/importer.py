@@ -279,6 +279,7 @@ class _BagImport:
     def _clock(self) -> str:
         """Return the best clock that all tracks have, that increases and that is one clock."""
         tracks = [track for track in self._tracks.values() if track.readings]
+        # The clock of the bag needs no check: it is used where no other one fits.
         for clock in CLOCKS[:-1]:
             offsets = [track.offset(clock) for track in tracks]
             if np.ptp(offsets) <= ONE_CLOCK_DIFFERENCE:  # False if an offset is NaN
@@ -287,8 +288,19 @@ class _BagImport:
 
     def _modules(self, clock: str) -> dict[str, Tactile]:
         modules: dict[str, Tactile] = {}
-        for (topic, finger), track in self._tracks_by_finger().items():
-            new = _modules_of(finger, track, clock)
+        n_without = 0  # devices without a number are counted over all topics
+        for (topic, number), track in sorted(self._tracks.items()):
+            n_without += track.first.number is None
+            finger = f"finger{n_without if track.first.number is None else number}"
+            times = track.times(clock)
+            if times is None:  # the bag's times do not increase either: Tactile names the place
+                times = np.array([stamps[-1] for stamps in track.stamps])
+            sensors = sensors_of(track.first, "count")
+            parts = xela_models.split(track.first.model, np.array(track.readings))
+            new = {
+                module_name(finger, part, named=False): Tactile(sensor, times, parts[part])
+                for part, sensor in sensors.items()
+            }
             prefix = _unused_prefix(modules, new, finger, topic.strip("/"))
             modules.update({f"{prefix}{name}": module for name, module in new.items()})
         return modules
@@ -300,16 +312,6 @@ class _BagImport:
         times = np.array([(stamps[place], stamps[-1]) for stamps in track.stamps], dtype=np.float64)
         device, bag = (times - times[0]).T
         return round(float(np.polyfit(device, bag - device, 1)[0]), 6) if len(times) > 2 else 0.0
-
-    def _tracks_by_finger(self) -> dict[tuple[str, str], _DeviceTrack]:
-        """Return tracks by topic and finger; devices without a number are counted by topic."""
-        tracks: dict[tuple[str, str], _DeviceTrack] = {}
-        n_without = 0
-        for (topic, number), track in sorted(self._tracks.items()):
-            n_without += track.first.number is None
-            finger = n_without if track.first.number is None else number
-            tracks[topic, f"finger{finger}"] = track
-        return tracks
 
     def _metadata(self, topics: list[_TactileTopic], clock: str) -> dict[str, Any]:
         hands = [xela_models.whole_hand(track.first.model) for track in self._tracks.values()]
@@ -335,15 +337,3 @@ def _unused_prefix(
         (prefix for prefix in ("", *longer) if not any(f"{prefix}{name}" in taken for name in new)),
         longer[-1],
     )
-
-
-def _modules_of(finger: str, track: _DeviceTrack, clock: str) -> Mapping[str, Tactile]:
-    times = track.times(clock)
-    if times is None:  # the bag's times do not increase either: Tactile names the place
-        times = np.array([stamps[-1] for stamps in track.stamps])
-    sensors = sensors_of(track.first, "count")
-    parts = xela_models.split(track.first.model, np.array(track.readings))
-    return {
-        module_name(finger, part, named=False): Tactile(sensor, times, parts[part])
-        for part, sensor in sensors.items()
-    }

@@ -90,8 +90,10 @@ def _pose(
     position: Mapping[str, float],
     rotation: Mapping[str, float],
 ) -> StampedPose:
+    # ROS 1 and ROS 2 give the two fields other names, in the same order.
     seconds, nanoseconds = header["stamp"].values()
     return StampedPose(
+        # ROS 1 allowed a slash before the name of a frame; tf2 does not.
         body.lstrip("/"),
         header["frame_id"].lstrip("/"),
         seconds + nanoseconds * 1e-9,

@@ -111,6 +111,7 @@ class RosPublisher(Openable):
         self._link = link
         self._publishers: dict[str, Publisher] = {}
         self._grip = grip
+        # Set at each event of the loop, cleared when its state is published.
         self._grip_changed = False
         self._units = dict(units)
         self._names = topic_names(units, namespace)
@@ -118,6 +119,7 @@ class RosPublisher(Openable):
         self._queue: deque[tuple[HandEstimate, tuple[str, ...], float]] = deque()
         self._queue_changed = Condition()
         self._thread: Thread | None = None
+        # Newest estimate and its time, for the diagnostics; only the thread sets it.
         self._newest: tuple[HandEstimate, float] | None = None
         self._levels: tuple[int, ...] = ()
         self._diagnostics_due = 0.0
@@ -194,14 +196,14 @@ class RosPublisher(Openable):
             self._grip_changed = True
             self._queue_changed.notify()
 
-    def _has_work(self) -> bool:
-        return bool(self._queue) or self._grip_changed or self._closing
-
     def _run(self) -> None:
         while True:
             with self._queue_changed:
+                # Diagnostics go on while no estimate comes.
                 until = max(self._diagnostics_due - time.monotonic(), 0.0)
-                self._queue_changed.wait_for(self._has_work, until)
+                self._queue_changed.wait_for(
+                    lambda: self._queue or self._grip_changed or self._closing, until
+                )
                 self._grip_changed = False
                 if self._closing and not self._queue:
                     return
@@ -246,6 +248,7 @@ class RosPublisher(Openable):
         statuses = diagnostics_of(self._newest, now)
         if grip is not None:
             statuses.append(diagnostic_of_grip(grip))
+        # A new level or text is published at once, without a wait for the period.
         levels = tuple(hash((status.level, status.message)) for status in statuses)
         if levels == self._levels and time.monotonic() < self._diagnostics_due:
             return
@@ -304,6 +307,7 @@ def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
     if not re.fullmatch(r"(/[A-Za-z][A-Za-z0-9_]*)*", base):
         raise ValueError(f"a namespace as /holdfast expected, {namespace!r} given")
     names = {finger: f"{base}/{_ros_name(finger)}" for finger in fingers}
+    # `hand` and `grip` have topics too, which no finger may take.
     if len({*names.values(), f"{base}/hand", f"{base}/grip"}) <= len(names) + 1:
         raise ValueError(f"fingers {', '.join(names)} would share topics: rename one")
     return names

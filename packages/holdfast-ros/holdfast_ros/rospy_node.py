@@ -37,6 +37,7 @@ ROSPY_FOLDERS = ("/opt/ros/*/lib/python3/dist-packages", "/usr/lib/python3/dist-
 
 _NODE_NAME = "/holdfast"
 _lock = threading.Lock()
+# A process stays the node of one master until it ends.
 _master: str | None = None
 QUEUE_SIZE = 10
 """Messages that rospy keeps for a slow subscriber; the oldest is dropped first."""
@@ -55,11 +56,13 @@ def rospy_module() -> ModuleType:
     with suppress(ImportError):
         return import_module("rospy")
     for folder in _rospy_folders():
+        # Last, so that its packages replace none of this environment.
         sys.path.append(folder)
         try:
             return import_module("rospy")
         except ImportError:
             sys.path.remove(folder)
+            # A failed import leaves modules, which the next folder must not get.
             for name in [name for name in sys.modules if name.split(".")[0] == "rospy"]:
                 del sys.modules[name]
     raise SourceError(
@@ -87,6 +90,8 @@ def start_node(master: str) -> ModuleType:
                 raise SourceError(f"this process is a node of {_master} and cannot be of {master}")
             return rospy
         os.environ["ROS_MASTER_URI"] = master  # rospy reads it as long as the process runs
+        # Anonymous, because a master ends the older of two nodes of one name. Without `argv` and
+        # `disable_signals` rospy would read our arguments and handle Ctrl-C.
         rospy.init_node("holdfast", argv=["holdfast"], anonymous=True, disable_signals=True)
         atexit.register(rospy.signal_shutdown, "the process ends")
         # Stop rospy from writing its log to stdout, which is for results; its log file stays.
@@ -145,6 +150,7 @@ def published_topics(master: str) -> dict[str, str]:
     Raises:
         SourceError: the ROS master does not answer.
     """
+    # `getTopicTypes` also lists topics without a publisher.
     names = {name for name, nodes in call_master(master, "getSystemState")[0] if nodes}
     return {name: kind for name, kind in call_master(master, "getTopicTypes") if name in names}
 

@@ -264,6 +264,7 @@ def _counts(values: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
         return values
     with np.errstate(invalid="ignore"):
         counts = values.astype(np.uint16)
+    # A cast wraps around, so the result is compared with its input.
     if (counts != values).any():
         raise ValueError("a reading is not a whole number from 0 to 65535")
     return counts
@@ -271,6 +272,7 @@ def _counts(values: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
 
 def _seconds(stamp: Mapping[str, int]) -> float | None:
     """Return a stamp of ROS 1 or ROS 2 [s]; None if it was not set."""
+    # ROS 1 and ROS 2 give the two fields other names, in the same order.
     seconds, nanoseconds = stamp.values()
     return seconds + nanoseconds * 1e-9 if seconds or nanoseconds else None
 

@@ -85,6 +85,7 @@ def _fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the fields of a message; points and arrays with a layout in their shape."""
     if {"point_step", "data", "fields"} <= message.keys():
         yield from _points(message).items()
+        # The other fields of a PointCloud2 only describe its data.
         message = {"header": message.get("header", {})}
     for name, value in message.items():
         if name == "header" and isinstance(value, Mapping):
@@ -125,6 +126,7 @@ def _points(message: Mapping[str, Any]) -> dict[str, Any]:
     points = np.frombuffer(message["data"].tobytes(), kind, n)
     joined = joined_axes({name: points[name] for name in kind.names or ()})
     vectors = [name for name, values in joined.items() if values.ndim > 1]
+    # The place of a point is no reading where it has another vector.
     if len(vectors) > 1:
         joined.pop("xyz", None)
     return joined

@@ -156,6 +156,7 @@ def trajectory_message(names: Sequence[str], positions: Array) -> dict[str, Any]
 
 def header(time: float, frame: str = "") -> dict[str, Any]:
     """Return a header with a time [s], which is not set if it is negative or NaN."""
+    # The field has 31 bits; NaN is in no order with a number.
     seconds = int(time) if 0.0 <= time < 2.0**31 else 0
     nanoseconds = int((time - seconds) * 1e9) if 0.0 <= time < 2.0**31 else 0
     return {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": frame}

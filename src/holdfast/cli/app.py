@@ -98,6 +98,7 @@ EXIT_INTERRUPTED = 130
 _UsageError = typer.BadParameter.__mro__[2]
 """Base class of usage errors, from click or from the copy of click within typer."""
 
+# Failures of the input, of files or of memory; any other is an error of holdfast.
 _EXPECTED_ERRORS = (HoldfastError, ValueError, TypeError, OSError, MemoryError)
 
 
@@ -113,9 +114,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         code = _run(words)
-        sys.stdout.flush()
+        sys.stdout.flush()  # a closed pipe fails here, inside the `try`
     except BrokenPipeError:
-        return _close_stdout()
+        # The reader has closed the pipe, as `| head` does, which is no error. Python flushes
+        # stdout once more at its end, and would report the pipe then.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    # Also SystemExit and KeyboardInterrupt: `_report` has the exit code of each.
     except BaseException as failure:
         return _report(failure)
     return code
@@ -123,7 +128,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     if COMPLETE_VARIABLE in os.environ:
-        return _complete()
+        # The script of the shell has set the typed words in the environment.
+        typed = [os.environ.get(name, "") for name in ("COMP_WORDS", "_TYPER_COMPLETE_ARGS")]
+        command = get_command(_app(" ".join(typed).split()))
+        command.main([], prog_name="holdfast", complete_var=COMPLETE_VARIABLE)
+        return 0
     command = get_command(_app(words))
     try:
         with command.make_context("holdfast", words) as context:
@@ -145,6 +154,7 @@ def _app(words: list[str]) -> typer.Typer:
     app.callback()(_root)
     others = {
         name: "A verb of a plug-in."
+        # Without a report: a plug-in whose name is taken must not print a line at every verb.
         for name in VERB_PLUGINS.names(report=False)
         if name not in VERBS
     }
@@ -152,8 +162,10 @@ def _app(words: list[str]) -> typer.Typer:
         if name in words:
             _add(app, name)
         else:
+            # The help needs the name and one line; importing all verbs would make it slow.
             app.command(name, help=summary)(_placeholder)
     for name in SUB_VERBS:
+        # A subset: options of holdfast itself, as --config, may stand before the words.
         if set(name.split()) <= set(words):
             _add(app, name, hidden=True)
     return app
@@ -169,9 +181,12 @@ def _add(app: typer.Typer, name: str, *, hidden: bool = False) -> None:
 
     own, shared = (inspect.signature(x).parameters for x in (run, spread))
     options = [*shared.values(), own["help_all"]]
+    # Typer reads the options from the signature and the annotations.
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
-    app.command(name, cls=_Verb, help=_help(verb), hidden=hidden)(run)
+    # `\b` keeps click from wrapping the lines of the example.
+    text = (inspect.getdoc(verb) or "").replace("\nExample", "\n\b\nExample")
+    app.command(name, cls=_Verb, help=text, hidden=hidden)(run)
 
 
 class _Verb(TyperCommand):
@@ -203,6 +218,7 @@ def _show_all(context: typer.Context, value: bool) -> None:
         raise typer.Exit
 
 
+# Eager: typer calls it before it reports that an argument is missing.
 HelpAllOption = Annotated[
     bool,
     typer.Option(
@@ -223,22 +239,17 @@ class _GroupedVerbs(TyperGroup):
         """Write a section for each group, and one for verbs of plug-ins."""
         others = {name: "" for name in self.commands if name not in {**VERBS, **SUB_VERBS}}
         width = max(map(len, (*VERBS, *others)))
+        # 6 as in click: three times the spacing of its columns.
         limit = formatter.width - 6 - width
         for title, verbs in {**VERB_GROUPS, "Plug-ins": others}.items():
             rows = [
-                (name.ljust(width), self.commands[name].get_short_help_str(limit)) for name in verbs
+                # All sections have columns of equal width.
+                (name.ljust(width), self.commands[name].get_short_help_str(limit))
+                for name in verbs
             ]
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
-
-
-def _complete() -> int:
-    """Print the completions for a shell; its script set the words in the environment."""
-    typed = [os.environ.get(name, "") for name in ("COMP_WORDS", "_TYPER_COMPLETE_ARGS")]
-    command = get_command(_app(" ".join(typed).split()))
-    command.main([], prog_name="holdfast", complete_var=COMPLETE_VARIABLE)
-    return 0
 
 
 def _version(value: bool) -> None:
@@ -268,6 +279,7 @@ def load_verb(name: str) -> Callable[..., None]:
     """
     if name not in (*OWN_VERBS, *SUB_VERBS):
         return VERB_PLUGINS.require(name, f"the verb {name}")
+    # `import` is a keyword, so its module is import_.py.
     names = [f"{word}_" if keyword.iskeyword(word) else word for word in name.split()]
     module = import_module(".".join(("holdfast.cli", *names)))
     verb: Callable[..., None] = getattr(module, names[-1])
@@ -299,15 +311,20 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
     parameters: list[inspect.Parameter] = []
     groups: dict[str, tuple[Callable[[Values], object], list[str]]] = {}
     for name, parameter in inspect.signature(verb, eval_str=True).parameters.items():
-        kind, is_rare = _unmarked(parameter.annotation)
-        if _is_group(kind):
+        kind = parameter.annotation
+        is_rare = RARE in getattr(kind, "__metadata__", ())
+        kind = get_args(kind)[0] if is_rare else kind
+        if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, PluginOptions)):
             options = _options_of(kind, parameter.default)
             groups[name] = _maker_of(kind), [option.name for option in options]
-            parameters += [_marked(option) for option in options] if is_rare else options
+            if is_rare:
+                options = [x.replace(annotation=Annotated[x.annotation, RARE]) for x in options]
+            parameters += options
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 
     def run(**values: Any) -> None:  # noqa: ANN401
+        # The values of a group's options become one value, that of the group.
         for name, (make, options) in groups.items():
             values[name] = make({option: values.pop(option) for option in options})
         verb(**values)
@@ -319,20 +336,6 @@ def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
 
 Values = dict[str, Any]
 """Values of options, by name."""
-
-
-def _unmarked(annotation: Any) -> tuple[Any, bool]:  # noqa: ANN401
-    """Return the type of a parameter, and whether it is marked as rare."""
-    is_rare = RARE in getattr(annotation, "__metadata__", ())
-    return (get_args(annotation)[0] if is_rare else annotation), is_rare
-
-
-def _marked(option: inspect.Parameter) -> inspect.Parameter:
-    return option.replace(annotation=Annotated[option.annotation, RARE])
-
-
-def _is_group(kind: object) -> bool:
-    return isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, PluginOptions))
 
 
 def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[inspect.Parameter]:
@@ -382,12 +385,14 @@ def _root(
 ) -> None:
     """Read the configuration file, for the verbs that use it."""
     verb = context.invoked_subcommand or ""
+    # A file that is named by --config is checked, even if the verb does not use it.
     if _is_configured(verb) or config is not None:
         from holdfast.cli.config import find_config, load_config
 
         path = find_config(config)
         if path is not None:
             context.obj = load_config(path)
+            # Defaults only: what is typed wins.
             context.default_map = {verb: context.obj.defaults()} if _is_configured(verb) else {}
 
 
@@ -406,20 +411,10 @@ def _placeholder() -> None:
     """Do nothing; in place of a verb that is not imported."""
 
 
-def _help(verb: Callable[..., None]) -> str:
-    r"""Return the docstring; `\b` keeps click from wrapping the lines of the example."""
-    return (inspect.getdoc(verb) or "").replace("\nExample", "\n\b\nExample")
-
-
-def _close_stdout() -> int:
-    """Handle a reader that has closed the pipe, as `| head` does; this is no error."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
-
-
 def _report(failure: BaseException) -> int:
-    if os.environ.get("HOLDFAST_DEBUG"):
+    if os.environ.get("HOLDFAST_DEBUG"):  # the traceback, before the line for users
         traceback.print_exception(failure)
+    # The message then names the extra, and the command that installs it.
     if isinstance(failure, ModuleNotFoundError):
         failure = missing_extra(failure) or failure
     match failure:
@@ -429,26 +424,19 @@ def _report(failure: BaseException) -> int:
             print_error("interrupted")
             return EXIT_INTERRUPTED
         case _ if isinstance(failure, _UsageError):
-            print_error(_usage_text(failure))
+            context, option = getattr(failure, "ctx", None), getattr(failure, "option_name", "")
+            verb = getattr(context, "info_name", "")
+            # The option of a package that is not installed is unknown to click.
+            missing = missing_part("options", f"{verb} {option}", f"the option {option}")
+            text = failure.format_message().rstrip(".")  # type: ignore[attr-defined]
+            path = getattr(context, "command_path", "holdfast")
+            print_error(str(missing) if missing else f"{text} (see {path} --help)")
             return EXIT_BAD_INPUT
         case _ if isinstance(failure, _EXPECTED_ERRORS):
-            print_error(_error_text(failure))
+            text = str(failure) or type(failure).__name__
+            if isinstance(failure, OSError) and failure.filename and failure.strerror:
+                text = f"{failure.filename}: {failure.strerror}"  # without "[Errno 2]"
+            print_error(text)
             return EXIT_BAD_INPUT
     print_error(f"internal error ({type(failure).__name__}: {failure}): please report it")
     return 1
-
-
-def _usage_text(failure: BaseException) -> str:
-    option = getattr(failure, "option_name", "")
-    verb = getattr(getattr(failure, "ctx", None), "info_name", "")
-    if missing := missing_part("options", f"{verb} {option}", f"the option {option}"):
-        return str(missing)
-    text: str = failure.format_message()  # type: ignore[attr-defined]
-    path = getattr(getattr(failure, "ctx", None), "command_path", "holdfast")
-    return f"{text.rstrip('.')} (see {path} --help)"
-
-
-def _error_text(failure: BaseException) -> str:
-    if isinstance(failure, OSError) and failure.filename and failure.strerror:
-        return f"{failure.filename}: {failure.strerror}"
-    return str(failure) or type(failure).__name__

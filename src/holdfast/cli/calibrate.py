@@ -105,7 +105,7 @@ def calibrate(
     from holdfast.model import Model
     from holdfast.training.calibration import calibrate_with_report, check_normalised
 
-    refuse_overwrite(out, force=force)
+    refuse_overwrite(out, force=force)  # before a minute of handling is recorded
     check_seconds(seconds)
     loaded = Model.load(model)
     check_normalised(loaded)
@@ -149,10 +149,12 @@ def _recorded(
     from holdfast.training.own_handling import ENOUGH_HANDLING
 
     with handle_stop_signals() as stop, sources.open_source(data, speed=speed) as source:
+        # Ctrl-C before ends the wait for the source; from here on it ends the recording.
         stop.graceful = True
         print_message(f"recording {source.name} for {seconds:g} s; Ctrl-C stops")
         stream = start.create_stream(model, source)
         buffer, shown = HandlingBuffer(stream), 0.0
+        # One second more than the handling: a source that falls silent is not awaited for ever.
         end = time.monotonic() + (seconds / speed + 1.0 if speed else math.inf)
         while not (source.ended or stop.requested or time.monotonic() > end):
             buffer.put(stream.read())

@@ -43,15 +43,22 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         from holdfast.devices.uri import is_uri, parse, source_module
 
+        # A recording of this name is meant, if there is one.
         if source == HAND and not Path(HAND).exists():
             source = self.source or f"xela://{self.host or 'auto'}"
         if not is_uri(source):
             return source
         scheme, address = parse(source)
         known = getattr(source_module(scheme), "PARAMETERS", ())
+        fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items())
         missing = {
             key: value
-            for key, value in self._parameters().items()
+            for key, value in (
+                ("fingers", fingers or None),
+                ("sensor", self.sensor),
+                ("values", self.values),
+            )
+            # A scheme refuses parameters that it does not have.
             if key in known and key not in address.parameters and value is not None
         }
         if not missing:
@@ -68,10 +75,6 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             defaults["ignore"] = ",".join(taxels)
         return defaults
 
-    def _parameters(self) -> dict[str, str | None]:
-        fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items()) or None
-        return {"fingers": fingers, "sensor": self.sensor, "values": self.values}
-
 
 def find_config(option: Path | None = None) -> Path | None:
     """Return the configuration file: that of `--config`, HOLDFAST_CONFIG, or holdfast.toml here.
@@ -80,6 +83,7 @@ def find_config(option: Path | None = None) -> Path | None:
         ValueError: the file of the option or the variable does not exist.
     """
     variable = os.environ.get(CONFIG_VARIABLE)
+    # --config outranks the variable, and both outrank the file in this folder.
     for path, where in ((option, "--config"), (variable and Path(variable), CONFIG_VARIABLE)):
         if path:
             if not path.is_file():
@@ -95,6 +99,8 @@ def load_config(path: Path) -> Config:
     Raises:
         ValueError: it is not TOML, or has an unknown key or a value of another type.
     """
+    from holdfast.sensors.taxel_numbers import FIRST_TAXEL
+
     try:
         content = read_toml(path)
     except OSError as cause:
@@ -102,6 +108,7 @@ def load_config(path: Path) -> Config:
     except ValueError as cause:
         raise ValueError(f"{path} is not TOML: {cause}") from cause
     known = Config.__struct_fields__
+    # msgspec names one unknown key, and not those that exist.
     if unknown := sorted(set(content) - set(known)):
         raise ValueError(
             f"{path}: unknown key {', '.join(unknown)}; there are {', '.join(sorted(known))}"
@@ -110,9 +117,21 @@ def load_config(path: Path) -> Config:
         config = msgspec.convert(content, Config)
     except msgspec.ValidationError as cause:
         raise ValueError(f"{path}: {cause}") from cause
-    _check(config, path)
-    files = {
-        key: _beside(path, value)
+    if config.source is not None and config.host is not None:
+        raise ValueError(f"{path}: source or host expected, both given")
+    if wrong := [number for number in config.fingers if not number.isdecimal()]:
+        raise ValueError(
+            f'{path}: fingers: 1 = "thumb" expected, the number of a module, {wrong[0]!r} given'
+        )
+    for finger, taxels in config.ignore.items():
+        for taxel in taxels:
+            if taxel < FIRST_TAXEL:
+                raise ValueError(
+                    f"{path}: ignore: taxels from {FIRST_TAXEL} expected, {taxel} given for "
+                    f"{finger}"
+                )
+    files = {  # a name without .json is that of a built-in model or sensor, and no path
+        key: (str(path.parent / value) if value.endswith(".json") else value)
         for key in ("model", "sensor")
         if (value := getattr(config, key)) is not None
     }
@@ -137,31 +156,3 @@ def config_state(config: Config | None) -> dict[str, Any]:
         "content": {key: value for key, value in content.items() if value},
         "error": error,
     }
-
-
-def _check(config: Config, path: Path) -> None:
-    if config.source is not None and config.host is not None:
-        raise ValueError(f"{path}: source or host expected, both given")
-    if wrong := [number for number in config.fingers if not number.isdecimal()]:
-        raise ValueError(
-            f'{path}: fingers: 1 = "thumb" expected, the number of a module, {wrong[0]!r} given'
-        )
-    if config.ignore:
-        _check_ignored(config.ignore, path)
-
-
-def _check_ignored(ignored: dict[str, list[int]], path: Path) -> None:
-    from holdfast.sensors.taxel_numbers import FIRST_TAXEL
-
-    for finger, taxels in ignored.items():
-        for taxel in taxels:
-            if taxel < FIRST_TAXEL:
-                raise ValueError(
-                    f"{path}: ignore: taxels from {FIRST_TAXEL} expected, {taxel} given for "
-                    f"{finger}"
-                )
-
-
-def _beside(path: Path, value: str) -> str:
-    """Return the path of a .json file that is named relative to the configuration file."""
-    return str(path.parent / value) if value.endswith(".json") else value

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.options import RARE
 from holdfast.cli.sensors import find_sensor
 from holdfast.cli.terminal.console import print_message
 
@@ -44,7 +45,7 @@ class CsvOptions:
     """Group of options: the sensor and the columns of a CSV file that is read directly."""
 
     sensor: SensorsOption = None
-    columns: ColumnsOption = None
+    columns: Annotated[ColumnsOption, RARE] = None
 
     def fits(self, source: str) -> bool:
         """Return whether a source is read as CSV: by its suffix, or because an option is given.

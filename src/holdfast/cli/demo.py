@@ -64,6 +64,7 @@ def demo(
     """
     require_extras("twin", "train", "parquet")
     from holdfast.cli.demo_replay import show_clip
+    from holdfast.cli.serve import has_browser
     from holdfast.files import refuse_overwrite
     from holdfast.model import Model
     from holdfast.training import evaluate
@@ -74,7 +75,7 @@ def demo(
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
-    refuse_overwrite(model, force=force)
+    refuse_overwrite(model, force=force)  # before minutes of simulation
     grasps = plan_grasps(
         DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
     )
@@ -85,7 +86,10 @@ def demo(
     metrics = evaluate(ours, recordings)
     trained = _train(recordings, model, seed, force)
     shown = recordings[-1]
-    n_updates = _replay(ours, shown, out, speed, page=_on_page(browser, speed, as_json=as_json))
+    if browser is None:
+        browser = has_browser() and sys.stdin.isatty()
+    page = bool(browser and speed and not as_json)  # at speed 0 a page would show only the end
+    n_updates = _replay(ours, shown, out, speed, page=page)
     if as_json:
         print_json(
             {
@@ -136,14 +140,6 @@ def _train(recordings: "Sequence[Recording]", path: Path, seed: int, force: bool
     named = replace(trained, model=msgspec.structs.replace(trained.model, name="demo"))
     named.model.save(path, force=force)
     return named
-
-
-def _on_page(browser: bool | None, speed: float, *, as_json: bool) -> bool:
-    """Return whether the replay is shown on a page."""
-    from holdfast.cli.serve import has_browser
-
-    wanted = has_browser() and sys.stdin.isatty() if browser is None else browser
-    return bool(wanted and speed and not as_json)
 
 
 def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, page: bool) -> int:

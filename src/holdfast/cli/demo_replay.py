@@ -13,7 +13,6 @@ from holdfast.cli import serve
 from holdfast.cli.terminal.console import print_message
 from holdfast.contact import (
     Cause,
-    ContactEstimate,
     ContactEvent,
     HandEstimate,
     StateChanges,
@@ -96,6 +95,7 @@ def show_clip(speed: float, write: Callable[[str], None]) -> list[ClipEvent]:
         The events.
     """
     write("1/5  a real recording: a robot carries a box between two uSkin sensors")
+    # Changes, slips and labels come one kind after the other.
     events = sorted(_events())
     start = time.monotonic()
     for event in events:
@@ -151,17 +151,22 @@ class TrueEvents(NamedTuple):
         """Return what happens when the state of the hand changes."""
         if change.state != "UNSTABLE":
             return STATES[change.state]
-        for start, end, words in self.causes:
-            if start - CAUSE_TOLERANCE <= change.time < end + CAUSE_TOLERANCE:
-                return words + self._delay(change.time)
-        return STATES[change.state]
-
-    def _delay(self, instant: float) -> str:
+        reasons = (
+            words
+            for start, end, words in self.causes
+            if start - CAUSE_TOLERANCE <= change.time < end + CAUSE_TOLERANCE
+        )
+        words = next(reasons, None)
+        if words is None:
+            return STATES[change.state]
         for event in self.events:
-            if event.onset - CAUSE_TOLERANCE <= instant <= event.end and event.alarm is not None:
+            during = event.onset - CAUSE_TOLERANCE <= change.time <= event.end
+            if during and event.alarm is not None:
                 delay = round(1000 * event.delay)
-                return f"; detected after {delay} ms" if delay > 0 else "; detected at once"
-        return ""
+                return words + (
+                    f"; detected after {delay} ms" if delay > 0 else "; detected at once"
+                )
+        return words
 
 
 def replay(model: Model, path: Path, speed: float, true_events: TrueEvents) -> int:
@@ -179,17 +184,32 @@ def replay(model: Model, path: Path, speed: float, true_events: TrueEvents) -> i
     Returns:
         Number of estimates.
     """
+    # At a terminal that is watched in real time, the table; else only the lines.
     with open_source(str(path), speed=speed) as source:
         if speed and sys.stderr.isatty():
-            return _show_table(model, source, true_events)
+            from rich.console import Console
+            from rich.live import Live
+
+            updated_at, n_updates = 0.0, 0
+            console = Console(stderr=True, highlight=False)
+            with Live(
+                console=console, auto_refresh=False, transient=True, redirect_stdout=False
+            ) as screen:
+                for estimate in print_changes(model, source, true_events, console.print):
+                    n_updates += 1
+                    if time.monotonic() - updated_at > SCREEN_INTERVAL:
+                        updated_at = time.monotonic()
+                        screen.update(finger_table(estimate), refresh=True)
+            return n_updates
         estimates = print_changes(model, source, true_events, print_message)
-        return sum(1 for _ in estimates)
+        return sum(1 for _ in estimates)  # the lines are printed while it is consumed
 
 
 def replay_on_page(model: Model, path: Path, folder: Path, speed: float) -> None:
     """Replay on a web page; at a terminal the page stays open until Ctrl-C."""
     stay = sys.stdin.isatty()
     with (
+        # A page that stays shows the recording again and again.
         open_source(str(path), speed=speed, loop=stay) as source,
         Session(StreamDetector(model, source)) as session,
     ):
@@ -201,6 +221,7 @@ def replay_on_page(model: Model, path: Path, folder: Path, speed: float) -> None
                 "     Ctrl-C stops it" if stay else "     it stops at the end of the recording"
             )
 
+        # Port 0: a free one, as 8080 may be taken.
         serve.run_page(session, announce, port=0, folder=folder, stay=stay)
 
 
@@ -217,21 +238,6 @@ def print_changes(
         yield estimate
 
 
-def _show_table(model: Model, source: Source, true_events: TrueEvents) -> int:
-    from rich.console import Console
-    from rich.live import Live
-
-    updated_at, n_updates = 0.0, 0
-    console = Console(stderr=True, highlight=False)
-    with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False) as screen:
-        for estimate in print_changes(model, source, true_events, console.print):
-            n_updates += 1
-            if time.monotonic() - updated_at > SCREEN_INTERVAL:
-                updated_at = time.monotonic()
-                screen.update(finger_table(estimate), refresh=True)
-    return n_updates
-
-
 def finger_table(estimate: HandEstimate) -> "Table":
     """Return a table of the fingers, at most 80 columns wide."""
     from rich.table import Table
@@ -241,23 +247,19 @@ def finger_table(estimate: HandEstimate) -> "Table":
     for heading, width in (("finger", 8), ("state", 18), ("stable", 6), ("", BAR_WIDTH)):
         table.add_column(heading, width=width)
     table.add_column("instability", width=11, justify="right")
+    # `\[` is a bracket, not a style of rich.
     table.add_column(r"force \[counts]", width=14, justify="right")
     for name, finger in estimate.fingers.items():
-        table.add_row(name, *_cells(finger))
+        known = finger.state != "UNKNOWN"  # without an estimate, the probability means nothing
+        table.add_row(
+            name,
+            _coloured(finger.state) + (f" {finger.reason}" if finger.reason else ""),
+            _number(finger.stable_probability, 2) if known else "-",
+            "#" * round(BAR_WIDTH * finger.stable_probability) if known else "",
+            _number(finger.instability, 1),
+            _number(sum(value * value for value in finger.force) ** 0.5, 0),
+        )
     return table
-
-
-def _cells(finger: ContactEstimate) -> tuple[str, ...]:
-    probability = finger.stable_probability
-    known = finger.state != "UNKNOWN"
-    amplitude = sum(value * value for value in finger.force) ** 0.5
-    return (
-        _coloured(finger.state) + (f" {finger.reason}" if finger.reason else ""),
-        _number(probability, 2) if known else "-",
-        "#" * round(BAR_WIDTH * probability) if known else "",
-        _number(finger.instability, 1),
-        _number(amplitude, 0),
-    )
 
 
 def _number(value: float, digits: int) -> str:
@@ -267,6 +269,7 @@ def _number(value: float, digits: int) -> str:
         >>> _number(-0.001, 1), _number(float("nan"), 1), _number(12.34, 1)
         ('0.0', '-', '12.3')
     """
+    # `value - value` is NaN for NaN and for infinity; `+ 0.0` makes 0.0 of -0.0.
     return "-" if value - value != 0 else f"{round(value, digits) + 0.0:.{digits}f}"
 
 

@@ -15,7 +15,7 @@ from holdfast.errors import EXTRA_PURPOSES, install_command, package_versions
 from holdfast.threads import usable_processors
 
 if TYPE_CHECKING:
-    from holdfast.live.health import HealthCheck
+    from matplotlib.figure import Figure
 
 
 def doctor(
@@ -65,7 +65,7 @@ def doctor(
         "python": platform.python_version(),
         "platform": platform.platform(),
         "cpus": usable_processors(),
-        "packages": packages.pop("", {}),
+        "packages": packages.pop("", {}),  # those that every installation needs
         "extras": {
             extra: {
                 "purpose": EXTRA_PURPOSES.get(extra, ""),
@@ -98,10 +98,16 @@ def _check_modules(
         history_path,
         keep,
         read_history,
+        table_of,
     )
 
+    def draw() -> "Figure":
+        from holdfast.plots.sensors import plot_noise
+
+        return plot_noise({name: module.noise for name, module in check.modules.items()})
+
     check_seconds(seconds)
-    figure.check()
+    figure.check()  # before ten seconds are read
     path = history_path(uri) if history is None else history
     earlier = read_history(path)
     with open_source(uri, speed=0) as source:
@@ -109,31 +115,20 @@ def _check_modules(
     last = earlier[-1] if earlier else None
     findings = changes_since(check, last)
     keep(path, earlier, check)
-    figure.save(lambda: _plot(check))
+    figure.save(draw)
     if as_json:
         from msgspec import to_builtins
 
         report = to_builtins(check) | {"last": last and last.date, "findings": findings}
         print_json(report | {"history": str(path)})
     else:
-        _print_health(check, findings)
-
-
-def _plot(check: "HealthCheck") -> Any:  # noqa: ANN401 (a figure, where matplotlib is installed)
-    from holdfast.plots.sensors import plot_noise
-
-    return plot_noise({name: module.noise for name, module in check.modules.items()})
-
-
-def _print_health(check: "HealthCheck", findings: list[str]) -> None:
-    from holdfast.live.health import table_of
-
-    header = ("module", "rate [Hz]", "jitter [ms]", "gaps", "zeros", "noise x y z",
-              "loudest (taxel)", "readings", "field")  # fmt: skip
-    print_table(header, table_of(check.modules))
-    print_line()
-    for finding in findings or ["nothing is wrong, and nothing is worse than at the last check"]:
-        print_paragraph(finding, "- ", "  ")
+        header = ("module", "rate [Hz]", "jitter [ms]", "gaps", "zeros", "noise x y z",
+                  "loudest (taxel)", "readings", "field")  # fmt: skip
+        print_table(header, table_of(check.modules))
+        print_line()
+        healthy = "nothing is wrong, and nothing is worse than at the last check"
+        for finding in findings or [healthy]:
+            print_paragraph(finding, "- ", "  ")
 
 
 def _kernels() -> dict[str, Any]:
@@ -155,12 +150,16 @@ def _print(report: dict[str, Any]) -> None:
     found = "found" if data["found"] else "NOT FOUND"
     held = ", ".join(name for name, holds in limits.items() if holds)
     lacking = ", ".join(name for name, holds in limits.items() if not holds)
+    config = report["config"]
+    hand = ", ".join(f"{key} {value}" for key, value in config["content"].items())
+    hand = hand or "none: holdfast.toml in this folder, or HOLDFAST_CONFIG"
+    hand = f"WRONG: {config['error']}" if config["error"] else hand
     rows = [(key, report[key]) for key in ("python", "platform", "cpus")]
     rows += [
         ("kernel", "works" if kernels["ok"] else kernels["error"]),
         ("limits of imports", (held or "none") + (f" (NOT {lacking})" if lacking else "")),
         ("HOLDFAST_DATA", "not set" if data["path"] is None else f"{data['path']} ({found})"),
-        ("your hand", _config_text(report["config"])),
+        ("your hand", hand),
     ]
     packages = [(name, version or "MISSING") for name, version in report["packages"].items()]
     extras = [
@@ -181,11 +180,3 @@ def _print(report: dict[str, Any]) -> None:
         if table:
             print_line()
             print_table(header, table)
-
-
-def _config_text(config: dict[str, Any]) -> str:
-    if config["error"]:
-        return f"WRONG: {config['error']}"
-    if not config["content"]:
-        return "none: holdfast.toml in this folder, or HOLDFAST_CONFIG"
-    return ", ".join(f"{key} {value}" for key, value in config["content"].items())

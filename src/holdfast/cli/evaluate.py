@@ -8,7 +8,6 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
-    RARE,
     EngineOption,
     JobsOption,
     JsonOption,
@@ -36,7 +35,7 @@ def evaluate(
         Path, typer.Argument(help="A labelled recording or CSV file, or a folder of them.")
     ],
     *,
-    csv: Annotated[CsvOptions, RARE],
+    csv: CsvOptions,
     seed: SeedOption = 0,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
@@ -73,7 +72,7 @@ def evaluate(
 
         return draw_evaluation(metrics, evaluation.decisions)
 
-    figure.check()
+    figure.check()  # before the evaluation, which may take minutes
     loaded = Model.load(model)
     started = start_engine(engine, jobs)
     path = started.path(data)
@@ -85,6 +84,7 @@ def evaluate(
         loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
     )
     metrics = evaluation.metrics
+    # Labelled samples without a decision count too: the labels are there.
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(
             f"{data}: none of its recordings ({len(recordings)}) has labels; labels expected"

@@ -47,7 +47,8 @@ def export(
       holdfast export grasp.parquet view/ --format foxglove --model builtin:any
       holdfast export grasp.parquet grasp.csv --format csv
     """
-    if _is_model(source, out):
+    is_named_so = source.startswith("builtin:") or source.endswith(".json")
+    if is_named_so or out.suffix in MODEL_OUTPUTS:
         if recordings != RecordingOptions() or formats.chosen():
             raise ValueError(f"--format, --fps and --model are for recordings; {source} is a model")
         export_model(source, out, header, force=force, as_json=as_json)
@@ -58,8 +59,3 @@ def export(
             f"{source} is a recording or a folder"
         )
     export_recordings(Path(source), out, recordings.format, formats, force=force, as_json=as_json)
-
-
-def _is_model(source: str, out: Path) -> bool:
-    is_named_so = source.startswith("builtin:") or source.endswith(".json")
-    return is_named_so or out.suffix in MODEL_OUTPUTS

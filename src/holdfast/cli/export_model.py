@@ -2,16 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from holdfast.cli.options import RARE
 from holdfast.cli.terminal.console import print_json, print_line
-
-if TYPE_CHECKING:
-    from holdfast.exporters import CHeader, ExportedModel
-    from holdfast.recordings import Recording
 
 
 @dataclass(frozen=True)
@@ -64,6 +60,8 @@ def export_model(
     """
     from holdfast.exporters import export as write
     from holdfast.exporters import fingers_of_sensor
+    from holdfast.exporters.c_compiler import code_size
+    from holdfast.io import load_recording
     from holdfast.model import Model
 
     sensor, fingers = options.sensor, options.fingers
@@ -73,53 +71,30 @@ def export_model(
             "them for a model that names its fingers"
         )
     named = fingers_of_sensor(sensor, fingers) if sensor and fingers else None
+    like = None if options.like is None else load_recording(options.like)
     written = write(
-        Model.load(model), out, _recording(options.like), fingers=named, single=options.single,
+        Model.load(model), out, like, fingers=named, single=options.single,
         in_contact=options.in_contact, force=force,
     )  # fmt: skip
+    header = written.header
+    code = None if header is None else code_size(header)
     if as_json:
-        print_json(_document(written))
-    else:
-        _print(written)
-
-
-def _recording(path: Path | None) -> "Recording | None":
-    if path is None:
-        return None
-    from holdfast.io import load_recording
-
-    return load_recording(path)
-
-
-def _document(written: "ExportedModel") -> dict[str, object]:
-    header = written.header
-    sizes: dict[str, object] = {}
-    if header is not None:
-        sizes = {
-            "state_size": header.state_size,
-            "constants_size": header.constants_size,
-            "code_size": _code_size(header),
-            "double_fields": header.double_fields,
-        }
-    return {"out": written.path, "fingers": written.fingers, "size": written.size, **sizes}
-
-
-def _print(written: "ExportedModel") -> None:
-    header = written.header
-    if header is None:
+        document = {"out": written.path, "fingers": written.fingers, "size": written.size}
+        if header is not None:
+            document |= {
+                "state_size": header.state_size,
+                "constants_size": header.constants_size,
+                "code_size": code,
+                "double_fields": header.double_fields,
+            }
+        print_json(document)
+    elif header is None:
         print_line(f"{written.path}: {written.size} bytes; outputs {', '.join(written.fingers)}")
-        return
-    code = _code_size(header)
-    print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
-    print_line(f"  state      {header.state_size:9} bytes, one for each hand")
-    print_line(f"  constants  {header.constants_size:9} bytes")
-    known = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
-    print_line(f"  code       {known}")
-    if header.double_fields:
-        print_line(f"  double     {', '.join(header.double_fields)}: they hold times")
-
-
-def _code_size(header: "CHeader") -> int | None:
-    from holdfast.exporters.c_compiler import code_size
-
-    return code_size(header)
+    else:
+        print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
+        print_line(f"  state      {header.state_size:9} bytes, one for each hand")
+        print_line(f"  constants  {header.constants_size:9} bytes")
+        known = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
+        print_line(f"  code       {known}")
+        if header.double_fields:
+            print_line(f"  double     {', '.join(header.double_fields)}: they hold times")

@@ -13,7 +13,6 @@ from holdfast.cli.terminal.progress import progress
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from holdfast.io import Dataset
     from holdfast.recordings import Recording
 
 FILE_SUFFIXES = (".csv", ".json", ".mcap", ".parquet")
@@ -60,22 +59,37 @@ def export_recordings(
         ValueError: the format is missing, or an option does not belong to it.
         HoldfastError: the recordings cannot be exported.
     """
+    from holdfast.exporters import generic_csv
     from holdfast.io import load_dataset
+
+    def writing(items: "Iterable[Recording]") -> "Iterable[Recording]":
+        return progress(items, "exporting")
 
     plugin = _check(out, name, others)
     recordings = load_dataset(source)
     if plugin is None:
-        document = _to_csv(recordings, out, force=force)
+        written = generic_csv.export(recordings, out, force=force, progress=writing)
+        if written.left_out:
+            print_message(f"a CSV table has no {', '.join(written.left_out)}")
+        if written.sensors:
+            texts = " ".join(f"--sensor {text}" for text in written.sensors)
+            print_message(f"hint: to import it again, give {texts}")
+        document = {
+            "tables": len(written.files),
+            "files": written.files,
+            "sensors": written.sensors,
+            "left_out": written.left_out,
+        }
     else:
         options = others.of(str(name))
-        document = plugin.export(recordings, out, options, force=force, progress=_writing)
+        document = plugin.export(recordings, out, options, force=force, progress=writing)
     if as_json:
         print_json({"out": out, "format": name, **document})
         return
     counts = [
-        f"{n} {what.removesuffix('s') if n == 1 and what != 'fps' else what}"
+        f"{n} {what.removesuffix('s') if n == 1 and what != 'fps' else what}"  # fps is no plural
         for what, n in document.items()
-        if isinstance(n, int)
+        if isinstance(n, int)  # lists of files are for JSON
     ]
     print_line(f"{out}: {', '.join(counts)}")
 
@@ -97,24 +111,3 @@ def _check(out: Path, name: str | None, others: ExporterOptions) -> Any:  # noqa
     if out.suffix in FILE_SUFFIXES and name != out.suffix[1:]:
         raise ValueError(f"{out}: a folder expected for the format {name}, a file given")
     return plugin
-
-
-def _writing(recordings: "Iterable[Recording]") -> "Iterable[Recording]":
-    return progress(recordings, "exporting")
-
-
-def _to_csv(recordings: "Dataset", out: Path, *, force: bool) -> dict[str, Any]:
-    from holdfast.exporters import generic_csv
-
-    written = generic_csv.export(recordings, out, force=force, progress=_writing)
-    if written.left_out:
-        print_message(f"a CSV table has no {', '.join(written.left_out)}")
-    if written.sensors:
-        options = " ".join(f"--sensor {text}" for text in written.sensors)
-        print_message(f"hint: to import it again, give {options}")
-    return {
-        "tables": len(written.files),
-        "files": written.files,
-        "sensors": written.sensors,
-        "left_out": written.left_out,
-    }

@@ -25,7 +25,7 @@ class PluginOptions:
     group: ClassVar[PluginGroup[Any]]
 
     def __init__(self, values: Mapping[str, object]) -> None:
-        self._values = values
+        self._values = values  # options of each plug-in, by its name
 
     @classmethod
     def plugins(cls) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """`holdfast import`: recordings from other formats, and from files that were cut off."""
 
+import errno
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -138,21 +139,40 @@ def import_all(
         force: replace existing files.
 
     Raises:
-        RecordingError: the input cannot be read.
-        OutputError: a recording exists already, or cannot be written.
+        RecordingError: the input cannot be read, or two recordings have the same name.
+        OutputError: a recording exists already, or cannot be written, or a worker does not share
+            the folder.
     """
+    from holdfast.io.importers import import_hint
+
     if out.exists() and not out.is_dir():
-        raise NotADirectoryError(20, "is a file; a folder expected", str(out))
+        raise NotADirectoryError(errno.ENOTDIR, "is a file; a folder expected", str(out))
     prefixes, task = _parts(started.path(path), options.task(started.path(out), force=force))
     with _staging_folder(task.out) as folder:
         results = started.map_ordered(_import_part, prefixes.items(), shared=(task, folder))
         results = progress(results, "importing", len(prefixes))
-        imported = list(_collect(results, folder, started))
+        imported: list[_Imported] = []
+        names: set[str] = set()
+        printed: set[str] = set()
+        for recordings, messages in results:
+            for key, text in messages.items():
+                if key not in printed:
+                    print_message(text)
+            printed |= messages.keys()
+            for recording in recordings:
+                started.check_written(folder / recording.file_name)
+                # Parts are imported in different processes: only here are all names known.
+                _check_new(recording.document["name"], recording.file_name in names)
+                names.add(recording.file_name)
+            imported += recordings
+        # All parts were read without an error: only now do the recordings get their names.
         for recording in imported:
             (folder / recording.file_name).replace(task.out / recording.file_name)
+    # The path as the user gave it; that of the task is absolute on a cluster.
     for recording in imported:
         recording.document["path"] = out / recording.file_name
-    return ImportResult(imported, out, _hint(task))
+    hint = None if task.data_format is None else import_hint(task.data_format)
+    return ImportResult(imported, out, hint)
 
 
 class ImportResult(NamedTuple):
@@ -187,7 +207,8 @@ class ImportResult(NamedTuple):
         )  # fmt: skip
         print_line()
         n_recordings, n_modules, n_samples = (
-            _count(document[f"n_{what}s"], what) for what in ("recording", "module", "sample")
+            f"{(n := document[f'n_{what}s'])} {what}{'' if n == 1 else 's'}"
+            for what in ("recording", "module", "sample")
         )
         print_line(f"{n_recordings} with {n_modules} and {n_samples} in {self.out}")
 
@@ -216,12 +237,20 @@ def _parts(path: Path, task: _ImportTask) -> tuple[dict[Path, str], _ImportTask]
 
     The parts are imported one by one.
     """
+    from holdfast.errors import RecordingError
+    from holdfast.io.dataset import load_dataset
     from holdfast.io.importers import import_parts
     from holdfast.io.importers.table import name_prefixes
+    from holdfast.io.recording_files import is_recording
 
     foreign = task.data_format is not None or task.sensors or task.columns is not None
-    if not foreign and (files := _own_files(path)):
-        return dict.fromkeys(files, ""), task
+    if not foreign:
+        files: Sequence[Path] = [path] if is_recording(path) else []
+        if path.is_dir():
+            with suppress(RecordingError):  # a folder of other files
+                files = load_dataset(path).paths
+        if files:
+            return dict.fromkeys(files, ""), task
     name, parts = import_parts(path, task.data_format, sensors=task.sensors, columns=task.columns)
     return name_prefixes(parts), replace(task, data_format=name)
 
@@ -233,13 +262,29 @@ def _import_part(
 
     Each message is a text, by the same text without the name of the part.
     """
+    from holdfast.io import import_recordings, load_recording
+
     messages: dict[str, str] = {}
 
     def report(text: str) -> None:
+        # One text for all parts: a message about a hundred files is printed once.
         messages[text.replace(part.name, "")] = text
 
+    recordings: Iterable[Recording]
+    if task.data_format is None:
+        recording = load_recording(part, labels=task.labels)
+        recordings = [recording if task.labels else recording.with_labels({})]
+    else:
+        recordings = import_recordings(
+            part,
+            task.data_format,
+            labels=task.labels,
+            sensors=task.sensors,
+            columns=task.columns,
+            report=report,
+        )
     written: list[_Imported] = []
-    for recording in _recordings(part, task, report):
+    for recording in recordings:
         if not recording.complete:
             report(f"{part} is cut off: {recording.duration:.2f} s recovered")
         named = replace(recording, name=f"{prefix}{recording.name}")
@@ -247,71 +292,11 @@ def _import_part(
     return written, messages
 
 
-def _collect(
-    results: "Iterable[tuple[list[_Imported], dict[str, str]]]", folder: Path, engine: "Engine"
-) -> Iterator[_Imported]:
-    """Yield the imported recordings; print each message once.
-
-    Raises:
-        RecordingError: two recordings have the same name.
-        OutputError: a worker does not share the folder.
-    """
-    names: set[str] = set()
-    printed: set[str] = set()
-    for recordings, messages in results:
-        for key, text in messages.items():
-            if key not in printed:
-                print_message(text)
-        printed |= messages.keys()
-        for recording in recordings:
-            engine.check_written(folder / recording.file_name)
-            _check_new(recording.document["name"], recording.file_name in names)
-            names.add(recording.file_name)
-            yield recording
-
-
 def _check_new(name: str, known: bool) -> None:
     from holdfast.errors import RecordingError
 
     if known:
         raise RecordingError(f"two recordings have the name {name!r}: import them one by one")
-
-
-def _recordings(
-    part: Path, task: _ImportTask, report: Callable[[str], None]
-) -> Iterator["Recording"]:
-    from holdfast.io import import_recordings
-
-    if task.data_format is None:
-        return iter([_load(part, labels=task.labels)])
-    return import_recordings(
-        part,
-        task.data_format,
-        labels=task.labels,
-        sensors=task.sensors,
-        columns=task.columns,
-        report=report,
-    )
-
-
-def _own_files(path: Path) -> list[Path]:
-    """Return the recordings of holdfast at this path: the file, or the files in the folder."""
-    from holdfast.errors import RecordingError
-    from holdfast.io.dataset import load_dataset
-    from holdfast.io.recording_files import is_recording
-
-    if path.is_dir():
-        with suppress(RecordingError):
-            return list(load_dataset(path).paths)
-        return []
-    return [path] if is_recording(path) else []
-
-
-def _load(file: Path, *, labels: bool) -> "Recording":
-    from holdfast.io import load_recording
-
-    recording = load_recording(file, labels=labels)
-    return recording if labels else recording.with_labels({})
 
 
 @contextmanager
@@ -322,6 +307,7 @@ def _staging_folder(out: Path) -> Iterator[Path]:
     created = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         out.mkdir(parents=True, exist_ok=True)
+        # In `out`, on its file system: the files need only be renamed at the end.
         staging = tempfile.TemporaryDirectory(prefix=".import.", dir=out)
     except OSError as cause:
         raise OutputError(f"cannot write to {out}: {cause.strerror}") from cause
@@ -329,9 +315,11 @@ def _staging_folder(out: Path) -> Iterator[Path]:
         with staging as name:
             yield Path(name)
     except OutputError as cause:
+        # The user knows `out` and not the temporary folder.
         raise OutputError(str(cause).replace(staging.name, str(out))) from cause
     finally:
         for folder in created:
+            # A folder with recordings is not removed.
             with suppress(OSError):
                 folder.rmdir()
 
@@ -355,14 +343,3 @@ def _write(recording: "Recording", folder: Path, task: _ImportTask) -> _Imported
         "complete": recording.complete,
     }
     return _Imported(document, tuple(findings_of(recording)))
-
-
-def _hint(task: _ImportTask) -> str | None:
-    """Return the option that helps with the recordings of the format; None for our own."""
-    from holdfast.io.importers import import_hint
-
-    return None if task.data_format is None else import_hint(task.data_format)
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'' if n == 1 else 's'}"

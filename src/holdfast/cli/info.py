@@ -83,6 +83,7 @@ def _show_recording(
         return plot_recording(recording or load_recording(path), tare, model=loaded)
 
     figure.check()
+    # Only then is the whole needed; in parts, a recording may be larger than the memory.
     whole = figure.plot is not None or tare.kind == "interval"
     recording = load_recording(path) if whole else None
     content = content_of(path, tare, recording)
@@ -106,4 +107,5 @@ def _show_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
     for failure in failures[:-1]:
         print_error(failure)
     if failures:
+        # The others are shown all the same; this sets the exit code.
         raise RecordingError(failures[-1])

@@ -38,6 +38,7 @@ def print_recording(content: Mapping[str, Any]) -> None:
     if content["markers"]:
         from holdfast.recordings import shown_origin
 
+        # Times since 1970 are shown from the first sample on.
         origin = shown_origin(content["start"])
         print_line()
         if origin:
@@ -97,29 +98,30 @@ def print_folder(documents: list[dict[str, Any]]) -> None:
             [(x["name"], *_label_cells([*x["modules"].values()])) for x in readable],
         )
         print_line()
+    rows: list[tuple[object, ...]] = []
+    for x in documents:
+        if "error" in x:
+            rows.append((x["name"], *5 * ("-",), "unreadable"))
+            continue
+        modules = list(x["modules"].values())
+        rates = sorted(m["rate"] for m in modules if m["n_samples"])
+        faults = sorted({fault for m in modules for fault in m["faults"]})
+        kinds = dict.fromkeys(finding["kind"] for finding in x["findings"])
+        findings = [kind for kind in kinds if kind not in ("no_labels", "gaps")]  # other columns
+        rows.append(
+            (
+                x["name"],
+                len(modules),
+                sum(m["n_samples"] for m in modules),
+                f"{rates[len(rates) // 2]:.1f}",  # the median of the modules
+                f"{x['duration']:.2f}",
+                sum(m["gaps"] for m in modules),
+                ", ".join(([] if x["complete"] else ["cut off"]) + [*faults, *findings]) or "ok",
+            )
+        )
     print_table(
         ("recording", "modules", "samples", "rate [Hz]", "duration [s]", "gaps", "state"),
-        [_summary(document) for document in documents],
-    )
-
-
-def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
-    """Return a row of the table of recordings."""
-    if "error" in document:
-        return (document["name"], *5 * ("-",), "unreadable")
-    modules = list(document["modules"].values())
-    rates = sorted(m["rate"] for m in modules if m["n_samples"])
-    faults = sorted({fault for m in modules for fault in m["faults"]})
-    kinds = dict.fromkeys(finding["kind"] for finding in document["findings"])
-    findings = [kind for kind in kinds if kind not in ("no_labels", "gaps")]  # other columns
-    return (
-        document["name"],
-        len(modules),
-        sum(m["n_samples"] for m in modules),
-        f"{rates[len(rates) // 2]:.1f}",
-        f"{document['duration']:.2f}",
-        sum(m["gaps"] for m in modules),
-        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *findings]) or "ok",
+        rows,
     )
 
 
@@ -196,20 +198,17 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
     yield f"{name}: {'; '.join(texts)}"
     added = [feature for feature in head["features"] if feature not in known]
     yield f"  of them new {_few(added)}" if added else f"  features {_few(head['features'])}"
-    if head["choice"] is not None:
-        yield f"  threshold from {_chosen(name, head['choice'])}"
-
-
-def _chosen(name: str, choice: dict[str, Any]) -> str:
-    """Return where a threshold was chosen, and what it gave there."""
+    if (choice := head["choice"]) is None:
+        return
     names = choice["recordings"]
     origin = f"{len(names)} recordings ({_few(names)})" if names else "the training, out of fold"
-    events, time = ("events", "stable") if name == "stable" else ("slips", "held")
-    within = "0.2" if name == "stable" else "0.1"
+    # A slip is judged faster than a state, and by the time of one held finger.
+    is_stable = name == "stable"
+    events, time, within = ("events", "stable", 0.2) if is_stable else ("slips", "held", 0.1)
     found = "" if choice["found"] is None else f"; {choice['found']:.0f} % found within {within} s"
-    return (
-        f"{origin}: {choice['false_alarms_per_minute']:.2g} false alarms a minute (at most "
-        f"{choice['requested']:g} wanted) in {choice['minutes']:.3g} min of {time} time; "
+    yield (
+        f"  threshold from {origin}: {choice['false_alarms_per_minute']:.2g} false alarms a minute "
+        f"(at most {choice['requested']:g} wanted) in {choice['minutes']:.3g} min of {time} time; "
         f"{choice['n']} {events}{found}"
     )
 

@@ -161,6 +161,7 @@ class StartOptions:
 
     def of(self, recording: "Recording") -> "Recording":
         """Return a recording with this start."""
+        # None, and not False: without the option, what the recording says of its start counts.
         return recording.with_start(loaded=self.in_contact or None)
 
     def create_stream(
@@ -219,6 +220,7 @@ class DetectorOptions:
         from holdfast.devices.uri import is_uri
         from holdfast.model import Debounce, Model
 
+        # builtin:any has the form of a URI; a forgotten MODEL is the usual mistake.
         is_source = is_uri(name) and not name.startswith("builtin:")
         if is_source or name.endswith((".parquet", ".mcap", ".csv")):
             raise ValueError(
@@ -229,6 +231,7 @@ class DetectorOptions:
                 "--raw decides without debouncing; leave out --debounce and --hysteresis"
             )
         model = Model.load(name)
+        # The defaults of `Debounce` are no debouncing.
         trained = Debounce() if self.raw else model.debounce
         debounce = Debounce(
             trained.min_duration if self.debounce is None else self.debounce,
@@ -285,6 +288,7 @@ class ServerOptions:
             if not file.is_file():
                 raise ValueError(f"--token-file {file}: a file expected, there is none")
             with file.open(encoding="utf-8") as opened:
+                # The file may be a device or a log without end.
                 return opened.readline(MAX_TOKEN_LENGTH + 1).strip()
         except OSError as cause:
             raise ValueError(f"--token-file {file}: cannot be read: {cause.strerror}") from cause
@@ -325,7 +329,7 @@ class PlotOptions:
         if self.plot is None:
             return
         figure = draw()
-        with whole_file(self.plot, force=self.force) as part:
+        with whole_file(self.plot, force=self.force) as part:  # a failure leaves no half figure
             figure.savefig(part)
         print_message(f"{self.plot} written")
 
@@ -343,7 +347,7 @@ def start_engine(engine: str, jobs: int) -> "Engine":
     if jobs == 0:
         raise ValueError("jobs other than 0 expected, 0 given")
     started = Engine.parse(engine, jobs)
-    started.check()
+    started.check()  # a wrong address is reported now, not after the data are read
     return started
 
 
@@ -409,7 +413,7 @@ def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[
         >>> parse_taxels("index:7,index:12,thumb:1", {"index": sensor("uskin-4x4")})
         {'index': (6, 11), 'thumb': (0,)}
     """
-    from holdfast.sensors import taxel_index
+    from holdfast.sensors import taxel_index, taxel_number
 
     taxels: dict[str, tuple[int, ...]] = {}
     for part in filter(None, text.split(",")):
@@ -417,19 +421,14 @@ def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[
         if not (finger and number.isdecimal()):
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
         if finger in sensors:
-            _check_taxel(finger, int(number), sensors[finger].n_taxels)
+            first, last = taxel_number(0), taxel_number(sensors[finger].n_taxels - 1)
+            if not first <= int(number) <= last:
+                raise ValueError(
+                    f"{finger}: taxel {int(number)} to be ignored; it has the taxels {first} to "
+                    f"{last}"
+                )
         taxels[finger] = (*taxels.get(finger, ()), taxel_index(int(number)))
     return taxels
-
-
-def _check_taxel(finger: str, number: int, n_taxels: int) -> None:
-    from holdfast.sensors import taxel_number
-
-    first, last = taxel_number(0), taxel_number(n_taxels - 1)
-    if not first <= number <= last:
-        raise ValueError(
-            f"{finger}: taxel {number} to be ignored; it has the taxels {first} to {last}"
-        )
 
 
 def check_seconds(seconds: float | None) -> None:

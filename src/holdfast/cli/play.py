@@ -25,7 +25,6 @@ from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source
-    from holdfast.live.publishers.xela_server import XelaServer
 
 END_POLL_INTERVAL = 0.2
 """Time between two checks whether the server has ended [s]."""
@@ -84,6 +83,7 @@ def play(
         require_extras("twin", "parquet")
     once = once or bool(players.chosen())
     with ExitStack() as stack:
+        # The imports are inside: they are part of the wait.
         with message_if_slow(awaited(source)):
             from holdfast.devices.sources.xela.encoder import is_part_of_hand
             from holdfast.live.publishers.xela_server import XelaServer
@@ -94,9 +94,33 @@ def play(
             opened, version=version, host=host, port=port, whole_hand=whole,
             wait=once, restart=not once,
         )  # fmt: skip
-        with suppress(KeyboardInterrupt), handle_stop_signals(), server:
-            _print_address(server, source, version, as_json=as_json)
-            _print_status(server)
+        with suppress(KeyboardInterrupt), handle_stop_signals(), server:  # Ctrl-C is the usual end
+            if as_json:
+                modules = {
+                    str(number): list(names) for number, names in server.encoder.modules.items()
+                }
+                print_json(
+                    {"uri": server.uri, "version": version, "sensors": modules, "source": source}
+                )
+                sys.stdout.flush()
+            print_message(
+                f"{server.uri} sends {source} as a XELA server {version}; Ctrl-C stops it"
+            )
+            # A terminal has one line that is overwritten; a file gets a line only at a change.
+            updated_at, n_sent, n_clients = time.monotonic(), 0, -1
+            while not server.wait(END_POLL_INTERVAL):
+                now = time.monotonic()
+                if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
+                    rate = (server.n_packets - n_sent) / (now - updated_at)
+                    clients = _clients(server.n_clients, server.port)
+                    # `\033[K` erases the rest of a longer line.
+                    sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
+                    updated_at, n_sent = now, server.n_packets
+                elif not sys.stderr.isatty() and server.n_clients != n_clients:
+                    n_clients = server.n_clients
+                    print_message(_clients(n_clients, server.port))
+            if sys.stderr.isatty():
+                print_message("")  # ends the line that was overwritten
     if server.failure is not None:
         raise server.failure
     if as_json:
@@ -112,31 +136,6 @@ def _open(source: str, players: PlayerOptions, speed: float, *, loop: bool) -> "
     from holdfast.devices.sources import open_source
 
     return open_source(source, speed=speed, loop=loop)
-
-
-def _print_address(server: "XelaServer", source: str, version: str, *, as_json: bool) -> None:
-    if as_json:
-        modules = {str(number): list(names) for number, names in server.encoder.modules.items()}
-        print_json({"uri": server.uri, "version": version, "sensors": modules, "source": source})
-        sys.stdout.flush()
-    print_message(f"{server.uri} sends {source} as a XELA server {version}; Ctrl-C stops it")
-
-
-def _print_status(server: "XelaServer") -> None:
-    """Print the number of clients until the server ends; without a terminal only its changes."""
-    updated_at, n_sent, n_clients = time.monotonic(), 0, -1
-    while not server.wait(END_POLL_INTERVAL):
-        now = time.monotonic()
-        if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
-            rate = (server.n_packets - n_sent) / (now - updated_at)
-            clients = _clients(server.n_clients, server.port)
-            sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
-            updated_at, n_sent = now, server.n_packets
-        elif not sys.stderr.isatty() and server.n_clients != n_clients:
-            n_clients = server.n_clients
-            print_message(_clients(n_clients, server.port))
-    if sys.stderr.isatty():
-        print_message("")
 
 
 def _clients(number: int, port: int) -> str:

@@ -24,7 +24,7 @@ from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Arrival, Source
-    from holdfast.live.recorder import Recorder, RecorderStatus
+    from holdfast.live.recorder import Recorder
 
 READ_TIMEOUT = 0.1
 """Time to wait for the source before keys and signals are checked [s]."""
@@ -77,19 +77,37 @@ def record(
       holdfast record twin:?object=can can.mcap --seconds 10
       (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
+    from holdfast.cli.terminal.progress import format_size
     from holdfast.devices.sources import open_source
 
     check_seconds(seconds)
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
-    path = _output_path(source, out, object_name, force=force)
+    path = _output_path(source, out, object_name, force=force)  # before a device is awaited
     with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
-        stop.graceful = True
+        stop.graceful = True  # Ctrl-C from here on closes the file; before, it ends the wait
         recorder = _create_recorder(
             opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
         )
         _record(opened, recorder, stop, _read(opened, seconds, speed))
-    _print_result(recorder.path, recorder.status, as_json)
+    path, status = recorder.path, recorder.status
+    if as_json:
+        mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
+        fields = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
+        counts = {field: getattr(status, field) for field in fields}
+        known = {"path": path, "seconds": status.seconds, "n_samples": status.modules}
+        print_json({**known, "rate": mean, **counts, "complete": True})
+        return
+    print_line(
+        f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "
+        f"in {path} ({format_size(status.n_bytes)})"
+    )
+    if status.n_dropped:
+        print_message(
+            f"{status.n_dropped} samples were dropped: the disk is too slow, "
+            "or the file cannot store them"
+        )
+    print_message(f"next: holdfast info {path}")
 
 
 def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Arrival | None]":
@@ -101,6 +119,7 @@ def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Ar
         arrival = source.read(READ_TIMEOUT)
         if arrival is not None and arrival.samples:
             first = arrival.time if math.isnan(first) else first
+            # The source's own clock counts; the other one only if it falls silent.
             if arrival.time - first >= duration:
                 return
         yield arrival
@@ -126,6 +145,7 @@ def _record(
             line.print(KEY_HELP if keys.interactive else "Ctrl-C stops")
             for arrival in arrivals:
                 if arrival is not None:
+                    # A recording can wait for a slow disk; a device drops samples.
                     recorder.put(arrival, wait=not source.paced)
                     line.print(*map(marker_text, arrival.notices))
                 for text in keys.poll():
@@ -134,7 +154,7 @@ def _record(
                 if stop.requested or keys.stop_pressed or recorder.failed:
                     break
     except OutputError as failure:
-        if not recorder.status.n_samples:
+        if not recorder.status.n_samples:  # a file without samples is of no use
             recorder.path.unlink(missing_ok=True)
         kept = recorder.path.exists()
         hint = f"; see the recorded part with: holdfast info {recorder.path}" if kept else ""
@@ -156,6 +176,7 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
     if out.is_dir() or not out.suffix:
         name = file_stem(Path(source).stem)
         if is_uri(source):
+            # The name of an object becomes part of the file name, which does not begin with a dot.
             what = re.sub(r"[^\w.-]+", "_", object_name or source.partition(":")[0]).strip("._")
             name = f"{file_stem(what or 'grasp')}-{time.strftime('%Y%m%d-%H%M%S')}"
         path = out / f"{name}{_SUFFIX}"
@@ -195,6 +216,7 @@ def _create_recorder(
     except OSError as cause:
         raise OutputError(f"cannot write to {path.parent}: {cause.strerror}") from cause
     recorded_at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    # What was typed outranks what the source says of itself.
     metadata = {**source.metadata, "recorded_at": recorded_at, **metadata}
     return Recorder(path, sensors, metadata=metadata, force=force, fsync=fsync)
 
@@ -220,31 +242,9 @@ def _value(text: str) -> float | str:
         >>> _value("3"), _value("0.25"), _value("can")
         (3, 0.25, 'can')
     """
+    # `re.ASCII`, because `\d` matches digits of other scripts as well.
     if re.fullmatch(r"-?\d{1,15}", text, re.ASCII):
         return int(text)
     if re.fullmatch(r"-?\d+\.\d+", text, re.ASCII):
         return float(text)
     return text
-
-
-def _print_result(path: Path, status: "RecorderStatus", as_json: bool) -> None:
-    """Print what was recorded, and the next command."""
-    from holdfast.cli.terminal.progress import format_size
-
-    if as_json:
-        mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
-        fields = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
-        counts = {field: getattr(status, field) for field in fields}
-        known = {"path": path, "seconds": status.seconds, "n_samples": status.modules}
-        print_json({**known, "rate": mean, **counts, "complete": True})
-        return
-    print_line(
-        f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "
-        f"in {path} ({format_size(status.n_bytes)})"
-    )
-    if status.n_dropped:
-        print_message(
-            f"{status.n_dropped} samples were dropped: the disk is too slow, "
-            "or the file cannot store them"
-        )
-    print_message(f"next: holdfast info {path}")

@@ -1,6 +1,6 @@
 """Tables of the scores of a model, for `holdfast evaluate`, `train` and `tune`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from holdfast.cli.terminal.console import (
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
     from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
     from holdfast.metrics.slips import SlipMetrics
-    from holdfast.metrics.statistics import Interval
     from holdfast.training import CurvePoint
     from holdfast.training.evaluation import Evaluation
 
@@ -106,6 +105,7 @@ def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
 def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:
     missed = (format_number(share, 1) for share in metrics.missed.values())
     delays = (
+        # Events without any delay: all were missed.
         format_number(delay, 3) if delay is not None or not metrics.n_events else "never"
         for delay in (metrics.delay_median, metrics.delay_p95)
     )
@@ -146,13 +146,17 @@ def print_slips(
         print_line(unscored if has_rule else NO_RULE)
         return
     print_line(f"slips of fingers ({slips_origin(summary.pooled)})")
+    pooled = summary.pooled
     rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]
-    print_table(
-        ("", "slips", "over 1 mm", *SHARES_HEADER, "AUC"),
-        [*rows, _finger_row("all", summary.pooled), _never_a_slip(summary.pooled)],
-    )
+    rows.append(_finger_row("all", pooled))
+    shares = ["0" if pooled.n else "-"] * (len(SHARES_HEADER) - 2)  # two are rates of false alarms
+    rows.append(("never", *rows[-1][1:3], *shares, "0.00", "0.00", "0.500"))
+    print_table(("", "slips", "over 1 mm", *SHARES_HEADER, "AUC"), rows)
     print_paragraph(SHARES_NOTE)
-    print_paragraph(_support(summary.pooled) + NEVER_NOTE)
+    support = f"{pooled.quiet_minutes:.1f} min quiet of {pooled.held_minutes:.1f} min held"
+    if pooled.raised_quiet is not None:
+        support += f"; a slip is reported in {pooled.raised_quiet:.2f} % of quiet hold"
+    print_paragraph(f"Of one finger: {support}.{NEVER_NOTE}")
     if summary.intervals is not None:
         print_line()
         print_paragraph(_intervals(summary.intervals, chosen=summary.threshold_chosen))
@@ -174,28 +178,11 @@ def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
 
 
 def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
+    # A label says when a finger slides, not how far.
     n_over = "-" if metrics.onsets in ("labels", "rule") else str(metrics.n_over_1mm)
     return (
         name, str(metrics.n), n_over, *share_cells(metrics), format_number(metrics.auc, 3)
     )  # fmt: skip
-
-
-def _never_a_slip(metrics: "SlipMetrics") -> tuple[str, ...]:
-    """Return the row of a model that never reports a slip."""
-    n, n_over = _finger_row("", metrics)[1:3]
-    shares = ["0"] * (len(SHARES_HEADER) - 2) if metrics.n else ["-"] * (len(SHARES_HEADER) - 2)
-    return "never", n, n_over, *shares, "0.00", "0.00", "0.500"
-
-
-def _support(metrics: "SlipMetrics") -> str:
-    """Return of how much time the rates are, and how long a slip is reported in quiet hold."""
-    minutes = f"{metrics.quiet_minutes:.1f} min quiet of {metrics.held_minutes:.1f} min held"
-    if metrics.raised_quiet is None:
-        return f"Of one finger: {minutes}."
-    return (
-        f"Of one finger: {minutes}; a slip is reported in {metrics.raised_quiet:.2f} % of quiet "
-        "hold."
-    )
 
 
 def _intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
@@ -212,14 +199,14 @@ def _intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
         f"false alarms of {name}": intervals.false_alarms_per_minute[name]
         for name in ("quiet", "held")
     }
-    parts = [*_ranges(shares, "{:.0f} to {:.0f} %"), *_ranges(rates, "{:.2f} to {:.2f}")]
+    parts = [
+        f"{name} {form.format(*interval)}"
+        for known, form in ((shares, "{:.0f} to {:.0f} %"), (rates, "{:.2f} to {:.2f}"))
+        for name, interval in known.items()
+        if interval is not None
+    ]
     choice = "with the choice of the threshold" if chosen else "without a choice of the threshold"
     return f"{100 * LEVEL:g} % intervals of all slips, {choice}: " + ", ".join(parts)
-
-
-def _ranges(intervals: "Mapping[str, Interval | None]", form: str) -> list[str]:
-    known = {name: interval for name, interval in intervals.items() if interval is not None}
-    return [f"{name} {form.format(*interval)}" for name, interval in known.items()]
 
 
 def print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> None:

@@ -56,6 +56,11 @@ def sensors(
     """
     from holdfast import sensors as known
 
+    def draw() -> "Figure":
+        from holdfast.plots.sensors import plot_hand, plot_sensor
+
+        return plot_sensor(layout) if isinstance(layout, known.Sensor) else plot_hand(layout)
+
     if template is not None:
         if name is not None:
             raise ValueError(f"--template makes a new sensor; {name!r} given as well")
@@ -70,12 +75,18 @@ def sensors(
         return
     layout = _find(name, base)
     figure.check()
-    figure.save(lambda: _draw(layout))
+    figure.save(draw)
     if isinstance(layout, known.Sensor):
         facts = layout.to_dict() | {"n_taxels": layout.n_taxels}
         print_json(facts) if as_json else _print_sensor(layout)
+    elif as_json:
+        print_json(_hand_facts(layout))
     else:
-        print_json(_hand_facts(layout)) if as_json else _print_hand(layout)
+        rows = [
+            (name, m.sensor.name, m.sensor.n_taxels, m.link, _ranges(m.flat_indices.tolist()))
+            for name, m in layout.modules.items()
+        ]
+        print_table(("module", "sensor", "taxels", "link", "flat indices, from 0"), rows)
 
 
 def find_sensor(name: str) -> "Sensor":
@@ -207,14 +218,6 @@ def _print_sensor(sensor: "Sensor") -> None:
     print_table(("taxel", "x [mm]", "y [mm]", "z [mm]", "n_x", "n_y", "n_z"), rows)
 
 
-def _print_hand(hand: "Hand") -> None:
-    rows = [
-        (name, m.sensor.name, m.sensor.n_taxels, m.link, _ranges(m.flat_indices.tolist()))
-        for name, m in hand.modules.items()
-    ]
-    print_table(("module", "sensor", "taxels", "link", "flat indices, from 0"), rows)
-
-
 def _ranges(indices: list[int]) -> str:
     """Return indices as ranges: "0-8, 18-26"."""
     runs: list[list[int]] = []
@@ -224,10 +227,3 @@ def _ranges(indices: list[int]) -> str:
         else:
             runs.append([index, index])
     return ", ".join(f"{a}-{b}" if a < b else f"{a}" for a, b in runs)
-
-
-def _draw(layout: "Sensor | Hand") -> "Figure":
-    from holdfast.plots.sensors import plot_hand, plot_sensor
-    from holdfast.sensors import Sensor
-
-    return plot_sensor(layout) if isinstance(layout, Sensor) else plot_hand(layout)

@@ -76,13 +76,14 @@ def serve(
       holdfast serve model.json grasp.parquet --host 0.0.0.0 \
         --token-file secret.txt
     """
+    from holdfast.devices.sources import open_source
     from holdfast.web.guard import Guard
 
     openers = [
         plugin.panel(chosen, source, speed=speed, loop=not once)
         for _, plugin, chosen in panels.chosen()
     ]
-    token = access.find_token()
+    token = access.find_token()  # a wrong token is refused before anything is loaded
     guard = Guard(access.host, token)
     check_speed(source, speed)
     with message_if_slow(f"loading the detector for {source}" if awaited(source) else ""):
@@ -90,33 +91,24 @@ def serve(
 
     def announce(url: str) -> None:
         report_missing_slip_rules(loaded)
-        _announce(page_url(url, token), loaded, source, as_json=as_json)
+        page = page_url(url, token)
+        if as_json:
+            print_json({"url": page, "model": loaded.name, "source": source})
+            sys.stdout.flush()  # a program that reads the pipe waits for the address
+        print_message(f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it")
 
-    opened = _find(source, openers, speed=speed, loop=not once)
+    # A panel may make the source, as the twin whose hand it commands.
+    made = [opener.source() for opener in openers]
+    own = next((one for one in made if one is not None), None)
+    unopened = own or open_source(source, speed=speed, loop=not once)
     with (
-        _open_session(options, start, loaded, opened, openers) as (session, shown),
+        _open_session(options, start, loaded, unopened, openers) as (session, shown),
         _publish(session, shown, publishers),
     ):
         run_page(
             session, announce, host=access.host, port=access.port,
             guard=guard, folder=record_to, panels=shown, stay=not once,
         )  # fmt: skip
-
-
-def _announce(page: str, model: "Model", source: str, *, as_json: bool) -> None:
-    if as_json:
-        print_json({"url": page, "model": model.name, "source": source})
-        sys.stdout.flush()
-    print_message(f"{page} shows the estimates of {model.name} for {source}; Ctrl-C stops it")
-
-
-def _find(source: str, openers: "Sequence[PanelOpener]", *, speed: float, loop: bool) -> "Source":
-    """Return the source: that of a panel if one makes it. It is not open yet."""
-    from holdfast.devices.sources import open_source
-
-    made = [opener.source() for opener in openers]
-    own = next((one for one in made if one is not None), None)
-    return own or open_source(source, speed=speed, loop=loop)
 
 
 @contextmanager
@@ -196,6 +188,7 @@ def run_page(
     session.start()
     run_server(
         service.app, host, port, announce,
+        # A page that stays still ends when the session fails.
         lambda: session.ended and not (stay and session.failure is None),
     )  # fmt: skip
     if session.failure is not None:

@@ -157,7 +157,7 @@ def _simulate(
         from holdfast.twin.render import check_film
 
         check_film(film)
-        refuse_overwrite(film, force=force)
+        refuse_overwrite(film, force=force)  # before minutes of simulation
     planned = options.plan(engine)
     out.mkdir(parents=True, exist_ok=True)
     names = simulate_grasps(

@@ -74,7 +74,7 @@ def train(
     from holdfast.training.verdict import no_verdict
 
     setting = options.setting(init)
-    refuse_overwrite(model, force=force)
+    refuse_overwrite(model, force=force)  # before a training, which may take hours
     started = start_engine(engine, jobs)
     if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
@@ -91,7 +91,7 @@ def train(
             print_message(f"the trials so far are in {journal}: continue with --resume")
         raise
     trained.model.save(model, force=force)
-    journal.unlink(missing_ok=True)
+    journal.unlink(missing_ok=True)  # only now: a search that was stopped goes on from it
     split, n, scores = trained.split, len(recordings), trained.cross_validation
     if as_json:
         verdict = trained.verdict

@@ -1,7 +1,7 @@
 """Options of `holdfast train` that become the `Setting` of a training."""
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,7 +9,6 @@ from holdfast.cli.options import RARE, FittingTareOption, HysteresisOption, Seed
 from holdfast.cli.terminal.console import print_lines
 
 if TYPE_CHECKING:
-    from holdfast.model import Model
     from holdfast.training import Setting
 
 
@@ -119,7 +118,10 @@ class TrainingOptions:
             ValueError: an option is not valid, or contradicts `init`.
             ModelError: the model to adapt cannot be read, or does not fit the options.
         """
+        from msgspec.structs import replace
+
         from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
+        from holdfast.model import Model
         from holdfast.training import Setting
         from holdfast.training.setting import DEFAULT_HOLD, DEFAULT_HYSTERESIS
 
@@ -127,24 +129,16 @@ class TrainingOptions:
         if "tare" in chosen:
             chosen["tare"] = Tare.parse(chosen["tare"])
         if init is not None:
-            return Setting.adapting(_model_to_adapt(init, chosen), **chosen)
+            refused = [name for name in ("classifier", "window", "features") if name in chosen]
+            if refused:
+                raise ValueError(
+                    "--init uses the classifier, window and features of its model; leave out "
+                    + " and ".join(f"--{name}" for name in refused)
+                )
+            return Setting.adapting(replace(Model.load(init), name=init), **chosen)
         names = chosen.get("features", ",".join(DEPLOYED_FEATURES))
         chosen["features"] = parse_features(names, chosen.get("window", Setting.window))
+        # Windows in seconds: the features of `any`, whose model decides without hysteresis.
         relative = all(spec.seconds for spec in chosen["features"])
         steady = {"hold": DEFAULT_HOLD, "hysteresis": 0.0 if relative else DEFAULT_HYSTERESIS}
         return Setting(**(steady | chosen))
-
-
-def _model_to_adapt(init: str, chosen: dict[str, Any]) -> "Model":
-    """Load the model of `--init`; its name is the text of the option."""
-    from msgspec.structs import replace
-
-    from holdfast.model import Model
-
-    refused = [name for name in ("classifier", "window", "features") if name in chosen]
-    if refused:
-        raise ValueError(
-            "--init uses the classifier, window and features of its model; leave out "
-            + " and ".join(f"--{name}" for name in refused)
-        )
-    return replace(Model.load(init), name=init)

@@ -90,6 +90,7 @@ def tune(
         return progress(items, "deciding", n)
 
     tuned = choose(loaded, recordings, false_alarms, question.value, progress=deciding)
+    # The verdict is on the copy, with its new threshold.
     evaluation = evaluate_recordings(tuned.model, recordings, progress=progress)
     warn_about_recordings(evaluation, n)
     tuned.model.save(out, force=force)

@@ -138,18 +138,14 @@ def parse(text: str) -> tuple[str, Address]:
         raise ValueError(f"{text} is no URI: {cause}") from cause
     if parts.fragment:
         raise ValueError(f"{text}: nothing after # expected, {parts.fragment!r} given")
-    return scheme, Address(text, parts.netloc, parts.path, _parameters(text, parts.query))
-
-
-def _parameters(text: str, query: str) -> dict[str, str]:
-    for part in filter(None, query.split("&")):
+    for part in filter(None, parts.query.split("&")):
         if "=" not in part:  # `parse_qsl` would leave it out without a word
             raise ValueError(f"{text}: name=value expected, {part!r} given")
     # Blank values stay: `sensor=` is refused by its reader, and not ignored.
-    pairs = parse_qsl(query, keep_blank_values=True)
+    pairs = parse_qsl(parts.query, keep_blank_values=True)
     if len(dict(pairs)) < len(pairs):
         raise ValueError(f"{text}: a parameter is given twice")
-    return dict(pairs)
+    return scheme, Address(text, parts.netloc, parts.path, dict(pairs))
 
 
 def is_uri(text: str) -> bool:

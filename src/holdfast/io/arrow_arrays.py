@@ -20,6 +20,7 @@ def arrow_column(values: npt.NDArray[Any]) -> pa.Array:
     """Return a column with the values (n,), which are numbers, booleans or texts."""
     if values.dtype.kind == "U":
         return pa.array(values.tolist(), type=pa.string())
+    # Arrow holds booleans as bits, the lowest first.
     stored = np.packbits(values, bitorder="little") if values.dtype.kind == "b" else values
     buffers = [None, pa.py_buffer(np.ascontiguousarray(stored))]
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), buffers)

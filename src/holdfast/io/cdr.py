@@ -46,7 +46,14 @@ class MessageDecoder:
     def __init__(self, definition: Definition, *, ros2: bool) -> None:
         self._definition = definition
         self._open: Callable[[bytes], _Ros1Bytes] = _CdrBytes if ros2 else _Ros1Bytes
-        self._points = _point_types(definition)
+        # The number type of each message of x, y and z: a sequence of them is one array, as a loop
+        # over the points of a module would take most of the time.
+        self._points = {
+            name: number
+            for name, fields in definition.types.items()
+            for number in NUMBER_CODES
+            if fields == tuple(MessageField(axis, number) for axis in "xyz")
+        }
         self._sizes = {**FIELD_SIZES, **definition.sizes}
 
     def __call__(self, data: bytes) -> dict[str, Any]:
@@ -75,6 +82,7 @@ class MessageDecoder:
             return source.array(field.kind, n)
         if (number := self._points.get(field.kind)) is not None:
             return source.array(number, 3 * n).reshape(n, 3)
+        # Before the list is made: a short message may claim 2^32 elements.
         if n * self._sizes[field.kind] > source.n_left:
             raise ValueError(f"{field.name}: {n} given, {source.n_left} bytes left")
         return [self._value(source, field.kind) for _ in range(n)]
@@ -144,22 +152,13 @@ class MessageEncoder:
 
 def _append_numbers(data: bytearray, kind: str, values: Sequence[float] | npt.NDArray[Any]) -> None:
     """Append numbers, aligned to their size; an array of the same type is copied as a whole."""
+    # The length of an empty sequence is followed by no padding.
     if len(values):
         data += _PADDING[-len(data) % _LITTLE_ENDIAN[kind].itemsize]
     if isinstance(values, np.ndarray) and values.dtype == _LITTLE_ENDIAN[kind]:
         data += values.tobytes()
     else:
         data += struct.pack(f"<{len(values)}{_CODES[kind]}", *values)
-
-
-def _point_types(definition: Definition) -> dict[str, str]:
-    """Return the number type of each message that consists of x, y and z of one number type."""
-    return {
-        name: number
-        for name, fields in definition.types.items()
-        for number in NUMBER_CODES
-        if fields == tuple(MessageField(axis, number) for axis in "xyz")
-    }
 
 
 class _Ros1Bytes:
@@ -205,10 +204,12 @@ class _Ros1Bytes:
 class _CdrBytes(_Ros1Bytes):
     """Reader of a message in CDR: values are aligned, and texts end with a zero byte."""
 
+    # Some writers pad a message to a multiple of 4 bytes.
     max_padding = 3
 
     def __init__(self, data: bytes) -> None:
         super().__init__(data)
+        # Plain CDR, big or little endian; other numbers are encodings with parameters.
         if len(data) < 4 or data[0] != 0 or data[1] > 1:
             raise ValueError("no CDR message")
         if not data[1]:

@@ -70,6 +70,7 @@ def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = 
     if not place.is_dir():
         raise RecordingError(f"there is no folder {place}; a folder of recordings expected")
     by_name: dict[str, Path] = {}
+    # The preferred suffix comes last and replaces others. A file that is being written is hidden.
     for suffix in reversed(SUFFIXES):
         by_name.update({p.stem: p for p in place.glob(f"[!.]*{suffix}") if is_recording(p)})
     if not by_name:

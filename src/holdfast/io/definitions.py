@@ -173,6 +173,7 @@ def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[Messag
         if match["rest"].lstrip().startswith("="):
             continue  # a constant
         size = int(match["size"] or 0) if match["many"] else None
+        # `[<=N]` is encoded as a sequence of any length, `[N]` has no length.
         bounded = match["many"] and "<=" in match["many"]
         yield MessageField(
             match["name"], _kind(match["kind"], block, blocks), 0 if bounded else size
@@ -184,6 +185,7 @@ def _kind(kind: str, block: str, blocks: Mapping[str, str]) -> str:
         return kind
     kind = short_name(kind)
     package = block.split("/", maxsplit=1)[0]
+    # The package of the message comes first; `Header` alone is that of std_msgs, as in ROS 1.
     for full in (kind, f"{package}/{kind}", f"std_msgs/{kind}"):
         if full in blocks:
             return full

@@ -68,7 +68,7 @@ _ONE_THREAD = dict.fromkeys(
 ) | {"ARROW_DEFAULT_MEMORY_POOL": "system"}
 """Environment of the child: stacks of threads and pools of memory would count as its memory."""
 _VALUE_FILE = "value"
-_NEXT = b"next\n"
+_NEXT = b"next\n"  # no JSON object, as a request is
 Arrays = list[npt.NDArray[Any]]
 
 
@@ -76,11 +76,11 @@ class _Request(msgspec.Struct, frozen=True):
     """What the child shall read, with its limits; paths are relative to `folder`."""
 
     task: str
-    path: bytes
+    path: bytes  # a name may be no UTF-8, which JSON cannot hold
     options: dict[str, Any]
     folder: bytes
-    memory: int
-    seconds: float
+    memory: int  # [bytes]
+    seconds: float  # of the processor [s]
 
 
 class _Answer(msgspec.Struct, frozen=True):
@@ -119,6 +119,7 @@ def read_foreign(
         pairs = zip(arrays[::2], arrays[1::2], strict=True)
         topics = (spec.topic for spec in array_specs(header))
         recording = recording_from(header, dict(zip(topics, pairs, strict=True)), path)
+        # Header and arrays are matched by their order alone; the digest guards it.
         if recording.digest != header.digest:
             raise RecordingError(f"{path}: the recording is another one than the child has read")
         yield recording
@@ -154,6 +155,7 @@ def read_stickers(
         numbers = msgspec.json.decode(document, type=list[int])
         times.append(part_times)
         parts.append(dict(zip(numbers, places, strict=True)))
+    # A part names only the stickers that are seen in it.
     unseen = [np.full((len(part), 2, 3), np.nan) for part in times]
     return np.concatenate([np.zeros(0), *times]), {
         number: np.concatenate(
@@ -178,10 +180,12 @@ def _values(task: str, path: Path, options: dict[str, Any]) -> Iterator[tuple[by
     """
     size = stored_size(path)
     memory = size_limit(path)
+    # HOLDFAST_MAX_BYTES raises the time as well: what unpacks to more takes longer.
     seconds = FREE_SECONDS + SECONDS_PER_BYTE * max(size, given_limit() or 0)
     names = os.fsencode(path), os.fsencode(Path.cwd())
     request = _Request(task, names[0], options, names[1], memory, seconds)
     budget = ReadBudget(path)
+    # A child is kept for the next file: a start takes 0.3 s.
     child = _idle.pop() if _idle else _Child()
     try:
         answer = child.ask(msgspec.json.encode(request) + b"\n", path, request)
@@ -211,10 +215,12 @@ class _Child:
 
     def __init__(self) -> None:
         self._folder = mkdtemp(prefix="holdfast-")
+        # Set by the timer that kills the process: without it, this would look like a crash.
         self._is_late = False
         try:
             self._process = subprocess.Popen(
                 python_command(_PROGRAM, self._folder),
+                # A pipe for its errors that is not read would fill, and block it.
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                 env={**os.environ, **_ONE_THREAD},
             )  # fmt: skip
@@ -238,6 +244,7 @@ class _Child:
         if answer := self._answer(timeout):
             return answer
         code = self._process.wait()
+        # SIGXCPU: the child has reached the limit of the processor that it set itself.
         if self._is_late or code == -getattr(signal, "SIGXCPU", 0):
             raise RecordingError(
                 f"{path} takes too long to read: {request.seconds:.0f} s of the processor, and "
@@ -268,7 +275,9 @@ class _Child:
 
     def _answer(self, timeout: float) -> _Answer | None:
         """Return the next answer; None if there is none in time, and the process has ended."""
+        # Not every system reads a pipe with a timeout; the end of the process ends the reading.
         timer = Timer(timeout, self._give_up)
+        # The timer must not keep this process alive after its end.
         timer.daemon = True
         timer.start()
         try:
@@ -330,6 +339,7 @@ def _receive(lines: "SimpleQueue[bytes]", folder: str) -> None:
     for line in sys.stdin.buffer:
         lines.put(line)
     rmtree(folder, ignore_errors=True)
+    # `sys.exit` would end this thread only.
     os._exit(0)
 
 
@@ -349,7 +359,9 @@ def _next_answer(values: Iterator[tuple[bytes, Arrays]], path: Path) -> _Answer:
 
 def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     """Yield the values of a request; the time that it may take grows with each of them."""
+    # The working folder of the parent may have changed since the child began.
     os.chdir(os.fsdecode(request.folder))
+    # The limit of the system counts from the start of the process, so it moves with each file.
     end = sum(os.times()[:2]) + request.seconds
     _limit("CPU", int(end) + 1)
     path = Path(os.fsdecode(request.path))
@@ -366,7 +378,8 @@ def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
     name = str(request.options["format"])
     source = importer(name)
-    for module in EXTRA_MODULES.get(extra_of(name) or "", ()):  # of an idle process
+    # Before the limit: the memory of libraries is not that of the file.
+    for module in EXTRA_MODULES.get(extra_of(name) or "", ()):
         import_module(module)
     _limit_memory(request)
     lines: list[str] = []
@@ -413,6 +426,7 @@ def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     _limit_memory(request)
     try:
+        # Twice the limit, so that it must fail where the limit holds.
         np.ones(2 * request.memory, np.uint8)
         has_memory = False
     except MemoryError:
@@ -431,8 +445,8 @@ _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]]
 
 def _limit_memory(request: _Request) -> None:
     """Limit the memory of this process to what it has and that of the request, and its files."""
-    _limit("CORE", 0)
-    _limit("FSIZE", request.memory)
+    _limit("CORE", 0)  # a crash leaves no image of the memory in the folder of the user
+    _limit("FSIZE", request.memory)  # of values, which the parent reads into its memory
     with suppress(OSError):  # there is no such file: only Linux has this limit
         status = Path("/proc/self/status").read_text()
         (used,) = re.findall(r"^VmData:\s+(\d+) kB", status, re.MULTILINE)
@@ -453,6 +467,7 @@ def _limit(name: str, value: int) -> None:
 def _is_of_memory(cause: BaseException | None) -> bool:
     """Return whether an error, or what caused it, is that no memory is left, or no file for it."""
     while cause is not None and not isinstance(cause, MemoryError):
+        # The file of values has reached its limit, FSIZE.
         if isinstance(cause, OSError) and cause.errno == errno.EFBIG:
             return True
         cause = cause.__cause__ or cause.__context__

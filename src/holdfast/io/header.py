@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.recordings import Label, Recording, Truth
+from holdfast.recordings import Label, Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Unit
 
@@ -59,6 +59,7 @@ class ArrayData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shape: Shape
 
     def __post_init__(self) -> None:
+        # The schema limits each size, not their product.
         if prod(self.shape) > MAX_VALUES:
             raise ValueError(f"at most {MAX_VALUES} values expected, shape {self.shape} given")
 
@@ -112,11 +113,19 @@ def header_of(recording: Recording, file: str) -> Header:
         )
         for name, module in recording.modules.items()
     }
+    truth = None
+    if (arrays := recording.truth) is not None:
+        # A `Truth` takes any times; row groups and messages are cut by them, so they must increase.
+        steps = np.diff(arrays.times)
+        if not (np.isfinite(arrays.times).all() and (steps > 0).all()):
+            raise RecordingError("truth needs finite, strictly increasing times to be written")
+        fingers = {finger: _array_data(by_name) for finger, by_name in arrays.fingers.items()}
+        truth = TruthData(len(arrays.times), _array_data(arrays.hand), fingers)
     return Header(
         name=recording.name,
         file=file,
         modules=modules,
-        truth=None if recording.truth is None else _truth_data(recording.truth),
+        truth=truth,
         metadata=dict(recording.metadata),
         markers=list(recording.markers),
         media=list(recording.media),
@@ -152,6 +161,7 @@ def decode_header(data: bytes | str, path: Path) -> Header:
     """
     try:
         header = msgspec.json.decode(data, type=Header)
+        # Only to refuse it here: what a sensor accepts is checked by `Sensor`, not by the schema.
         header_sensors(header)
     except (
         msgspec.DecodeError, ValueError, TypeError, LookupError, ArithmeticError, RecursionError
@@ -198,17 +208,6 @@ def number_type(array: npt.NDArray[Any], name: str) -> NumberType:
     if number not in NUMBER_TYPES:
         raise RecordingError(f"{name} are {number}; a file stores {', '.join(NUMBER_TYPES)}")
     return number  # type: ignore[return-value]
-
-
-def _truth_data(truth: Truth) -> TruthData:
-    steps = np.diff(truth.times)
-    if not (np.isfinite(truth.times).all() and (steps > 0).all()):
-        raise RecordingError("truth needs finite, strictly increasing times to be written")
-    return TruthData(
-        len(truth.times),
-        _array_data(truth.hand),
-        {finger: _array_data(arrays) for finger, arrays in truth.fingers.items()},
-    )
 
 
 def _array_data(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, ArrayData]:

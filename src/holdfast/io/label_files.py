@@ -180,28 +180,28 @@ def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[La
         RecordingError: a column is missing, or a row is not a label.
     """
     try:
+        # Spreadsheets write a byte order mark.
         text = read_input(path, MAX_LABEL_FILE_SIZE).decode("utf-8-sig")
         labels: dict[str, list[Label]] = {}
-        for number, row in enumerate(csv.DictReader(StringIO(text)), start=2):
-            finger, label = _from_row(row, f"{path}, row {number}", author)
-            labels.setdefault(finger, []).append(label)
-    except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
-    except (UnicodeError, csv.Error) as cause:
-        raise RecordingError(f"{path} is not CSV text: {cause}") from cause
+        for number, row in enumerate(
+            csv.DictReader(StringIO(text)), start=2
+        ):  # row 1 is the header
+            place = f"{path}, row {number}"
+            # The cause, the last column, may be empty or missing.
+            if missing := [name for name in CSV_COLUMNS[:4] if not row.get(name)]:
+                raise RecordingError(
+                    f"{place}: no {', '.join(missing)}; the columns are {','.join(CSV_COLUMNS)}"
+                )
+            finger, start, end, state, cause = ((row.get(k) or "").strip() for k in CSV_COLUMNS)
+            try:
+                label_cause = Cause(cause.lower()) if cause else None
+                contact = ContactState(state.upper())
+                label = Label(float(start), float(end), contact, label_cause, "csv", 1.0, author)
+            except ValueError as problem:
+                raise RecordingError(f"{place}: {problem}") from problem
+            labels.setdefault(cell_text(finger), []).append(label)
+    except OSError as error:
+        raise RecordingError(f"cannot read {path}: {error.strerror}") from error
+    except (UnicodeError, csv.Error) as error:
+        raise RecordingError(f"{path} is not CSV text: {error}") from error
     return {finger: tuple(intervals) for finger, intervals in labels.items()}
-
-
-def _from_row(row: Mapping[str, str | None], place: str, author: str) -> tuple[str, Label]:
-    if missing := [name for name in CSV_COLUMNS[:4] if not row.get(name)]:
-        raise RecordingError(
-            f"{place}: no {', '.join(missing)}; the columns are {','.join(CSV_COLUMNS)}"
-        )
-    values = {name: (row.get(name) or "").strip() for name in CSV_COLUMNS}
-    try:
-        cause = Cause(values["cause"].lower()) if values["cause"] else None
-        state = ContactState(values["state"].upper())
-        start, end = float(values["start"]), float(values["end"])
-        return cell_text(values["finger"]), Label(start, end, state, cause, "csv", 1.0, author)
-    except ValueError as problem:
-        raise RecordingError(f"{place}: {problem}") from problem

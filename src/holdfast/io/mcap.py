@@ -36,7 +36,6 @@ from holdfast.io.safe_reading import (
 from holdfast.io.timed_arrays import (
     TACTILE,
     TRUTH,
-    ArraySpec,
     TimedArray,
     TimedArrays,
     array_specs,
@@ -71,14 +70,29 @@ def save(recording: Recording, path: Path, *, force: bool = False) -> None:
         OutputError: as in `whole_file`.
         RecordingError: the file cannot store the recording.
     """
+    # Markers are messages of their own: while recording, the header is written before any is set.
     header = msgspec.structs.replace(header_of(recording, path.stem), markers=[])
     arrays = arrays_of(recording)
+    # Names may contain slashes: finger `a`, array `b/c` and finger `a/b`, array `c` are one topic.
     if len(arrays) < len(array_specs(header)):
         raise RecordingError("two truth arrays of the recording would share a topic")
     with whole_file(path, force=force) as part:
+        # `whole_file` has made this file already.
         log = MessageLog(part, header, force=True)
         try:
-            _write(log, arrays, list(recording.markers))
+            # In the order of time, as while recording; the order of markers does not change, though
+            # one may lie before the marker that was set before it.
+            times = {topic: pair[0] for topic, pair in arrays.items()}
+            markers = list(recording.markers)
+            for span in time_spans(times, MESSAGE_SECONDS):
+                for topic, cut in span.items():
+                    if cut.start < cut.stop:
+                        log.write_samples(topic, arrays[topic][0][cut], arrays[topic][1][cut])
+                newest = max(times[topic][cut.stop - 1] for topic, cut in span.items() if cut.stop)
+                while markers and markers[0][0] <= newest:
+                    log.write_text(MARKERS_TOPIC, *markers.pop(0))
+            for time, text in markers:
+                log.write_text(MARKERS_TOPIC, time, text)
         finally:
             log.close()
 
@@ -94,6 +108,8 @@ def load(path: Path) -> Recording:
     messages = _messages(path, complete, budget)
     header = _header(path, messages, complete, budget)
     specs = array_specs(header)
+    # A module without samples has an empty array of its number type; a file recorded live names
+    # no types, and has only the arrays of modules with samples.
     parts: dict[str, list[TimedArray]] = {
         spec.topic: [(np.empty(0), spec.empty())] if spec.number else [] for spec in specs
     }
@@ -111,7 +127,14 @@ def load(path: Path) -> Recording:
         if samples
     }
     header = msgspec.structs.replace(header, markers=markers)
-    recording = recording_from(header, _with_equal_truth(arrays), path, complete=complete)
+    # Truth arrays share their times, but each has its own messages: a cut file may lack the last of
+    # some, so all are cut to the rows that all have.
+    truth = [topic for topic in arrays if topic.startswith(TRUTH)]
+    n_rows = min((len(arrays[topic][0]) for topic in truth), default=0)
+    for topic in truth:
+        arrays[topic] = (arrays[topic][0][:n_rows], arrays[topic][1][:n_rows])
+    recording = recording_from(header, arrays, path, complete=complete)
+    # A cut file has lost samples, and one recorded live was written before its digest was known.
     if complete and header.digest and recording.digest != header.digest:
         raise RecordingError(f"{path} is damaged: its samples do not match their digest")
     return recording
@@ -128,6 +151,7 @@ def read_groups(path: Path) -> tuple[Header, Iterator[TimedArrays], bool]:
     messages = _messages(path, complete, budget)
     header = _header(path, messages, complete, budget)
     markers: list[tuple[float, str]] = []
+    # Markers may stand anywhere in the file, and the header needs all: so it is read twice.
     for _ in _with_markers(messages, markers, budget):
         pass
     header = msgspec.structs.replace(header, markers=markers)
@@ -137,23 +161,11 @@ def read_groups(path: Path) -> tuple[Header, Iterator[TimedArrays], bool]:
 
 def is_foreign(path: Path) -> bool:
     """Return whether a file is MCAP, but of another program."""
+    # The name of the program is in the first record. A head that is shorter is of a cut file, which
+    # may be ours.
     with path.open("rb") as file:
         head = file.read(256)
     return head.startswith(MAGIC) and len(head) >= 64 and LIBRARY.encode() not in head
-
-
-def _write(log: MessageLog, arrays: TimedArrays, markers: list[tuple[float, str]]) -> None:
-    """Write samples and markers in the order of time; the order of markers does not change."""
-    times = {topic: pair[0] for topic, pair in arrays.items()}
-    for span in time_spans(times, MESSAGE_SECONDS):
-        for topic, cut in span.items():
-            if cut.start < cut.stop:
-                log.write_samples(topic, arrays[topic][0][cut], arrays[topic][1][cut])
-        newest = max(times[topic][cut.stop - 1] for topic, cut in span.items() if cut.stop)
-        while markers and markers[0][0] <= newest:
-            log.write_text(MARKERS_TOPIC, *markers.pop(0))
-    for time, text in markers:
-        log.write_text(MARKERS_TOPIC, time, text)
 
 
 def _is_complete(path: Path) -> bool:
@@ -164,6 +176,7 @@ def _is_complete(path: Path) -> bool:
     """
     if is_foreign(path):
         raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
+    # A cut file has no checksum of the whole; that of each chunk is checked as it is read.
     complete = has_end(path)
     if complete:
         check_checksums(path)
@@ -201,8 +214,19 @@ def _samples(
     """Yield topic, times and values of each message of samples."""
     specs = {spec.topic: spec for spec in array_specs(header)}
     for message in messages:
-        if message.topic not in (MARKERS_TOPIC, HEADER_TOPIC):
-            yield message.topic, _decoded(path, message, specs.get(message.topic))
+        topic = message.topic
+        if topic in (MARKERS_TOPIC, HEADER_TOPIC):
+            continue
+        number = number_of_type(message.schema)
+        try:
+            times, values = decode_samples(message.data, number)
+        except (ValueError, TypeError) as cause:
+            raise RecordingError(f"{path}: {topic}: {cause}") from cause
+        # The number type of a file recorded live is only in the schema of its messages.
+        spec = specs.get(topic)
+        if spec is None or spec.number not in (None, number) or values.shape[1:] != spec.shape:
+            raise RecordingError(f"{path}: {topic} does not match the header")
+        yield topic, (times, values)
 
 
 class _Channels:
@@ -272,43 +296,22 @@ class _JoinedSize:
         self._budget.keep(n_bytes + max(n_bytes, work), 1)
 
 
-def _decoded(path: Path, message: _McapMessage, spec: ArraySpec | None) -> TimedArray:
-    number = number_of_type(message.schema)
-    try:
-        times, values = decode_samples(message.data, number)
-    except (ValueError, TypeError) as cause:
-        raise RecordingError(f"{path}: {message.topic}: {cause}") from cause
-    if spec is None or spec.number not in (None, number) or values.shape[1:] != spec.shape:
-        raise RecordingError(f"{path}: {message.topic} does not match the header")
-    return times, values
-
-
-def _with_equal_truth(arrays: dict[str, TimedArray]) -> TimedArrays:
-    """Cut truth arrays to the rows that all of them have; a cut file may lack the last ones."""
-    truth = [topic for topic in arrays if topic.startswith(TRUTH)]
-    n = min((len(arrays[topic][0]) for topic in truth), default=0)
-    return arrays | {topic: (arrays[topic][0][:n], arrays[topic][1][:n]) for topic in truth}
-
-
 def _messages(path: Path, complete: bool, budget: ReadBudget) -> Iterator[_McapMessage]:
     """Yield the messages with valid checksums in order; a missing number is damage."""
-    try:
-        yield from _numbered_messages(path, complete, budget)
-    except (ValueError, McapError, struct.error) as cause:
-        raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
-
-
-def _numbered_messages(path: Path, complete: bool, budget: ReadBudget) -> Iterator[_McapMessage]:
     channels = _Channels(budget)
     expected = 0
-    chunks = read_chunks(path, complete, budget)
-    for opcode, content in (record for chunk in chunks for record in records_in(chunk, budget)):
-        if opcode != Opcode.MESSAGE:
-            channels.add(opcode, content)
-            continue
-        message = Message.read(ReadDataStream(BytesIO(content)), len(content))
-        channel, schema = channels.of(message)
-        if channel.is_counted and message.sequence != expected & 0xFFFFFFFF:
-            raise RecordingError(f"{path} is damaged: message {expected} is missing")
-        expected += 1
-        yield _McapMessage(channel.topic, schema, message.data)
+    try:
+        for chunk in read_chunks(path, complete, budget):
+            for opcode, content in records_in(chunk, budget):
+                if opcode != Opcode.MESSAGE:
+                    channels.add(opcode, content)
+                    continue
+                message = Message.read(ReadDataStream(BytesIO(content)), len(content))
+                channel, schema = channels.of(message)
+                # A checksum covers one chunk; only the numbers show that a whole chunk is missing.
+                if channel.is_counted and message.sequence != expected & 0xFFFFFFFF:
+                    raise RecordingError(f"{path} is damaged: message {expected} is missing")
+                expected += 1
+                yield _McapMessage(channel.topic, schema, message.data)
+    except (ValueError, McapError, struct.error) as cause:
+        raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause

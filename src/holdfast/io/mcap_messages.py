@@ -85,17 +85,15 @@ def decode_samples(data: bytes, number: str) -> tuple[Array, npt.NDArray[Any]]:
     times, shape = message["times"], tuple(message["shape"].tolist())
     values = message["values"]
     if number == "str":
-        _check_texts(values)
+        # In an array each text takes as much as the longest, so one long text multiplies the size.
+        if (size := 4 * len(values) * max(map(len, values), default=0)) > MAX_TEXTS_SIZE:
+            raise ValueError(
+                f"texts take {size} bytes in memory, at most {MAX_TEXTS_SIZE} expected"
+            )
         values = np.array(values, dtype=str)
     if len(values) != len(times) * prod(shape):
         raise ValueError(f"{len(values)} values given for {len(times)} samples of shape {shape}")
     return times, values.reshape(len(times), *shape)
-
-
-def _check_texts(texts: list[str]) -> None:
-    """Check the size of the array of texts, whose elements are as long as the longest."""
-    if (size := 4 * len(texts) * max(map(len, texts), default=0)) > MAX_TEXTS_SIZE:
-        raise ValueError(f"texts take {size} bytes in memory, at most {MAX_TEXTS_SIZE} expected")
 
 
 def encode_text(time: float, text: str) -> bytes:

@@ -57,12 +57,14 @@ def read_chunks(path: Path, complete: bool, budget: ReadBudget) -> Iterator[byte
             start, end = file.tell(), file.tell() + length
             head = file.read(min(length, _HEAD_SIZE))
             if not complete and not _is_plausible(opcode, length, head):
+                # Zeros up to the end are blocks that a power failure lost: a cut, no damage.
                 if _is_blank(file, start + _HEAD_SIZE):
                     return
                 raise RecordingError(
                     f"{path} is damaged: the record at byte {start - _RECORD.size} contradicts "
                     "its length"
                 )
+            # A record that ends after the file is the place of the cut.
             if opcode == Opcode.DATA_END or end > size:
                 return
             if opcode == Opcode.CHUNK:
@@ -109,6 +111,7 @@ def has_end(path: Path) -> bool:
         opcode, length, *_ = _FOOTER.unpack(_tail(file))
         file.seek(-min(len(MAGIC), size), 2)
         ends = file.read() == MAGIC
+    # Either of the two: a file with a flipped bit in one of them is damaged, not cut.
     return (ends and size > len(MAGIC)) or _is_footer(opcode, length)
 
 
@@ -130,7 +133,7 @@ def check_checksums(path: Path) -> None:
             valid = (
                 ending == (Opcode.DATA_END, 4, data_crc)
                 and _crc(file, place + _FOOTER.size - 4 - start) == summary_crc
-                and file.read()[4:] == MAGIC
+                and file.read()[4:] == MAGIC  # after the checksum of the summary itself
             )
     if not valid:
         raise RecordingError(
@@ -155,19 +158,17 @@ def _is_plausible(opcode: int, length: int, head: bytes) -> bool:
             n_bytes = _number(head, 2, 4)
             inside = None if n_bytes is None else 6 + n_bytes
         case Opcode.CHUNK:
-            inside = _chunk_length(head)
+            first = _number(head, _CHUNK.size - 4, 4)  # of the name of the compression
+            second = None if first is None else _number(head, _CHUNK.size + first, 8)
+            inside = None
+            if first is not None and second is not None:
+                inside = _CHUNK.size + first + 8 + second
         case Opcode.DATA_END:
             inside = 4
-        case _:
+        case _:  # a recording has no other records outside of chunks
             return False
+    # None: the lengths inside are cut off; there is nothing to compare.
     return length < MAX_CHUNK_SIZE and inside in (None, length)
-
-
-def _chunk_length(head: bytes) -> int | None:
-    """Return the length of a chunk by the lengths inside of it; None if they are cut off."""
-    name_size = _number(head, _CHUNK.size - 4, 4)
-    n_bytes = None if name_size is None else _number(head, _CHUNK.size + name_size, 8)
-    return None if name_size is None or n_bytes is None else _CHUNK.size + name_size + 8 + n_bytes
 
 
 def _number(data: bytes, place: int, size: int) -> int | None:
@@ -192,21 +193,21 @@ def _unpacked(data: bytes, budget: ReadBudget) -> bytes:
         raise ValueError(f"compression {chunk.compression[:20]!r} given, zstd expected")
     if chunk.uncompressed_size > MAX_CHUNK_SIZE:
         raise ValueError(f"{chunk.uncompressed_size} bytes claimed")
+    # The format allows 0 for "not computed", and readers then check nothing.
     if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
         raise ValueError("no checksum")
     try:
-        if chunk.compression and not 0 <= _content_size(chunk.data) <= chunk.uncompressed_size:
+        # zstd allocates the size that the packed data claim; it is -1 if they claim none.
+        if (
+            chunk.compression
+            and not 0 <= zstandard.frame_content_size(chunk.data) <= chunk.uncompressed_size
+        ):
             raise ValueError("its packed size contradicts its size")
         budget.unpack(max(chunk.uncompressed_size, len(chunk.data)))
         stream, n_bytes = get_chunk_data_stream(chunk, validate_crc=True)
         return stream.read(n_bytes)
     except zstandard.ZstdError as cause:
         raise ValueError(str(cause)) from cause
-
-
-def _content_size(data: bytes) -> int:
-    """Return the size that zstd would allocate for packed data; -1 if the data do not have it."""
-    return zstandard.frame_content_size(data)
 
 
 def _is_footer(opcode: int, length: int) -> bool:

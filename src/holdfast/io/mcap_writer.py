@@ -29,7 +29,7 @@ from holdfast.sensors.types import Array, Unit
 MESSAGE_SECONDS = 0.1
 """Maximum duration of the samples in a message [s]."""
 CHUNK_SECONDS = 0.3
-"""Maximum duration of a chunk of the file [s]."""
+"""Maximum duration of a chunk of the file [s]; with a message, what a crash loses."""
 WRITTEN_CHUNK_SIZE = 1 << 24
 """Number of bytes above which a chunk ends early."""
 
@@ -99,10 +99,11 @@ class RecordingWriter(Closable):
             media=list(media),
         )
         self._sensors = dict(sensors)
+        # `append` adds samples and `_write` takes those of whole messages.
         self._pending: dict[str, list[tuple[Array, npt.NDArray[Any]]]] = {m: [] for m in sensors}
-        self._numbers: dict[str, str] = {}
+        self._numbers: dict[str, str] = {}  # of the first samples of each module
         self._last_times = dict.fromkeys(sensors, -np.inf)
-        self._newest = -np.inf
+        self._newest = -np.inf  # of any module; messages are written by it
         self._log = MessageLog(target, header, force=force, fsync=fsync)
 
     def append(self, module: str, times: npt.ArrayLike, readings: npt.ArrayLike) -> None:
@@ -120,13 +121,30 @@ class RecordingWriter(Closable):
         """
         sample_times = np.array(times, dtype=np.float64)
         values = np.array(readings)
-        self._check(module, sample_times, values)
+        if module not in self._sensors:
+            raise RecordingError(
+                f"samples of {module!r} given; this recording has {', '.join(self._sensors)}"
+            )
+        n_taxels = self._sensors[module].n_taxels
+        if sample_times.ndim != 1 or values.shape != (len(sample_times), n_taxels, 3):
+            raise RecordingError(
+                f"{module}: times (n,) and readings (n, {n_taxels}, 3) expected, "
+                f"{sample_times.shape} and {values.shape} given"
+            )
+        # One topic has one schema, so the first samples decide the number type of all.
+        number = number_type(values, f"readings of {module}")
+        if self._numbers.setdefault(module, number) != number:
+            raise RecordingError(f"{module}: {self._numbers[module]} expected, {number} given")
+        steps = np.diff(sample_times, prepend=self._last_times[module])
+        if not (np.isfinite(sample_times).all() and (steps > 0).all()):
+            raise RecordingError(f"{module}: finite, strictly increasing times expected")
         if len(sample_times) == 0:
             return
         self._pending[module].append((sample_times, values))
         self._last_times[module] = float(sample_times[-1])
         self._newest = max(self._newest, self._last_times[module])
         for name, parts in self._pending.items():
+            # Of every module, not only this one: also one that falls silent is written.
             if parts and parts[0][0][0] <= self._newest - MESSAGE_SECONDS:
                 self._write(name, before=self._newest - MESSAGE_SECONDS)
 
@@ -179,24 +197,6 @@ class RecordingWriter(Closable):
         finally:
             self._log.close()
 
-    def _check(self, module: str, times: Array, values: npt.NDArray[Any]) -> None:
-        if module not in self._sensors:
-            raise RecordingError(
-                f"samples of {module!r} given; this recording has {', '.join(self._sensors)}"
-            )
-        n_taxels = self._sensors[module].n_taxels
-        if times.ndim != 1 or values.shape != (len(times), n_taxels, 3):
-            raise RecordingError(
-                f"{module}: times (n,) and readings (n, {n_taxels}, 3) expected, "
-                f"{times.shape} and {values.shape} given"
-            )
-        number = number_type(values, f"readings of {module}")
-        if self._numbers.setdefault(module, number) != number:
-            raise RecordingError(f"{module}: {self._numbers[module]} expected, {number} given")
-        steps = np.diff(times, prepend=self._last_times[module])
-        if not (np.isfinite(times).all() and (steps > 0).all()):
-            raise RecordingError(f"{module}: finite, strictly increasing times expected")
-
     def _write_all(self) -> None:
         for name, parts in self._pending.items():
             if parts:
@@ -240,13 +240,15 @@ class MessageLog:
     def __init__(
         self, path: Path, header: Header, *, force: bool = False, fsync: bool = False
     ) -> None:
+        # Before the file is opened: metadata that JSON cannot hold leave no empty file.
         header_text = encode_header(header).decode()
         refuse_overwrite(path, force=force)
         self._path = path
         self._fsync = fsync
+        # Numbers in the file, by topic and by type.
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        self._n_messages = 0
+        self._n_messages = 0  # number of the next one: a gap in the numbers is damage
         self._chunk_span = (np.inf, -np.inf)
         self.closed = False
         with _disk_errors(path):
@@ -256,15 +258,27 @@ class MessageLog:
                 cast("IO[bytes]", self._stream),
                 WRITTEN_CHUNK_SIZE,
                 CompressionType.ZSTD,
+                # By default, mcap checks the chunks but not the section that holds them.
                 enable_data_crcs=True,
             )
             self._writer.start("", LIBRARY)
-            self._writer.add_metadata("holdfast", _summary(header))
+            # The metadata that `mcap get metadata` shows; the header itself is a message.
+            self._writer.add_metadata(
+                "holdfast",
+                {
+                    "name": header.name,
+                    "schema": header.schema,
+                    "modules": ", ".join(header.modules),
+                    "metadata": msgspec.json.encode(header.metadata, enc_hook=str).decode(),
+                },
+            )
+        # At once: from a file that is cut before its header nothing can be recovered.
         self.write_text(HEADER_TOPIC, 0.0, header_text)
         self.flush()
         if fsync:
             self.sync()
             with _disk_errors(path):
+                # The name of a new file is an entry of its folder.
                 sync(path.parent)
 
     def write_samples(self, topic: str, times: Array, values: npt.NDArray[Any]) -> None:
@@ -301,6 +315,7 @@ class MessageLog:
         """Write the end of the file; a second call does nothing."""
         if self.closed:
             return
+        # First, also if the disk fails now: an end after a missing part would hide it.
         self.closed = True
         with _disk_errors(self._path), self._file:
             self._writer.finish()  # type: ignore[no-untyped-call]
@@ -329,8 +344,9 @@ class MessageLog:
         return self._channels[topic]
 
     def _write_message(self, channel: int, time: float, data: bytes) -> None:
+        # Log times are unsigned, so negative ones are cut; readers use the times in the message.
         nanoseconds = int(min(max(time * 1e9, 0.0), _MAX_NANOSECONDS))
-        sequence = self._n_messages & 0xFFFFFFFF
+        sequence = self._n_messages & 0xFFFFFFFF  # the format has 32 bits for it
         with _disk_errors(self._path):
             self._writer.add_message(channel, nanoseconds, data, nanoseconds, sequence)
         self._n_messages += 1
@@ -348,13 +364,3 @@ class _disk_errors:  # noqa: N801 (used like a function)
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if isinstance(error, OSError):
             raise OutputError(f"cannot write {self._path}: {error.strerror}") from error
-
-
-def _summary(header: Header) -> dict[str, str]:
-    """Return the metadata that `mcap get metadata` shows; the header itself is a message."""
-    return {
-        "name": header.name,
-        "schema": header.schema,
-        "modules": ", ".join(header.modules),
-        "metadata": msgspec.json.encode(header.metadata, enc_hook=str).decode(),
-    }

@@ -18,27 +18,25 @@ def open_alone(path: Path, *, force: bool) -> FileIO:
         OutputError: another program is recording to the file, or it is no regular file.
         OSError: it cannot be opened.
     """
+    # O_NONBLOCK: to open a pipe must not wait; `check_regular` refuses it afterwards.
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | (0 if force else os.O_EXCL)
     file = os.fdopen(os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666), "wb", buffering=0)
     try:
         check_regular(path)
-        _lock(file, path)
+        try:
+            lock(file.fileno())
+        except BlockingIOError as cause:
+            raise OutputError(
+                f"{path} is being recorded by another program; choose another name"
+            ) from cause
+        except OSError:  # a network file system without locks
+            pass
+        # Only now, and not by O_TRUNC: a file that another program records keeps its content.
         file.truncate(0)
     except BaseException:
         file.close()
         raise
     return file
-
-
-def _lock(file: FileIO, path: Path) -> None:
-    try:
-        lock(file.fileno())
-    except BlockingIOError as cause:
-        raise OutputError(
-            f"{path} is being recorded by another program; choose another name"
-        ) from cause
-    except OSError:  # a network file system without locks
-        return
 
 
 class UnbufferedStream:

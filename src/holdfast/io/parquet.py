@@ -9,7 +9,7 @@ A checksum over all bytes is stored in the footer of the file, so that any flipp
 
 import hashlib
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice, product
 from pathlib import Path
@@ -78,18 +78,42 @@ def save(recording: Recording, path: Path, *, force: bool = False) -> None:
     specs = array_specs(header)
     schema = _schema(specs)
     arrays = arrays_of(recording)
+    # Neighbouring numbers share their high bytes: split by byte they take less. Arrow refuses this
+    # encoding for texts and booleans.
+    encodings = {
+        f.name: "BYTE_STREAM_SPLIT"
+        if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)
+        else "PLAIN"
+        for f in schema
+    }
+    # All truth arrays have the times of one track, so they are cut at the same rows.
+    tracks = {spec.topic: TRUTH_TIME if spec.track == "truth" else spec.topic for spec in specs}
+    times = {track: arrays[track][0] for track in tracks.values()}
+    row_size = sum(_value_size(spec) for spec in specs)
+    n_group_rows = max(1, min(GROUP_ROWS, GROUP_SIZE // row_size))
     with whole_file(path, force=force) as part:
         with pq.ParquetWriter(
             str(part),
             schema,
             compression="zstd",
-            use_dictionary=False,
-            column_encoding=_encodings(schema),
+            use_dictionary=False,  # with dictionaries, Arrow takes no encoding of a column
+            column_encoding=encodings,
             write_page_checksum=True,
         ) as writer:
-            times = {_track_key(spec): arrays[spec.topic][0] for spec in specs}
-            for span in time_spans(times, np.inf, _group_rows(specs)):
-                writer.write_batch(_batch(specs, arrays, span, schema), row_group_size=1 << 30)
+            for span in time_spans(times, np.inf, n_group_rows):
+                n_rows = max(cut.stop - cut.start for cut in span.values())
+                columns: list[pa.Array] = []
+                for spec in specs:
+                    cut = span[tracks[spec.topic]]
+                    sample_times, values = arrays[spec.topic]
+                    if spec.track != "truth":
+                        columns.append(_padded(sample_times[cut], n_rows))
+                    flat = values[cut].reshape(cut.stop - cut.start, spec.n_components)
+                    columns += [_padded(column, n_rows) for column in np.ascontiguousarray(flat.T)]
+                # A span is one row group: Arrow must not divide it again.
+                batch = pa.RecordBatch.from_arrays(columns, schema=schema)
+                writer.write_batch(batch, row_group_size=1 << 30)
+            # The checksum covers the footer that holds it: a blank of its length is written first.
             writer.add_key_value_metadata({HEADER_KEY: text, CHECKSUM_KEY: BLANK_CHECKSUM})
         write_checksum(part)
 
@@ -102,7 +126,12 @@ def load(path: Path) -> Recording:
     """
     header, file = _open(path)
     n_rows = file.metadata.num_rows
-    check_size(path, sum(_size(spec) for spec in array_specs(header)), PARTS_WAY_OUT)
+    # Before any buffer is made: the arrays, and what verbs compute of the samples of modules.
+    n_bytes = 0
+    for spec in array_specs(header):
+        work = 0 if spec.track == "truth" else WORK_PER_SAMPLE
+        n_bytes += (spec.n or 0) * (_value_size(spec) + work)
+    check_size(path, n_bytes, PARTS_WAY_OUT)
     buffers = {spec.topic: _ArrayBuffer(spec, n_rows, path) for spec in array_specs(header)}
     for arrays in _groups(header, file, path):
         for topic, (times, values) in arrays.items():
@@ -139,6 +168,7 @@ def read_columns(path: Path) -> tuple[Header, Iterator[TimedArrays]]:
 def is_foreign(path: Path) -> bool:
     """Return whether a file is Parquet, but not a recording."""
     _, footer = _read_footer(path)
+    # Either key, so that a recording with a flipped bit in one is damaged, not foreign.
     keys = (HEADER_KEY, CHECKSUM_KEY)
     return footer.endswith(PARQUET_MAGIC) and not any(key.encode() in footer for key in keys)
 
@@ -155,8 +185,14 @@ def write_checksum(path: Path) -> None:
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     budget = ReadBudget(path)
     _check_ends(path)
+    # The checksum comes first: Arrow may end the process for a file that is damaged.
     try:
-        _check_checksum(path)
+        place = _checksum_place(path)
+        with path.open("rb") as file:
+            file.seek(place)
+            stored = file.read(len(BLANK_CHECKSUM))
+        if stored != _checksum(path, place):
+            raise RecordingError(f"{path} is damaged: its content does not match its checksum")
     except RecordingError:
         if is_foreign(path):
             raise RecordingError(
@@ -164,12 +200,12 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
             ) from None
         raise
     try:
-        file = pq.ParquetFile(path, page_checksum_verification=True)
+        table = pq.ParquetFile(path, page_checksum_verification=True)
     except (pa.ArrowException, OSError) as cause:
         raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
-    header = (file.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
+    header = (table.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
     budget.keep(JSON_EXPANSION * len(header))
-    return decode_header(header, path), file
+    return decode_header(header, path), table
 
 
 def _check_ends(path: Path) -> None:
@@ -182,25 +218,12 @@ def _check_ends(path: Path) -> None:
         tail = file.read()
     if head != PARQUET_MAGIC:
         raise RecordingError(f"{path} is no Parquet file, or its first bytes are damaged")
+    # The smallest file is the magic, a length of 4 bytes, and the magic.
     if tail != PARQUET_MAGIC or size < 3 * len(PARQUET_MAGIC):
         raise RecordingError(
             f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
             "from which nothing can be recovered"
         )
-
-
-def _check_checksum(path: Path) -> None:
-    """Check that the file is unchanged since it was written, without loading it whole.
-
-    Raises:
-        RecordingError: the file has no checksum, or its content has changed.
-    """
-    place = _checksum_place(path)
-    with path.open("rb") as file:
-        file.seek(place)
-        stored = file.read(len(BLANK_CHECKSUM))
-    if stored != _checksum(path, place):
-        raise RecordingError(f"{path} is damaged: its content does not match its checksum")
 
 
 def _checksum_place(path: Path) -> int:
@@ -252,45 +275,16 @@ def _schema(specs: list[ArraySpec]) -> pa.Schema:
     return pa.schema(fields)
 
 
-def _encodings(schema: pa.Schema) -> dict[str, str]:
-    split = {f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)}
-    return {f.name: "BYTE_STREAM_SPLIT" if f.name in split else "PLAIN" for f in schema}
-
-
 def _column_names(spec: ArraySpec) -> list[str]:
     """Return the name of the column of each component of a value."""
     if spec.track != "truth":
         n_taxels = spec.shape[0]
+        # Numbers of one width, so that the names of columns sort like the taxels.
         width = max(2, len(str(n_taxels)))
         taxels = [f"t{number:0{width}d}" for number in taxel_numbers(range(n_taxels))]
         return [f"{spec.column}.{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
     places = product(*(range(size) for size in spec.shape))
     return [".".join([spec.column, *map(str, place)]) for place in places]
-
-
-def _group_rows(specs: list[ArraySpec]) -> int:
-    """Return the maximum number of rows in a row group of these arrays."""
-    row_size = sum(_value_size(spec) for spec in specs)
-    return max(1, min(GROUP_ROWS, GROUP_SIZE // row_size))
-
-
-def _track_key(spec: ArraySpec) -> str:
-    return TRUTH_TIME if spec.track == "truth" else spec.topic
-
-
-def _batch(
-    specs: list[ArraySpec], arrays: TimedArrays, span: Mapping[str, slice], schema: pa.Schema
-) -> pa.RecordBatch:
-    n_rows = max(cut.stop - cut.start for cut in span.values())
-    columns: list[pa.Array] = []
-    for spec in specs:
-        cut = span[_track_key(spec)]
-        times, values = arrays[spec.topic]
-        if spec.track != "truth":
-            columns.append(_padded(times[cut], n_rows))
-        flat = values[cut].reshape(cut.stop - cut.start, spec.n_components)
-        columns += [_padded(column, n_rows) for column in np.ascontiguousarray(flat.T)]
-    return pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
 def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
@@ -345,6 +339,7 @@ class _GroupReader:
         self._file = file
         self._path = path
         self._order = order
+        # All groups are checked before the first is read; a group of few bytes may claim any size.
         budget = ReadBudget(path)
         for number in range(file.num_row_groups):
             group = file.metadata.row_group(number)
@@ -378,12 +373,6 @@ class _GroupReader:
         return arrays
 
 
-def _size(spec: ArraySpec) -> int:
-    """Return the memory of an array, its times, and what verbs compute of them [bytes]."""
-    work = 0 if spec.track == "truth" else WORK_PER_SAMPLE
-    return (spec.n or 0) * (_value_size(spec) + work)
-
-
 def _value_size(spec: ArraySpec) -> int:
     """Return the size of a value and its time in memory [bytes]."""
     n_bytes: int = 8 + spec.n_components * np.dtype(_memory_type(spec)).itemsize
@@ -409,6 +398,7 @@ def _columns(specs: list[ArraySpec], table: pa.Table, order: Literal["C", "F"]) 
     for spec in specs:
         if spec.track != "truth" or spec.topic == TRUTH_TIME:
             column = next(columns)
+            # Nulls are only after the last sample of the module in this span.
             times = _rows([column], len(column) - column.null_count)[0]
         if spec.topic == TRUTH_TIME:
             arrays[spec.topic] = (times, times)
@@ -438,12 +428,13 @@ class _ArrayBuffer:
 
     def __init__(self, spec: ArraySpec, n_rows: int, path: Path) -> None:
         self._n = spec.n or 0
+        # Before the buffer is made: a header may claim any number.
         if self._n > n_rows:
             raise RecordingError(f"{path}: {spec.column} names {self._n} samples of {n_rows}")
         self._is_text = spec.number == "str"
         self._times = np.empty(self._n)
         self._values = np.empty((self._n, *spec.shape), _memory_type(spec))
-        self._end = 0
+        self._end = 0  # number of samples so far
         self._path = path
 
     def append(self, times: Array, values: npt.NDArray[Any]) -> None:
@@ -457,9 +448,9 @@ class _ArrayBuffer:
     def result(self) -> TimedArray:
         if self._end != self._n:
             raise RecordingError(f"{self._path}: {self._end} samples, its header names {self._n}")
-        return self._times, self._texts() if self._is_text else self._values
-
-    def _texts(self) -> npt.NDArray[Any]:
+        if not self._is_text:
+            return self._times, self._values
+        # Their lengths are known only now: as an array each takes as much as the longest.
         longest = max(map(len, self._values.flat), default=0)
         check_size(self._path, 4 * longest * self._values.size)
-        return self._values.astype(str)
+        return self._times, self._values.astype(str)

@@ -1,6 +1,6 @@
 """Load and save recordings by path; the suffix of the file chooses the format."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 
 from holdfast.errors import OutputError, RecordingError, require_extras
-from holdfast.io.header import Header
 from holdfast.io.label_files import labels_for, labels_path
 from holdfast.io.safe_reading import ReadBudget, recording_errors
 from holdfast.io.timed_arrays import (
@@ -19,7 +18,7 @@ from holdfast.io.timed_arrays import (
     recording_from,
     time_spans,
 )
-from holdfast.recordings import Label, Recording, cut_labels
+from holdfast.recordings import Recording, cut_labels
 
 SUFFIXES = (".parquet", ".mcap")
 """Suffixes of the formats; the first is preferred if a recording exists in both."""
@@ -72,7 +71,13 @@ def save_recording(recording: Recording, path: str | Path, force: bool = False) 
     target = Path(path)
     if target.suffix not in SUFFIXES:
         raise OutputError(f"cannot write {target}: {_expected_suffixes(target)}")
-    format_module(target.suffix).save(_with_native_readings(recording), target, force=force)
+    modules = dict(recording.modules)
+    for name, module in recording.modules.items():
+        # Arrow refuses arrays in another byte order, which importers of such files may give.
+        native = module.readings.dtype.newbyteorder("=")
+        if native != module.readings.dtype:
+            modules[name] = replace(module, readings=module.readings.astype(native))
+    format_module(target.suffix).save(replace(recording, modules=modules), target, force=force)
 
 
 def read_chunks(
@@ -98,6 +103,7 @@ def read_chunks(
     if n_samples < 1:
         raise ValueError(f"at least 1 sample in a chunk expected, {n_samples} given")
     file = Path(path)
+    # Not a generator itself: a wrong path is refused by the call, not by the first chunk.
     return _chunks(_format_of(file), file, n_samples, labels=labels)
 
 
@@ -144,54 +150,31 @@ def _expected_suffixes(path: Path) -> str:
     )
 
 
-def _with_native_readings(recording: Recording) -> Recording:
-    """Return the recording with its readings in the byte order of the machine."""
-    modules = {
-        name: replace(m, readings=m.readings.astype(m.readings.dtype.newbyteorder("=")))
-        if not m.readings.dtype.isnative
-        else m
-        for name, m in recording.modules.items()
-    }
-    return replace(recording, modules=modules)
-
-
 def _chunks(
     file_format: ModuleType, path: Path, n_samples: int, *, labels: bool
 ) -> Iterator[Recording]:
     with recording_errors(path):
-        yield from _chunks_of(file_format, path, n_samples, labels=labels)
-
-
-def _chunks_of(
-    file_format: ModuleType, path: Path, n_samples: int, *, labels: bool
-) -> Iterator[Recording]:
-    header, groups, complete = file_format.read_groups(path)
-    file_labels = _labels_beside(file_format, path, header, complete) if labels else None
-    markers = sorted(header.markers)
-    for arrays, end in _chunk_arrays(groups, n_samples, path):
-        n_markers = sum(marker[0] < end for marker in markers)
-        part = msgspec.structs.replace(header, markers=markers[:n_markers])
-        markers = markers[n_markers:]
-        chunk = recording_from(part, arrays, path, complete=complete)
-        yield chunk if file_labels is None else _with_labels(chunk, file_labels)
-
-
-def _labels_beside(
-    file_format: ModuleType, path: Path, header: Header, complete: bool
-) -> Mapping[str, tuple[Label, ...]] | None:
-    """Return the labels of the label file; a cut file is loaded to compute its digest."""
-    if not labels_path(path).exists():
-        return None
-    digest = header.digest if complete else ""
-    return labels_for(path, digest or file_format.load(path).digest)
-
-
-def _with_labels(chunk: Recording, labels: Mapping[str, tuple[Label, ...]]) -> Recording:
-    modules = {
-        name: replace(module, labels=cut_labels(labels.get(name, ()), module))
-        for name, module in chunk.modules.items()
-    }
-    return replace(chunk, modules=modules)
+        header, groups, complete = file_format.read_groups(path)
+        file_labels = None
+        if labels and labels_path(path).exists():
+            # A label file names its recording by the digest. A cut file, or one recorded live, has
+            # none in its header, and is loaded to compute it.
+            digest = header.digest if complete else ""
+            file_labels = labels_for(path, digest or file_format.load(path).digest)
+        # A marker may be set for an earlier time than the one before.
+        markers = sorted(header.markers)
+        for arrays, end in _chunk_arrays(groups, n_samples, path):
+            n_markers = sum(marker[0] < end for marker in markers)
+            part = msgspec.structs.replace(header, markers=markers[:n_markers])
+            markers = markers[n_markers:]
+            chunk = recording_from(part, arrays, path, complete=complete)
+            if file_labels is not None:
+                modules = {
+                    name: replace(module, labels=cut_labels(file_labels.get(name, ()), module))
+                    for name, module in chunk.modules.items()
+                }
+                chunk = replace(chunk, modules=modules)
+            yield chunk
 
 
 def _chunk_arrays(
@@ -206,12 +189,16 @@ def _chunk_arrays(
         for topic, (times, values) in group.items():
             n_buffered[topic] = n_buffered.get(topic, 0) + len(times)
             budget.keep(times.nbytes + values.nbytes, 1)
-        if max((n for topic, n in n_buffered.items() if _is_tactile(topic)), default=0) > n_samples:
+        n_tactile = (n for topic, n in n_buffered.items() if topic.startswith(TACTILE))
+        if max(n_tactile, default=0) > n_samples:
             chunks = _split(_joined(parts), n_samples)
             starts = [_start(chunk) for chunk in chunks]
-            n_ready = int(np.searchsorted(starts[1:], _end(chunks[-1]) - MAX_MODULE_LAG))
+            newest = max(float(times[-1]) for times, _ in chunks[-1].values() if len(times))
+            # A chunk is ready when the next one begins before what other modules may still lack.
+            n_ready = int(np.searchsorted(starts[1:], newest - MAX_MODULE_LAG))
             yield from zip(chunks[:n_ready], starts[1:], strict=False)
             rest = _joined(chunks[n_ready:])
+            # The chunks that went out are the caller's; only what is buffered here counts.
             budget = ReadBudget(path)
             parts, n_buffered = [rest], {topic: len(times) for topic, (times, _) in rest.items()}
     if parts:
@@ -221,7 +208,8 @@ def _chunk_arrays(
 
 def _split(arrays: TimedArrays, n_samples: int) -> list[dict[str, TimedArray]]:
     times = {topic: pair[0] for topic, pair in arrays.items()}
-    tactile = [topic for topic in times if _is_tactile(topic)]
+    # `n_samples` limits the modules; truth may have rows at another rate.
+    tactile = [topic for topic in times if topic.startswith(TACTILE)]
     return [
         {topic: (arrays[topic][0][cut], arrays[topic][1][cut]) for topic, cut in span.items()}
         for span in time_spans(times, np.inf, n_samples, tactile)
@@ -241,11 +229,3 @@ def _joined(parts: Sequence[TimedArrays]) -> dict[str, TimedArray]:
 
 def _start(arrays: TimedArrays) -> float:
     return min(float(times[0]) for times, _ in arrays.values() if len(times))
-
-
-def _end(arrays: TimedArrays) -> float:
-    return max(float(times[-1]) for times, _ in arrays.values() if len(times))
-
-
-def _is_tactile(topic: str) -> bool:
-    return topic.startswith(TACTILE)

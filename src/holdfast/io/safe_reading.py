@@ -47,7 +47,7 @@ def recording_errors(path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except HoldfastError:
+    except HoldfastError:  # it names the file already
         raise
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror or one_line(cause)}") from cause
@@ -72,7 +72,21 @@ def stored_size(path: Path) -> int:
     stat = path.stat()
     if 512 * getattr(stat, "st_blocks", stat.st_size) >= stat.st_size or not stat.st_size:
         return stat.st_size
-    return _size_of_extents(path)
+    # It has holes, or its disk compresses it, or it is not yet on the disk: count what is no hole.
+    n_bytes = 0
+    with path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        end = 0
+        while end < size:
+            try:
+                start = os.lseek(file.fileno(), end, os.SEEK_DATA)
+                end = os.lseek(file.fileno(), start, os.SEEK_HOLE)
+            except OSError as cause:
+                if cause.errno == errno.ENXIO:  # only a hole is left
+                    return n_bytes
+                return size  # the file system does not report holes
+            n_bytes += end - start
+    return n_bytes
 
 
 def size_limit(path: Path) -> int:
@@ -95,6 +109,7 @@ def given_limit() -> int | None:
     given = os.environ.get(LIMIT_VARIABLE)
     if not given:
         return None
+    # `int` alone would take "1_000" and digits of any script.
     if not (given.isascii() and given.isdigit() and len(given) < 20 and int(given)):
         raise RecordingError(f"{LIMIT_VARIABLE}: a whole number of bytes expected, {given!r} given")
     return int(given)
@@ -136,8 +151,8 @@ class ReadBudget:
         self._path = path
         self._way_out = way_out
         self._limit = size_limit(path)
-        self._kept = 0
-        self._work = 0
+        self._kept = 0  # memory in use until the file is read [bytes]
+        self._work = 0  # all that was unpacked, kept or not [bytes]
         content = given_limit() or max(MAX_MEMORY, MAX_EXPANSION * stored_size(path))
         self._max_work = MAX_WORK * content
         size = path.stat().st_size
@@ -199,24 +214,6 @@ class ReadBudget:
                 f"{megabytes(self._max_work)} when it is unpacked, where a short record "
                 f"counts {STEP_WORK} bytes; set {LIMIT_VARIABLE} to read it anyway"
             )
-
-
-def _size_of_extents(path: Path) -> int:
-    """Return the number of bytes of a file that are not in holes."""
-    n_bytes = 0
-    with path.open("rb") as file:
-        size = os.fstat(file.fileno()).st_size
-        end = 0
-        while end < size:
-            try:
-                start = os.lseek(file.fileno(), end, os.SEEK_DATA)
-                end = os.lseek(file.fileno(), start, os.SEEK_HOLE)
-            except OSError as cause:
-                if cause.errno == errno.ENXIO:  # only a hole is left
-                    return n_bytes
-                return size  # the file system does not report holes
-            n_bytes += end - start
-    return n_bytes
 
 
 def megabytes(n_bytes: int) -> str:

@@ -62,6 +62,7 @@ def sticker_places(
             f"{path} has {megabytes(size)}; a video of at most {megabytes(MAX_VIDEO)} expected: "
             "cut it into shorter ones"
         )
+    # The stacks of more threads would count as memory of the child.
     cv2.setNumThreads(1)
     film = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
     if not film.isOpened():
@@ -82,6 +83,7 @@ def sticker_places(
     n = 0
     while film.grab():
         stamp = film.get(cv2.CAP_PROP_POS_MSEC) / 1000 if fps is None else n / fps
+        # Also a damaged picture takes its time.
         n += 1
         is_read, picture = film.retrieve()
         if not is_read or (times and stamp <= times[-1]):
@@ -161,6 +163,7 @@ class _Sticker:
             step = self._solve @ (now - self._template)
             change = np.eye(3)
             change[:2] += step.reshape(2, 3)
+            # The step moves the template to the picture; the place moves the other way.
             place = place @ np.linalg.inv(change)
             if np.abs(step).max() < SETTLED:
                 break
@@ -181,4 +184,5 @@ class _Sticker:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         seen = cv2.warpAffine(grey, place @ grid, (N_POINTS, N_POINTS), flags=flags)
         values = seen.astype(np.float64).ravel()
+        # A plain area has no variance: its noise must not become a pattern.
         return np.asarray((values - values.mean()) / max(values.std(), 1.0))

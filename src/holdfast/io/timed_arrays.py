@@ -159,6 +159,7 @@ def time_spans(
     first = dict.fromkeys(times, 0)
     while left := [key for key in times if first[key] < len(times[key])]:
         start = min(float(times[key][first[key]]) for key in left)
+        # At times so large that the sum is rounded to `start`, a span still has one sample.
         end = max(start + seconds, float(np.nextafter(start, np.inf)))
         for key in left:
             if key in (limited or times) and first[key] + max_samples < len(times[key]):

@@ -57,24 +57,23 @@ class HoldDrift:
         if not self._n or not 0 <= time - self._start < 2 * BLOCK_SECONDS:
             self._start, self._sum, self._n, self._n_blocks = time, np.zeros(3), 0, 0
         if time - self._start >= BLOCK_SECONDS:
-            self._end_block(float(np.linalg.norm(self._sum / self._n)))
+            amplitude = float(np.linalg.norm(self._sum / self._n))
+            # A larger change is a new grip, whose drift begins anew.
+            if self._n_blocks and abs(amplitude - self._last) > HOLD_SHARE * self._last:
+                self._n_blocks = 0
+            if not self._n_blocks:
+                self._first, self._moments = amplitude, np.zeros(3)
+            k, self._last = self._n_blocks, amplitude
+            self._moments += (k, amplitude, k * amplitude)
+            self._n_blocks = n = k + 1
+            if n >= MIN_BLOCKS and n * BLOCK_SECONDS > self.seconds:
+                # Least squares: (n sum k a - sum k sum a) / (n sum k^2 - (sum k)^2).
+                sum_k, sum_a, sum_ka = self._moments
+                slope = (n * sum_ka - sum_k * sum_a) / (n * n * (n * n - 1) / 12)
+                self.per_minute = float(slope) * 60 / BLOCK_SECONDS
+                self.seconds, self.load = n * BLOCK_SECONDS, self._first
             self._start, self._sum, self._n = time, np.zeros(3), 0
         self._sum, self._n = self._sum + force, self._n + 1
-
-    def _end_block(self, amplitude: float) -> None:
-        if self._n_blocks and abs(amplitude - self._last) > HOLD_SHARE * self._last:
-            self._n_blocks = 0
-        if not self._n_blocks:
-            self._first, self._moments = amplitude, np.zeros(3)
-        k, self._last = self._n_blocks, amplitude
-        self._moments += (k, amplitude, k * amplitude)
-        self._n_blocks = n = k + 1
-        if n >= MIN_BLOCKS and n * BLOCK_SECONDS > self.seconds:
-            # Least squares: (n sum k a - sum k sum a) / (n sum k^2 - (sum k)^2).
-            sum_k, sum_a, sum_ka = self._moments
-            slope = (n * sum_ka - sum_k * sum_a) / (n * n * (n * n - 1) / 12)
-            self.per_minute = float(slope) * 60 / BLOCK_SECONDS
-            self.seconds, self.load = n * BLOCK_SECONDS, self._first
 
 
 class Likeness(NamedTuple):

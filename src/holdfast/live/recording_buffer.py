@@ -125,7 +125,21 @@ class RecordingBuffer:
         self.n_lost += arrival.n_lost
         self.n_refused += arrival.n_refused
         if arrival.samples:
-            self._add_samples(arrival)
+            rejected, n_appended = [], 0
+            for module, readings in arrival.samples.items():
+                if buffer := self.modules.get(module):
+                    appended = buffer.append(arrival.time, readings)
+                    n_appended += appended
+                    rejected += [module] * (not appended)
+            if n_appended:
+                self.n_samples += 1
+                self.newest_time = arrival.time
+                if math.isnan(self.first_time):
+                    self.first_time = arrival.time
+            if rejected:
+                self.n_rejected += 1
+                text = f"note: a sample of {', '.join(rejected)} cannot be stored: dropped"
+                self.add_notice(text, arrival.received)
         if arrival.faults or self._active_faults:
             self._add_faults(arrival)
         for notice in arrival.notices:
@@ -178,23 +192,6 @@ class RecordingBuffer:
             if now - when < RECENT_FAULT_AGE:
                 recent[module] = (*recent.get(module, ()), fault)
         return recent
-
-    def _add_samples(self, arrival: Arrival) -> None:
-        rejected, n_appended = [], 0
-        for module, readings in arrival.samples.items():
-            if buffer := self.modules.get(module):
-                appended = buffer.append(arrival.time, readings)
-                n_appended += appended
-                rejected += [module] * (not appended)
-        if n_appended:
-            self.n_samples += 1
-            self.newest_time = arrival.time
-            if math.isnan(self.first_time):
-                self.first_time = arrival.time
-        if rejected:
-            self.n_rejected += 1
-            text = f"note: a sample of {', '.join(rejected)} cannot be stored: dropped"
-            self.add_notice(text, arrival.received)
 
     def _add_faults(self, arrival: Arrival) -> None:
         """Count the faults, and add a marker for each that begins.

@@ -39,6 +39,7 @@ class HandDevice(Openable):
     standby: bool = False
     n_refused: int = 0
 
+    # Whether a grip has begun, and what was sent last and when; `send` and `forget` set them.
     _begun = False
     _sent: object = None
     _sent_at = -math.inf
@@ -109,7 +110,12 @@ class HandDevice(Openable):
                     f"{self.name}: a scale of at least 0 expected, {one.scale:g} given for {finger}"
                 )
         self._watch()
-        self._follow(command.state)
+        # A fault neither begins a grip nor ends one: the loop may recover with the same grip.
+        if command.state is LoopState.IDLE:
+            self._begun = False
+        elif command.state is not LoopState.FAULT and not self._begun:
+            self._begin()
+            self._begun, self._sent = True, None
         if not (command.release or self._begun or self.needs_idle or repeat):
             return False
         content, now = self._content(command), time.monotonic()
@@ -151,14 +157,6 @@ class HandDevice(Openable):
         """Return what the hand gets of a command: equal for commands that are the same to it."""
         scales = {finger: one.scale for finger, one in command.fingers.items()}
         return command.release, None if command.release else scales
-
-    def _follow(self, state: LoopState) -> None:
-        """Follow the begin and the end of the grip."""
-        if state is LoopState.IDLE:
-            self._begun = False
-        elif state is not LoopState.FAULT and not self._begun:
-            self._begin()
-            self._begun, self._sent = True, None
 
     @abstractmethod
     def close(self) -> None:

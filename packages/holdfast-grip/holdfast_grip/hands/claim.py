@@ -27,6 +27,7 @@ class Claim(Openable):
 
     def __init__(self, name: str) -> None:
         self._name = name
+        # A hash, because the name of a resource has slashes and any length.
         self._file_name = f"{hashlib.sha256(os.fsencode(name)).hexdigest()[:32]}.lock"
         self._stack = ExitStack()
 
@@ -85,6 +86,7 @@ def _open_folder(path: Path) -> int:
     path.parent.mkdir(parents=True, exist_ok=True)
     with suppress(FileExistsError):
         path.mkdir(_FOLDER_MODE)
+    # Open first and check what is open: a path can be replaced in between.
     folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
     found = os.fstat(folder)
     if found.st_uid == os.geteuid() and not found.st_mode & _FOREIGN_BITS:

@@ -106,6 +106,7 @@ def _import(name: str) -> ModuleType:
     here = str(Path.cwd())
     if here in sys.path:
         return import_module(name)
+    # Last, so that a file here does not replace an installed module.
     sys.path.append(here)
     try:
         return import_module(name)
@@ -169,6 +170,7 @@ class LogFile(HandDevice):
             HandError: it cannot be written.
         """
         try:
+            # Without a buffer, so that no command is lost if the process dies.
             self._file = self._path.open("ab", buffering=0)
         except OSError as cause:
             raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause

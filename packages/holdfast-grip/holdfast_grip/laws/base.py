@@ -92,7 +92,9 @@ class Touch:
         self.instability = estimate.instability * (a + b + c) / 3
         self.force = (x, y, z)
         self.normal = along if along > 0.0 else 0.0
+        # Rounding makes it negative where the force is along the normal.
         self.tangential = math.sqrt(across) if across > 0.0 else 0.0
+        # Each comparison is False for NaN as well as for infinity.
         return square < math.inf and abs(probability) < math.inf and abs(slip or 0.0) <= 1.0
 
     def start(self) -> None:

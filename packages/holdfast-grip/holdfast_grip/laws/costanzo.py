@@ -83,6 +83,7 @@ class Costanzo(Law):
         if not (self._start_force > 0 and all(touch.known for touch in touches)):
             return stay(touches)
         load = sum(touch.tangential for touch in touches)
+        # At most the whole step: after a pause the filter would overshoot.
         self._load += min(dt / LOAD_SMOOTHING, 1.0) * (load - self._load)
         slip = self._slip(touches)
         static = max(STATIC_MARGIN * self._load / self._friction, LEAST_STATIC_FORCE)
@@ -93,6 +94,7 @@ class Costanzo(Law):
         if least > STATIC_RISE * scale:
             return [(least, GripReason.MARGIN)] * len(touches)
         wish = self.relaxation.wish(scale, time, dt, least)
+        # The integral falls with the force, or the next slip would begin with the old one.
         self._integral = min(self._integral, max(wish[0] - least, 0.0) * self._start_force)
         return [wish] * len(touches)
 

@@ -68,11 +68,13 @@ class FrictionMargin(Law):
         ratio = touch.tangential / touch.normal
         if touch.probability >= STABLE_PROBABILITY:
             self._friction[k] = max(self._friction[k], ratio)
+        # A finger that slips below the known coefficient shows a lower one.
         elif ratio < self._friction[k]:
             self._friction[k] = max(self.first_friction, SLIP_SHARE * ratio)
         target = max(self.margin * touch.tangential / self._friction[k], LOWEST_FORCE)
         scale = target / touch.start_normal
         if scale > touch.scale:
+            # Two margins: a rise begins below the lower one, and ends at the upper one.
             acts = self.acts_at * scale > self.margin * touch.scale
             return (scale, GripReason.MARGIN) if acts else (touch.scale, GripReason.NONE)
         share = max(1.0 - self.fall * dt, FALL_SHARE)

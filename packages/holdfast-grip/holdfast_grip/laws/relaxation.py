@@ -31,6 +31,7 @@ class Relaxation:
 
     def slipped(self, scale: float, time: float) -> None:
         """Take a slip at a scale."""
+        # A slip lasts for many samples; only its first one has the force that was too low.
         if time - self._slipped_at > RELAXATION_SETTLE_TIME:
             self._floor = max(1.0, RELAXATION_MARGIN * scale)
         self._slipped_at = time

@@ -51,7 +51,8 @@ class WongZhu(Law):
         """Raise each finger that slips, or all; relax the others."""
         slips = []
         for k, touch in enumerate(touches):
-            slips.append(touch.known and self._slips(touch, self._last[k]))
+            least = self.threshold * max(self._last[k], FLOOR * touch.start_normal)
+            slips.append(touch.known and abs(touch.tangential - self._last[k]) > least)
             if touch.known:
                 self._last[k] = touch.tangential
         if self.together and any(slips):
@@ -64,6 +65,3 @@ class WongZhu(Law):
             return relaxation.wish(touch.scale, time, dt)
         relaxation.slipped(touch.scale, time)
         return (touch.scale * self.gain, GripReason.SLIP)
-
-    def _slips(self, touch: Touch, last: float) -> bool:
-        return abs(touch.tangential - last) > self.threshold * max(last, FLOOR * touch.start_normal)

@@ -43,8 +43,10 @@ class GripLoop:
         n_sent: number of commands that were sent; a hand gets no command twice, see `HandDevice`.
     """
 
+    # Newest time of a step; infinite before the first one and after `resume`.
     _now = -math.inf
     _ahead = math.nan  # the time of the last step, if the clock jumped to it
+    # Newest command that left, whose scales the safe command keeps.
     _sent: GripCommand | None = None
 
     def __init__(
@@ -125,6 +127,7 @@ class GripLoop:
         self._stays_open = self._stays_open and self.last.state is LoopState.IDLE
         if self._stays_open:
             self.last = structs.replace(self.last, release=True)
+        # The first IDLE command after a reset has released the hand; no other one is sent.
         repeats = self._stays_open and before is not None and before.state is LoopState.IDLE
         if self.armed:
             self._send(self.last, is_new=admitted is not None and not repeats)
@@ -153,6 +156,7 @@ class GripLoop:
         if not self.armed or base is None:
             return
         release = base.release or self.controller.limits.on_fault == "open"
+        # A hand that got no command keeps its own force: only a release is sent to it.
         if release or self._sent is not None:
             with suppress(Exception):
                 self.hand.send(safe_command(base, GripReason.NONE, release=release))
@@ -172,6 +176,7 @@ class GripLoop:
         """Return the time of a step, which never decreases; NaN if the clock jumped ahead."""
         if not math.isfinite(time):
             return math.nan
+        # One stamp far ahead is a fault; a second one that continues it is a new clock.
         if -math.inf < self._now < time - MAX_CLOCK_STEP:
             ahead, self._ahead = self._ahead, time
             if not ahead <= time <= ahead + MAX_CLOCK_STEP:

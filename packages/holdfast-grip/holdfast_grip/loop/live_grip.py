@@ -43,6 +43,7 @@ class EventLog:
 
     def add_listener(self, listener: GripListener) -> None:
         """Call `listener` with every event from now on."""
+        # A new list: the thread of the loop may be in the old one.
         self._listeners = [*self._listeners, listener]
 
     def __call__(self, text: str, time: float) -> None:
@@ -139,6 +140,7 @@ class LiveGrip:
         try:
             self._runner.run(self._over.is_set)
         except Exception as failure:  # leaving the context raises it
+            # First the hand, then the log, which calls listeners.
             self._loop.make_safe()
             self.failure = failure
             last = self._loop.last
@@ -159,6 +161,7 @@ class LiveGrip:
     ) -> None:
         self._session.remove_listener(self._runner.put)
         self._over.set()
+        # Before the lock ends: no step may use another threshold.
         self._thread.join()
         self._session.lock = ""
         if self.failure is not None and kind is None:

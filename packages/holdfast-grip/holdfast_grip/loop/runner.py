@@ -91,6 +91,7 @@ class LoopRunner:
         """
         while not is_over() or self._pending:
             self._wake.wait(TICK)
+            # Before the updates are taken: one that comes after it wakes the next step.
             self._wake.clear()
             self._process([self._pending.popleft() for _ in range(len(self._pending))])
 
@@ -115,6 +116,7 @@ class LoopRunner:
             self.loop.follow(estimate, estimate.time)
         if estimates:
             newest = estimates[-1]
+            # `not <`: the first time before, NaN, counts as another one.
             if not abs(newest.time - self._received_time) < MIN_TIME_STEP:
                 self._received_time = newest.time
                 self._received = max(received for update, received in arrived if update.estimates)
@@ -124,13 +126,10 @@ class LoopRunner:
             return
         self._stepped_at = now
         fault = GripReason.BEHIND if behind else GripReason.NONE
-        at = self._estimate.time + self._age(now)
-        self._on_command(self.loop.step(self._estimate, at, fault, now))
-
-    def _age(self, now: float) -> float:
-        """Return the age of the newest estimate by the clock of the source; 0 if it is new [s]."""
+        # An estimate younger than a tick is new: its own time counts.
         age = now - self._received
-        return 0.0 if age < TICK else self._speed * age
+        at = self._estimate.time + (0.0 if age < TICK else self._speed * age)
+        self._on_command(self.loop.step(self._estimate, at, fault, now))
 
     def _step_each(self, arrived: Sequence[_Arrived]) -> None:
         """Step the loop of a source that is not paced, with each estimate."""

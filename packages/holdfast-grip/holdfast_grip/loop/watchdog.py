@@ -61,6 +61,7 @@ class Watchdog:
         self._arguments = [uri, on_fault, repr(timeout)]
         self._timeout = timeout
         self._beaten_at = math.inf  # before the first heartbeat, none is missing
+        # Bytes that were written, those the watchdog has read, and when these grew.
         self._n_written = self._n_read = 0
         self._read_at = -math.inf
         self._process: subprocess.Popen[bytes] | None = None
@@ -85,6 +86,7 @@ class Watchdog:
             text = answer.decode("utf-8", "replace").strip() or "it does not start"
             raise HandError(f"the watchdog cannot command {self._arguments[0]}: {text}")
         if process.stdin is not None:
+            # A full pipe must not block the loop.
             os.set_blocking(process.stdin.fileno(), False)
 
     def beat(self, command: GripCommand) -> None:
@@ -109,6 +111,7 @@ class Watchdog:
             raise HandError(
                 f"the watchdog of {self._arguments[0]} has taken over or ended"
             ) from cause
+        # The write may have waited: only a heartbeat that was in time counts.
         self.check()
         self._beaten_at = begun_at
 
@@ -189,6 +192,7 @@ class Watchdog:
 
         if self._process is None or self._process.stdin is None:
             return
+        # The bytes in the pipe that are not read yet.
         found = fcntl.ioctl(self._process.stdin, termios.FIONREAD, bytes(4))
         n_read = self._n_written - int.from_bytes(found, sys.byteorder)
         if n_read > self._n_read or self._read_at == -math.inf:
@@ -252,6 +256,7 @@ def _watch(pipe: int, timeout: float) -> GripCommand | None:
         for line in lines:
             try:
                 last = decoder.decode(line)
+            # A loop that sends no JSON is broken.
             except msgspec.DecodeError:
                 return last
         if not data:

@@ -47,6 +47,7 @@ class FolderBag:
         self.complete = all(storage.complete for storage in storages)
         check_number(len(topics))
         inside = [connection for storage in storages for connection in storage.connections]
+        # Reversed, so that the first definition of a type is used.
         definitions = {one.kind: one.definition for one in reversed(inside) if one.definition}
         self._connections = [
             _connection(number, topic, definitions) for number, topic in enumerate(topics)
@@ -82,7 +83,9 @@ def open_folder(path: Path, budget: ReadBudget) -> Iterator[FolderBag]:
         ValueError: the metadata or a file are cut, damaged, or of a kind that is not supported.
     """
     metadata = _metadata(path)
+    # The name alone: a path could lead out of the folder.
     files = [path / PurePath(str(name)).name for name in metadata["relative_file_paths"]]
+    # A file that is named often would be read as often, for the size of one.
     if len(set(files)) < len(files):
         raise ValueError(f"{METADATA} names a file twice")
     storage, mode = str(metadata["storage_identifier"]), _compression_mode(metadata)

@@ -24,10 +24,13 @@ from holdfast.io.safe_reading import ReadBudget
 from holdfast_ros.bag_storage import BagConnection, check_number
 from holdfast_ros.bag_storage.unpacking import unpack
 
+# Head of a record: its kind and the length of its content.
 _RECORD = struct.Struct("<BQ")
+# Head (9 bytes), two offsets (8 each) and a checksum (4).
 _FOOTER_SIZE = 29
 _MESSAGE = struct.Struct("<HIQQ")
 """Beginning of a message: its channel, number, time of recording and time of sending."""
+# Definitions in IDL are not parsed.
 _DEFINITION_ENCODING = "ros2msg"
 
 
@@ -40,12 +43,29 @@ class McapBag:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._counts: Counter[int] = Counter()
-        self.complete = self._has_end()
-        self._scan()
+        # A file without its footer was cut.
+        self._file.seek(max(0, self._file.seek(0, 2) - len(MAGIC) - _FOOTER_SIZE))
+        tail = self._file.read()
+        self.complete = tail.endswith(MAGIC) and tail[0] == Opcode.FOOTER
+        # The summary has channels and numbers of messages; chunks are unpacked only without one.
+        counts: Counter[int] = Counter()
+        statistics = None
+        has_chunks = False
+        for opcode, content in self._records(in_chunks=False):
+            has_chunks |= opcode == Opcode.CHUNK
+            if opcode == Opcode.STATISTICS:
+                statistics = Statistics.read(ReadDataStream(BytesIO(content)))
+            self._add(opcode, content, counts)
+        if has_chunks and (statistics is None or not self._channels or not self._schemas):
+            counts.clear()
+            for opcode, content in self._records(in_chunks=True):
+                self._add(opcode, content, counts)
+        self._counts = counts if statistics is None else Counter(statistics.channel_message_counts)
 
     @property
     def connections(self) -> list[BagConnection]:
         """All connections."""
+        # A channel may have no schema, by the number 0.
         none = Schema(id=0, data=b"", encoding="", name="")
         found = [(one, self._schemas.get(one.schema_id, none)) for one in self._channels.values()]
         return [
@@ -53,7 +73,7 @@ class McapBag:
                 channel.id,
                 channel.topic,
                 schema.name,
-                _definition(schema),
+                schema.data.decode() if schema.encoding == _DEFINITION_ENCODING else "",
                 self._counts[channel.id],
             )
             for channel, schema in found
@@ -70,27 +90,12 @@ class McapBag:
                     found.append((number, time, content[_MESSAGE.size :]))
         yield from sorted(found, key=lambda message: message[1])
 
-    def _scan(self) -> None:
-        """Read channels and the numbers of messages: of the summary if there is one."""
-        counts: Counter[int] = Counter()
-        statistics = None
-        has_chunks = False
-        for opcode, content in self._records(in_chunks=False):
-            has_chunks |= opcode == Opcode.CHUNK
-            if opcode == Opcode.STATISTICS:
-                statistics = Statistics.read(ReadDataStream(BytesIO(content)))
-            self._add(opcode, content, counts)
-        if has_chunks and (statistics is None or not self._channels or not self._schemas):
-            counts.clear()
-            for opcode, content in self._records(in_chunks=True):
-                self._add(opcode, content, counts)
-        self._counts = counts if statistics is None else Counter(statistics.channel_message_counts)
-
     def _add(self, opcode: int, content: bytes, counts: Counter[int]) -> None:
         if opcode == Opcode.MESSAGE:
             counts[_MESSAGE.unpack_from(content)[0]] += 1
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(ReadDataStream(BytesIO(content)))
+            # Schemas and channels are repeated in chunks and in the summary; the first one counts.
             if schema.id not in self._schemas:
                 self._budget.keep(len(schema.data) + len(schema.name), 1)
                 self._schemas[schema.id] = schema
@@ -113,6 +118,7 @@ class McapBag:
             self._budget.step()
             self._file.seek(place)
             head = self._file.read(_RECORD.size)
+            # No record has the kind 0: a cut file may end with zeros.
             if not self.complete and (len(head) < _RECORD.size or not head[0]):
                 return
             opcode, length = _RECORD.unpack(head)
@@ -130,20 +136,15 @@ class McapBag:
                     return
                 yield from records_in(data, self._budget)
             elif opcode == Opcode.CHUNK:
+                # Not unpacked, because the summary may have all that is needed.
                 yield opcode, b""
             elif opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
                 yield opcode, self._file.read(length)
 
-    def _has_end(self) -> bool:
-        """Return whether the file has its footer; without one it was cut."""
-        size = self._file.seek(0, 2)
-        self._file.seek(max(0, size - len(MAGIC) - _FOOTER_SIZE))
-        tail = self._file.read()
-        return tail.endswith(MAGIC) and tail[0] == Opcode.FOOTER
-
     def _unpacked(self, data: bytes) -> bytes:
         chunk = Chunk.read(ReadDataStream(BytesIO(data)))
         found = unpack(chunk.data, chunk.compression, self._budget, chunk.uncompressed_size)
+        # A checksum of 0 is none.
         if chunk.uncompressed_crc and zlib.crc32(found) != chunk.uncompressed_crc:
             raise ValueError("the checksum of a chunk does not match")
         return found
@@ -158,7 +159,3 @@ def open_mcap(path: Path, budget: ReadBudget) -> Iterator[McapBag]:
     """
     with path.open("rb") as file:
         yield McapBag(file, budget)
-
-
-def _definition(schema: Schema) -> str:
-    return schema.data.decode() if schema.encoding == _DEFINITION_ENCODING else ""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _LENGTH = struct.Struct("<I")
 _INDEX_HEAD_SIZE = 55
+# Time (8 bytes) and place in the chunk (4) of a message.
 _INDEX_ENTRY_SIZE = 12
 _CONNECTION, _MESSAGE = b"\x07", b"\x02"
 """Kinds of records in a chunk."""
@@ -32,6 +33,7 @@ class Ros1Bag:
     def __init__(self, reader: "Reader", budget: ReadBudget) -> None:
         self._reader = reader
         self._budget = budget
+        # The chunk that was unpacked last: most messages follow one of the same chunk.
         self._place, self._chunk = -1, b""
 
     @property
@@ -62,6 +64,7 @@ class Ros1Bag:
         from rosbags.rosbag1.reader import decompressors
 
         chunk = self._reader.chunks[place]
+        # rosbags keeps the function of a compression, not its name.
         names = [name for name, one in decompressors.items() if one is chunk.decompressor]
         file: Any = self._reader.bio
         file.seek(chunk.datapos)
@@ -78,6 +81,7 @@ class Ros1Bag:
             head, place = self._part(place)
             data, place = self._part(place)
             fields = _fields(head)
+            # The record of a connection may stand before its first message.
             if fields.get(b"op") != _CONNECTION:
                 break
         if fields.get(b"op") != _MESSAGE:

@@ -42,13 +42,23 @@ class SqliteBag:
         """
         if not self.complete:  # else SQLite refuses a file with fewer pages than it states
             self._rows("PRAGMA writable_schema = ON")
+        # The schema of an unknown file must not call functions that have effects.
         self._rows("PRAGMA trusted_schema = OFF")
+        # A CHECK is an expression of the file, which `quick_check` would evaluate.
         self._rows("PRAGMA ignore_check_constraints = ON")
         items = self._rows("SELECT type, name, rootpage FROM sqlite_master", MAX_TABLES)
         for kind, name, page in items:
             if kind not in ("table", "index") or not page or not isinstance(name, str):
                 raise ValueError(f"tables of a ROS 2 bag expected, {str(kind)[:20]} {name!r} given")
-            self._check_columns(kind, name)
+            quoted = name.replace('"', '""')
+            if kind == "table":
+                # Field 6 is 0 for a stored column, field 1 of an index the number of its column.
+                hidden = [row[1] for row in self._rows(f'PRAGMA table_xinfo("{quoted}")') if row[6]]
+            else:
+                columns = self._rows(f'PRAGMA index_xinfo("{quoted}")')
+                hidden = [row[2] for row in columns if row[1] == _EXPRESSION]
+            if hidden:
+                raise ValueError(f"{name!r} has a computed column; only stored columns are read")
         names = {name for _, name, _ in items}
         if missing := {"topics", "messages"} - names:
             raise ValueError(f"no table {min(missing)!r}; the tables of a ROS 2 bag expected")
@@ -91,16 +101,6 @@ class SqliteBag:
                 if not isinstance(time, int) or not isinstance(data, bytes):
                     raise ValueError("a message without a time or without bytes")
                 yield number, time, data
-
-    def _check_columns(self, kind: str, name: str) -> None:
-        quoted = name.replace('"', '""')
-        if kind == "table":
-            hidden = [row[1] for row in self._rows(f'PRAGMA table_xinfo("{quoted}")') if row[6]]
-        else:
-            columns = self._rows(f'PRAGMA index_xinfo("{quoted}")')
-            hidden = [row[2] for row in columns if row[1] == _EXPRESSION]
-        if hidden:
-            raise ValueError(f"{name!r} has a computed column; only stored columns are read")
 
     def _definitions(self) -> dict[str, str]:
         """Return the texts of definitions by type; older bags have none."""
@@ -151,8 +151,10 @@ def open_sqlite(path: Path, budget: ReadBudget) -> Iterator[SqliteBag]:
         ValueError: it holds something else than plain tables.
         sqlite3.Error: it is damaged.
     """
+    # `immutable`: no lock, journal or other file is made or read beside the bag.
     address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
+        # A text that is no UTF-8 becomes part of a message, not an error of its own.
         database.text_factory = lambda data: data.decode(errors="replace")
         bag = SqliteBag(database, budget, complete=_has_all_pages(path))
         bag.check()
@@ -163,5 +165,6 @@ def _has_all_pages(path: Path) -> bool:
     """Return whether a file has as many pages as its header states; else it was cut."""
     with path.open("rb") as file:
         head = file.read(100)
+    # Places in the header of a database; the size 65536 does not fit and is stored as 1.
     size, n_pages = int.from_bytes(head[16:18]), int.from_bytes(head[28:32])
     return path.stat().st_size >= n_pages * (65536 if size == 1 else size)

@@ -41,6 +41,7 @@ def unpack(data: bytes, compression: str, budget: ReadBudget, size: int | None =
     """
     if (size or 0) > MAX_CHUNK_SIZE:
         raise ValueError(f"at most {MAX_CHUNK_SIZE} unpacked bytes expected, {size} given")
+    # Before the bytes take memory, where their number is known.
     budget.unpack(size or 0)
     found = _unpacked(data, compression, MAX_CHUNK_SIZE if size is None else size)
     if compression == "bz2":
@@ -76,7 +77,12 @@ def _unpacked(data: bytes, compression: str, limit: int) -> bytes:
     if compression in ("", "none"):
         return data
     if compression == "zstd":
-        return _unpacked_zstd(data, limit)
+        decompressor = zstandard.ZstdDecompressor()
+        try:
+            stream = decompressor.stream_reader(BytesIO(data), read_across_frames=True)
+            return stream.read(limit + 1)
+        except zstandard.ZstdError as cause:
+            raise ValueError(str(cause)) from cause
     if compression == "bz2":
         return _unpacked_parts(data, bz2.BZ2Decompressor, limit)
     if compression == "lz4":
@@ -84,14 +90,6 @@ def _unpacked(data: bytes, compression: str, limit: int) -> bytes:
 
         return _unpacked_parts(data, lz4.frame.LZ4FrameDecompressor, limit)
     raise ValueError(f"compression {compression[:20]!r} given; zstd, lz4 or bz2 expected")
-
-
-def _unpacked_zstd(data: bytes, limit: int) -> bytes:
-    stream = zstandard.ZstdDecompressor().stream_reader(BytesIO(data), read_across_frames=True)
-    try:
-        return stream.read(limit + 1)
-    except zstandard.ZstdError as cause:
-        raise ValueError(str(cause)) from cause
 
 
 def _unpacked_parts(data: bytes, make: Callable[[], _Decompressor], limit: int) -> bytes:

@@ -54,10 +54,11 @@ class ControllerKind:
             )
         if not (lowest < highest).all():
             raise ValueError(f"{given.text}: lowest below highest expected for each joint")
+        types = tuple(JOINT_TYPES) if positions else ("Float64MultiArray",)
         return JointSetup(
             output=JointOutput.POSITIONS if positions else JointOutput.TORQUES,
             topic=given.topic("topic"),
-            message=JOINT_TYPES[given.word("type", _types(positions=positions))],
+            message=JOINT_TYPES[given.word("type", types)],
             order=order,
             max_torques=given.positive_joints("max_effort", n=n),
             torques=torques,
@@ -114,8 +115,3 @@ class WidthKind:
             stroke=stroke,
         )
         return WidthHand(name, link, setup, shared=given.shared)
-
-
-def _types(*, positions: bool) -> tuple[str, ...]:
-    """Return the names of the message types that carry set-points, or efforts."""
-    return tuple(JOINT_TYPES) if positions else ("Float64MultiArray",)

@@ -61,21 +61,18 @@ class DrivenTwin(LiveTwin):
     def read(self, timeout: float) -> Arrival | None:
         """Simulate the next sample with the newest command, and return it when it is due."""
         found = [] if self._reader is None else self._reader.take(0.0)
-        if found:
-            self._take(found[-1])
+        if found:  # the newest alone: a driver keeps its last command
+            self.n_commands += 1
+            try:
+                self.send(self._command(self._decode(found[-1])["data"]))
+            except (ValueError, HandError):
+                self.n_refused += 1
         return super().read(timeout)
 
     def close(self) -> None:
         """End the grasp and the subscription."""
         self._reader = None
         super().close()
-
-    def _take(self, data: bytes) -> None:
-        self.n_commands += 1
-        try:
-            self.send(self._command(self._decode(data)["data"]))
-        except (ValueError, HandError):
-            self.n_refused += 1
 
     def _command(self, values: np.ndarray) -> GripCommand:
         """Return the command that the largest torques (16,) mean.

@@ -167,6 +167,7 @@ class JointHand(RosHand):
             return np.full(n, np.nan), np.zeros(n)
         efforts = [state.efforts for state in states if len(state.efforts)]
         torques = np.zeros(n)
+        # A median of some of the states would be of another time than the positions.
         if len(efforts) == len(states):
             torques = np.median(efforts, axis=0)
         return np.median([state.positions for state in states], axis=0), torques
@@ -193,6 +194,7 @@ class JointHand(RosHand):
         if setup.output is JointOutput.TORQUES:
             return self._values(time, efforts=torques)
         if setup.output is JointOutput.LARGEST:
+            # A limit has no sign; the position control of the driver gives it.
             return self._values(time, efforts=np.abs(torques))
         targets = grip.positions + torques / setup.stiffness
         return self._values(time, positions=np.clip(targets, setup.lowest, setup.highest))

@@ -95,6 +95,7 @@ class JointOrder:
         names, n = states.names, len(states.positions)
         if not names and n == len(self.names):
             places = list(range(n))
+        # A publisher may name more joints than it sends positions of.
         elif missing := [name for name in self.names if name not in names[:n]]:
             have = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
             raise ValueError(f"no joint {missing[0]} (there are {have or 'no names'})")

@@ -99,6 +99,7 @@ class JointKind:
         torques = None
         if given.has("effort") or largest:
             torques = given.joints("effort", each=not largest)
+        # Only the kinds of V4 have known torques.
         is_v4 = self.max_torque is not None
         lowest, highest = _joint_limits(given, order, is_v4=is_v4)
         release = given.word("release", self.release)
@@ -240,6 +241,7 @@ def ros_hand(uri: str) -> HandDevice:
     """
     scheme, address = parse(uri)
     kinds = HAND_KINDS[scheme]
+    # ROS 1 has this grasp, so its name is answered with the reason and another way.
     if (scheme, address.path) == ("ros2", "v4-envelop"):
         raise ValueError(f"{uri}: {NO_ACTION}")
     kind = None if address.host else kinds.get(address.path)

@@ -155,6 +155,7 @@ class Parameters:
         try:
             found = [float(part) for part in (text or "").split(",")]
         except ValueError:
+            # Text gets the message of a wrong number of values.
             found = []
         if len(found) not in sizes or not all(map(math.isfinite, found)):
             given = "nothing" if text is None else repr(text)

@@ -64,7 +64,9 @@ class RosHand(HandDevice):
         self._states_topic, self._shared = states, shared
         self._publishers: dict[str, Publisher] = {}
         self._take_states: TakeStates | None = None
+        # Valid joint states and when they were read, newest last; `_poll` adds and drops them.
         self._states: deque[tuple[float, JointStates]] = deque()
+        # Angles since the last call of `joint_reports`, which empties it.
         self._reports: deque[Array] = deque(maxlen=MAX_JOINT_REPORTS)
         self._refusal = ""
 
@@ -118,8 +120,16 @@ class RosHand(HandDevice):
             self._wait(publisher.n_listeners, begun_at, partial(self._not_heard, topic))
         if self._take_states is not None:
             self._wait(self._poll, begun_at, self._no_states)
-        if not (self._shared or self.standby):
-            self._refuse_others(begun_at + DISCOVERY_TIME)
+        if self._shared or self.standby:  # a watchdog stands beside the loop that publishes
+            return
+        # Discovery of other publishers takes time, of which the waits above were a part.
+        time.sleep(max(begun_at + DISCOVERY_TIME - time.monotonic(), 0.0))
+        for topic in self._topics:
+            if self._link.n_other_publishers(topic):
+                raise HandError(
+                    f"{self.name}: another program publishes {topic} {self._link.where}: stop it, "
+                    "or give shared=true if it is silent while the loop runs"
+                )
 
     def close(self) -> None:
         """Disconnect. It has no effect on a hand that is closed."""
@@ -135,8 +145,23 @@ class RosHand(HandDevice):
         if not self._publishers:
             raise HandError(f"{self.name} is not open")
         self._poll()
-        if not self.standby:
-            self._check_answers()
+        if self.standby:  # it sends a release in any case, even if the hand seems dead
+            return
+        for topic, publisher in self._publishers.items():
+            if not publisher.n_listeners():
+                raise HandError(
+                    f"{self.name}: nothing listens on {topic} any more; the hand keeps its last "
+                    "command"
+                )
+        if self._take_states is None:
+            return
+        silence = time.monotonic() - self._states[-1][0]
+        if silence > STATE_TIMEOUT:
+            valid = "valid " if self._refusal else ""
+            raise HandError(
+                f"{self.name}: no {valid}joint states on {self._states_topic} for {silence:.1f} s"
+                f"{self._refused()}; the hand keeps its last command"
+            )
 
     def _send(self, command: GripCommand) -> None:
         if command.release:
@@ -178,26 +203,10 @@ class RosHand(HandDevice):
             else:
                 self._states.append((now, checked))
                 self._reports.append(checked.positions)
+        # Of a slow publisher the last ones stay, however old they are.
         while len(self._states) > MIN_STATES and now - self._states[0][0] > STATE_MEMORY:
             self._states.popleft()
         return len(self._states) >= MIN_STATES
-
-    def _check_answers(self) -> None:
-        for topic, publisher in self._publishers.items():
-            if not publisher.n_listeners():
-                raise HandError(
-                    f"{self.name}: nothing listens on {topic} any more; the hand keeps its last "
-                    "command"
-                )
-        if self._take_states is None:
-            return
-        silence = time.monotonic() - self._states[-1][0]
-        if silence > STATE_TIMEOUT:
-            valid = "valid " if self._refusal else ""
-            raise HandError(
-                f"{self.name}: no {valid}joint states on {self._states_topic} for {silence:.1f} s"
-                f"{self._refused()}; the hand keeps its last command"
-            )
 
     def _refused(self) -> str:
         """Return how many joint states were refused, and why the last one was."""
@@ -208,15 +217,6 @@ class RosHand(HandDevice):
             if time.monotonic() - begun_at > HAND_OPEN_TIMEOUT:
                 raise HandError(why())
             time.sleep(HAND_POLL_INTERVAL)
-
-    def _refuse_others(self, at: float) -> None:
-        time.sleep(max(at - time.monotonic(), 0.0))
-        for topic in self._topics:
-            if self._link.n_other_publishers(topic):
-                raise HandError(
-                    f"{self.name}: another program publishes {topic} {self._link.where}: stop it, "
-                    "or give shared=true if it is silent while the loop runs"
-                )
 
     def _not_heard(self, topic: str) -> str:
         others = ", ".join(self._link.subscribed_topics()) or "none"

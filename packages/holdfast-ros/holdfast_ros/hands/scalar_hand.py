@@ -102,6 +102,7 @@ class ScalarHand(RosHand):
             self._publish(self._setup.word_topic, {"data": HOME})
         else:
             setup, moves = self._setup, self._setup.message == GRIPPER_COMMAND
+            # A gripper that moves to a position needs an effort to open, too.
             value = setup.effort if moves else setup.open_value
             self._publish(setup.topic, self._message(setup.open_value, value))
 

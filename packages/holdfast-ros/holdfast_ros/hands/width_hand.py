@@ -165,6 +165,7 @@ class WidthHand(RosHand):
         if setup.message == FLOAT_ARRAY:
             return array_message(np.array([position]))
         if setup.message == GRIPPER_COMMAND:
+            # The width makes the force; the effort only limits the motor.
             return gripper_message(position, setup.max_effort)
         return number_message(position)
 

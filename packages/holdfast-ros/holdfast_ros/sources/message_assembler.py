@@ -1,6 +1,6 @@
 """Assembly of ROS messages into arrivals. No I/O and no clock: times are arguments."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from holdfast.devices.sources.assembler import Assembler, Device
@@ -71,6 +71,7 @@ class MessageAssembler:
             if one.counts is not None and self._unit == "N" and not len(one.forces):
                 raise SourceError(no_calibration(number, one.model))
         self._assembler.devices = self._devices(found)
+        # One kind for all devices: stamps of two clocks have no common order.
         self._stamp = next(
             (stamp for stamp in _STAMPS if any(stamp(one) is not None for one in found.values())),
             None,
@@ -91,7 +92,14 @@ class MessageAssembler:
         stamps = [received if self._stamp is None else self._stamp(one) for one in new]
         newest = max((stamp for stamp in stamps if stamp is not None), default=None)
         if newest is not None:
-            self._add(new, stamps, newest, received)
+            self._assembler.stamp(newest, received)
+            # A lost message lacks all of its devices, and counts once.
+            n_lost = [0]
+            for sample, stamp in zip(new, stamps, strict=True):
+                number = _number(sample)
+                n_lost.append(self._assembler.n_missing(sample.sequence, number))
+                self._assembler.add(number, readings_of(sample, self._unit), stamp)
+            self._assembler.n_lost += max(n_lost)
         elif new:
             self._assembler.refuse("time", "a message has no time, others had", received)
         return self._assembler.finish(received)
@@ -102,6 +110,7 @@ class MessageAssembler:
         return self._assembler.finish(received)
 
     def _devices(self, found: Mapping[int, DeviceSample]) -> dict[int, Device]:
+        # Only a PapillArray sends newtons without counts.
         hubs = [number for number, one in found.items() if one.counts is None]
         if hubs:
             return {number: self._papillarray(number, found[number]) for number in hubs}
@@ -133,21 +142,6 @@ class MessageAssembler:
             )
             and self._assembler.is_new(number, None if stamp is None else (sample.sequence, stamp))
         )
-
-    def _add(
-        self,
-        samples: Sequence[DeviceSample],
-        stamps: Sequence[float | None],
-        newest: float,
-        received: float,
-    ) -> None:
-        self._assembler.stamp(newest, received)
-        n_lost = [0]
-        for sample, stamp in zip(samples, stamps, strict=True):
-            number = _number(sample)
-            n_lost.append(self._assembler.n_missing(sample.sequence, number))
-            self._assembler.add(number, readings_of(sample, self._unit), stamp)
-        self._assembler.n_lost += max(n_lost)
 
 
 def has_taxels(sample: DeviceSample) -> bool:

@@ -152,6 +152,7 @@ class Ros1Subscription(Subscription):
             subscriber.unregister()
 
     def _put(self, message: Any) -> None:  # noqa: ANN401 (rospy.AnyMsg), in a thread of rospy
+        # Before the lock, for which it may wait.
         received = time.monotonic()
         with self._queue_changed:
             if len(self._queue) == MAX_QUEUED_MESSAGES:

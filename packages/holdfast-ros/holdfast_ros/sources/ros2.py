@@ -60,6 +60,7 @@ class Ros2Subscription(Subscription):
             SourceError: no node publishes, or the messages have an unsupported type.
         """
         self._node = dds.Node(self._domain)
+        # DDS connects a reader only to publishers of the same type.
         kind = self._type(deadline)
         definition = known_definition(kind, ros2=True)
         if definition is None:

@@ -136,6 +136,7 @@ class TopicSource(DeviceSource):
         notices = [text for device in self._assembler.devices.values() for text in device.notices]
         if notices:
             self._notify(now, *notices)
+        # The messages that identified the devices have samples, too.
         for message in messages:
             self._assemble(message)
         self._note_clock()
@@ -157,6 +158,7 @@ class TopicSource(DeviceSource):
                 invalid = why
                 continue
             messages.append(message)
+            # A device that comes again has come after all others.
             if any(sample.number in found for sample in samples):
                 break
             if samples and not found:
@@ -173,11 +175,15 @@ class TopicSource(DeviceSource):
         if n_dropped := self._subscription.n_dropped():
             text = f"{n_dropped} messages dropped: they were read too slowly"
             self._notify(time.monotonic(), text)
-        if message is None:
-            self._check_publishers()
-            return False
-        self._assemble(message)
-        return True
+        if message is not None:
+            self._assemble(message)
+            return True
+        now = time.monotonic()
+        if now - self._checked_at >= PUBLISHER_CHECK_INTERVAL:
+            self._checked_at = now
+            if not self._subscription.n_publishers():
+                self._lose("the topic has no publisher")
+        return False
 
     def _assemble(self, message: ReceivedMessage) -> None:
         received = message.received
@@ -186,14 +192,6 @@ class TopicSource(DeviceSource):
         except ValueError as why:
             arrivals = self._assembler.refuse(str(why), received)
         self._queue(arrivals, received)
-
-    def _check_publishers(self) -> None:
-        now = time.monotonic()
-        if now - self._checked_at < PUBLISHER_CHECK_INTERVAL:
-            return
-        self._checked_at = now
-        if not self._subscription.n_publishers():
-            self._lose("the topic has no publisher")
 
     def _pause(self, seconds: float) -> None:
         """Wait for a message of a new publisher."""

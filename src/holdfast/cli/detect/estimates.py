@@ -18,7 +18,7 @@ from holdfast.cli.options import (
     report_other_handling,
 )
 from holdfast.cli.terminal.console import print_message
-from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.contact import ContactEstimate, ContactState
 from holdfast.detector import Detection, Detector
 from holdfast.devices.sources import open_source
@@ -27,7 +27,7 @@ from holdfast.features import Tare
 from holdfast.io import load_recording, read_chunks
 from holdfast.live.fault_notices import FaultWatch
 from holdfast.live.readings_monitor import ReadingsMonitor
-from holdfast.live.stream_detector import StreamDetector, StreamEstimate, StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample, true_updates
@@ -112,6 +112,7 @@ def _read_parts(
     first = next(parts, None)
     if first is None:
         raise RecordingError(f"{path} has no samples; at least one expected")
+    # A sensor that the model does not know is refused before any other message.
     model.fingers_of({name: module.sensor for name, module in first.modules.items()})
     if not first.complete:
         print_message(f"{path} is cut off: only its readable part is used")
@@ -124,7 +125,7 @@ def _read_parts(
         first, parts = whole(), iter(())
     if model.rate is None or model.rate_fits(first.rate):
         if Tare.parse(model.tare).kind == "interval":
-            return iter([whole()])
+            return iter([whole()])  # the interval may lie after the first part
         return chain([first], parts)
     given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
     if rate is RatePolicy.STRICT:
@@ -144,23 +145,17 @@ def detect_live(
     with handle_stop_signals() as stop, open_source(uri) as source:
         stream = options.create_stream(model, source, start)
         report_missing_slip_rules(model)
+        # Ctrl-C before ends the wait; from here on the summary is still printed.
         stop.graceful = True
-        for update in _read_updates(stream, seconds, stop):
+        end = math.inf if seconds is None else monotonic() + seconds
+        faults = FaultWatch()
+        while not (source.ended or stop.requested) and monotonic() < end:
+            update = stream.read()
+            for notice in update.arrival.notices if update.arrival else ():
+                print_message(notice)
+            for estimate in update.estimates:
+                for problem in faults.update(estimate.estimate):
+                    print_message(problem.text)
             yield chunk_from_stream(source.name, update.estimates)
-
-
-def _read_updates(
-    stream: StreamDetector, seconds: float | None, stop: StopRequest
-) -> Iterator[StreamUpdate]:
-
-    end = math.inf if seconds is None else monotonic() + seconds
-    faults = FaultWatch()
-    while not (stream.source.ended or stop.requested) and monotonic() < end:
-        update = stream.read()
-        for notice in update.arrival.notices if update.arrival else ():
-            print_message(notice)
-        for estimate in update.estimates:
-            for problem in faults.update(estimate.estimate):
-                print_message(problem.text)
-        yield update
-    yield stream.finish()
+        # Samples that a short source sent before its rate was known.
+        yield chunk_from_stream(source.name, stream.finish().estimates)

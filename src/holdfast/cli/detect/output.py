@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from math import isnan, nan
 from operator import attrgetter, itemgetter
@@ -54,7 +54,7 @@ def json_lines(chunk: EstimateChunk) -> Iterator[str]:
         for finger, estimates in chunk.fingers.items()
         for estimate in estimates
     ]
-    lines.sort(key=attrgetter("time"))
+    lines.sort(key=attrgetter("time"))  # each finger has times of its own
     encoder = Encoder()
     for start in range(0, len(lines), LINES_PER_BLOCK):
         # A list, because msgspec 0.22 leaks the items of an iterator.
@@ -69,12 +69,12 @@ class DetectionSummary:
 
     def __init__(self) -> None:
         self._name = ""
-        self._counts: dict[str, _StateCounts] = {}
+        self._counts: dict[str, _StateCounts] = {}  # of each finger and of the hand
         self._changes: dict[str, StateChanges] = {}
         self._events: dict[str, list[ContactEvent]] = {}
-        self._start: float | None = None
+        self._start: float | None = None  # time of the first instant of the hand [s]
         self._watch = SlipWatch()
-        self._ended_slips: list[DetectedSlip] = []
+        self._ended_slips: list[DetectedSlip] = []  # `_watch` keeps only those that have not ended
 
     def add(self, chunk: EstimateChunk) -> None:
         """Add the next chunk of the same recording or source."""
@@ -124,11 +124,6 @@ class DetectionSummary:
             [(name, *self._counts[name].causes()) for name in names if name != HAND],
         )
         origin = shown_origin(self._start or 0.0)
-        self._print_events(origin)
-        if self._watch.has_rule:
-            self._print_slips(origin)
-
-    def _print_events(self, origin: float) -> None:
         events = self._sorted_events()
         print_line()
         if origin:
@@ -142,6 +137,8 @@ class DetectionSummary:
         )
         if len(events) > MAX_EVENTS_SHOWN:
             print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
+        if self._watch.has_rule:
+            self._print_slips(origin)
 
     def _print_slips(self, origin: float) -> None:
         slips = self._sorted_slips()
@@ -149,10 +146,17 @@ class DetectionSummary:
         if not slips:
             print_line("no slips")
             return
-        print_table(
-            ("slip from [s]", "to [s]", "finger", "largest P(slip) %", "slid [mm]"),
-            [_slip_cells(slip, origin) for slip in slips[:MAX_EVENTS_SHOWN]],
-        )
+        rows = [
+            (
+                f"{slip.begin - origin:.3f}",
+                "-" if slip.end is None else f"{slip.end - origin:.3f}",
+                slip.finger,
+                f"{100 * slip.max_probability:.0f}",
+                "-" if slip.distance is None else f"{slip.distance:.1f}",
+            )
+            for slip in slips[:MAX_EVENTS_SHOWN]
+        ]
+        print_table(("slip from [s]", "to [s]", "finger", "largest P(slip) %", "slid [mm]"), rows)
         if len(slips) > MAX_EVENTS_SHOWN:
             print_line(f"and {len(slips) - MAX_EVENTS_SHOWN} more slips (--json prints all)")
 
@@ -169,14 +173,6 @@ class DetectionSummary:
         return sorted([*self._ended_slips, *self._watch.running], key=attrgetter("begin"))
 
 
-def _slip_cells(slip: DetectedSlip, origin: float) -> tuple[object, ...]:
-    """Return a slip as cells of a table."""
-    end = "-" if slip.end is None else f"{slip.end - origin:.3f}"
-    distance = "-" if slip.distance is None else f"{slip.distance:.1f}"
-    percent = f"{100 * slip.max_probability:.0f}"
-    return f"{slip.begin - origin:.3f}", end, slip.finger, percent, distance
-
-
 class _StateCounts:
     """Number of samples with each state, reason and fault."""
 
@@ -190,8 +186,8 @@ class _StateCounts:
         return {
             "n_samples": n,
             "states": {state.value: self.states[state] / n if n else 0.0 for state in ContactState},
-            "reasons": _ordered(self.reasons, Reason),
-            "faults": _ordered(self.faults, Fault),
+            "reasons": {x.value: self.reasons[x] for x in Reason if self.reasons[x]},
+            "faults": {x.value: self.faults[x] for x in Fault if self.faults[x]},
         }
 
     def shares(self) -> tuple[object, ...]:
@@ -202,16 +198,11 @@ class _StateCounts:
     def causes(self) -> tuple[str, str]:
         """Return the counts of reasons and of faults as cells of a table."""
         counts = self.to_dict()
-        return _text(counts["reasons"]), _text(counts["faults"])
-
-
-def _ordered(counts: Counter[Any], members: Iterable[Any]) -> dict[str, int]:
-    """Return the counts that are not zero, in the order of the members."""
-    return {member.value: counts[member] for member in members if counts[member]}
-
-
-def _text(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{name} {n}" for name, n in counts.items()) or "-"
+        reasons, faults = (
+            ", ".join(f"{name} {n}" for name, n in counts[key].items()) or "-"
+            for key in ("reasons", "faults")
+        )
+        return reasons, faults
 
 
 class ChangeLines:
@@ -229,6 +220,7 @@ class ChangeLines:
         self.origin = nan
         self._from_first = from_first
         self._changes: dict[str, StateChanges] = {}
+        # State of each finger, and why it began.
         self._why: dict[str, tuple[ContactState, str]] = {}
         self._watch = SlipWatch()
 
@@ -239,22 +231,17 @@ class ChangeLines:
             self.origin = first if self._from_first else shown_origin(first)
         lines: list[tuple[float, str]] = []
         for finger, estimates in chunk.fingers.items():
-            lines += self._finger_changes(finger, estimates)
+            for estimate in estimates:
+                # The reason at the change, not that of the sample at which it has lasted.
+                if self._why.get(finger, (None,))[0] is not estimate.state:
+                    self._why[finger] = estimate.state, why(estimate)
+                events = self._lasting(finger, estimate.state, estimate.time)
+                lines += [self._line(event, self._why[finger][1]) for event in events]
             lines += map(self._slip_line, self._watch.update(finger, estimates))
         for time, state in chunk.hand:
             lines += [self._line(event, "") for event in self._lasting(HAND, state, time)]
         lines.sort(key=itemgetter(0))
         return [line for _, line in lines]
-
-    def _finger_changes(
-        self, finger: str, estimates: Sequence[ContactEstimate]
-    ) -> Iterator[tuple[float, str]]:
-        """Yield the time and the line of each change of a finger."""
-        for estimate in estimates:
-            if self._why.get(finger, (None,))[0] is not estimate.state:
-                self._why[finger] = estimate.state, why(estimate)
-            for event in self._lasting(finger, estimate.state, estimate.time):
-                yield self._line(event, self._why[finger][1])
 
     def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
         changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))
@@ -302,7 +289,7 @@ def print_estimates(chunks: Iterator[EstimateChunk], *, live: bool) -> None:
         for text in json_lines(chunk):
             sys.stdout.write(text)
         if live:
-            sys.stdout.flush()
+            sys.stdout.flush()  # a program that reads the pipe acts on each estimate
 
 
 def print_changes(chunks: Iterator[EstimateChunk], *, live: bool) -> None:

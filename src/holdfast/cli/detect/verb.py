@@ -8,7 +8,6 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
-    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -32,7 +31,7 @@ def detect(
     *,
     options: DetectorOptions,
     start: StartOptions,
-    csv: Annotated[CsvOptions, RARE],
+    csv: CsvOptions,
     seconds: SecondsOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,7 +56,6 @@ def detect(
       holdfast detect builtin:any xela://auto
       holdfast detect builtin:noise-floor grasp.mcap --summary
       holdfast detect builtin:any press.csv --sensor sensor.json
-      holdfast detect model.json grasp.parquet --debounce 0.05 --hysteresis 0.1
     """
     from holdfast.cli.detect.estimates import detect_live, detect_recording
     from holdfast.cli.detect.output import print_changes, print_estimates, print_summary

@@ -1,6 +1,6 @@
 """`holdfast label audit`: labels that a classifier contradicts."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from holdfast.cli.label.inputs import (
     LABEL_ADDRESS,
@@ -12,9 +12,6 @@ from holdfast.cli.label.inputs import (
 from holdfast.cli.options import RARE, BrowserOption, JobsOption, JsonOption, ServerOptions
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.errors import require_extras
-
-if TYPE_CHECKING:
-    from holdfast.labelling.review.audit import Audit
 
 
 def audit(
@@ -52,32 +49,28 @@ def audit(
     if as_json and not page:  # the page prints its own
         print_json(to_builtins(result))
     else:
-        _print_suspects(result)
+        rows = [
+            (
+                suspect.recording, suspect.finger, suspect.kind,
+                f"{suspect.start:.2f}", f"{suspect.end:.2f}",
+                suspect.given, suspect.expected, f"{suspect.confidence:.2f}",
+                "-" if suspect.shift is None else f"{suspect.shift:+.2f}",
+            )
+            for suspect in result.suspects
+        ]  # fmt: skip
+        if rows:
+            header = (
+                "recording", "finger", "kind", "start [s]", "end [s]",
+                "label", "expected", "confidence", "shift [s]",
+            )  # fmt: skip
+            print_table(header, rows)
+            print_line()
+        print_line(
+            f"{len(rows)} suspects in {result.judged:.1f} s of labels of "
+            f"{result.n_recordings} recordings"
+        )
     if page:
         show_label_page(
             paths, options, access, author,
             browser=browser is not False, as_json=as_json, suspects=result.suspects,
         )  # fmt: skip
-
-
-def _print_suspects(result: "Audit") -> None:
-    rows = [
-        (
-            suspect.recording, suspect.finger, suspect.kind,
-            f"{suspect.start:.2f}", f"{suspect.end:.2f}",
-            suspect.given, suspect.expected, f"{suspect.confidence:.2f}",
-            "-" if suspect.shift is None else f"{suspect.shift:+.2f}",
-        )
-        for suspect in result.suspects
-    ]  # fmt: skip
-    if rows:
-        header = (
-            "recording", "finger", "kind", "start [s]", "end [s]",
-            "label", "expected", "confidence", "shift [s]",
-        )  # fmt: skip
-        print_table(header, rows)
-        print_line()
-    print_line(
-        f"{len(rows)} suspects in {result.judged:.1f} s of labels of "
-        f"{result.n_recordings} recordings"
-    )

@@ -1,8 +1,7 @@
 """`holdfast label auto`: write the labels that a rule proposes."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -42,6 +41,7 @@ def auto(
         --track object=/aruco/pose
     """
     require_extras("label")
+    from holdfast.features import Tare
     from holdfast.labelling.rules import RULES
 
     if rule not in RULES:
@@ -52,27 +52,16 @@ def auto(
         return options.propose(rule, recording, path)
 
     documents = label_all(paths, labels_of, author or f"rule:{rule}", saving)
-    _report_loaded_starts(documents, options.tare)
-    print_labelled({"rule": rule}, documents, saving, as_json=as_json)
-
-
-def _report_loaded_starts(documents: Sequence[dict[str, Any]], tare: str | None) -> None:
-    """Report recordings that begin in contact, and whether the tare fits them.
-
-    Args:
-        documents: from `label_all`.
-        tare: of the option `--tare`, if it is given.
-    """
-    from holdfast.features import Tare
-
     loaded = [document for document in documents if document.get("starts_loaded")]
-    if not loaded or (tare is not None and not Tare.parse(tare).without_contact):
-        return
-    first = loaded[0]
-    text = f"{len(loaded)} of {len(documents)} recordings begin in contact "
-    text += f"({first['name']}: {first['starts_loaded']})"
-    if tare is not None:
-        print_message(f"{text}: a tare of {tare} s contains their grip, --tare first fits them")
-        return
-    more = "; if the others do too, give --tare first" if len(loaded) < len(documents) else ""
-    print_message(f"{text}: the first sample is their tare{more}")
+    if loaded and (options.tare is None or Tare.parse(options.tare).without_contact):
+        first = loaded[0]
+        text = f"{len(loaded)} of {len(documents)} recordings begin in contact "
+        text += f"({first['name']}: {first['starts_loaded']})"
+        if options.tare is not None:
+            text += f": a tare of {options.tare} s contains their grip, --tare first fits them"
+        else:
+            text += ": the first sample is their tare"
+            if len(loaded) < len(documents):
+                text += "; if the others do too, give --tare first"
+        print_message(text)
+    print_labelled({"rule": rule}, documents, saving, as_json=as_json)

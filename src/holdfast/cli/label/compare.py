@@ -77,6 +77,8 @@ def compare(
 
 
 def _print(agreement: "Agreement") -> None:
+    from holdfast.contact import Cause
+
     header = (
         "recording", "finger", "kappa", "kappa stable", "onsets", "median [ms]", "p95 [ms]",
         "only A [%]", "only B [%]", "not in A", "not in B",
@@ -98,24 +100,17 @@ def _print(agreement: "Agreement") -> None:
         "onset differences: B minus A, for onsets of instability in both; "
         "not in A, not in B: number of intervals that only the other has"
     )
-    _print_causes(agreement.pooled)
-
-
-def _print_causes(pooled: "PooledAgreement") -> None:
-    """Print the number of samples by their cause in A and in B, if both give causes."""
-    from holdfast.contact import Cause
-
-    counts = dict(zip(Cause, pooled.causes, strict=True))
+    counts = dict(zip(Cause, agreement.pooled.causes, strict=True))
     columns = [k for k in range(len(Cause)) if any(row[k] for row in counts.values())]
-    if not columns:
+    if not columns:  # one of both gives no causes
         return
-    rows = [(cause, *(row[k] for k in columns)) for cause, row in counts.items() if any(row)]
+    table = [(cause, *(row[k] for k in columns)) for cause, row in counts.items() if any(row)]
     print_line()
-    print_table(("cause", *(list(Cause)[k] for k in columns)), rows)
+    print_table(("cause", *(list(Cause)[k] for k in columns)), table)
     print_line()
     print_paragraph(
         "samples for which both give a cause, by that in A (rows) and in B (columns); "
-        f"their kappa is {format_number(pooled.kappa_cause, 3)}"
+        f"their kappa is {format_number(agreement.pooled.kappa_cause, 3)}"
     )
 
 

@@ -1,6 +1,7 @@
 """Inputs of the modes of `holdfast label`: recordings, and options that modes share."""
 
 import getpass
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -105,8 +106,12 @@ class RuleOptions:
         """
         arguments: dict[str, Any] = {
             "tare": self.tare,
-            **dict(map(_parameter, self.parameters or ())),
         }
+        for text in self.parameters or ():
+            name, value = _pair(text, "--set NAME=VALUE")
+            arguments[name] = value
+            with suppress(ValueError):  # a word, as of a choice
+                arguments[name] = float(value)
         if self.tracking is not None:
             if rule != "tracking":
                 raise ValueError(f"--poses are for the rule tracking; rule {rule!r} given")
@@ -141,17 +146,14 @@ class RuleOptions:
             arguments.setdefault("video", beside)
         if "video" in arguments:
             require_extras("video")
-            arguments["fps"], arguments["bodies"] = self.fps, self._stickers()
+            pairs = [_pair(text, "--track BODY=NUMBER") for text in self.tracks or ()]
+            if wrong := [name for _, name in pairs if not name.isdecimal()]:
+                raise ValueError(f"--track BODY=NUMBER expected with a video, {wrong[0]!r} given")
+            arguments["bodies"] = {body: int(number) for body, number in pairs} or None
+            arguments["fps"] = self.fps
         elif self.fps is not None:
             raise ValueError("--fps is for a video: give --video FILE")
         return propose(rule, recording, **arguments)
-
-    def _stickers(self) -> dict[str, int] | None:
-        """Return the number of the sticker of each body that is given."""
-        pairs = [_pair(text, "--track BODY=NUMBER") for text in self.tracks or ()]
-        if wrong := [name for _, name in pairs if not name.isdecimal()]:
-            raise ValueError(f"--track BODY=NUMBER expected with a video, {wrong[0]!r} given")
-        return {body: int(number) for body, number in pairs} or None
 
 
 @dataclass(frozen=True)
@@ -175,14 +177,6 @@ def login_name() -> str:
 def current_time() -> str:
     """Return the time in ISO 8601 format."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
-
-
-def _parameter(text: str) -> tuple[str, Any]:
-    name, value = _pair(text, "--set NAME=VALUE")
-    try:
-        return name, float(value)
-    except ValueError:
-        return name, value
 
 
 def _pair(text: str, expected: str) -> tuple[str, str]:

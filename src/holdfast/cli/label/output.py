@@ -36,6 +36,7 @@ def label_all(
     from holdfast.labelling.labelled_files import check_no_manual_labels, label_file, recordings_at
 
     files = recordings_at(paths)
+    # All are checked before the first is written.
     if not (saving.dry_run or saving.force):
         check_no_manual_labels(files)
     return [

@@ -18,8 +18,6 @@ from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
     from holdfast.labelling.review.audit import Suspect
-    from holdfast.labelling.server.workspace import Workspace
-
 END_TIMEOUT = 10.0
 """Time for which the preparation may go on after Ctrl-C [s]."""
 
@@ -50,6 +48,7 @@ def show_label_page(
         ValueError: other hosts may connect, but there is no token.
         OutputError: the address is not available.
     """
+    from holdfast.errors import HoldfastError
     from holdfast.labelling.labelled_files import recordings_at
     from holdfast.labelling.server.service import LabellingService
     from holdfast.labelling.server.workspace import Workspace
@@ -69,27 +68,19 @@ def show_label_page(
     )
 
     def announce(url: str) -> None:
-        _announce(page_url(url, token), files, browser=browser, as_json=as_json)
+        page = page_url(url, token)
+        if as_json:
+            print_json({"url": page, "recordings": len(files)})
+            sys.stdout.flush()  # a program that reads the pipe waits for the address
+        where = "is open in the browser" if browser and open_browser(page) else "is the page"
+        what = f"{len(files)} recordings" if len(files) > 1 else files[0]
+        print_message(f"{page} {where} for {what}; Ctrl-C stops it")
 
-    preparing = Thread(target=_prepare, args=(workspace,), daemon=True)
+    def prepare() -> None:  # read the first recording while the browser starts
+        with suppress(HoldfastError, ValueError, OSError):  # the page reports it
+            workspace.changes(0)
+
+    preparing = Thread(target=prepare, daemon=True)
     preparing.start()
     run_server(LabellingService(workspace, guard).app, access.host, access.port, announce)
     preparing.join(END_TIMEOUT)  # a library that is at work when Python ends stops with an error
-
-
-def _announce(page: str, files: Sequence[Path], *, browser: bool, as_json: bool) -> None:
-    """Print the address of the page, and open it in a browser."""
-    if as_json:
-        print_json({"url": page, "recordings": len(files)})
-        sys.stdout.flush()
-    where = "is open in the browser" if browser and open_browser(page) else "is the page"
-    what = f"{len(files)} recordings" if len(files) > 1 else files[0]
-    print_message(f"{page} {where} for {what}; Ctrl-C stops it")
-
-
-def _prepare(workspace: "Workspace") -> None:
-    """Read the first recording while the browser starts."""
-    from holdfast.errors import HoldfastError
-
-    with suppress(HoldfastError, ValueError, OSError):  # the page reports it
-        workspace.changes(0)

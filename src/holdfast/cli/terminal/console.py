@@ -38,12 +38,13 @@ def visible_json(text: str) -> str:
 
     JSON itself escapes only the first 32 characters, and terminals have further control characters.
     """
-    if text.isascii() and "\x7f" not in text:
+    if text.isascii() and "\x7f" not in text:  # nothing to escape, as in nearly all texts
         return text
     return "".join(c if c.isprintable() or c == "\n" else _json_escape(c) for c in text)
 
 
 def _json_escape(character: str) -> str:
+    # Escapes of JSON are units of UTF-16; file names that are not UTF-8 have lone surrogates.
     units = character.encode("utf-16-be", "surrogatepass").hex()
     return "".join(f"\\u{units[place : place + 4]}" for place in range(0, len(units), 4))
 
@@ -57,6 +58,7 @@ def print_message(text: str) -> None:
 def message_if_slow(text: str, after: float = SLOW_AFTER) -> Iterator[None]:
     """Print a message if the body takes longer than `after` [s]; an empty message never."""
     timer = Timer(after, print_message, (text,))
+    # A process that ends while it waits does not wait for the timer.
     timer.daemon = True
     if text:
         timer.start()
@@ -137,7 +139,12 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
     lines = [[visible(str(cell)) for cell in row] for row in (header, *rows)]
     columns = list(zip(*lines, strict=True))
     numeric = [all(_is_number(cell) for cell in column[1:]) for column in columns]
-    ranges = [_width_range(*both) for both in zip(columns, numeric, strict=True)]
+    ranges = []  # smallest and natural width of each column; its first cell is its heading
+    for column, is_number in zip(columns, numeric, strict=True):
+        widest, least = max(map(len, column)), MIN_TEXT_WIDTH
+        if is_number:  # the words of the heading may stand below each other, a number is whole
+            least = max(map(len, (*column[0].split(), *column[1:], "")))
+        ranges.append((min(widest, least), widest))
     widths = _fit(ranges, numeric)
     for k, row in enumerate(lines):
         cells = [_wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
@@ -145,19 +152,11 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
         if k == 0 and any(numeric):  # a heading stands directly above its numbers
             cells = [[""] * (height - len(cell)) + cell for cell in cells]
         for parts in zip_longest(*cells, fillvalue=""):
-            print_line(_GAP.join(map(_align, parts, widths, numeric)).rstrip())
-
-
-def _align(cell: str, width: int, numeric: bool) -> str:
-    return cell.rjust(width) if numeric else cell.ljust(width)
-
-
-def _width_range(column: Sequence[str], numeric: bool) -> tuple[int, int]:
-    """Return the smallest and the natural width of a column whose first cell is its heading."""
-    widest = max(map(len, column))
-    if not numeric:
-        return min(widest, MIN_TEXT_WIDTH), widest
-    return max(map(len, (*column[0].split(), *column[1:], ""))), widest
+            padded = [
+                part.rjust(width) if is_number else part.ljust(width)
+                for part, width, is_number in zip(parts, widths, numeric, strict=True)
+            ]
+            print_line(_GAP.join(padded).rstrip())
 
 
 def _fit(ranges: Sequence[tuple[int, int]], numeric: Sequence[bool]) -> list[int]:
@@ -167,6 +166,7 @@ def _fit(ranges: Sequence[tuple[int, int]], numeric: Sequence[bool]) -> list[int
     """
     available = get_terminal_size().columns
     widths = [max(least, min(widest, available)) for least, widest in ranges]
+    # Each round takes one character from the column with most room, headings of numbers first.
     for _ in range(sum(widths) + len(_GAP) * (len(widths) - 1) - available):
         room = [
             (width > least and is_number, width - least)
@@ -185,29 +185,28 @@ def _wrap(text: str, width: int) -> list[str]:
     """
     if len(text) <= width:
         return [text]
-    parts = (part for word in text.split(" ") for part in _split(word, width))
+    parts = []
+    for word in text.split(" "):
+        start = 0
+        while len(word) - start > width:
+            marks = (word.rfind(mark, start, start + width) for mark in "_-/.")
+            end = max(marks) + 1 or start + width
+            parts.append(word[start:end])
+            start = end
+        parts.append(word[start:])
     return wrap(" ".join(parts), width, break_on_hyphens=False)
-
-
-def _split(word: str, width: int) -> Iterator[str]:
-    """Yield the parts of a word, each at most `width` long."""
-    start = 0
-    while len(word) - start > width:
-        end = max(word.rfind(mark, start, start + width) for mark in "_-/.") + 1 or start + width
-        yield word[start:end]
-        start = end
-    yield word[start:]
 
 
 def _is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:
-        return text in ("", "-")
+        return text in ("", "-")  # a dash stands for a number that is not known
     return True
 
 
 def _to_json_value(value: object) -> object:
+    # Arrays and scalars of NumPy, without an import of it.
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Mapping):

@@ -42,9 +42,10 @@ class MarkerKeys:
 
     def __init__(self) -> None:
         self.interactive = self.stop_pressed = False
-        self._stdin: int | None = None
+        self._stdin: int | None = None  # None if nothing can be read, also after the end of a pipe
+        # Sets the terminal back; None if it was not switched.
         self._restore: Callable[[], None] | None = None
-        self._unfinished_line = b""
+        self._unfinished_line = b""  # bytes of a pipe after its last newline
 
     def __enter__(self) -> Self:
         with suppress(OSError, ValueError, AttributeError):
@@ -67,8 +68,13 @@ class MarkerKeys:
         """Return the markers since the last call."""
         data = self._read()
         if not self.interactive:
-            return self._split_lines(data)
-        keys = data.decode(errors="replace").lower()
+            *lines, self._unfinished_line = (self._unfinished_line + data).split(b"\n")
+            # A pipe without newlines fills no memory.
+            if len(self._unfinished_line) > _MAX_LINE_LENGTH:
+                lines, self._unfinished_line = [*lines, self._unfinished_line], b""
+            texts = (line.decode(errors="replace").strip() for line in lines)
+            return [text for text in texts if text]
+        keys = data.decode(errors="replace").lower()  # also with caps lock
         self.stop_pressed |= STOP_KEY in keys
         return [MARKER_KEYS[key] for key in keys if key in MARKER_KEYS]
 
@@ -80,14 +86,17 @@ class MarkerKeys:
             import tty
         except ImportError:  # not a POSIX system
             return
+        # The system stops a process in the background that changes the terminal.
         if os.tcgetpgrp(stdin) != os.getpgrp():
             return
         before = termios.tcgetattr(stdin)
 
         def restore() -> None:
             with suppress(termios.error):  # the terminal is closed
+                # After what was written is shown.
                 termios.tcsetattr(stdin, termios.TCSADRAIN, before)
 
+        # Before the switch: an interrupt in between leaves the terminal as it was.
         self._stdin, self._restore, self.interactive = stdin, restore, True
         tty.setcbreak(stdin)
 
@@ -95,22 +104,15 @@ class MarkerKeys:
         if self._stdin is None:
             return b""
         try:
-            if not select.select([self._stdin], [], [], 0)[0]:
+            if not select.select([self._stdin], [], [], 0)[0]:  # 0: never wait
                 return b""
             data = os.read(self._stdin, _MAX_LINE_LENGTH)
         except (OSError, ValueError):  # stdin is closed, or cannot be polled
             data = b""
         if not data:  # end of file
             self._stdin = None
-            return b"\n"
+            return b"\n"  # ends a last line without a newline
         return data
-
-    def _split_lines(self, data: bytes) -> list[str]:
-        *lines, self._unfinished_line = (self._unfinished_line + data).split(b"\n")
-        if len(self._unfinished_line) > _MAX_LINE_LENGTH:
-            lines, self._unfinished_line = [*lines, self._unfinished_line], b""
-        texts = (line.decode(errors="replace").strip() for line in lines)
-        return [text for text in texts if text]
 
 
 @dataclass
@@ -137,19 +139,16 @@ class StopRequest:
 def handle_stop_signals() -> Iterator[StopRequest]:
     """Handle the stop signals inside a `with` block; only in the main thread."""
     stop = StopRequest()
-    numbers = _stop_signals() if threading.current_thread() is threading.main_thread() else []
+    numbers = []
+    if threading.current_thread() is threading.main_thread():  # the only one that may set handlers
+        numbers = [signal.SIGINT, signal.SIGTERM]
+        hang_up = getattr(signal, "SIGHUP", None)  # Windows has none
+        # Under nohup, SIGHUP is ignored: the command goes on when the terminal is closed.
+        if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
+            numbers.append(hang_up)
     previous = [(number, signal.signal(number, stop)) for number in numbers]
     try:
         yield stop
     finally:
         for number, handler in previous:
             signal.signal(number, handler)
-
-
-def _stop_signals() -> list[signal.Signals]:
-    """Return the stop signals; without SIGHUP if it is ignored, as under nohup."""
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    hang_up = getattr(signal, "SIGHUP", None)
-    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
-        numbers.append(hang_up)
-    return numbers

@@ -74,10 +74,11 @@ class ProgressBar:
     def __init__(self, description: str, total: float | None = None) -> None:
         self._description = description
         self._total = total
-        self._done = 0.0
-        self._started_at = self._last_message_at = time.monotonic()
-        self._bar: Progress | None = None
-        self._lock = Lock()
+        self._done = 0.0  # sum of the costs of finished steps
+        self._started_at = self._last_message_at = time.monotonic()  # [s, monotonic]
+        self._bar: Progress | None = None  # None until it appears
+        self._lock = Lock()  # the timer and `advance` start the bar in two threads
+        # A first step may take minutes, and only then is `advance` called.
         self._timer = Timer(DISPLAY_DELAY, self._display)
         self._timer.daemon = True
 
@@ -85,7 +86,12 @@ class ProgressBar:
         """Add the cost of a finished step."""
         self._done += cost
         if not sys.stderr.isatty():
-            self._print_sometimes()
+            now = time.monotonic()
+            if self._total and now - self._last_message_at > PROGRESS_INTERVAL:
+                self._last_message_at = now
+                left = self._expected_duration() - (now - self._started_at)
+                text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"
+                print_message(f"{self._description}: {self._done / self._total:.0%}{text}")
         elif time.monotonic() - self._started_at > DISPLAY_DELAY:
             self._display()
 
@@ -108,14 +114,6 @@ class ProgressBar:
                 completed=self._done,
                 ends=self._started_at + self._expected_duration(),
             )
-
-    def _print_sometimes(self) -> None:
-        now = time.monotonic()
-        if self._total and now - self._last_message_at > PROGRESS_INTERVAL:
-            self._last_message_at = now
-            left = self._expected_duration() - (now - self._started_at)
-            text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"
-            print_message(f"{self._description}: {self._done / self._total:.0%}{text}")
 
     def _expected_duration(self) -> float:
         """Return the expected time from start to end [s]; NaN if it is not known yet."""
@@ -171,8 +169,8 @@ class StatusLine:
 
     def __init__(self, recorder: "Recorder") -> None:
         self._recorder = recorder
-        self._live: Live | None = None
-        self._next_update = 0.0
+        self._live: Live | None = None  # None where stderr is no terminal
+        self._next_update = 0.0  # [s, monotonic]
 
     def __enter__(self) -> Self:
         self._next_update = time.monotonic()

@@ -136,11 +136,7 @@ class LiveService:
         self._newest_document = b"{}"  # for GET, made for the WebSockets anyway
         self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
-        self.app.add_routes(self._routes())
-        self.app.cleanup_ctx.append(self._publish)
-
-    def _routes(self) -> list[web.AbstractRouteDef]:
-        return [
+        routes: list[web.AbstractRouteDef] = [
             web.get("/", self._get_page),
             web.static("/page", PAGE_FOLDER),
             web.static("/web", SHARED_FOLDER),
@@ -159,6 +155,8 @@ class LiveService:
             *(web.static(f"/panels/{panel.name}", panel.folder) for panel in self._panels),
             *(route for panel in self._panels for route in panel.routes(self._status.add_notice)),
         ]
+        self.app.add_routes(routes)
+        self.app.cleanup_ctx.append(self._publish)
 
     def _mark(self, text: str, time: float) -> None:
         """Add an event of a panel to the recording, if one is running."""
@@ -278,13 +276,15 @@ class LiveService:
 
     async def _post_recording(self, request: web.Request) -> web.Response:
         name = (await self._bodies.read(request, _FileRequest)).name
-        return await _answer(lambda: self._start_recording(name))
 
-    def _start_recording(self, name: str) -> dict[str, str]:
-        path = self._recorder.start(name)
-        for panel in self._panels:
-            self._recorder.add_marker(panel.summary())
-        return {"path": str(path)}
+        def start() -> dict[str, str]:
+            path = self._recorder.start(name)
+            # The events of panels before this are not in the recording; a summary stands for them.
+            for panel in self._panels:
+                self._recorder.add_marker(panel.summary())
+            return {"path": str(path)}
+
+        return await _answer(start)
 
     async def _delete_recording(self, _: web.Request) -> web.Response:
         return await _answer(lambda: recording_info(self._recorder.stop()))

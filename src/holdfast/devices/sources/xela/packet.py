@@ -64,7 +64,22 @@ class Counts(msgspec.Struct):
         """
         if not self.data:
             return _points(_from_integers(self.integer)) if self.integer else None
-        counts = _from_hex(self.data)
+        # Checked as a whole: a loop over 1,100 numbers would take most of the time of a packet.
+        text = self.data
+        n = (len(text) + 1) // 5
+        if len(text) != 5 * n - 1 or text[4::5] != "," * (n - 1):
+            raise InvalidPacket(
+                "four hexadecimal digits a number expected in data, with commas between"
+            )
+        try:
+            digits = bytes.fromhex(text.replace(",", ""))
+        except ValueError as cause:
+            raise InvalidPacket(
+                "data contains characters that are no hexadecimal digits"
+            ) from cause
+        if len(digits) != 2 * n:  # fromhex skips white space
+            raise InvalidPacket("data contains characters that are no hexadecimal digits")
+        counts = np.frombuffer(digits, ">u2").astype(np.uint16)
         # A packet that contradicts itself is damaged; comparing costs little.
         if self.integer and _from_integers(self.integer).tobytes() != counts.tobytes():
             raise InvalidPacket("data and integer differ")
@@ -208,23 +223,6 @@ def _stamp(time: object) -> float:
     if not is_plausible(time):
         raise InvalidPacket("its time is thousands of years away")
     return float(time)
-
-
-def _from_hex(text: str) -> npt.NDArray[np.uint16]:
-    """Parse numbers of four hexadecimal digits, separated by commas."""
-    # Checked as a whole: a loop over 1,100 numbers would take most of the time of a packet.
-    n = (len(text) + 1) // 5
-    if len(text) != 5 * n - 1 or text[4::5] != "," * (n - 1):
-        raise InvalidPacket(
-            "four hexadecimal digits a number expected in data, with commas between"
-        )
-    try:
-        digits = bytes.fromhex(text.replace(",", ""))
-    except ValueError as cause:
-        raise InvalidPacket("data contains characters that are no hexadecimal digits") from cause
-    if len(digits) != 2 * n:  # fromhex skips white space
-        raise InvalidPacket("data contains characters that are no hexadecimal digits")
-    return np.frombuffer(digits, ">u2").astype(np.uint16)
 
 
 def _from_integers(values: list[int]) -> npt.NDArray[np.uint16]:
