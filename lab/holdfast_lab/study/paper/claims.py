@@ -287,7 +287,7 @@ def claim_effect(
         n = np.array([len(recording.settling) for recording in used], dtype=np.float64)
 
         def statistic(draws: Array) -> Array:
-            return np.exp((draws @ total) / (draws @ n))
+            return np.asarray(np.exp((draws @ total) / (draws @ n)))
 
     if not used:
         return None, None, 0
