@@ -97,13 +97,30 @@ def methods_text(plan: StudyPlan, summary: Mapping[str, Any], tables: Sequence[R
         summary: contents of `study.json`, without the tables.
         tables: of the study.
     """
+    source = (
+        "simulated by the physical twin of holdfast [@holdfast]"
+        if plan.main.is_simulated
+        else "the recordings of the study"
+    )
+    data = [
+        f"- {role}: {corpus['recordings']} recordings ({ROLES.get(role, 'others')}), "
+        f"{corpus['samples']} samples of single fingers at {corpus['rate']:.0f} Hz, digest "
+        f"{corpus['digest']}"
+        for role, corpus in summary["data"].items()
+    ]
+    methods = [
+        f"- {title}{f' [@{CITED[name]}]' if name in CITED else ''}: {METHODS[name].source}."
+        for name, title in method_titles(plan).items()
+    ]
+    versions = [f"{name} {number}" for name, number in summary["versions"].items() if number]
+    quick = " This was a quick study; quote a full one." if summary["quick"] else ""
     paragraphs = [
         "# Methods",
-        _data_text(plan, summary),
+        "\n".join([f"**Data**: {source}.", "", *data]),
         _protocol_text(plan),
-        _methods_text(plan),
+        "\n".join(["**Methods**:", "", *methods]),
         _comparisons_text(tables),
-        _software_text(summary),
+        f"**Software**: {', '.join(versions)}.{quick}",
     ]
     return "\n\n".join(paragraphs) + "\n"
 
@@ -125,21 +142,6 @@ def compares_methods(keys: Iterable[str]) -> bool:
     return not COMPARED_KEYS.isdisjoint(keys)
 
 
-def _data_text(plan: StudyPlan, summary: Mapping[str, Any]) -> str:
-    source = (
-        "simulated by the physical twin of holdfast [@holdfast]"
-        if plan.main.is_simulated
-        else "the recordings of the study"
-    )
-    lines = [
-        f"- {role}: {corpus['recordings']} recordings ({ROLES.get(role, 'others')}), "
-        f"{corpus['samples']} samples of single fingers at {corpus['rate']:.0f} Hz, digest "
-        f"{corpus['digest']}"
-        for role, corpus in summary["data"].items()
-    ]
-    return "\n".join([f"**Data**: {source}.", "", *lines])
-
-
 def _protocol_text(plan: StudyPlan) -> str:
     effort = method_effort(plan, next(iter(METHODS)))
     return (
@@ -156,14 +158,6 @@ def _protocol_text(plan: StudyPlan) -> str:
     )
 
 
-def _methods_text(plan: StudyPlan) -> str:
-    lines = [
-        f"- {title}{f' [@{CITED[name]}]' if name in CITED else ''}: {METHODS[name].source}."
-        for name, title in method_titles(plan).items()
-    ]
-    return "\n".join(["**Methods**:", "", *lines])
-
-
 def _comparisons_text(tables: Sequence[ResultTable]) -> str:
     counts = {
         table.name: sum(row.interval is not None for row in table.rows)
@@ -178,9 +172,3 @@ def _comparisons_text(tables: Sequence[ResultTable]) -> str:
         f"{beside if counts else ''} No interval is corrected for their number: of a hundred "
         "true values, about five lie outside their interval."
     )
-
-
-def _software_text(summary: Mapping[str, Any]) -> str:
-    versions = [f"{name} {number}" for name, number in summary["versions"].items() if number]
-    quick = " This was a quick study; quote a full one." if summary["quick"] else ""
-    return f"**Software**: {', '.join(versions)}.{quick}"

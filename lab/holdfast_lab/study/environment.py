@@ -43,7 +43,12 @@ def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:
 def report_facts(summary: Mapping[str, Any]) -> dict[str, object]:
     """Return the head of the report, from the contents of `study.json`."""
     return {
-        "data": {role: _corpus_text(corpus) for role, corpus in summary["data"].items()},
+        "data": {
+            role: f"{each['recordings']} recordings, {each['samples']:,} samples of single "
+            f"fingers, {each['rate']:.0f} Hz, {', '.join(each['fingers'])}; digest "
+            f"{each['digest'][:12]}"
+            for role, each in summary["data"].items()
+        },
         **fact_texts(summary),
     }
 
@@ -64,10 +69,3 @@ def run_notes(summary: Mapping[str, Any]) -> list[str]:
         "earlier run are not counted in the time."
     )
     return [*notes, *(f"Left out: {sentence}" for sentence in summary["left_out"])]
-
-
-def _corpus_text(corpus: Mapping[str, Any]) -> str:
-    return (
-        f"{corpus['recordings']} recordings, {corpus['samples']:,} samples of single fingers, "
-        f"{corpus['rate']:.0f} Hz, {', '.join(corpus['fingers'])}; digest {corpus['digest'][:12]}"
-    )

@@ -45,9 +45,10 @@ class KeptValues:
         if key in self._kept:
             value: T = self._kept[key]
             return value
-        value = make()
+        value = make()  # without the lock, or one slow file would stop all threads
         size = n_bytes(value)
         with self._lock:
+            # Another thread may have made the same value meanwhile.
             if key not in self._kept and size <= self._left:
                 self._kept[key] = value
                 self._left -= size

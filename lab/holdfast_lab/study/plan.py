@@ -53,6 +53,7 @@ class Corpus(msgspec.Struct, frozen=True):
                 f"the folder {self.folder} with the recordings of {self.name!r} does not exist "
                 "here: every worker needs it at the same path"
             )
+        # Recordings that were added to the folder later are left out.
         paths = {path.stem: path for path in load_dataset(self.folder).paths}
         if gone := [name for name in self.recordings if name not in paths]:
             raise RecordingError(
@@ -94,6 +95,7 @@ class CorpusRecordings(Sequence[Recording]):
     def __getitem__(self, index: int | slice) -> "Recording | CorpusRecordings":
         if isinstance(index, slice):
             return CorpusRecordings(self.corpus, self.files[index])
+        # With the digest: a folder that was made anew is read anew.
         key = (*self.corpus.identity, self.files.paths[index])
         return WORKER_MEMORY.get(key, lambda: self.files[index], recording_bytes)
 
@@ -142,11 +144,15 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
     n_labelled: dict[str, Counter[bool]] = {}
     n_samples: list[int] = []
 
+    # All that is needed of a recording is taken on its way to the scan: files are read once.
     def counted() -> Iterator[Recording]:
         for recording in dataset:
             n_samples.extend(len(module.times) for module in recording.modules.values())
             digest.update(content_digest(recording))
-            _count(recording, n_labelled)
+            for finger, module in recording.modules.items():
+                if module.labels:
+                    known = module.label_states[module.label_states != UNKNOWN]
+                    n_labelled.setdefault(finger, Counter()).update((known == STABLE).tolist())
             yield recording
 
     scan = scan_dataset(counted())
@@ -178,18 +184,10 @@ def content_digest(recording: Recording) -> bytes:
         arrays += [(f"{finger} {name}", array) for finger, each in truth.fingers.items()
                    for name, array in each.items()]  # fmt: skip
         for key, array in arrays:
+            # With type and shape: equal bytes of other arrays must not give the same digest.
             state.update(f"{key} {array.dtype} {array.shape}".encode())
             state.update(np.ascontiguousarray(array).tobytes())
     return state.digest()
-
-
-def _count(recording: Recording, n_labelled: dict[str, Counter[bool]]) -> None:
-    """Add the numbers of samples labelled stable and not stable of every finger."""
-    for finger, module in recording.modules.items():
-        if module.labels:
-            states = module.label_states
-            known = states[states != UNKNOWN]
-            n_labelled.setdefault(finger, Counter()).update((known == STABLE).tolist())
 
 
 def _fingers_of_both_classes(

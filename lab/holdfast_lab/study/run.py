@@ -100,6 +100,7 @@ def run_study(
         TrainingError: the data are not enough to train a method.
         EngineError: as `TaskRunner.run`.
     """
+    # First, so that hours of work are not lost to a folder that is refused.
     check_output_folder(out, STUDY, force=force)
     start = time.perf_counter()
     tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
@@ -122,6 +123,7 @@ def run_study(
         "left_out": [*left_out, *whole_hand_note(plan)],
     }
     sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
+    # Those of the sections, because they carry the note on the twin.
     tables = [table for section in sections for table in section.tables]
     document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
     facts = environment.report_facts(summary)

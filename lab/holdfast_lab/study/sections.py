@@ -219,7 +219,13 @@ def report_sections(
         figures = _select(outline, figures_by_part)
         if tables or figures:
             if twin:
-                tables = [_with_twin_note(table, outline) for table in tables]
+                # Not where no recording was evaluated, as in the table of the paper's statements.
+                tables = [
+                    msgspec.structs.replace(table, note=f"{table.note} {TWIN_NOTE}".strip())
+                    if outline.part != "real" and any(row.n for row in table.rows)
+                    else table
+                    for table in tables
+                ]
             sections.append(Section(outline.title, join_lines(outline.text), tables, figures))
     if twin:
         sections.append(Section("What the twin cannot show", join_lines(LIMITS_TEXT)))
@@ -234,10 +240,3 @@ def _select(outline: SectionOutline, by_part: Mapping[str, Sequence[E]]) -> list
 
 
 _NAMED = frozenset(name for outline in OUTLINES for name in outline.names)
-
-
-def _with_twin_note(table: ResultTable, outline: SectionOutline) -> ResultTable:
-    """Add the note on the twin to a table that is made from recordings of the twin."""
-    if outline.part == "real" or not any(row.n for row in table.rows):
-        return table
-    return msgspec.structs.replace(table, note=f"{table.note} {TWIN_NOTE}".strip())

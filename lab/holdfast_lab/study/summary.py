@@ -53,6 +53,7 @@ def _accuracies(rows: list[Row]) -> Iterator[str]:
 def _strongest(rows: list[Row]) -> Iterator[str]:
     ours = _select(rows, {**STRONGEST, "figure": "holdfast [%]"})
     baseline = _select(rows, {**STRONGEST, "figure": "baseline [%]"})
+    # Without a baseline there is nothing to compare.
     for mine, other in zip(ours, baseline, strict=False):
         yield (
             f"On unseen objects our own method has {_value(mine)} % errors by samples of hands, "

@@ -3,15 +3,14 @@
 The scorer chooses every threshold itself, on the split `tuning`, for a budget of false alarms.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from holdfast.contact import STABLE, UNSTABLE
-from holdfast.io import Dataset
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.slip_truth import slip_truth
@@ -88,6 +87,20 @@ class FingerTruth(NamedTuple):
     labels: Codes
     slip: SlipScores | None
 
+    @classmethod
+    def of(cls, recording: Recording, finger: str, scores: FingerScores) -> Self:
+        """Return the truth of a finger beside its scores."""
+        module = recording.modules[finger]
+        # A submission says nothing of contact, so every sample counts as known and in contact.
+        everywhere = np.ones(module.n_samples, dtype=np.bool_)
+        margin = log_odds(scores.stable)
+        stable = Scores(module.times, margin, everywhere, everywhere, scores.stable)
+        truth = None if scores.slip is None else slip_truth(recording, finger, module.times)
+        slip = None
+        if truth is not None and scores.slip is not None:
+            slip = SlipScores(module.times, log_odds(scores.slip), truth)
+        return cls(stable, module.label_states, slip)
+
     def samples(self) -> FingerDecisions:
         """Return the decision of every sample by itself."""
         times, scores = self.scores.times, self.scores.probability
@@ -148,8 +161,14 @@ def score_submission(
         recordings = load_split(folder, name)
         submission.check_names(name, list(recordings.names))
         digests: dict[str, str] = {}
-        scored[name] = dict(_scored(submission, name, recordings, digests))
+        fingers: dict[str, dict[str, FingerTruth]] = {}
+        for recording in recordings:  # one pass: each pass reads every file anew
+            digests[recording.name] = digest_of(recording)
+            given = submission.scores_of(name, recording).items()
+            fingers[recording.name] = {f: FingerTruth.of(recording, f, own) for f, own in given}
+        scored[name] = fingers
         differ += [f"{name}/{d}" for d in differing(protocol.splits[name], digests)]
+    # The recordings that thresholds are chosen on are not scored themselves.
     tuning = scored.pop(TUNING)
     tables = [_stability_table(scored), _events_table(scored, tuning)]
     if submission.has_slips:
@@ -160,30 +179,6 @@ def score_submission(
     return BenchmarkResult(tables, differ, left_out)
 
 
-def _scored(
-    submission: Submission, split: str, recordings: Dataset, digests: dict[str, str]
-) -> Iterator[tuple[str, dict[str, FingerTruth]]]:
-    for recording in recordings:
-        digests[recording.name] = digest_of(recording)
-        scores = submission.scores_of(split, recording)
-        yield (
-            recording.name,
-            {finger: _finger_truth(recording, finger, own) for finger, own in scores.items()},
-        )
-
-
-def _finger_truth(recording: Recording, finger: str, scores: FingerScores) -> FingerTruth:
-    module = recording.modules[finger]
-    everywhere = np.ones(module.n_samples, dtype=np.bool_)
-    margin = log_odds(scores.stable)
-    stable = Scores(module.times, margin, everywhere, everywhere, scores.stable)
-    truth = None if scores.slip is None else slip_truth(recording, finger, module.times)
-    slip = None
-    if truth is not None and scores.slip is not None:
-        slip = SlipScores(module.times, log_odds(scores.slip), truth)
-    return FingerTruth(stable, module.label_states, slip)
-
-
 def log_odds(scores: Array) -> Array:
     """Return the log odds of scores, within limits.
 
@@ -191,6 +186,7 @@ def log_odds(scores: Array) -> Array:
         >>> log_odds(np.array([0.0, 0.5, 1.0])).tolist()
         [-40.0, 0.0, 40.0]
     """
+    # Scores of exactly 0 and 1 are allowed; their log odds are infinite until they are clipped.
     with np.errstate(divide="ignore"):
         odds = np.log(scores) - np.log1p(-scores)
     return np.asarray(np.clip(odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS))

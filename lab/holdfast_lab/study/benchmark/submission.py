@@ -7,10 +7,9 @@ A submission has a row for each sample of each finger: `recording` (SPLIT/NAME),
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
@@ -105,11 +104,21 @@ def read_submission(path: Path) -> Submission:
         ValueError: it is no table of scores, or a score is not from 0 to 1.
     """
     table = _read_table(path)
-    values = {
-        name: _values(path, table, name) for name in ("stable", SLIP) if name in table.column_names
-    }
+    values: dict[str, Array] = {}
+    for name in ("stable", SLIP):
+        if name not in table.column_names:
+            continue
+        column = values[name] = table.column(name).to_numpy(zero_copy_only=False)
+        # Not `(column < 0) | (column > 1)`: an empty cell is NaN, which no comparison finds.
+        wrong = np.flatnonzero(~((column >= 0) & (column <= 1)))
+        if len(wrong):
+            raise ValueError(
+                f"{path}: {name} is {column[wrong[0]]:g} in row {wrong[0] + 1} of {len(column)}; a "
+                f"number from 0 to 1 expected ({len(wrong)} of them are not)"
+            )
     samples = table.column("sample").to_numpy(zero_copy_only=False)
     names = ("recording", "finger")
+    # Names as codes: rows are sorted and compared by numbers, not by millions of strings.
     keys = [table.column(name).combine_chunks().dictionary_encode() for name in names]
     codes = [key.indices.to_numpy(zero_copy_only=False) for key in keys]
     order = np.lexsort((samples, codes[1], codes[0]))
@@ -119,7 +128,14 @@ def read_submission(path: Path) -> Submission:
         recording, finger = (
             str(key.dictionary[int(code[rows[0]])]) for key, code in zip(keys, codes, strict=True)
         )
-        _check_samples(path, samples[rows], f"{finger} of {recording}")
+        # The sorted numbers run from 0 without a gap or a repeat.
+        numbers = samples[rows]
+        wrong = np.flatnonzero(numbers != np.arange(len(numbers)))
+        if len(wrong):
+            raise ValueError(
+                f"{path}: sample {wrong[0]} of {finger} of {recording} expected, "
+                f"{numbers[wrong[0]]} found; every sample has one row"
+            )
         slip = values[SLIP][rows] if SLIP in values else None
         recordings.setdefault(recording, {})[finger] = FingerScores(values["stable"][rows], slip)
     return Submission(path.name, recordings, SLIP in values)
@@ -130,6 +146,7 @@ def _read_table(path: Path) -> pa.Table:
         raise ValueError(f"{path}: a .csv or .parquet file expected")
     try:
         if path.suffix == ".csv":
+            # Without types pyarrow guesses them, and names that are digits become numbers.
             options = pa.csv.ConvertOptions(column_types=COLUMN_TYPES)
             table = pa.csv.read_csv(path, convert_options=options)
         else:
@@ -141,6 +158,7 @@ def _read_table(path: Path) -> pa.Table:
                 f"{SLIP} for the task of slips"
             )
         names = [name for name in COLUMN_TYPES if name in table.column_names]
+        # Other columns are dropped, and a Parquet file may have narrower numbers.
         table = table.select(names).cast(pa.schema([(name, COLUMN_TYPES[name]) for name in names]))
     except pa.ArrowException as cause:
         raise ValueError(f"{path}: {str(cause).splitlines()[0]}") from cause
@@ -151,32 +169,6 @@ def _read_table(path: Path) -> pa.Table:
         if table.column(name).null_count:
             raise ValueError(f"{path}: {name} is empty in {table.column(name).null_count} rows")
     return table
-
-
-def _values(path: Path, table: pa.Table, name: str) -> Array:
-    """Return the scores of a column.
-
-    Raises:
-        ValueError: one is not from 0 to 1.
-    """
-    values: Array = table.column(name).to_numpy(zero_copy_only=False)
-    wrong = np.flatnonzero(~((values >= 0) & (values <= 1)))
-    if len(wrong):
-        raise ValueError(
-            f"{path}: {name} is {values[wrong[0]]:g} in row {wrong[0] + 1} of {len(values)}; a "
-            f"number from 0 to 1 expected ({len(wrong)} of them are not)"
-        )
-    return values
-
-
-def _check_samples(path: Path, samples: npt.NDArray[Any], where: str) -> None:
-    """Check that sorted numbers of samples run from 0 without a gap or a repeat."""
-    wrong = np.flatnonzero(samples != np.arange(len(samples)))
-    if len(wrong):
-        raise ValueError(
-            f"{path}: sample {wrong[0]} of {where} expected, {samples[wrong[0]]} found; every "
-            "sample has one row"
-        )
 
 
 def _named(names: list[str]) -> str:

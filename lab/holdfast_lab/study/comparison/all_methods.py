@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from holdfast.metrics.events import POST_DURATIONS
-from holdfast.sensors.types import Array
 from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_reliability
 from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast_lab.report.html_report import ReportFigure
@@ -28,7 +27,6 @@ from holdfast_lab.study.comparison.jobs import (
     method_task,
     method_titles,
 )
-from holdfast_lab.study.evaluation.alarms import AlarmStatistics
 from holdfast_lab.study.evaluation.evaluate_method import (
     BY_RATE,
     COMPARED_RATE,
@@ -68,14 +66,14 @@ DETAIL_METHODS = ("logreg", "svm", "zhang", "trees", "holdfast")
 def tasks(plan: StudyPlan) -> list[Task]:
     """Return the evaluation tasks of all methods, those by a random split, and the costs."""
     evaluated = [method_task(plan, name) for name in method_titles(plan)]
-    pooled = [_pooled_task(plan, name) for name in sample_tables.pooled_methods(plan)]
+    pooled = []
+    for name in sample_tables.pooled_methods(plan):
+        cost = METHOD_SECONDS.get(name, DEFAULT_SECONDS) / 4
+        arguments = (method_job(plan, name),)
+        pooled.append(
+            Task(f"pooled/{name}", evaluate_pooled, arguments, ConfusionCounts, cost=cost)
+        )
     return [*evaluated, *pooled, *costs.tasks(plan)]
-
-
-def _pooled_task(plan: StudyPlan, name: str) -> Task:
-    cost = METHOD_SECONDS.get(name, DEFAULT_SECONDS) / 4
-    arguments = (method_job(plan, name),)
-    return Task(f"pooled/{name}", evaluate_pooled, arguments, ConfusionCounts, cost=cost)
 
 
 def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
@@ -137,44 +135,29 @@ def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
 
 def _alarm_curve(evaluation: MethodEvaluation) -> PlottedCurve:
     """Return missed events over false alarms under a stable label."""
-    by_rate = [evaluation.alarms[name] for name in BY_RATE]
-    rates = np.array([_false_alarms_per_minute(alarms) for alarms in by_rate])
-    missed = np.array([_missed_share(alarms) for alarms in by_rate])
-    return PlottedCurve(rates, missed, chosen=FALSE_ALARM_RATES.index(COMPARED_RATE))
-
-
-def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
-    seconds = sum(alarm.stable_seconds for alarm in alarms)
-    return 60 * sum(alarm.n_under_stable for alarm in alarms) / seconds if seconds else np.nan
-
-
-def _missed_share(alarms: Sequence[AlarmStatistics]) -> float:
-    n_events = sum(len(alarm.delays) for alarm in alarms)
-    return _percent(sum(alarm.n_missed(POST_DURATIONS[0]) for alarm in alarms), n_events)
-
-
-def _percent(part: int, whole: int) -> float:
-    return 100 * part / whole if whole else np.nan
+    rates, missed = [], []
+    for alarms in (evaluation.alarms[name] for name in BY_RATE):
+        seconds = sum(alarm.stable_seconds for alarm in alarms)
+        n_false = sum(alarm.n_under_stable for alarm in alarms)
+        rates.append(60 * n_false / seconds if seconds else np.nan)
+        n_events = sum(len(alarm.delays) for alarm in alarms)
+        n_missed = sum(alarm.n_missed(POST_DURATIONS[0]) for alarm in alarms)
+        missed.append(100 * n_missed / n_events if n_events else np.nan)
+    chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
+    return PlottedCurve(np.array(rates), np.array(missed), chosen=chosen)
 
 
 def _reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
-    evaluations = _by_recording(plan, results, DETAIL_METHODS)
-    curves = {title: _reliability_bins(evaluation) for title, evaluation in evaluations.items()}
-    notes = {title: _brier_note(evaluation) for title, evaluation in evaluations.items()}
+    # Of each method, (m, 3): mean probability, share of stable samples, samples of each used bin.
+    curves, notes = {}, {}
+    for title, evaluation in _by_recording(plan, results, DETAIL_METHODS).items():
+        total = np.array(evaluation.calibration, dtype=np.float64).sum(axis=0)
+        p, stable, n = total[total[:, 2] > 0].T
+        curves[title] = np.column_stack([p / n, stable / n, n])
+        brier = evaluation.metrics.pooled.brier
+        notes[title] = "" if brier is None else f"Brier {brier:.3f}"
     caption = "Reliability of the probabilities, by recording. On the dotted line they are right."
     return ReportFigure("reliability", caption, draw_reliability(curves, notes))
-
-
-def _reliability_bins(evaluation: MethodEvaluation) -> Array:
-    """Return (m, 3): mean probability, share of stable samples, and samples of each used bin."""
-    total = np.array(evaluation.calibration, dtype=np.float64).sum(axis=0)
-    p, stable, n = total[total[:, 2] > 0].T
-    return np.column_stack([p / n, stable / n, n])
-
-
-def _brier_note(evaluation: MethodEvaluation) -> str:
-    brier = evaluation.metrics.pooled.brier
-    return "" if brier is None else f"Brier {brier:.3f}"
 
 
 def _grip_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:

@@ -77,7 +77,10 @@ def measure_costs(corpus: Corpus, names: Sequence[str], seed: int) -> MethodCost
         names: of the methods.
         seed: of the classifiers.
     """
-    few = msgspec.structs.replace(corpus, recordings=_select(corpus.recordings))
+    # At even steps, because recordings are sorted by object and case.
+    every = corpus.recordings
+    steps = np.linspace(0, len(every) - 1, min(N_RECORDINGS, len(every))).round().astype(int)
+    few = msgspec.structs.replace(corpus, recordings=tuple(every[k] for k in np.unique(steps)))
     recording = few.load()[0]
     live = {
         name: _measure_update(recording, few, LIVE_FEATURES[name])
@@ -150,17 +153,12 @@ def _measure_update(
         start = time.perf_counter_ns()
         detector.update(samples, k / corpus.rate)
         nanoseconds.append(time.perf_counter_ns() - start)
+    # Without the warm-up, of which a short recording has less.
     return float(np.median(nanoseconds[min(N_WARM_UP, n // 2) :])) * 1e-9
 
 
 def _fingers(recording: Recording, corpus: Corpus) -> list[str]:
     return [name for name in corpus.fingers if name in recording.modules]
-
-
-def _select(names: Sequence[str]) -> tuple[str, ...]:
-    """Return `N_RECORDINGS` of the names, at even steps."""
-    indices = np.linspace(0, len(names) - 1, min(N_RECORDINGS, len(names))).round().astype(int)
-    return tuple(names[index] for index in np.unique(indices))
 
 
 def _shortest(work: Callable[[], object]) -> float:

@@ -45,6 +45,7 @@ def force(plan: StudyPlan, results: Results) -> ResultTable:
     """Return the table of errors by grip force. The paper states that it has no influence."""
     rows: list[Row] = []
     lines = [line for line in _lines(plan, results) if any(errors.grips for errors in line[1])]
+    # Of the first line, for the grips are those of the recordings, whatever the method.
     edges = force_quartiles(lines[0][1]) if lines else np.empty(0)
     for keys, breakdowns in lines:
         for quarter, title in enumerate(QUARTERS):
@@ -78,6 +79,7 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
             wrong = [sum(wrong for _, wrong in of_recording) for of_recording in events]
             if sum(n):
                 rows.append(ratio_row(keys | {"direction": direction}, wrong, n, plan.seed))
+                # The first line counts: it has the recordings evaluated by recording.
                 n_disturbances.setdefault(direction, sum(map(len, events)))
     ordered = [each for each in (*PULL_DIRECTIONS, OBLIQUE) if each in n_disturbances]
     counts = ", ".join(f"{direction} {n_disturbances[direction]}" for direction in ordered)

@@ -58,7 +58,9 @@ Keys = dict[str, Key]
 def events(plan: StudyPlan, results: Results) -> ResultTable:
     """Return the table of events: missed, delay and false alarms."""
     rows: list[Row] = []
-    for keys, alarms in _lines(plan, results, SHOWN_THRESHOLDS, _event_splits(plan)):
+    # The easiest and the hardest split, to keep the table short.
+    shown = ("recording", "others" if "others" in plan.corpora else "object")
+    for keys, alarms in _lines(plan, results, SHOWN_THRESHOLDS, shown):
         rows += event_rows(keys, alarms, plan.seed)
     note = (
         "Of the hand, by labels without margin. An event is the end of a hold of at least half a "
@@ -124,7 +126,15 @@ def event_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iter
     delays = [alarm.delays for alarm in alarms]
     yield quantile_row(keys | {"figure": "delay median [s]"}, delays, 0.5, seed)
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
-    yield from _false_alarm_rows(keys, alarms, seed)
+    minutes = [alarm.stable_seconds / 60 for alarm in alarms]
+    counts = {
+        FALSE_ALARMS: [alarm.n_false_alarms for alarm in alarms],
+        FALSE_ALARMS_UNDER_STABLE: [alarm.n_under_stable for alarm in alarms],
+        FALSE_ALARMS_OF_GLITCH: [alarm.n_of_glitch for alarm in alarms],
+        OTHER_FALSE_ALARMS: [alarm.n_under_stable - alarm.n_of_glitch for alarm in alarms],
+    }
+    for head, count in counts.items():
+        yield ratio_row(keys | {"figure": head}, count, minutes, seed, scale=1.0)
     yield count_row(keys | {"figure": "events"}, n_events)
 
 
@@ -154,23 +164,6 @@ def _lines(
                     keys: Keys = {"on": SPLIT_TITLES[key], "threshold": threshold}
                     keys |= {READING: reading, "method": title}
                     yield keys, evaluation.readings[reading][threshold]
-
-
-def _event_splits(plan: StudyPlan) -> tuple[str, ...]:
-    """Return the easiest and the hardest split, to keep the table short."""
-    return "recording", "others" if "others" in plan.corpora else "object"
-
-
-def _false_alarm_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
-    minutes = [alarm.stable_seconds / 60 for alarm in alarms]
-    counts = {
-        FALSE_ALARMS: [alarm.n_false_alarms for alarm in alarms],
-        FALSE_ALARMS_UNDER_STABLE: [alarm.n_under_stable for alarm in alarms],
-        FALSE_ALARMS_OF_GLITCH: [alarm.n_of_glitch for alarm in alarms],
-        OTHER_FALSE_ALARMS: [alarm.n_under_stable - alarm.n_of_glitch for alarm in alarms],
-    }
-    for figure, count in counts.items():
-        yield ratio_row(keys | {"figure": figure}, count, minutes, seed, scale=1.0)
 
 
 def _glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:

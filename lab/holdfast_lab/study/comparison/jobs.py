@@ -114,7 +114,11 @@ def evaluation_task(name: str, job: EvaluationJob, *, quick: bool = False) -> Ta
 
 def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
     """Return the complete evaluation job of a method."""
-    tests = tuple(plan.corpora[role] for role in _test_roles(plan, method))
+    # Corpora other than "main": all for the main methods, else only those of unseen objects.
+    roles = ["others"] if not plan.quick else []
+    if method in (QUICK_METHODS if plan.quick else MAIN_METHODS):
+        roles = list(SPLIT_TITLES)[2:]
+    tests = tuple(plan.corpora[role] for role in roles if role in plan.corpora)
     splits: tuple[GroupSplit, ...] = ("recording", "object")
     if plan.quick and method not in QUICK_METHODS:
         splits = ("recording",)
@@ -148,13 +152,7 @@ def method_results(
     """Yield the results of a method on each split and corpus, by key of `SPLIT_TITLES`."""
     evaluations: Mapping[str, MethodEvaluation] = results[f"methods/{method}"]
     for key in SPLIT_TITLES:
+        # Results are stored by the name of a corpus, tables are made by its role.
         name = plan.corpora[key].name if key in plan.corpora else key
         if name in evaluations:
             yield key, evaluations[name]
-
-
-def _test_roles(plan: StudyPlan, method: str) -> list[str]:
-    """Return the roles of the corpora, other than "main", that a method is tested on."""
-    if method in (QUICK_METHODS if plan.quick else MAIN_METHODS):
-        return [role for role in list(SPLIT_TITLES)[2:] if role in plan.corpora]
-    return [role for role in ("others",) if role in plan.corpora and not plan.quick]

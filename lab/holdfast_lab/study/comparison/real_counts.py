@@ -131,6 +131,7 @@ def count_recordings(
 
 def common_samples(estimates: Sequence[RecordingEstimates]) -> Mask:
     """Return the (n,) samples of the hand at which every method with estimates has one."""
+    # A method without any estimate here would leave no sample; it is dropped unless all are so.
     known = [estimate.known.array for estimate in estimates]
     return np.asarray(np.all([each for each in known if each.any()] or known, axis=0))
 
@@ -176,6 +177,7 @@ def pair_rows(keys: RowKeys, pairs: Sequence[ScorePair], seed: int) -> list[Row]
     key = {**keys, "figure": AUC_DIFFERENCE}
     if shipped.ours is None or other.ours is None:
         return [shipped, other, Row(key, None, None, shipped.n)]
+    # Paired: both statistics get the same resamples.
     interval = None
     if (shipped.n or 0) >= MIN_RECORDINGS:
         statistics = [auc_of([x.stable for x in s], [x.slip for x in s]) for s in (first, second)]
@@ -278,6 +280,7 @@ def _count(labels: RecordingLabels, estimates: RecordingEstimates, common: Mask)
         fingers[name] = _count_unit(finger, estimate, estimate.states.array != UNKNOWN, at_finger)
     hand = _count_unit(labels.hand, estimates.hand, estimates.known.array, common)
     times, slip = labels.hand.times.array, labels.hand.slip.array
+    # UNKNOWN where a method has no estimate: no event begins there, and no time is counted.
     codes = np.where(common, labels.hand.codes.array, UNKNOWN)
     match = match_alarms(times, codes, estimates.alarm_states.array)
     slips = [

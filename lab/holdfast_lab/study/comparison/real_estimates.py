@@ -22,7 +22,6 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationJob,
     score_splits,
 )
-from holdfast_lab.study.evaluation.fitted_method import ScoredRecording
 from holdfast_lab.study.evaluation.recording_features import label_hand
 from holdfast_lab.study.methods import HAND
 from holdfast_lab.study.plan import Corpus
@@ -107,7 +106,23 @@ class RecordingLabels(msgspec.Struct, frozen=True):
 
 def recording_labels(real: Corpus) -> list[RecordingLabels]:
     """Return the labels of every recording that has one of the fingers of the corpus."""
-    return [_labels(load_finger) for load_finger in load_fingers(real)]
+    labels = []
+    for recording in load_fingers(real):
+        times, codes, slip = {}, {}, {}
+        for name, module in recording.modules.items():
+            times[name] = module.times
+            codes[name] = label_states(module.labels, module.times)
+            # An unstable label without a cause counts as slip.
+            slips = [label for label in module.labels if label.cause in (Cause.SLIP, None)]
+            slip[name] = np.asarray(label_states(slips, module.times) == UNSTABLE)
+        hand = label_hand(times, codes)
+        # The hand slips where a finger does: the rule of the hand, with slip as the only cause.
+        sliding = {name: np.where(mask, UNSTABLE, STABLE) for name, mask in slip.items()}
+        hand_slip = label_hand(times, sliding).labels == UNSTABLE
+        fingers = {name: _unit_labels(times[name], codes[name], slip[name]) for name in times}
+        of_hand = _unit_labels(hand.times, hand.labels, hand_slip)
+        labels.append(RecordingLabels(recording.name, fingers, of_hand))
+    return labels
 
 
 def load_fingers(real: Corpus) -> list[Recording]:
@@ -145,48 +160,29 @@ def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEsti
     """
     effort = EvaluationEffort(folds=n_folds(real), inner=1)
     job = EvaluationJob(method, real, ("recording",), effort=effort, seed=seed)
-    return [_estimates(each) for _, scored in score_splits(job) for each in scored]
-
-
-def _estimates(scored: ScoredRecording) -> RecordingEstimates:
-    recording = scored.recording
-    decided, hand = scored.decide(recording.labels), scored.hand
-    return RecordingEstimates(
-        recording.name,
-        {
+    estimates = []
+    for scored in (each for _, split in score_splits(job) for each in split):
+        recording, hand = scored.recording, scored.hand
+        fingers = {
             name: unit_estimates(f.stable_probability, f.states)
-            for name, f in decided.fingers.items()
+            for name, f in scored.decide(recording.labels).fingers.items()
             if name != HAND
-        },
-        unit_estimates(hand.probability, hand.states()),
-        Column.of(hand.hold(HOLD_TIME).states()),
-        Column.of(hand.known),
-    )
+        }
+        estimates.append(
+            RecordingEstimates(
+                recording.name,
+                fingers,
+                unit_estimates(hand.probability, hand.states()),
+                Column.of(hand.hold(HOLD_TIME).states()),
+                Column.of(hand.known),
+            )
+        )
+    return estimates
 
 
 def unit_estimates(probability: Array, states: Codes) -> UnitEstimates:
     """Return the estimates of a finger or a hand from (n,) arrays."""
     return UnitEstimates(Column.of(probability), Column.of(states))
-
-
-def _labels(recording: Recording) -> RecordingLabels:
-    modules = recording.modules
-    codes = {name: label_states(module.labels, module.times) for name, module in modules.items()}
-    slip = {name: _slip_samples(module) for name, module in modules.items()}
-    times = {name: module.times for name, module in modules.items()}
-    hand = label_hand(times, codes)
-    sliding = {name: np.where(mask, UNSTABLE, STABLE) for name, mask in slip.items()}
-    hand_slip = label_hand(times, sliding).labels == UNSTABLE
-    fingers = {n: _unit_labels(m.times, codes[n], slip[n]) for n, m in modules.items()}
-    return RecordingLabels(
-        recording.name, fingers, _unit_labels(hand.times, hand.labels, hand_slip)
-    )
-
-
-def _slip_samples(module: Tactile) -> Mask:
-    """Return the (n,) samples that are labelled as slip; an unstable label without cause counts."""
-    slips = [label for label in module.labels if label.cause in (Cause.SLIP, None)]
-    return np.asarray(label_states(slips, module.times) == UNSTABLE)
 
 
 def _unit_labels(times: Array, codes: Codes, slip: Mask) -> UnitLabels:

@@ -3,7 +3,7 @@
 Features, tare, contact threshold and hold time are those of the model file.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -50,18 +50,15 @@ def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEs
     """
     recordings = load_fingers(real)
     estimates: dict[int, RecordingEstimates] = {}
-    for left_out in _folds(recordings, real, seed):
+    # The folds of all other methods.
+    named = [recording.metadata.get("object") for recording in recordings]
+    objects = [None if name is None else str(name) for name in named]
+    for left_out in held_out_folds(objects, "recording", n_folds(real), seed):
         others = [recording for index, recording in enumerate(recordings) if index not in left_out]
+        # Another draw in each fold, the same in every run.
         model = _model(making, others, seed + min(left_out))
         estimates |= {index: _estimates(model, recordings[index]) for index in left_out}
     return [estimates[index] for index in sorted(estimates)]
-
-
-def _folds(recordings: Sequence[Recording], real: Corpus, seed: int) -> Iterator[frozenset[int]]:
-    """Yield the folds, which are those of all other methods."""
-    objects = [recording.metadata.get("object") for recording in recordings]
-    names = [None if name is None else str(name) for name in objects]
-    return held_out_folds(names, "recording", n_folds(real), seed)
 
 
 def _model(making: Making, others: Sequence[Recording], seed: int) -> Model | None:
@@ -126,6 +123,7 @@ def _latest(decided: FingerDecisions | None, times: Array) -> FingerDecisions:
     if decided is None:
         return FingerDecisions(times, unlabelled, unlabelled, np.full(len(times), np.nan))
     at = np.searchsorted(decided.times, times + TIME_TOLERANCE, side="right")
+    # Position 0 stands for the times before the first decision.
     states = np.append(np.int8(UNKNOWN), decided.states)[at]
     probability = np.append(np.nan, decided.stable_probability)[at]
     return FingerDecisions(times, unlabelled, states, probability)

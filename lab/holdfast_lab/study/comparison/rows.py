@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.metrics import Interval, Metrics, SampleMetrics, bootstrap_interval, ratio_of_sums
-from holdfast.metrics.statistics import Statistic, quantile, quantile_of
+from holdfast.metrics import Interval, Metrics, bootstrap_interval, ratio_of_sums
+from holdfast.metrics.statistics import quantile, quantile_of
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, Row
 from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
@@ -67,10 +67,12 @@ def quotient_row(keys: RowKeys, base: Array, ours: Array, seed: int) -> Row:
         seed: of the bootstrap.
     """
     counts = np.column_stack([base, ours]).astype(np.float64)
+    # A recording counts only if both have samples in it, or the pairs would differ.
     counts = counts[(counts[:, 1] > 0) & (counts[:, 3] > 0)]
 
     def statistic(draws: Array) -> Array:
         wrong, n, our_wrong, our_n = (draws @ counts).T
+        # A resample without an error of ours is infinite, or NaN if there is none of either.
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray((wrong / n) / (our_wrong / our_n))
 
@@ -119,7 +121,8 @@ def sample_rows(
         name = SAMPLE_METRICS[figure]
         interval: Interval | None = None
         n = sum(
-            any(map(_has_samples, recording.fingers.values())) for recording in metrics.recordings
+            any(finger.n > 0 for finger in recording.fingers.values())
+            for recording in metrics.recordings
         )
         if metrics.intervals is not None:
             interval, n = getattr(metrics.intervals, name), metrics.intervals.n_recordings
@@ -127,10 +130,6 @@ def sample_rows(
         row_keys = {**keys, "figure": figure}
         rows.append(Row(row_keys, ours, (paper or {}).get(figure), n, interval))
     return rows
-
-
-def _has_samples(metrics: SampleMetrics) -> bool:
-    return metrics.n > 0
 
 
 def without_estimate_row(keys: RowKeys, counts: Sequence[tuple[int, int]], seed: int) -> Row:
@@ -163,18 +162,14 @@ def difference_row(keys: RowKeys, first: Metrics, second: Metrics, seed: int) ->
     one, other = correct_and_all(first), correct_and_all(second)
     names = [name for name in one if name in other and one[name][1] and other[name][1]]
     counts = np.array([(*one[name], *other[name]) for name in names], dtype=np.float64)
-    statistic = _accuracy_difference(counts.reshape(-1, 4))
+
+    def statistic(draws: Array) -> Array:
+        correct, n, other_correct, other_n = (draws @ counts.reshape(-1, 4)).T
+        return np.asarray(PERCENT * (correct / n - other_correct / other_n))
+
     ours = float(statistic(np.ones((1, len(names))))[0]) if names else None
     interval = bootstrap_interval(statistic, len(names), seed=seed)
     return Row(dict(keys), ours, None, len(names), interval)
-
-
-def _accuracy_difference(counts: Array) -> Statistic:
-    def statistic(draws: Array) -> Array:
-        correct, n, other_correct, other_n = (draws @ counts).T
-        return np.asarray(PERCENT * (correct / n - other_correct / other_n))
-
-    return statistic
 
 
 def calibration_row(keys: RowKeys, evaluation: MethodEvaluation, seed: int) -> Row:

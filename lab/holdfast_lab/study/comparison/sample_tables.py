@@ -1,7 +1,5 @@
 """Tables of the comparison by sample: methods, hands, splits and probabilities."""
 
-from collections.abc import Mapping
-
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import (
     REFERENCE_METHOD,
@@ -107,7 +105,14 @@ def splits(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for name in pooled_methods(plan):
         keys: Keys = {"method": METHODS[name].title}
-        rows.append(_pooled_row(keys, results[f"pooled/{name}"], _paper_accuracy(name), plan.seed))
+        counts: ConfusionCounts = results[f"pooled/{name}"]
+        ((_, row),) = rate_rows(counts, ("accuracy",), plan.seed)
+        # The paper's accuracies of the random split, beside both weights of the classes.
+        known = name.removesuffix("_unweighted")
+        paper = published.UNSEEN.get(known)
+        if known == REFERENCE_METHOD:
+            paper = published.FIRST_FINGER["accuracy"]
+        rows.append(Row({**keys, "split": "random"}, row.ours, paper, row.n, row.interval))
         for key, evaluation in method_results(plan, results, name):
             (row,) = sample_rows({}, evaluation.metrics, ("accuracy [%]",))
             row_keys = keys | {"split": SPLIT_TITLES[key]}
@@ -141,18 +146,3 @@ def pooled_methods(plan: StudyPlan) -> list[str]:
     """Return the names of the methods that are evaluated by the random split too."""
     left_out = ("trees",) if plan.quick else ()
     return [n for n in method_titles(plan) if n in POOLED_METHODS and n not in left_out]
-
-
-def _pooled_row(
-    keys: Mapping[str, Key], counts: ConfusionCounts, paper: float | None, seed: int
-) -> Row:
-    ((_, row),) = rate_rows(counts, ("accuracy",), seed)
-    return Row({**keys, "split": "random"}, row.ours, paper, row.n, row.interval)
-
-
-def _paper_accuracy(method: str) -> float | None:
-    """Return the accuracy that the paper prints for the random split."""
-    known = method.removesuffix("_unweighted")
-    if known == REFERENCE_METHOD:
-        return published.FIRST_FINGER["accuracy"]
-    return published.UNSEEN.get(known)

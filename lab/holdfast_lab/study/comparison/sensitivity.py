@@ -85,6 +85,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
     Without a variation the task is that of the comparison of methods.
     """
+    # By name, because the conditions share the task without a variation.
     named: dict[str, Task] = {}
     for sweep in sweeps(plan):
         for method in varied_methods(plan):
@@ -173,27 +174,20 @@ def _margins(plan: StudyPlan) -> dict[float, Variation]:
 
 
 def _task(plan: StudyPlan, method: str, variation: Variation) -> Task:
-    job = _job(plan, method, variation)
+    if method in METHODS and variation == Variation():
+        job = method_job(plan, method)  # as in the comparison: equal jobs are done once
+    else:
+        effort = method_effort(plan, method)
+        compared = tuple(varied_methods(plan)) if method in METHODS else tuple(CUTS)
+        job = EvaluationJob(
+            method, plan.main, ("recording",), (), variation, effort, plan.seed, compared
+        )
     return evaluation_task(_task_name(method, variation), job, quick=plan.quick)
 
 
 def _task_name(method: str, variation: Variation) -> str:
     margin = "" if variation.margin is None else f"/margin-{variation.margin:g}"
     return f"sensitivity/{method}/noise-{variation.noise:g}/every-{variation.every}{margin}"
-
-
-def _job(plan: StudyPlan, method: str, variation: Variation) -> EvaluationJob:
-    """Return the job of a method; without a variation, the same job as in the comparison.
-
-    Equal jobs are done once.
-    """
-    if method in METHODS and variation == Variation():
-        return method_job(plan, method)
-    effort = method_effort(plan, method)
-    compared = tuple(varied_methods(plan)) if method in METHODS else tuple(CUTS)
-    return EvaluationJob(
-        method, plan.main, ("recording",), (), variation, effort, plan.seed, compared
-    )
 
 
 def _sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:

@@ -72,24 +72,18 @@ SLIP_NOTE = (
 def tasks(plan: StudyPlan) -> list[Task]:
     """Return the tasks that evaluate each method."""
     names = slip_methods(plan)
-    return [
-        Task(
-            f"slips/{name}",
-            evaluate_slips,
-            (_job(plan, name, names),),
-            dict[str, SlipEvaluation],
-            cost=TASK_SECONDS.get(name, OTHER_SECONDS) * (0.5 if plan.quick else 1.0),
-        )
-        for name in names
-    ]
-
-
-def _job(plan: StudyPlan, name: str, compared: tuple[str, ...]) -> EvaluationJob:
     tests = tuple(plan.corpora[role] for role in TESTED_ROLES if role in plan.corpora)
-    return EvaluationJob(
-        name, plan.main, ("object", "recording"), tests, effort=method_effort(plan, name),
-        seed=plan.seed, compared=compared, slips=True,
-    )  # fmt: skip
+    every = []
+    for name in names:
+        # By object where objects are known; the split by recording only stands in for it.
+        job = EvaluationJob(
+            name, plan.main, ("object", "recording"), tests, effort=method_effort(plan, name),
+            seed=plan.seed, compared=names, slips=True,
+        )  # fmt: skip
+        cost = TASK_SECONDS.get(name, OTHER_SECONDS) * (0.5 if plan.quick else 1.0)
+        result = dict[str, SlipEvaluation]
+        every.append(Task(f"slips/{name}", evaluate_slips, (job,), result, cost=cost))
+    return every
 
 
 def slip_methods(plan: StudyPlan) -> tuple[str, ...]:
@@ -109,16 +103,11 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
             if corpus is not None and corpus.name in evaluations:
                 evaluation = evaluations[corpus.name]
                 keys = {"on": SPLIT_TITLES[evaluation.split or role], **method_keys(name)}
-                rows += _budget_rows(keys, evaluation)
+                rows += slip_rows({**keys, BUDGET: HELD_BUDGET}, evaluation)
+                if evaluation.quiet_budget is not None:
+                    quiet = msgspec.structs.replace(evaluation, summary=evaluation.quiet_budget)
+                    rows += slip_rows({**keys, BUDGET: QUIET_BUDGET}, quiet)
     return [slip_table(rows, ("on", BUDGET, FITTED_TO, METHOD))] if rows else []
-
-
-def _budget_rows(keys: RowKeys, evaluation: SlipEvaluation) -> Iterator[Row]:
-    """Yield the rows of a method at the threshold of each budget of false alarms."""
-    yield from slip_rows({**keys, BUDGET: HELD_BUDGET}, evaluation)
-    if evaluation.quiet_budget is not None:
-        quiet = msgspec.structs.replace(evaluation, summary=evaluation.quiet_budget)
-        yield from slip_rows({**keys, BUDGET: QUIET_BUDGET}, quiet)
 
 
 def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:

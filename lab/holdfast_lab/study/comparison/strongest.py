@@ -4,7 +4,7 @@ The strongest baseline is the one with the fewest errors on the very recordings 
 So the choice favours the baselines.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,6 @@ from holdfast_lab.study.evaluation.alarms import (
     EVENT,
     FALSE_ALARM,
     LEFT_OUT,
-    AlarmStatistics,
 )
 from holdfast_lab.study.evaluation.evaluate_method import (
     COMPARED,
@@ -108,6 +107,7 @@ def _measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterat
     if OURS not in known:
         return
     titles = method_titles(plan)
+    # Chosen anew for each measure and group: the rival is the best at the very thing shown.
     for group, names in ((FAMILY, PAPER_FAMILY), (EVERY, tuple(known))):
         best = _fewest_errors({n: known[n] for n in names if n in known and n != OURS})
         if best is None:
@@ -122,7 +122,9 @@ def _measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterat
             for who, name in (("holdfast", OURS), ("baseline", best)):
                 alarms = evaluations[name].readings[measure.reading][COMPARED]
                 figure = f"{who}, {FALSE_ALARMS_UNDER_STABLE}"
-                yield _false_alarm_row(keys | {"figure": figure}, alarms, plan.seed)
+                n = [alarm.n_under_stable for alarm in alarms]
+                minutes = [alarm.stable_seconds / 60 for alarm in alarms]
+                yield ratio_row(keys | {"figure": figure}, n, minutes, plan.seed, scale=1.0)
 
 
 def _evaluations(plan: StudyPlan, results: Results, key: str) -> dict[str, MethodEvaluation]:
@@ -138,11 +140,6 @@ def _fewest_errors(counts: dict[str, CountPairs]) -> str | None:
         for name, errors in counts.items()
     }
     return min(shares, key=lambda name: shares[name], default=None)
-
-
-def _false_alarm_row(keys: dict[str, Key], alarms: Sequence[AlarmStatistics], seed: int) -> Row:
-    n = [alarm.n_under_stable for alarm in alarms]
-    return ratio_row(keys, n, [alarm.stable_seconds / 60 for alarm in alarms], seed, scale=1.0)
 
 
 def _sample_errors(metrics: Metrics) -> CountPairs:

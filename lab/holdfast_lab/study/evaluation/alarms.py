@@ -101,6 +101,7 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
         at = np.searchsorted(times, [alarm.time for alarm in match.false_alarms])
         at = at[~labels.left_out[at]]
         is_stable = labels.labels[at] == STABLE
+        # Time in which no alarm is counted must not dilute the rate of the others.
         left_out = sample_durations(times)[(labels.labels == STABLE) & labels.left_out]
         # The state just before the first time at which an alarm belongs to the onset.
         onsets = np.array([event.onset for event in match.events])
@@ -120,7 +121,9 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
     def total(cls, parts: Sequence[Self]) -> Self:
         """Return the statistics of all parts together."""
         sums = {
-            name: sum(getattr(part, name) for part in parts) for name in cls.__struct_fields__[1:]
+            # All fields but the first, the delays, are sums.
+            name: sum(getattr(part, name) for part in parts)
+            for name in cls.__struct_fields__[1:]
         }
         return cls([delay for part in parts for delay in part.delays], **sums)
 
@@ -158,6 +161,7 @@ class FalseAlarmRanges(NamedTuple):
         times, stable = scores.times, labels.labels == STABLE
         match = match_alarms(times, labels.labels, labels.labels)
         spans = np.array([(event.onset, event.end) for event in match.events]).reshape(-1, 2)
+        # An alarm near an event belongs to the event, whatever the threshold.
         counted = stable & ~labels.left_out & outside(times, alarm_windows(spans))
         seconds = match.stable_seconds
         seconds -= float(sample_durations(times)[stable & labels.left_out].sum())
@@ -186,7 +190,9 @@ def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> fl
     edges = np.unique(np.concatenate([upper, lower]))
     if not len(edges):
         return 0.0
+    # Just above an edge, a range that begins there is open, and one that ends there is over.
     n_alarms = np.searchsorted(lower, edges, "right") - np.searchsorted(upper, edges, "right")
     too_many = n_alarms > per_minute * sum(interval.minutes for interval in ranges)
+    # The first edge with too many; else the edge above that with the most.
     last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
     return float(edges[last])

@@ -140,25 +140,19 @@ def count_glitches(truth: Truth | None) -> GlitchCount:
         return GlitchCount()
     grasped = np.isin(truth.hand["phase"], HELD_PHASES)
     steps = sample_durations(truth.times)
-    speed = _sliding_speed(truth)
-    sliding = runs(speed > 0)
-    distances = []
-    for start, end in runs(grasped & glitches(truth, LabelRule())):
-        begun = sliding[(sliding[:, 0] >= start) & (sliding[:, 0] < end)]
-        last = max([end, *begun[:, 1].tolist()])
-        distances.append(float((speed * steps)[start:last].sum()))
-    return GlitchCount(distances, float(steps[grasped].sum()))
-
-
-def _sliding_speed(truth: Truth) -> Array:
-    """Return the speed of the held object on the finger on which it slides fastest, (n,) [m/s].
-
-    The speed is 0 while nothing is held, and below 1 mm/s. A finger counts if it touches.
-    """
+    # The speed on the finger on which the object slides fastest [m/s].
     speed = np.zeros(len(truth.times))
     for finger in truth.fingers.values():
         if {"contact_force", "slip_speed"} <= set(finger):
             touching = np.linalg.norm(finger["contact_force"], axis=1) > CONTACT_FORCE
-            sliding = touching & (finger["slip_speed"] > SLIP_SPEED)
-            speed = np.maximum(speed, np.where(sliding, finger["slip_speed"], 0.0))
-    return np.where(np.isin(truth.hand["phase"], HELD_PHASES), speed, 0.0)
+            slips = touching & (finger["slip_speed"] > SLIP_SPEED)
+            speed = np.maximum(speed, np.where(slips, finger["slip_speed"], 0.0))
+    speed = np.where(grasped, speed, 0.0)
+    sliding = runs(speed > 0)
+    distances = []
+    for start, end in runs(grasped & glitches(truth, LabelRule())):
+        # A slide that the glitch began may outlast it: its whole way belongs to the glitch.
+        begun = sliding[(sliding[:, 0] >= start) & (sliding[:, 0] < end)]
+        last = max([end, *begun[:, 1].tolist()])
+        distances.append(float((speed * steps)[start:last].sum()))
+    return GlitchCount(distances, float(steps[grasped].sum()))

@@ -101,11 +101,12 @@ def warm_up(method: str, rate: float) -> float:
     kind = replace(sensor("uskin-4x4"), rate=rate, range=None)  # of small readings
     modules = {
         name: Tactile(kind, times, generator.normal(100.0, 10.0, (len(times), kind.n_taxels, 3)))
-        for name in PROBE_FINGERS
+        for name in PROBE_FINGERS  # two, because whole-hand methods refuse one
     }
     hand = hand_signal(Recording("probe", modules), Tare.parse("none"), PROBE_FINGERS)
     features = find_method(method).features(hand)
     known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
+    # argmax is 0 where nothing is known: such a method takes no samples from the others.
     return int(np.argmax(known)) / rate
 
 
@@ -228,7 +229,7 @@ def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording
             scored |= {index: fitted.scores(training.recordings[index]) for index in left_out}
         yield split, [scored[index] for index in sorted(scored)]
         if job.slips and scored:
-            break
+            break  # later splits only stand in for one that is not possible
     if job.tests:
         fitted = _fit_fold(job, training, everything)
         for corpus in job.tests:
@@ -256,6 +257,7 @@ def held_out_folds(
         folds = np.array([names.index(name) for name in objects])
     else:
         order = shuffled(len(objects), seed)
+        # Stable, so that the recordings of one object keep their shuffled order.
         order = order[np.argsort(np.array([str(objects[k]) for k in order]), kind="stable")]
         folds = deal_folds(len(objects), min(n_folds, len(objects)), order)
     for fold in np.unique(folds):
@@ -274,6 +276,7 @@ def _fit_fold(
         fitted = training.fit(set(chosen) - {chosen[k] for k in fold})
         for recording in (training.recordings[chosen[k]] for k in sorted(fold)):
             scores = fitted.scores(recording).hand.hold(HOLD_TIME)
+            # A fit without the recording: on its own fit a recording has too few false alarms.
             for reading, labels in labels_by_reading(recording).items():
                 ranges[reading].append(FalseAlarmRanges.of(scores, labels))
     shifts = {
@@ -291,18 +294,22 @@ def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     truths = [recording.truth for recording, *_ in scored]
     decided = [case.decide(case.recording.scored_labels) for case in scored]
     every = [case.decide(case.recording.labels) for case in scored]
-    alarms = [_alarms(case) for case in scored]
+    thresholds = (OWN, LASTING, *BY_RATE)
+    alarms: dict[str, dict[str, list[AlarmStatistics]]] = {
+        reading: {name: [] for name in thresholds} for reading in READINGS
+    }
+    for case in scored:
+        lasting = case.hand.hold(HOLD_TIME)
+        for reading, labels in labels_by_reading(case.recording).items():
+            alarms[reading][OWN].append(AlarmStatistics.of(case.hand, labels))
+            for name, shift in {LASTING: 0.0, **case.shifts[reading]}.items():
+                alarms[reading][name].append(AlarmStatistics.of(lasting, labels, shift))
     return MethodEvaluation(
         fingers=None if scored[0].whole_hand else summarise(decided),
         hand=summarise(map(_as_hand, decided)),
         without_estimate=[_n_without_estimate(decisions) for decisions in every],
         hand_without_estimate=[_n_without_estimate(_as_hand(decisions)) for decisions in every],
-        readings={
-            reading: {
-                name: [by[reading][name] for by in alarms] for name in (OWN, LASTING, *BY_RATE)
-            }
-            for reading in READINGS
-        },
+        readings=alarms,
         glitches=[count_glitches(truth) for truth in truths],
         breakdown=list(map(break_down_errors, truths, decided)),
         calibration=[calibration_sums(list(d.fingers.values())).tolist() for d in decided],
@@ -319,16 +326,6 @@ def _n_without_estimate(decisions: Decisions) -> CountPair:
     """Return the number of labelled samples, and of those of them without an estimate."""
     labelled = [unit.states[unit.labels != UNKNOWN] for unit in decisions.fingers.values()]
     return sum(map(len, labelled)), sum(int((states == UNKNOWN).sum()) for states in labelled)
-
-
-def _alarms(scored: ScoredRecording) -> dict[str, dict[str, AlarmStatistics]]:
-    """Return the alarms for each reading, at each threshold."""
-    lasting, alarms = scored.hand.hold(HOLD_TIME), {}
-    for reading, labels in labels_by_reading(scored.recording).items():
-        alarms[reading] = {OWN: AlarmStatistics.of(scored.hand, labels)}
-        for name, shift in {LASTING: 0.0, **scored.shifts[reading]}.items():
-            alarms[reading][name] = AlarmStatistics.of(lasting, labels, shift)
-    return alarms
 
 
 def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
@@ -351,6 +348,7 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
         trained = []
         for recording, fold_of in zip(recordings, folds, strict=True):
             labels = recording.labels.items()
+            # UNKNOWN trains nothing, so the features of all folds stay in one array.
             kept = {name: np.where(fold_of[name] == fold, UNKNOWN, codes) for name, codes in labels}
             trained.append(replace(recording, labels=kept))
         fitted = job.training(trained).fit()

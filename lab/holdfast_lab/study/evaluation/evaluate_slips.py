@@ -81,6 +81,7 @@ def evaluate_slips(job: EvaluationJob) -> dict[str, SlipEvaluation]:
             results[job.train.name] = summarise_slips(curves, job.seed, groups=folds, split=split)
         else:
             results[name] = summarise_slips(curves, job.seed, training=training)
+    # A corpus without a slip has no shares to report.
     return {name: result for name, result in results.items() if result.summary.pooled.n}
 
 
@@ -120,10 +121,12 @@ def smoothed(times: Array, log_odds: Array) -> Array:
     out = np.full(len(log_odds), np.nan)
     if len(times) < 2:
         return log_odds
+    # The median, which gaps and lost samples do not move.
     rate = 1.0 / float(np.median(np.diff(times)))
     gain = float(-np.expm1(-1.0 / (rate * SLIP_SMOOTHING)))
     for start, end in runs(~np.isnan(log_odds)):
         values = log_odds[start:end]
+        # The filter starts as if the first value had lasted for ever, so a contact has no ramp.
         before = [(1.0 - gain) * values[0]]
         out[start:end], _ = lfilter([gain], [1.0, gain - 1.0], values, zi=before)
     return out
@@ -133,6 +136,7 @@ def still_ranks(scores: Iterable[Mapping[str, SlipScores]]) -> Array:
     """Return the sorted scores of all samples of some recordings that are still, in contact."""
     every = [finger for fingers in scores for finger in fingers.values()]
     still = [s.score[np.isfinite(s.score) & (s.truth.codes == STILL)] for s in every]
+    # The empty array stands for no recordings at all, which NumPy cannot concatenate.
     return np.sort(np.concatenate([np.empty(0), *still]))
 
 
@@ -152,6 +156,7 @@ def log_odds_of(score: Array, ranks: Array) -> Array:
     """
     lowest, highest = SLIP_THRESHOLD_LOG_ODDS[0], SLIP_THRESHOLD_LOG_ODDS[-1]
     m = len(ranks)
+    # Half a sample is added, since a score above all still samples has no finite depth.
     above = m - np.searchsorted(ranks, score, side="left")
     depth = -np.log((above + 0.5) / (m + 1)) / np.log(m + 1)
     return np.asarray(np.where(np.isnan(score), np.nan, lowest + (highest - lowest) * depth))
@@ -167,6 +172,7 @@ def slip_curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, Sli
     curves = {}
     for finger, (times, score, truth) in scores.items():
         known = probability_of(log_odds_of(score, ranks))
+        # Without contact nothing slides: no threshold may raise a slip there.
         probability = np.where(score == -np.inf, 0.0, known)
         never = np.zeros(len(times), dtype=np.bool_)
         decisions = SlipDecisions(times, probability, never, SLIP_HOLD_TIME, truth)

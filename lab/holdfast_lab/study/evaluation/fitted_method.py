@@ -75,6 +75,7 @@ class MethodTraining:
             seed: of the fits.
             sliding: fit to true rest against sliding, not to the labels of stability.
         """
+        # Each recording may give the same number, rounded up.
         most = -(-max_samples // max(len(recordings), 1))
         widths: dict[str, int] = {}
         parts: dict[str, list[Samples]] = {}
@@ -84,9 +85,11 @@ class MethodTraining:
         for index, recording in enumerate(recordings):
             for unit, rows in recording.features.items():
                 labels = recording.slip_labels(unit) if sliding else recording.unit_labels(unit)
+                # A hand that lacks a finger has fewer features, which no classifier could share.
                 if labels is None or rows.shape[1] != widths[unit]:
                     continue
                 usable = usable_rows(rows, labels)
+                # Sliding is rare, so all of it is kept, and only the rest is thinned.
                 is_kept = sliding & (labels[usable] == UNSTABLE)
                 thinned = usable[~is_kept]
                 thinned = thinned[:: thinning_step(len(thinned), most)]
@@ -107,11 +110,13 @@ class MethodTraining:
         classifiers: dict[str, Classifier] = {}
         for unit, samples in self.samples.items():
             trained = samples.take(np.isin(samples.groups, fitted_to))
+            # A unit with one class gets no classifier, and its scores are NaN.
             if not trained.one_class:
                 recipe = self.method.recipe
                 classifiers[unit] = recipe.fit(trained, self.method.reference, self.seed)
         rest = [self.recordings[index].at_rest for index in fitted_to]
         fingers = dict.fromkeys(finger for moments in rest for finger in moments)
+        # A finger that a recording lacks adds nothing to its moments in the others.
         nothing = (0, 0.0, 0.0)
         contact = {
             f: contact_threshold(np.array([r.get(f, nothing) for r in rest])) for f in fingers
@@ -162,6 +167,7 @@ class Scores:
         times = np.unique(np.concatenate([finger.times for finger in fingers]))
         last = [np.searchsorted(f.times, times, side="right") - 1 for f in fingers]
         rows = list(zip(fingers, last, strict=True))
+        # Row -1, before the first sample of a finger, is masked by `at >= 0`.
         touches = np.array([(at >= 0) & finger.grasped[at] for finger, at in rows])
         known = np.array([(at >= 0) & finger.known[at] for finger, at in rows])
         margins = np.array([finger.margin[at] for finger, at in rows])
@@ -197,6 +203,7 @@ class Scores:
         if len(self.times) < 2:
             return self
         n = max(1, round(seconds / float(np.median(np.diff(self.times)))))
+        # Infinity before the start: nothing was unstable yet.
         padded = np.concatenate([np.full(n - 1, np.inf), self.margin])
         smallest = np.lib.stride_tricks.sliding_window_view(padded, n).min(axis=1)
         return replace(self, margin=np.where(self.grasped & self.known, smallest, self.margin))
@@ -208,6 +215,7 @@ class Scores:
 
 def probability_of(log_odds: Array) -> Array:
     """Return the probabilities of log odds. NaN stays NaN."""
+    # Clipped, because the exponential of a larger number overflows; 50 is certain already.
     return np.asarray(1.0 / (1.0 + np.exp(-np.clip(log_odds, -50, 50))))
 
 
@@ -262,11 +270,20 @@ class FittedMethod:
 
     def scores(self, recording: RecordingFeatures) -> ScoredRecording:
         """Return the scores of a recording; NaN for a unit without a matching classifier."""
-        margins = {unit: self._margins(unit, rows) for unit, rows in recording.features.items()}
+        # By unit, the margins and the threshold of its classifier [log odds].
+        margins: dict[str, tuple[Array, float]] = {}
+        for unit, rows in recording.features.items():
+            classifier = self.classifiers.get(unit)
+            if classifier is None or classifier.n_features != rows.shape[1]:
+                margins[unit] = np.full(len(rows), np.nan), 0.0
+            else:
+                threshold = float(_log_odds(classifier.threshold))
+                margins[unit] = _log_odds(classifier.probability(rows)) - threshold, threshold
         first = next(iter(recording.times.values()))
 
         def score(unit: str, times: Array, touching: Mask) -> Scores:
             margin, threshold = margins[unit if unit in margins else HAND]
+            # The margins of the hand are at the times of its first finger: take the latest.
             if unit not in margins or unit == HAND:
                 at = np.searchsorted(first, times, side="right") - 1
                 margin = np.where(at >= 0, margin[at], np.nan)
@@ -275,20 +292,13 @@ class FittedMethod:
         fingers = {}
         for name, times in recording.times.items():
             lowest = self.contact_thresholds.get(name) or 0.0
+            # Not `>=`: a finger whose force is NaN is not known to be without contact.
             fingers[name] = score(name, times, ~(recording.amplitude[name] < lowest))
         hand = Scores.of_hand(fingers.values())
         if HAND in margins:
             hand = score(HAND, hand.times, hand.grasped)
         scored = replace(recording, features={})
         return ScoredRecording(scored, fingers, hand, HAND in margins, self.shifts, self.fold)
-
-    def _margins(self, unit: str, rows: npt.NDArray[Any]) -> tuple[Array, float]:
-        """Return the margins of a unit, and the threshold of its classifier [log odds]."""
-        classifier = self.classifiers.get(unit)
-        if classifier is None or classifier.n_features != rows.shape[1]:
-            return np.full(len(rows), np.nan), 0.0
-        threshold = float(_log_odds(classifier.threshold))
-        return _log_odds(classifier.probability(rows)) - threshold, threshold
 
 
 def _log_odds(probability: npt.ArrayLike) -> Any:  # noqa: ANN401 (an array or a number, as given)

@@ -58,6 +58,7 @@ class Variation(msgspec.Struct, frozen=True):
         for index, (name, module) in enumerate(recording.modules.items()):
             readings = np.asarray(module.readings, dtype=np.float64)
             if self.noise:
+                # Seeded by the name, so that the noise is the same in any part of a corpus.
                 seed = [zlib.crc32(recording.name.encode()), index]
                 noise = np.random.default_rng(seed).normal(0.0, self.noise, size=readings.shape)
                 readings = readings + noise
@@ -122,6 +123,7 @@ class RecordingFeatures:
         for name, module in modules.items():
             codes = exact_labels[name]
             of_glitch = [label for label in exact[name].labels if label.cause is Cause.GLITCH]
+            # UNKNOWN stays UNKNOWN: a sample that nobody labelled is not made stable by a glitch.
             glitch = label_states(of_glitch, module.times) != UNKNOWN
             calm_labels[name] = np.where(glitch & (codes != UNKNOWN), STABLE, codes)
             slips[name] = slip_truth(recording, name, module.times, codes == STABLE)
@@ -137,6 +139,7 @@ class RecordingFeatures:
             exact_labels=exact_labels,
             calm_labels=calm_labels,
             slips={name: truth for name, truth in slips.items() if truth is not None},
+            # A tare that is taken in contact says nothing of the noise without contact.
             at_rest={
                 name: rest_moments(module, hand.tare, hand.rate)
                 for name, module in modules.items()
@@ -158,6 +161,7 @@ class RecordingFeatures:
             }
         changed["slips"] = {}
         for name, truth in self.slips.items():
+            # Before the stride, because a slip is one of consecutive samples.
             known = truth_without(self.times[name], truth, ~scored[name])
             changed["slips"][name] = replace(
                 known, codes=known.codes[::stride], quiet=known.quiet[::stride]
@@ -182,6 +186,7 @@ class RecordingFeatures:
         times = self.times[unit] if unit != HAND else next(iter(self.times.values()))
         codes = np.full(len(times), NOT_HELD, dtype=np.int8)
         for finger in fingers:
+            # Position 0 stands for the times before the first sample of the finger.
             own = np.append(np.int8(NOT_HELD), self.slips[finger].codes)
             at = np.searchsorted(self.times[finger], times, side="right")
             codes = np.maximum(codes, own[at])
@@ -244,22 +249,21 @@ def corpus_features(
     """
     featured = []
     for hand, labelled in prepared_recordings(corpus, variation):
-        scored = {name: _scored(hand, name, warm_up) for name in hand.fingers}
+        scored: dict[str, Mask] = {}
+        for name, finger in hand.fingers.items():
+            times = finger.times
+            scored[name] = np.full(len(times), not warm_up)
+            # Features start anew after every gap, so every stretch has its own warm-up. Half a
+            # sample period is allowed for the rounding of times.
+            for rows in finger.stretches if warm_up else ():
+                begin = times[rows.start] + warm_up - 0.5 / hand.rate
+                scored[name][rows] = times[rows] >= begin
         features = {
             unit: np.asarray(rows[::stride], dtype=np.float32)
             for unit, rows in method.features(hand).items()
         }
         featured.append(replace(labelled.scored_at(scored, stride), features=features))
     return featured
-
-
-def _scored(hand: HandSignal, name: str, warm_up: float) -> Mask:
-    """Return the samples of a finger that come at least `warm_up` [s] after a stretch begins."""
-    times = hand.fingers[name].times
-    scored = np.full(len(times), not warm_up)
-    for rows in hand.fingers[name].stretches if warm_up else ():
-        scored[rows] = times[rows] >= times[rows.start] + warm_up - 0.5 / hand.rate
-    return scored
 
 
 def prepared_recordings(

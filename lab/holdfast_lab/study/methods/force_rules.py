@@ -41,33 +41,32 @@ def normal_and_tangential(hand: HandSignal) -> Mapping[str, Array]:
     A linear classifier of them, w_0 + w_n F_n + w_t F_t >= 0, is the Coulomb margin
     mu F_n - F_t >= m_0 with mu = -w_n / w_t and m_0 = w_0 / w_t.
     """
-    return stretchwise(hand, _normal_and_tangential)
-
-
-def _normal_and_tangential(finger: FingerSignal) -> Array:
-    return np.column_stack([finger.normal_magnitude, finger.tangential_magnitude])
+    return stretchwise(
+        hand, lambda f: np.column_stack([f.normal_magnitude, f.tangential_magnitude])
+    )
 
 
 def tangential_change(hand: HandSignal) -> Mapping[str, Array]:
     """Return |T_k - T_(k-1)| / max(T_(k-1), eps), (n, 1); NaN at the start of a stretch."""
-    return stretchwise(hand, _tangential_change)
 
+    def of_stretch(finger: FingerSignal) -> Array:
+        now = finger.tangential_magnitude
+        # Cut, so that an empty stretch stays empty.
+        before = np.concatenate([[np.nan], now])[: len(now)]
+        smallest = MIN_TANGENTIAL_FORCE * finger.units_per_newton
+        return np.asarray((np.abs(now - before) / np.maximum(before, smallest))[:, None])
 
-def _tangential_change(finger: FingerSignal) -> Array:
-    now = finger.tangential_magnitude
-    before = np.concatenate([[np.nan], now])[: len(now)]
-    smallest = MIN_TANGENTIAL_FORCE * finger.units_per_newton
-    return np.asarray((np.abs(now - before) / np.maximum(before, smallest))[:, None])
+    return stretchwise(hand, of_stretch)
 
 
 def force_rate(hand: HandSignal) -> Mapping[str, Array]:
     """Return |F_k - F_(k-1)| x rate [count/s or N/s], (n, 1); NaN at the start of a stretch."""
-    return stretchwise(hand, _force_rate)
 
+    def of_stretch(finger: FingerSignal) -> Array:
+        steps = np.diff(finger.force, axis=0, prepend=np.full((1, 3), np.nan))
+        return np.asarray(np.linalg.norm(steps, axis=1, keepdims=True) * finger.rate)
 
-def _force_rate(finger: FingerSignal) -> Array:
-    steps = np.diff(finger.force, axis=0, prepend=np.full((1, 3), np.nan))[: len(finger.force)]
-    return np.asarray(np.linalg.norm(steps, axis=1, keepdims=True) * finger.rate)
+    return stretchwise(hand, of_stretch)
 
 
 FRICTION_METHOD = Method(

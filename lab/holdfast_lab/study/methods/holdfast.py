@@ -21,7 +21,9 @@ from holdfast.sensors.types import Array
 from holdfast_lab.study.methods.method import HandSignal, Method
 
 
-def _features(hand: HandSignal) -> Mapping[str, Array]:
+def holdfast_features(hand: HandSignal) -> Mapping[str, Array]:
+    """Return the features that the detector computes live, of every finger."""
+    # By the code of the detector itself, so the study evaluates what runs on a hand.
     sensors = {name: finger.sensor for name, finger in hand.fingers.items()}
     specs = dict.fromkeys(sensors, HOLDFAST_FEATURES)
     plan = StreamPlan(sensors, specs, DEFAULT_WINDOW, hand.tare, hand.rate)
@@ -34,6 +36,6 @@ HOLDFAST = Method(
     "holdfast",
     "ours: logarithms of sigma over three axes and of force changes, over several windows, of "
     "the finger and of the hand; logistic regression",
-    _features,
+    holdfast_features,
     recipe("logreg"),
 )

@@ -71,24 +71,24 @@ def shear_statistics(shear: Array, window: int = SHEAR_WINDOW) -> Array:
         of the sum of all; the sum over channels of the standard deviation over samples. NaN
         without a full window.
     """
+
+    def span_and_sum(windows: Array) -> Array:
+        """From (m, 3, window) largest, smallest and sum of the samples to (m, 2)."""
+        span = windows[:, 0].max(axis=1) - windows[:, 1].min(axis=1)
+        return np.column_stack([span, np.abs(windows[:, 2].sum(axis=1))])
+
+    def sum_of_deviations(windows: Array) -> Array:
+        """From (m, n_taxels, 2, window) to (m, 1), in two passes to avoid rounding errors."""
+        return np.asarray(windows.std(axis=-1).sum(axis=(1, 2))[:, None])
+
+    # Reduced over the channels first: the windows then hold 3 numbers a sample, not all taxels.
     extremes = [shear.max(axis=(1, 2)), shear.min(axis=(1, 2)), shear.sum(axis=(1, 2))]
     return np.column_stack(
         [
-            windowed(np.column_stack(extremes), window, _span_and_sum),
-            windowed(shear, window, _sum_of_deviations),
+            windowed(np.column_stack(extremes), window, span_and_sum),
+            windowed(shear, window, sum_of_deviations),
         ]
     )
-
-
-def _span_and_sum(windows: Array) -> Array:
-    """From (m, 3, window) largest, smallest and sum of the samples to (m, 2)."""
-    span = windows[:, 0].max(axis=1) - windows[:, 1].min(axis=1)
-    return np.column_stack([span, np.abs(windows[:, 2].sum(axis=1))])
-
-
-def _sum_of_deviations(windows: Array) -> Array:
-    """From (m, n_taxels, 2, window) to (m, 1), in two passes to avoid rounding errors."""
-    return np.asarray(windows.std(axis=-1).sum(axis=(1, 2))[:, None])
 
 
 def taxel_motion(hand: HandSignal) -> dict[str, Array]:
@@ -104,7 +104,16 @@ def taxel_motion(hand: HandSignal) -> dict[str, Array]:
         the directions from 0 (all alike) to 1; then the magnitude of every taxel. Magnitudes
         are in the unit of the readings. NaN until `MOTION_STEP` after the start of a stretch.
     """
-    return stretchwise(hand, _motion_of_finger)
+
+    def of_stretch(finger: FingerSignal) -> Array:
+        n_samples = max(1, round(MOTION_STEP * finger.rate))
+        features = np.full((len(finger.times), SUMMARY_FEATURES + finger.sensor.n_taxels), np.nan)
+        shear = finger.readings[:, :, :2]
+        if len(shear) > n_samples:
+            features[n_samples:] = motion_features(shear[n_samples:] - shear[:-n_samples])
+        return features
+
+    return stretchwise(hand, of_stretch)
 
 
 def hand_motion(hand: HandSignal) -> dict[str, Array]:
@@ -123,15 +132,6 @@ def hand_motion(hand: HandSignal) -> dict[str, Array]:
         )
     times = next(iter(hand.fingers.values())).times
     return {HAND: np.hstack(list(latest_rows(hand, taxel_motion(hand), times)))}
-
-
-def _motion_of_finger(finger: FingerSignal) -> Array:
-    n_samples = max(1, round(MOTION_STEP * finger.rate))
-    features = np.full((len(finger.times), SUMMARY_FEATURES + finger.sensor.n_taxels), np.nan)
-    shear = finger.readings[:, :, :2]
-    if len(shear) > n_samples:
-        features[n_samples:] = motion_features(shear[n_samples:] - shear[:-n_samples])
-    return features
 
 
 def motion_features(motion: Array) -> Array:
@@ -167,23 +167,26 @@ def last_second(hand: HandSignal) -> dict[str, Array]:
     the sample itself. The result is float32 because it is large. NaN in the first second of a
     stretch.
     """
-    return {name: rows.astype(np.float32) for name, rows in stretchwise(hand, _steps).items()}
+
+    def of_stretch(finger: FingerSignal) -> Array:
+        features = np.full((len(finger.times), N_LEARNING_STEPS, 3), np.nan)
+        first = finger.times[:1] + (N_LEARNING_STEPS - 1) * STEP - 0.5 / finger.rate
+        full = finger.times >= first
+        at = finger.times[full, None] - STEP * np.arange(N_LEARNING_STEPS)[::-1]
+        if full.any():  # np.interp refuses a stretch without samples
+            for axis in range(3):
+                features[full, :, axis] = np.interp(at, finger.times, finger.force[:, axis])
+        return features.reshape(len(features), 3 * N_LEARNING_STEPS)
+
+    return {name: rows.astype(np.float32) for name, rows in stretchwise(hand, of_stretch).items()}
 
 
-def _steps(finger: FingerSignal) -> Array:
-    """Return the steps of the second that ends at each sample: x y z of one after the other."""
-    features = np.full((len(finger.times), N_LEARNING_STEPS, 3), np.nan)
-    first = finger.times[:1] + (N_LEARNING_STEPS - 1) * STEP - 0.5 / finger.rate
-    full = finger.times >= first
-    at = finger.times[full, None] - STEP * np.arange(N_LEARNING_STEPS)[::-1]
-    if full.any():
-        for axis in range(3):
-            features[full, :, axis] = np.interp(at, finger.times, finger.force[:, axis])
-    return features.reshape(len(features), 3 * N_LEARNING_STEPS)
-
-
-def _james_lepora(scope: str, classifier: str, title: str) -> Method:
-    return Method(
+ANYSKIN = Method(
+    "anyskin", "AnySkin shear features", "learning", ANYSKIN_SOURCE, shear_features,
+    recipe("logreg"),
+)  # fmt: skip
+JAMES_LEPORA = tuple(
+    Method(
         f"jl_{scope}_{classifier}",
         f"{title}, {scope} (James & Lepora)",
         "learning",
@@ -192,14 +195,6 @@ def _james_lepora(scope: str, classifier: str, title: str) -> Method:
         recipe(classifier),
         whole_hand=scope == "global",
     )
-
-
-ANYSKIN = Method(
-    "anyskin", "AnySkin shear features", "learning", ANYSKIN_SOURCE, shear_features,
-    recipe("logreg"),
-)  # fmt: skip
-JAMES_LEPORA = tuple(
-    _james_lepora(scope, classifier, title)
     for scope in ("local", "global")
     for classifier, title in (("logreg", "LogReg"), ("svm", "Linear SVM"))
 )

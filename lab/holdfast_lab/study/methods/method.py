@@ -18,7 +18,7 @@ from holdfast.classifiers import Parameters, Recipe
 from holdfast.features import Tare
 from holdfast.features.force import tared_force
 from holdfast.features.tables import GAP_LIMIT_PERIODS
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
@@ -174,16 +174,14 @@ def hand_signal(
         fingers: names; by default all fingers that have labels.
     """
     names = fingers or tuple(name for name, module in recording.modules.items() if module.labels)
-    modules = {name: recording.modules[name] for name in names}
-    signals = {n: _finger_signal(module, tare, recording.rate) for n, module in modules.items()}
+    rate, signals = recording.rate, {}
+    for name in names:
+        module = recording.modules[name]
+        tared = tared_force(module, tare, rate)
+        signals[name] = FingerSignal(
+            module.sensor, module.times, module.readings, tared.baseline, tared.force, rate
+        )
     return HandSignal(recording, tare, signals)
-
-
-def _finger_signal(module: Tactile, tare: Tare, rate: float) -> FingerSignal:
-    tared = tared_force(module, tare, rate)
-    return FingerSignal(
-        module.sensor, module.times, module.readings, tared.baseline, tared.force, rate
-    )
 
 
 def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> dict[str, Array]:
@@ -196,6 +194,7 @@ def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> 
     """
     found = {}
     for name, finger in hand.fingers.items():
+        # Of an empty part: a finger without a stretch has NaN rows of the same width.
         n_features = function(finger.part(slice(0, 0))).shape[1]
         features = np.full((len(finger.times), n_features), np.nan)
         for rows, stretch in hand.each_stretch(name):
@@ -221,6 +220,7 @@ def latest_rows(hand: HandSignal, rows: Mapping[str, Array], times: Array) -> It
     for name, own in rows.items():
         sampled = hand.fingers[name].times
         last: npt.NDArray[np.intp] = np.searchsorted(sampled, times, side="right") - 1
+        # Row -1 stands for none yet; it is replaced by NaN.
         known = (last >= 0) & (times - sampled[last] <= GAP_LIMIT_PERIODS / hand.rate)
         yield np.where(known[:, None], own[last], np.nan)
 
@@ -237,6 +237,7 @@ def windowed(values: Array, window: int, function: Callable[[Array], Array]) -> 
     Returns:
         (n, n_features).
     """
+    # Zeros before a stretch that is too short, because NumPy makes no window of fewer samples.
     padding = np.zeros((max(window - len(values), 0), *values.shape[1:]))
     windows = sliding_window_view(np.concatenate([padding, values]), window, axis=0)
     values_of_windows = function(windows[len(padding) > 0 :])

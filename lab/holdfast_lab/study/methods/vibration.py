@@ -54,7 +54,17 @@ def slip_ratio(hand: HandSignal) -> Mapping[str, Array]:
 
     |F_hp| / clip(0.007 |F|, 0.048 N, 0.2 N) where |F_bp| < 0.18 N.
     """
-    return stretchwise(hand, _slip_ratio)
+
+    def of_stretch(finger: FingerSignal) -> Array:
+        force, newton = finger.normal_force, finger.units_per_newton
+        threshold = np.clip(
+            FORCE_FRACTION * np.abs(force), MIN_THRESHOLD * newton, MAX_THRESHOLD * newton
+        )
+        steady = np.abs(band_pass(force, finger.rate)) < MAX_GRIP_CHANGE * newton
+        ratio = np.abs(high_pass(force, finger.rate)) / threshold
+        return np.asarray((ratio * steady)[:, None])
+
+    return stretchwise(hand, of_stretch)
 
 
 def high_pass(values: Array, rate: float, frequency: float = HIGH_PASS) -> Array:
@@ -70,6 +80,7 @@ def high_pass(values: Array, rate: float, frequency: float = HIGH_PASS) -> Array
     Returns:
         (n,), in the unit of the values.
     """
+    # The first value is taken off, so that a force that lasts is no step at the start.
     a = 1.0 / (1.0 + 2.0 * np.pi * frequency / rate)
     return np.asarray(lfilter([a, -a], [1.0, -a], values - values[:1]))
 
@@ -80,19 +91,9 @@ def band_pass(values: Array, rate: float, band: tuple[float, float] = GRIP_BAND)
     return np.asarray(lfilter(numerator, denominator, values - values[:1]))
 
 
-def _slip_ratio(finger: FingerSignal) -> Array:
-    force, newton = finger.normal_force, finger.units_per_newton
-    threshold = np.clip(
-        FORCE_FRACTION * np.abs(force), MIN_THRESHOLD * newton, MAX_THRESHOLD * newton
-    )
-    steady = np.abs(band_pass(force, finger.rate)) < MAX_GRIP_CHANGE * newton
-    ratio = np.abs(high_pass(force, finger.rate)) / threshold
-    return np.asarray((ratio * steady)[:, None])
-
-
 def band_energies(hand: HandSignal) -> Mapping[str, Array]:
     """Return log10 of the energy of the force in each of `BANDS`, axes added, (n, 5)."""
-    return stretchwise(hand, _band_energies)
+    return stretchwise(hand, lambda f: np.log10(band_energy(f.force, f.rate, BANDS) + MIN_ENERGY))
 
 
 def band_energy(
@@ -123,16 +124,13 @@ def band_energy(
     inside = np.array([(frequencies >= low) & (frequencies < high) for low, high in bands])
 
     def of_windows(windows: Array) -> Array:
+        # The window would spread the mean, the grip itself, over the lowest bins.
         centred = windows - windows.mean(axis=-1, keepdims=True)
         spectrum = rfft(centred * weights, axis=-1)
         power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
         return np.asarray(power @ inside.T * (2 / (window * (weights**2).sum())))
 
     return windowed(values, window, of_windows)
-
-
-def _band_energies(finger: FingerSignal) -> Array:
-    return np.log10(band_energy(finger.force, finger.rate, BANDS) + MIN_ENERGY)
 
 
 SLIP_SERVO = Method(

@@ -12,6 +12,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 
@@ -137,15 +138,7 @@ def normal_energy(hand: HandSignal, window: int = DEFAULT_WINDOW) -> dict[str, A
     return stretchwise(hand, lambda finger: detail_energy(finger.normal_force, window)[:, None])
 
 
-def _deployed_features(hand: HandSignal) -> Mapping[str, Array]:
-    return paper_features(hand)
-
-
-def _six_features(hand: HandSignal) -> Mapping[str, Array]:
-    return paper_features(hand, FEATURE_NAMES)
-
-
-def _log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
+def log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
     """Return log10 of F_a and of sigma of every finger, (n, 2)."""
     return {
         name: np.log10(np.maximum(rows, MIN_LOG_ARGUMENT))
@@ -153,13 +146,14 @@ def _log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
     }
 
 
-def _log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
+def log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
     """Return log10 of F_a, of sigma and of the largest sigma of all fingers, (n, 3).
 
     Fingers without a sigma at the time are left out of the largest.
     """
-    own = _log_force_and_sigma(hand)
+    own = log_force_and_sigma(hand)
     sigmas = {name: rows[:, 1:] for name, rows in own.items()}
+    # fmax, not max, because it passes over the NaN of a finger.
     return {
         name: np.hstack([
             rows, np.fmax.reduce(list(latest_rows(hand, sigmas, hand.fingers[name].times)))
@@ -168,54 +162,40 @@ def _log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
     }  # fmt: skip
 
 
-def _normal_energy(hand: HandSignal) -> Mapping[str, Array]:
-    return normal_energy(hand)
-
-
 UNWEIGHTED = {"C": 1.0, "class_weight": None}
 """Parameters of a classifier whose classes are not weighted."""
 
 LOGREG = Method(
-    "logreg", "LogReg (the paper)", "paper", PAPER_SOURCE, _deployed_features, recipe("logreg")
+    "logreg", "LogReg (the paper)", "paper", PAPER_SOURCE, paper_features, recipe("logreg")
 )
 LOGREG_UNWEIGHTED = Method(
     "logreg_unweighted", "LogReg, classes unweighted (the paper)", "paper", UNWEIGHTED_SOURCE,
-    _deployed_features, recipe("logreg"), UNWEIGHTED,
+    paper_features, recipe("logreg"), UNWEIGHTED,
 )  # fmt: skip
-SVM = Method(
-    "svm", "Linear SVM (the paper)", "paper", PAPER_SOURCE, _deployed_features, recipe("svm")
-)
+SVM = Method("svm", "Linear SVM (the paper)", "paper", PAPER_SOURCE, paper_features, recipe("svm"))
 SVM_UNWEIGHTED = Method(
     "svm_unweighted", "Linear SVM, classes unweighted (the paper)", "paper", UNWEIGHTED_SOURCE,
-    _deployed_features, recipe("svm"), UNWEIGHTED,
+    paper_features, recipe("svm"), UNWEIGHTED,
 )  # fmt: skip
 LOG_TWO = Method(
     "log_two", "LogReg of log F_a and log sigma", "paper", LOG_TWO_SOURCE,
-    _log_force_and_sigma, recipe("logreg"),
+    log_force_and_sigma, recipe("logreg"),
 )  # fmt: skip
 LOG_HAND = Method(
     "log_hand", "LogReg of log F_a, log sigma and the hand's largest", "paper", LOG_HAND_SOURCE,
-    _log_force_and_sigmas, recipe("logreg"),
+    log_force_and_sigmas, recipe("logreg"),
 )  # fmt: skip
 TREES = Method(
-    "trees", "Boosted trees, 6 features", "learning", TREES_SOURCE, _six_features,
-    GradientBoosting(),
+    "trees", "Boosted trees, 6 features", "learning", TREES_SOURCE,
+    partial(paper_features, names=FEATURE_NAMES), GradientBoosting(),
 )  # fmt: skip
 ZHANG = Method(
-    "zhang", "Haar energy of F_x (Zhang 2016)", "vibration", ZHANG_SOURCE, _normal_energy,
+    "zhang", "Haar energy of F_x (Zhang 2016)", "vibration", ZHANG_SOURCE, normal_energy,
     recipe("svm"),
 )  # fmt: skip
 
 
-def _amplitude(finger: FingerSignal) -> Array:
-    return finger.amplitude
-
-
-def _normal_force(finger: FingerSignal) -> Array:
-    return finger.normal_force
-
-
-def _log_feature(
+def log_feature(
     signal: Callable[[FingerSignal], Array], measure: Callable[[Array], Array], hand: HandSignal
 ) -> Mapping[str, Array]:
     """Return log10 of a measure of a signal of every finger, (n, 1).
@@ -231,7 +211,7 @@ def _log_feature(
 
 ENERGY = Method(
     "energy", "Haar energy of F_a", "paper", ENERGY_SOURCE,
-    partial(_log_feature, _amplitude, detail_energy), Threshold("below"),
+    partial(log_feature, attrgetter("amplitude"), detail_energy), Threshold("below"),
 )  # fmt: skip
 CUTS = {
     name: Method(
@@ -239,13 +219,13 @@ CUTS = {
         title,
         "vibration",
         CUTS_SOURCE,
-        partial(_log_feature, signal, measure),
+        partial(log_feature, attrgetter(signal), measure),
         Threshold("below"),
     )
     for name, title, signal, measure in (
-        ("sigma_cut", "sigma of F_a", _amplitude, detail_sigma),
-        ("energy_cut", "energy of F_a", _amplitude, detail_energy),
-        ("energy_x_cut", "energy of F_x (Zhang)", _normal_force, detail_energy),
+        ("sigma_cut", "sigma of F_a", "amplitude", detail_sigma),
+        ("energy_cut", "energy of F_a", "amplitude", detail_energy),
+        ("energy_x_cut", "energy of F_x (Zhang)", "normal_force", detail_energy),
     )
 }
 """Methods of one feature and one threshold, by name.

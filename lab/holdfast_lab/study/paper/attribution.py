@@ -119,6 +119,7 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
                 figure = keys | {"figure": rate}
                 rows.append(Row(figure, row.ours, paper.get(rate), row.n, row.interval))
             if switch.name != "base":
+                # Only main has the very recordings of the first line.
                 paired = switch.role == "main"
                 rows.append(
                     difference_row(keys, result.counts[on], base.counts[on], plan.seed, paired)
@@ -203,10 +204,12 @@ def difference_row(
     if paired:
         both = np.hstack([first, second])
     else:
+        # Each recording fills its own half of the columns, so a resample draws them separately.
         both = np.vstack([np.pad(first, ((0, 0), (0, 2))), np.pad(second, ((0, 0), (2, 0)))])
     both = both[both.any(axis=1)]
 
     def statistic(draws: Array) -> Array:
+        # A resample of both together may have no recording of one of them.
         correct, n, other_correct, other_n = (draws @ both).T
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(100 * (correct / n - other_correct / other_n))

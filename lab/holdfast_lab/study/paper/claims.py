@@ -5,7 +5,7 @@ slips with the same velocity". Its features rest on a second claim: sigma falls 
 settles after the lock. The expectations below were written before either was run.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
@@ -16,7 +16,6 @@ from holdfast.contact import GLITCH_DURATION, HELD_PHASES, SLIP_SPEED, Phase
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.metrics import Interval, bootstrap_interval
 from holdfast.metrics.masks import Mask
-from holdfast.metrics.statistics import Statistic
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
@@ -118,7 +117,7 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     every = [each for of_role in by_role.values() for each in of_role]
     for expectation in (GRIP, SETTLES):
         for role, data in [("all", every), *by_role.items()]:
-            effect, interval, n = _effect(expectation, data, plan.seed)
+            effect, interval, n = claim_effect(expectation, data, plan.seed)
             about: dict[str, Key] = {
                 "claim": expectation.claim,
                 "effect": expectation.effect,
@@ -224,10 +223,13 @@ def settling_fall(signal: FingerSignal, truth: Truth) -> float | None:
     Only windows after the lock and before the first disturbance, the release or the loss, without
     a glitch of the hand's controller. None with too few samples.
     """
-    undisturbed = _undisturbed(truth)
-    if not undisturbed.any():
+    locked = truth.hand["phase"] == Phase.LOCKED
+    if not locked.any():
         return None
-    locked_at = float(truth.times[np.argmax(undisturbed)])
+    # Only the first stretch of the phase: what is locked again was disturbed before.
+    first = int(np.argmax(locked))
+    undisturbed = locked & (np.cumsum(~locked) == np.cumsum(~locked)[first])
+    locked_at = float(truth.times[first])
     at = _truth_rows(truth, signal.times)
     calm = (undisturbed & ~glitches(truth, LabelRule(glitch=GLITCH_DURATION)))[at]
     usable = _whole_window(calm & (signal.times >= locked_at), DEFAULT_WINDOW)
@@ -243,71 +245,52 @@ def settling_fall(signal: FingerSignal, truth: Truth) -> float | None:
     return float(np.log(sigma[early]).mean() - np.log(sigma[later]).mean())
 
 
-def _undisturbed(truth: Truth) -> Mask:
-    """Return where the object is locked, before anything else happens to it."""
-    locked = truth.hand["phase"] == Phase.LOCKED
-    if not locked.any():
-        return np.asarray(locked)
-    first = int(np.argmax(locked))
-    other = np.flatnonzero(~locked[first:])
-    end = first + int(other[0]) if len(other) else len(locked)
-    mask = np.zeros(len(locked), dtype=bool)
-    mask[first:end] = True
-    return mask
-
-
 def _whole_window(mask: Mask, window: int) -> Mask:
     """Return the samples whose whole window, which ends at them, is in the mask."""
     if not len(mask):
         return mask
+    # The origin moves the window back, so that it ends at the sample.
     whole = minimum_filter1d(mask.astype(np.int8), window, origin=(window - 1) // 2) > 0
     whole[: window - 1] = False
     return np.asarray(whole)
 
 
 def _truth_rows(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
+    # A time may differ from that of its row of the truth by a rounding error.
     last = np.searchsorted(truth.times, times + 1e-6, side="right") - 1
     return np.clip(last, 0, len(truth.times) - 1)
 
 
-def _effect(
+def claim_effect(
     expectation: Expectation, data: Sequence[ClaimData], seed: int
 ) -> tuple[float | None, Interval | None, int]:
     """Return the effect, its interval and the number of recordings."""
     if expectation is GRIP:
         used = [recording for recording in data if recording.n_sliding]
-        statistic = _exponent(used)
+        # The statistic: the exponent of the force in the regression of the energy.
+        moments = np.array([recording.moments for recording in used]).reshape(-1, 3, 3)
+        products = np.array([recording.products for recording in used]).reshape(-1, 3)
+
+        def statistic(draws: Array) -> Array:
+            exponents = []
+            summed = np.einsum("dr,rij->dij", draws, moments)
+            for matrix, vector in zip(summed, draws @ products, strict=True):
+                # A resample of a few alike recordings cannot tell the force from the speed.
+                solvable = np.linalg.matrix_rank(matrix) == len(matrix)
+                exponents.append(float(np.linalg.solve(matrix, vector)[1]) if solvable else np.nan)
+            return np.array(exponents)
+
     else:
         used = [recording for recording in data if recording.settling]
-        statistic = _ratio(used)
+        # The statistic: the ratio of the geometric means of sigma, over all fingers.
+        total = np.array([sum(recording.settling) for recording in used])
+        n = np.array([len(recording.settling) for recording in used], dtype=np.float64)
+
+        def statistic(draws: Array) -> Array:
+            return np.asarray(np.exp((draws @ total) / (draws @ n)))
+
     if not used:
         return None, None, 0
     value = float(statistic(np.ones((1, len(used))))[0])
     interval = bootstrap_interval(statistic, len(used), seed=seed)
     return None if np.isnan(value) else value, interval, len(used)
-
-
-def _exponent(data: Sequence[ClaimData]) -> Statistic:
-    """Return the statistic: the exponent of the force in the regression of the energy."""
-    moments = np.array([recording.moments for recording in data]).reshape(-1, 3, 3)
-    products = np.array([recording.products for recording in data]).reshape(-1, 3)
-
-    def statistic(draws: Array) -> Array:
-        return np.array(list(_solve(draws, moments, products)))
-
-    return statistic
-
-
-def _solve(draws: Array, moments: Array, products: Array) -> Iterator[float]:
-    for matrix, vector in zip(
-        np.einsum("dr,rij->dij", draws, moments), draws @ products, strict=True
-    ):
-        solvable = np.linalg.matrix_rank(matrix) == len(matrix)
-        yield float(np.linalg.solve(matrix, vector)[1]) if solvable else np.nan
-
-
-def _ratio(data: Sequence[ClaimData]) -> Statistic:
-    """Return the statistic: the ratio of the geometric means of sigma, over all fingers."""
-    total = np.array([sum(recording.settling) for recording in data])
-    n = np.array([len(recording.settling) for recording in data], dtype=np.float64)
-    return lambda draws: np.exp((draws @ total) / (draws @ n))

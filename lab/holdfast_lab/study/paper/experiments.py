@@ -11,7 +11,7 @@ import numpy as np
 
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
-from holdfast.plots.time_series import FingerSeries, StateCodes, finger_series
+from holdfast.plots.time_series import FingerSeries, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable
@@ -75,7 +75,9 @@ def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
     every: list[ReportFigure] = []
     for example in results[TASK]:
         corpus = plan.corpora[example.role]
-        series = _series(corpus, example.recording, example.finger)
+        (recording,) = _select(corpus, example.finger, example.recording).load()
+        series = finger_series(recording, example.finger, Tare.parse(corpus.tare))
+        series = series._replace(name=f"{example.recording}, {example.finger}")
         if example.experiment == "protocol":
             every += _protocol_figures(series)
         else:
@@ -102,8 +104,19 @@ def predict_examples(
         features = corpus_features(METHODS[name], _select(main, finger))
         training = MethodTraining.of(METHODS[name], features, seed=seed)
         for example in examples:
-            states = _predict(training, corpora, example)
+            # By a fit to all other main recordings.
+            own = (example.role, example.recording)
+            numbers = {k for k, each in enumerate(main.recordings) if own != ("main", each)}
+            fitted = training.fit(numbers)
+            if not fitted.classifiers:
+                raise TrainingError(
+                    f"without {example.recording} the {example.finger} has labels of one class"
+                )
+            corpus = _select(corpora[example.role], example.finger, example.recording)
+            (shown,) = corpus_features(training.method, corpus)
+            states = fitted.scores(shown).fingers[example.finger].states()
             example.states[name] = states.tolist()
+    # The first figures show what the paper does, so a recording with disturbances.
     first = _first(main, finger, EXPERIMENT_CASES["disturbed"]) or main.recordings[0]
     return [ExampleRecording("protocol", "main", first, finger), *examples]
 
@@ -131,33 +144,10 @@ def _first(corpus: Corpus, finger: str, case: str) -> str | None:
     return None
 
 
-def _predict(
-    training: MethodTraining, corpora: Mapping[str, Corpus], example: ExampleRecording
-) -> StateCodes:
-    """Return states (n,) of a recording, by a fit to all other main recordings."""
-    own = (example.role, example.recording)
-    names = corpora["main"].recordings
-    numbers = {k for k, name in enumerate(names) if own != ("main", name)}
-    fitted = training.fit(numbers)
-    if not fitted.classifiers:
-        raise TrainingError(
-            f"without {example.recording} the {example.finger} has labels of one class"
-        )
-    corpus = _select(corpora[example.role], example.finger, example.recording)
-    (features,) = corpus_features(training.method, corpus)
-    return fitted.scores(features).fingers[example.finger].states()
-
-
 def _select(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus:
     """Return one finger of a corpus, or of one recording of it."""
     names = corpus.recordings if recording is None else (recording,)
     return msgspec.structs.replace(corpus, fingers=(finger,), recordings=names)
-
-
-def _series(corpus: Corpus, name: str, finger: str) -> FingerSeries:
-    (recording,) = _select(corpus, finger, name).load()
-    series = finger_series(recording, finger, Tare.parse(corpus.tare))
-    return series._replace(name=f"{name}, {finger}")
 
 
 def _protocol_figures(series: FingerSeries) -> Iterator[ReportFigure]:

@@ -63,6 +63,7 @@ def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:
     quiet = (grasped & ~sliding)[at_sample] & (
         label_states(module.labels, module.times) == UNSTABLE
     )
+    # Labels are in order of time, so one pass over both is enough.
     labels = iter(module.labels)
     label = next(labels, None)
     states: list[tuple[ContactState, Cause | None] | None] = []

@@ -9,7 +9,6 @@ import numpy as np
 
 from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.metrics.samples import score_samples
-from holdfast.recordings import Recording
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.rows import DIGITS, ratio_row, sample_rows
@@ -114,13 +113,12 @@ def evaluate_labels(
     # The features with each kind of labels.
     features = corpus_features(method, corpus)
     by_name = {recording.name: recording for recording in corpus.load()}
-    by_source = {
-        source: [
-            _with_labels(feature, by_name[feature.name], source, corpus.tare)
-            for feature in features
-        ]
-        for source in SOURCES
-    }
+    by_source: dict[LabelSource, list[RecordingFeatures]] = {source: [] for source in SOURCES}
+    for source, labelled in by_source.items():
+        for each in features:
+            modules = relabelled(by_name[each.name], source, corpus.tare).modules
+            labels = {finger: modules[finger].label_states for finger in each.times}
+            labelled.append(replace(each, labels=labels))
     metrics = {}
     for trained in SOURCES:
         training = MethodTraining.of(method, by_source[trained], max_samples, seed)
@@ -136,15 +134,9 @@ def evaluate_labels(
         for tested, of_recording in decided.items():
             ordered = [of_recording[index] for index in sorted(of_recording)]
             metrics[f"{trained}/{tested}"] = summarise(ordered, seed=seed)
+    # The sources are in order: exact, then drawn.
     rule = [_confusion(exact, drawn) for exact, drawn in zip(*by_source.values(), strict=True)]
     return LabelEvaluation(metrics, rule)
-
-
-def _with_labels(
-    features: RecordingFeatures, recording: Recording, source: LabelSource, tare: str
-) -> RecordingFeatures:
-    modules = relabelled(recording, source, tare).modules
-    return replace(features, labels={name: modules[name].label_states for name in features.times})
 
 
 def _confusion(exact: RecordingFeatures, drawn: RecordingFeatures) -> list[int]:
@@ -173,6 +165,7 @@ def _label_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
                 if tested == "exact":
                     rows += _event_rows(keys, metrics)
     keys = {"method": "the drawn labels themselves", "trained on": "–", "tested on": "exact truth"}
+    # The heads of the other lines, so that the rule stands in the same columns.
     names = {"accuracy": "accuracy [%]", "FDR": "FDR [%]", "FNR": "FNR [%]"}
     rows += [
         Row(keys | {"figure": names[name]}, row.ours, None, row.n, row.interval)
@@ -241,6 +234,7 @@ def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Itera
     if "stable" in all_kinds:
         n = [count.samples.get("stable", 0) for count in counts]
         hidden = [count.hidden.get("stable", 0) for count in counts]
+        # Without the ceiling, which is one of unstable samples.
         yield from list(_cause_rows(keys | {"cause": "stable"}, hidden, n, seed))[:2]
 
 

@@ -67,6 +67,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
         variants = (
             *(("logreg", names) for names in FEATURE_SETS.values()), _ZHANG, _BEST_THRESHOLD,
         )  # fmt: skip
+        # What the task of the first finger computes already is not computed again.
         new = tuple(
             variant
             for variant in variants
@@ -208,6 +209,7 @@ def _window_table(fits: PaperResults) -> ResultTable:
             result = fits.of(("logreg", names), window)
             paper = published.PUBLISHED_WINDOW[window]
             rows += fits.rows(result, keys, published.RATES, paper, fits.tests)
+    # The sort is stable: the windows keep their order.
     rows.sort(key=lambda row: str(row.keys["features"]))
     note = f"All six features include m; the deployed five do not. {fits.protocol}"
     title = "The paper's Table II: LogReg by window [%]"
@@ -243,7 +245,10 @@ def _finger_table(fits: PaperResults) -> ResultTable:
     for finger in _fingers(fits.plan):
         for name, title in FINGER_TITLES.items():
             keys: Keys = {"finger": finger, "classifier": title}
-            paper = _published_values(fits.plan, finger) if name == "logreg" else {}
+            # The paper prints values of LogReg alone.
+            paper = published.OTHER_FINGERS.get(finger, {}) if name == "logreg" else {}
+            if name == "logreg" and finger == first_finger(fits.plan):
+                paper = published.FIRST_FINGER
             result = fits.of((name, DEPLOYED_FEATURES), finger=finger)
             rows += fits.rows(result, keys, ("accuracy", "FDR"), paper)
     note = (
@@ -307,13 +312,6 @@ def _fingers(plan: StudyPlan) -> list[str]:
     """Return all fingers, the first finger of the tables first."""
     first = first_finger(plan)
     return [first, *(finger for finger in plan.main.fingers if finger != first)]
-
-
-def _published_values(plan: StudyPlan, finger: str) -> Mapping[str, float]:
-    """Return the paper's values of LogReg on a finger."""
-    if finger == first_finger(plan):
-        return published.FIRST_FINGER
-    return published.OTHER_FINGERS.get(finger, {})
 
 
 def _protocol(plan: StudyPlan, result: VariantResult) -> Iterator[str]:

@@ -4,7 +4,7 @@ Each sample belongs to one of 25 parts, which is drawn at random from its record
 The part does not depend on finger, window and features.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from holdfast.classifiers.folds import random_folds
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.recordings import Recording
 from holdfast.resampling import at_rate
-from holdfast.sensors.types import Array, Integers
+from holdfast.sensors.types import Integers
 from holdfast.training.finger_samples import concatenate, labelled_samples, usable_rows
 from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import FingerSignal, hand_signal
@@ -90,6 +90,7 @@ def pool_samples(
         seed: of the parts.
         treatment: of the recordings.
     """
+    # An empty part first, for a corpus in which no recording has the finger.
     samples = [Samples(np.empty((0, len(COLUMNS))), np.empty(0, bool), np.empty(0, np.int64))]
     parts = [np.empty(0, dtype=np.int64)]
     forces = _corpus_forces(corpus, rate, treatment)
@@ -97,9 +98,14 @@ def pool_samples(
         if finger not in recording.fingers:
             continue
         signal, states = recording.fingers[finger]
-        features = _columns(signal, window)
+        features = np.full((len(signal.times), len(COLUMNS)), np.nan)
+        normal = signal.normal_magnitude
+        for stretch in signal.stretches:
+            features[stretch, :-1] = haar_features(signal.force[stretch], window)
+            features[stretch, -1] = detail_energy(normal[stretch], window)
         rows = usable_rows(features, states)
         samples.append(labelled_samples(features, states, rows, number))
+        # All samples are dealt, used or not, so that a part is the same for every window.
         drawn = random_folds(len(states), N_POOLED_PARTS, np.random.default_rng([seed, number]))
         parts.append(drawn[rows])
     objects = tuple(recording.object for recording in forces)
@@ -118,31 +124,17 @@ def _corpus_forces(
     corpus: Corpus, rate: float, treatment: Treatment
 ) -> tuple[_RecordingForces, ...]:
     """Return the forces of all recordings; a worker reads a corpus once for all its tasks."""
-    return tuple(_read_forces(corpus, rate, treatment))
-
-
-def _read_forces(corpus: Corpus, rate: float, treatment: Treatment) -> Iterator[_RecordingForces]:
+    forces = []
     for original in corpus.load():
         recording = at_rate(treatment.apply(original, corpus.tare), rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
-        fingers = {
-            name: (_without_readings(signal), recording.modules[name].label_states)
-            for name, signal in hand.fingers.items()
-        }
+        fingers = {}
+        for name, signal in hand.fingers.items():
+            # Without its readings, which are most of the memory: the features need forces alone.
+            no_taxels = np.empty((len(signal.times), 0, 3))
+            bare = replace(signal, with_baseline=no_taxels, baseline=np.empty((0, 3)))
+            fingers[name] = bare, recording.modules[name].label_states
         held_object = recording.metadata.get("object")
-        yield _RecordingForces(fingers, None if held_object is None else str(held_object))
-
-
-def _without_readings(signal: FingerSignal) -> FingerSignal:
-    no_taxels = np.empty((len(signal.times), 0, 3))
-    return replace(signal, with_baseline=no_taxels, baseline=np.empty((0, 3)))
-
-
-def _columns(signal: FingerSignal, window: int) -> Array:
-    """Return the features of `COLUMNS` (n, 7); NaN without a full window."""
-    table = np.full((len(signal.times), len(COLUMNS)), np.nan)
-    normal = signal.normal_magnitude
-    for rows in signal.stretches:
-        table[rows, :-1] = haar_features(signal.force[rows], window)
-        table[rows, -1] = detail_energy(normal[rows], window)
-    return table
+        name_of_object = None if held_object is None else str(held_object)
+        forces.append(_RecordingForces(fingers, name_of_object))
+    return tuple(forces)

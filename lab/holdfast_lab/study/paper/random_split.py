@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
-from holdfast.metrics.statistics import Interval, percent
+from holdfast.metrics.statistics import percent
 from holdfast.sensors.types import Integers
 from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
@@ -173,6 +173,7 @@ def evaluate_variants(
 def confusion_counts(classifier: Classifier, samples: Samples, n_recordings: int) -> Integers:
     """Return the numbers (n_recordings, 4) of TN, FP, FN and TP of each recording."""
     called_stable = classifier.probability(samples.features) >= classifier.threshold
+    # One number for each pair of a recording and a place in [TN, FP, FN, TP].
     cell = 4 * samples.groups + 2 * samples.positive + called_stable
     return np.bincount(cell, minlength=4 * n_recordings).reshape(-1, 4)
 
@@ -193,7 +194,10 @@ def rate_rows(
         part, whole = (table[:, list(columns)].sum(axis=1) for columns in CONFUSION_RATES[name])
         ours = percent(int(part.sum()), int(whole.sum()))
         interval = bootstrap_interval(ratio_of_sums(part, whole), len(table), seed=seed)
-        yield name, Row({}, ours, n=len(table), interval=_percent(interval))
+        if interval is not None:
+            low, high = (None if end is None else 100 * end for end in interval)
+            interval = (low, high)
+        yield name, Row({}, ours, n=len(table), interval=interval)
 
 
 @dataclass(frozen=True)
@@ -271,6 +275,7 @@ def _substitute_folds(
     if UNSEEN_OBJECTS not in tests and thorough and None not in main.objects and len(names) > 1:
         object_of_recording = np.array([names.index(str(name)) for name in main.objects])
         by_object = main.samples._replace(groups=object_of_recording[main.samples.groups])
+        # As many folds as objects, so each object is left out by itself.
         folds[UNSEEN_OBJECTS] = inner_folds(by_object, len(names), seed)
     return folds
 
@@ -282,15 +287,10 @@ def _search(train: Samples, folds: Integers, recipe: Recipe, trials: int, seed: 
     """
     if not recipe.reference:
         return {}
+    # The masks are thinned by the step by which `thin` takes the samples.
     few = _ungrouped(thin(train, SEARCH_SAMPLES))
     step = thinning_step(len(folds), SEARCH_SAMPLES)
     masks = [folds[::step] == fold for fold in range(N_FOLDS)]
     parameters = search(few, masks, recipe, n_trials=trials, seed=seed, objective="error")
+    # The search draws weights too, which the fits ignore: report those that were used.
     return recipe.fixed(parameters) if isinstance(recipe, FixedWeights) else parameters
-
-
-def _percent(interval: Interval | None) -> Interval | None:
-    if interval is None:
-        return None
-    low, high = (None if end is None else 100 * end for end in interval)
-    return low, high

@@ -158,6 +158,7 @@ def grasp_verdicts(
             for recording in corpus.recordings
             if role not in ONLY_FAILED or cases[role][recording] == "failed"
         )
+        # Main is tested out of fold, not as another corpus.
         if role != "main" and names:
             others[role] = msgspec.structs.replace(corpus, recordings=names)
     effort = EvaluationEffort(n_folds, inner=1, max_samples=max_samples)
@@ -205,6 +206,7 @@ def _contact_counts(
             phase = truth.hand["phase"][latest_rows(truth, finger.times)]
             closing = np.flatnonzero(phase == Phase.CLOSING)
             grasp = np.zeros(len(phase), dtype=bool)
+            # Without a closing there is no grasp, and nothing counts.
             grasp[closing[0] if len(closing) else len(phase) :] = True
             grasp &= (phase != Phase.RELEASED) & (finger.states != UNKNOWN)
             grasp &= (finger.labels != UNKNOWN) & (finger.labels != NO_CONTACT)
@@ -240,6 +242,7 @@ def stable_after_lock(
     )
     first, lasting = math.inf, math.inf
     for start, end in runs(stable):
+        # A sample at the lock may have a time just before it.
         begin = max(float(times[start]) - locked_at, 0.0)
         first = min(first, begin)
         if times[end - 1] - times[start] >= MIN_STABLE_DURATION - TIME_TOLERANCE:
@@ -268,6 +271,7 @@ def find_disturbances(
     for start, end in runs(join_runs(disturbed, truth.times, MERGE_GAP)):
         onset, last = float(truth.times[start]), float(truth.times[end - 1])
         inside = (hand.times >= onset - TIME_TOLERANCE) & (hand.times <= last + TIME_TOLERANCE)
+        # The last sample before the onset; -1 if the recording begins with it.
         before = int(np.searchsorted(hand.times, onset - TIME_TOLERANCE)) - 1
         alarms = hand.times[alarm & inside]
         disturbances.append(

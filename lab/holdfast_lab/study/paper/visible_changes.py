@@ -71,6 +71,7 @@ def count_hidden(corpus: Corpus, window: int) -> list[HiddenCounts]:
         rest.setdefault(change.finger, []).append(change.values[change.at_rest])
     limits = {}
     for finger, parts in rest.items():
+        # Nothing at rest says what noise is, so nothing can be called hidden in it.
         limit = noise_limits(parts)
         if limit is None:
             return []
@@ -95,6 +96,7 @@ def window_changes(module: Tactile, window: int) -> Array:
     force = np.einsum("tij,ntj->ni", module.sensor.rotations, readings)
     flat = readings.reshape(len(readings), -1)
     mean = _in_window(uniform_filter1d, flat, window)
+    # Mean of squares less square of the mean: SciPy has no filter of the variance.
     variance = _in_window(uniform_filter1d, flat**2, window) - mean**2
     changes = np.column_stack([_range(force, window), _range(flat, window), variance.sum(axis=1)])
     changes[: window - 1] = np.nan

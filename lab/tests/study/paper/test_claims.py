@@ -10,7 +10,7 @@ from holdfast_lab.study.paper.claims import (
     GRIP,
     SETTLES,
     ClaimData,
-    _effect,
+    claim_effect,
     settling_fall,
     sliding_samples,
     verdict,
@@ -44,20 +44,20 @@ def regression_data(exponent, n=50, seed=0):
 
 
 def test_the_exponent_is_that_of_the_force_at_equal_speed():
-    effect, interval, n = _effect(GRIP, regression_data(1.7), 0)
+    effect, interval, n = claim_effect(GRIP, regression_data(1.7), 0)
     assert effect == pytest.approx(1.7) and n == 4
     assert interval == (pytest.approx(1.7), pytest.approx(1.7))
 
 
 def test_recordings_without_slips_are_left_out():
     none = ClaimData(0, [0.0] * 9, [0.0] * 3, [])
-    assert _effect(GRIP, [none], 0) == (None, None, 0)
-    assert _effect(GRIP, [none, *regression_data(1.0)], 0)[2] == 4
+    assert claim_effect(GRIP, [none], 0) == (None, None, 0)
+    assert claim_effect(GRIP, [none, *regression_data(1.0)], 0)[2] == 4
 
 
 def test_the_ratio_of_sigma_is_geometric():
     data = [ClaimData(0, [0.0] * 9, [0.0] * 3, np.log(each).tolist()) for each in ([2, 8], [4])]
-    effect, _, n = _effect(SETTLES, data, 0)
+    effect, _, n = claim_effect(SETTLES, data, 0)
     assert effect == pytest.approx(4.0) and n == 2
 
 
