@@ -315,7 +315,8 @@ class Finger:
         motion = mean - self.common if same else np.zeros(3)
         self.common = mean - (1 - min(1, self.period / 0.05)) * motion
         change = mean - self.field if same else mean
-        least, moved = (4 * self.noise / n) ** 2, float(motion @ motion)
+        first = limit == math.inf and not self.field.any()
+        least, moved = ((16 if first else 4) * self.noise / n) ** 2, float(motion @ motion)
         if moved <= least:
             self.still_field = self.field
         size = float(change @ change)
@@ -334,13 +335,13 @@ class Finger:
             self.is_load = False
             if apart > 16 * alike:
                 self.n_skipped = 3
-            return not load and apart <= n * 0.0625 * size + noise
+            return not load and apart <= n * 0.0625 * size
         self.is_load = load
         if load and limit < math.inf and fast:
             self.field = self.still_field
         if load or strong:
             return not load
-        self.field, self.is_turned = mean, is_turned
+        self.field, self.is_turned = (mean if moved > 2.25 * least else self.common), is_turned
         return False
 
     def untrue(self, readings):

@@ -15,6 +15,9 @@
 /* A field, and its motion, count from this many times the noise of a component of the force: less
  * than any contact does. */
 #define HF_FIELD_TO_NOISE ((hf_real)4)
+#define HF_FIRST_FIELD ((hf_real)4)
+/* A field moves from this many times the least motion on. */
+#define HF_MOVES ((hf_real)1.5)
 /* Factor of the squared noise of taxels: twice what is expected, as the tare has noise, too. */
 #define HF_FIELD_MARGIN ((hf_real)4)
 /* Share of a change that is normal in a press; a field has any direction. */
@@ -122,15 +125,19 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
         s->common[axis] = mean[axis] - (1 - gain) * motion[axis];
         change[axis] = mean[axis] - (same_frame ? s->field[axis] : 0);
     }
-    /* n |v| > 4 noise: F of that vector is above the noise of F. */
-    const hf_real noise = HF_FIELD_TO_NOISE * s->noise / common->n, least = noise * noise;
+    /* n |v| > 4 noise: F of that vector is above the noise of F. The first field of a sensor whose
+     * unit is not known has four times that: what is less may be a skin that warms. */
+    const bool is_known = !isinf(most), is_first = !(hf_square(s->field) > 0);
+    const hf_real to_noise = HF_FIELD_TO_NOISE * (!is_known && is_first ? HF_FIRST_FIELD : 1);
+    const hf_real noise = to_noise * s->noise / common->n, least = noise * noise;
     const hf_real moved = hf_square(motion), square = hf_square(change);
     if (moved <= least) {
         memcpy(s->still_field, s->field, sizeof s->field);
     }
-    /* Untouched: sum |h_i - field|^2 <= 4 times that of noise. */
+    /* Untouched: sum |h_i - mean|^2 <= 4 times that of noise, and the mean is the field's. A drift
+     * of all taxels adds up in the force: what they have in common has the limit of the force. */
     const hf_real of_noise = HF_FIELD_MARGIN * 3 * (s->noise * s->noise);
-    s->is_untouched = common->differences + common->n * square <= of_noise;
+    s->is_untouched = square <= least && common->differences <= of_noise;
     if (square <= least) {
         s->field_is_load = false;
         return false;
@@ -143,7 +150,7 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
      * press is one, unless it is small beside a field that was found, or in the fingertip frame:
      * on a curved patch, no press is alike there. */
     const hf_real fastest = HF_FIELD_SPEED * HF_COMMON_SECONDS * most;
-    const bool is_known = !isinf(most), is_strong = hf_square(mean) > most * most;
+    const bool is_strong = hf_square(mean) > most * most;
     const bool is_fast = moved > fastest * fastest;
     const bool is_small = square < hf_square(s->field) / 4;
     const bool is_load =
@@ -154,8 +161,9 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
         if (common->differences > HF_DEEP_LOAD * (limit + of_noise)) {
             s->n_skipped = HF_SKIPPED_SAMPLES;
         }
+        /* Without the noise: what is under it is no field, and a light touch is not unclear. */
         const hf_real nearly = common->n * (HF_LOAD_SHARE * HF_LOAD_SHARE) * square;
-        return !is_load && common->differences <= nearly + of_noise;
+        return !is_load && common->differences <= nearly;
     }
     s->field_is_load = is_load;
     if (is_load) {
@@ -167,7 +175,9 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     if (is_strong) {
         return true;
     }
-    memcpy(s->field, mean, sizeof s->field);
+    /* What moves is taken as it is; else the smoothed part, as one noisy sample of the mean would
+     * stay in the force. Moves: |motion| > 1.5 times the least. */
+    memcpy(s->field, moved > HF_MOVES * HF_MOVES * least ? mean : s->common, sizeof s->field);
     s->has_new_field = true;
     s->field_is_turned = common->is_turned;
     return false;
