@@ -9,7 +9,7 @@ from holdfast_grip.hands import HAND_SCHEMES
 from . import blocks
 
 DOCS = blocks.ROOT / "docs"
-MAX_WORDS = {"support": 500, "datasets": 500, "plugins": 850}
+MAX_WORDS = {"support": 500, "datasets": 650, "plugins": 850}
 
 
 def text(page):

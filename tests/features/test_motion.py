@@ -26,7 +26,8 @@ from holdfast.features.tables import (
     stream_tables,
 )
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import Sensor, sensor
+from holdfast.sensors import Sensor
+from holdfast.sensors import sensor as built_in
 
 RATE = 100.0
 NEEDED = ("changes", "seconds", "means", "ratios")
@@ -137,6 +138,11 @@ def second_squares(forces, k, back, pressed, normal):
     return np.array(
         [squares.sum(), n * shares @ squares, n * shares @ shear, (own**2).sum(), n * top]
     )
+
+
+def sensor(name):
+    """Return a built-in sensor from whose readings no field of the earth is taken."""
+    return replace(built_in(name), magnetic=False)
 
 
 def walk(given, n=150, seed=0, scale=300.0):

@@ -199,7 +199,7 @@ def test_no_display_of_rich_takes_stdout():
                 options = {word.arg: ast.unparse(word.value) for word in node.keywords}
                 displays.append((path.name, options.get("redirect_stdout")))
     assert sorted(displays) == [
-        ("demo.py", "False"), ("progress.py", "False"), ("progress.py", "False"),
+        ("demo_replay.py", "False"), ("progress.py", "False"), ("progress.py", "False"),
     ]  # fmt: skip
 
 

@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.cli import simulate as verb
 from holdfast.devices.sources import open_source, replay
 from holdfast.devices.sources import twin as module
 from holdfast.devices.sources.twin import GRASP_ATTEMPTS, Twin, grasp_of, write
@@ -98,10 +97,6 @@ def test_a_grasp_that_always_fails_is_played(quick):
     with open_source("twin:", speed=0) as source:
         arrivals = list(source)
     assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 failed attempts",)
-
-
-def test_it_makes_as_many_attempts_as_simulate():
-    assert GRASP_ATTEMPTS == verb.GRASP_ATTEMPTS
 
 
 def test_the_next_repeats_follow(quick):

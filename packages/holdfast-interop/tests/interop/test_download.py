@@ -148,7 +148,8 @@ def test_a_set_that_is_gone_names_the_others(server, tmp_path):
         get(public_set(server), tmp_path / "got")
     assert str(raised.value) == (
         f"made-up: here/a.bin is gone (404 at {server.url}/deep/a.bin); there are also "
-        "uskin-pick-move, eflesh-tugs, gtac-grasps, gtac-manipulation, arq-slip-2021"
+        "uskin-pick-move, eflesh-tugs, gtac-grasps, gtac-manipulation, arq-slip-2021, "
+        "anyskin-slip"
     )
 
 
