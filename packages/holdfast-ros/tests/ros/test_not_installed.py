@@ -50,5 +50,5 @@ def test_the_other_formats_are_named(capsys, tmp_path):
     assert main(["import", str(tmp_path / "run.bag"), str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert "run.bag is of no supported format; there are xela-log, csv" in error
-    assert "; not installed: rosbag (holdfast-ros) (choose one with --format" in error
+    assert "; not installed: rosbag (holdfast-ros) (--format)" in error
     assert error.count("\n") == 1
