@@ -54,7 +54,9 @@ def test_every_verb_has_help_with_an_example(verb, capsys):
     assert "--json" in out
 
 
-@pytest.mark.parametrize(("verb", "line"), [*app.VERBS.items(), *app.SUB_VERBS.items()])
+@pytest.mark.parametrize(
+    ("verb", "line"), [*app.VERBS.items(), *app.SUB_VERBS.items()], ids=[*app.VERBS, *app.SUB_VERBS]
+)
 def test_help_lists_the_first_line_of_every_verb(verb, line):
     assert app.load_verb(verb).__doc__.splitlines()[0] == line
 
