@@ -105,7 +105,7 @@ def _printed(*words: str) -> str:
 
 @cache
 def _help_of(verb: str) -> str:
-    return _printed(verb, "--help")
+    return _printed(verb, "--help-all")
 
 
 def _verb_page(verb: str) -> str:
