@@ -7,6 +7,8 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
+from holdfast.io.importers.array_tables import StoredArray, recordings_of_arrays
+from holdfast.io.importers.csv_columns import Columns
 from holdfast.sensors import sensor
 
 SKIN = sensor("anyskin")
@@ -291,3 +293,19 @@ def test_only_the_last_line_of_json_may_be_cut(tmp_path):
     file.write_text(text.replace('"data"', '"data', 1))
     with pytest.raises(RecordingError, match=r"a\.jsonl: record 1 is damaged: "):
         imported(file, {"*": SKIN})
+
+
+def test_an_array_of_several_recordings_is_read_once(tmp_path):
+    reads = []
+
+    def values():
+        reads.append(1)
+        return np.random.default_rng(0).normal(size=(3, 80, 5, 3))
+
+    stored = StoredArray((3, 80, 5, 3), "f", values)
+    columns = Columns.parse("time=100Hz")
+    made = recordings_of_arrays(
+        tmp_path / "set.h5", {"tactile": stored}, {"tactile": SKIN}, columns, lambda _: None
+    )
+    assert [recording.name for recording in made] == ["set-1", "set-2", "set-3"]
+    assert len(reads) == 1

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import cache, partial
 from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -297,15 +298,25 @@ class _Choice:
         given = [text for field in fields if (text := getattr(self.columns, field))]
         return found | {text: text.strip("/") for text in given if text.strip("/") in self.arrays}
 
-    def episode(self, number: int, lead: tuple[int, ...]) -> "_Choice":
-        """Return the choice of one recording of arrays whose first axes count them."""
-        arrays = {
-            name: in_memory(array.read()[number], array.columns)
-            if array.shape[:2] == lead
-            else array
-            for name, array in self.arrays.items()
-        }
-        return _Choice(self.path, arrays, self.columns, self._option)
+    def episodes(self, lead: tuple[int, ...]) -> Iterator["_Choice"]:
+        """Yield the choice of each recording of arrays whose first axes count them.
+
+        Args:
+            lead: sizes of these axes: of recordings, and of samples.
+        """
+        whole = cache(lambda name: self.arrays[name].read())  # once for all recordings
+
+        def part(name: str, number: int) -> npt.NDArray[Any]:
+            return np.asarray(whole(name)[number])
+
+        for number in range(lead[0]):
+            arrays = {
+                name: array._replace(shape=array.shape[1:], read=partial(part, name, number))
+                if array.shape[:2] == lead
+                else array
+                for name, array in self.arrays.items()
+            }
+            yield _Choice(self.path, arrays, self.columns, self._option)
 
     def rate(self, name: str) -> str | None:
         """Return the rate that a single number beside an array states, as `100Hz`."""
@@ -340,10 +351,9 @@ def _recordings(
         )
     if layout.is_episodes:
         recordings = []
-        for k in range(array.shape[0]):
-            part = choice.episode(k, array.shape[:2])
+        for k, part in enumerate(choice.episodes(array.shape[:2]), start=1):
             recordings += [
-                replace(recording, name=f"{recording.name}-{k + 1}")
+                replace(recording, name=f"{recording.name}-{k}")
                 for recording in _recordings(part, place, one, report)
             ]
         return recordings

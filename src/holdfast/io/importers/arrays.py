@@ -77,7 +77,7 @@ def read(
         arrays = _READERS.get(path.suffix.lower(), _of_json)(path)
     except ValueError as cause:
         if "allow_pickle" in str(cause):  # NumPy stores objects as pickles
-            arrays = _of_pickle(path)
+            _of_pickle(path)
         raise
     if len(arrays) > MAX_ARRAYS:
         raise RecordingError(f"{path}: at most {MAX_ARRAYS} arrays expected, {len(arrays)} given")
@@ -203,7 +203,7 @@ def _of_dataset(
             raise RecordingError(f"{path}: {name} {_NOT_STORED}")
         check_filters(path, name, dataset)
         budget.keep(dataset.size * dataset.dtype.itemsize)
-        array = np.asarray(dataset[()] if field is None else dataset[()][field])
+        array = np.asarray(dataset[() if field is None else field])
         if array.dtype.kind == "O":
             array = np.array([text.decode(errors="replace") for text in array.ravel()])
         return array.transpose() if is_transposed else array
