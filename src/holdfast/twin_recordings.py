@@ -203,7 +203,7 @@ def film_all(
     *,
     engine: Engine,
     force: bool,
-    steps: "Callable[[Iterable[None], str, float], Iterable[None]]",
+    steps: GraspSteps[None],
 ) -> None:
     """Write the videos of a webcam that do not exist; `label auto tracking` reads them.
 

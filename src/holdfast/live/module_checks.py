@@ -36,7 +36,7 @@ class HoldDrift:
         per_minute: change of the force's amplitude [unit of the readings / min]; NaN without a
             hold of ten seconds.
         seconds: duration of that hold [s].
-        load: amplitude of the force at its begin [unit of the readings].
+        load: amplitude of the force at its beginning [unit of the readings].
 
     Example:
         >>> drift = HoldDrift()

@@ -166,9 +166,9 @@ class _FingerReadings:
     def _drifting(self) -> list[str]:
         """Return a notice if the force of a long hold drifts."""
         drift = self._drift
-        is_reported = any(text.startswith(DRIFTS[:20]) for text in self._reported)
-        if is_reported or drift.seconds < DRIFT_SECONDS:
+        if DRIFTS in self._reported or drift.seconds < DRIFT_SECONDS:
             return []
         if abs(drift.per_minute) < max(DRIFT_SHARE * drift.load, PULL_OF_NOISE * self._noise):
             return []
+        self._reported.add(DRIFTS)  # once, as the numbers in the text change
         return [DRIFTS.format(drift.per_minute, self._sensor.unit)]

@@ -1,6 +1,6 @@
 """The content of a recording, as `holdfast info` shows it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
@@ -47,7 +47,7 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
         truth = part.truth
     found, hidden = scan.recording, hidden_labels(path)
     invalid = [
-        invalid_readings(name, dict(faults.of(name)).get(Fault.INVALID, 0), module.force.n_samples)
+        invalid_readings(name, faults.of(name).get(Fault.INVALID, 0), module.force.n_samples)
         for name, module in scan.modules.items()
     ]
     findings = [*findings_of_scan(scan), *(each for each in [*invalid, hidden] if each)]
@@ -65,7 +65,7 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
                 "repeats": int(module.repeats.sum()),
                 "drift": None if isnan(module.drift.per_minute) else module.drift.per_minute,
                 "labels": label_seconds(module.labels),
-                "faults": {fault.value: n for fault, n in faults.of(name) if n},
+                "faults": {fault.value: n for fault, n in faults.of(name).items() if n},
             }
             for name, module in scan.modules.items()
         },
@@ -110,9 +110,9 @@ class _FaultCounts:
         self._model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
         self._detectors: dict[str, Detector] = {}
 
-    def of(self, name: str) -> Iterable[tuple[Fault, int]]:
-        """Return the faults of a module, each with its number of samples."""
-        return self._counts.get(name, {}).items()
+    def of(self, name: str) -> Mapping[Fault, int]:
+        """Return the number of samples of a module with each fault."""
+        return self._counts.get(name, {})
 
     def add(self, part: Recording) -> None:
         """Add a recording, or its next part."""
