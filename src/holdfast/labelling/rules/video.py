@@ -11,7 +11,7 @@ sliding is an outlier. What remains, d, is flat while the finger sticks, and mov
 has slid.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -184,7 +184,7 @@ def propose(
     labels, at = {}, grid + clock.offset
     for finger, tip in tips.items():
         held = held_at(base[finger], at) & tip.seen
-        force = force_at(recording, finger, how, at)
+        force = force_of(recording, finger, how)(at)
         slips, stuck = [], held
         for time in FIT_TIMES:
             n = n_samples_of(time, grid[1] - grid[0])
@@ -310,7 +310,8 @@ def video_clock(
     offsets = coarse + np.arange(-FINE_REACH, FINE_REACH + FINE_STEP / 2, FINE_STEP)
     costs = np.zeros((len(offsets), N_CLOCK_PARTS))
     for finger, tip in tips.items():
-        loaded = np.linalg.norm(force_at(recording, finger, tare, grid + coarse), axis=1)
+        force_at = force_of(recording, finger, tare)
+        loaded = np.linalg.norm(force_at(grid + coarse), axis=1)
         held = ((loaded > FITTED_SHARE) & tip.seen)[1:-1]
         jerks = np.diff(tip.place, 2, axis=0)
         size = _mean(np.linalg.norm(jerks, axis=1), 5)
@@ -319,7 +320,7 @@ def video_clock(
         fast = np.flatnonzero(held & (size > np.quantile(size[held], 1 - FAST_SHARE)))
         part = np.arange(len(fast)) * N_CLOCK_PARTS // len(fast)
         for k, offset in enumerate(offsets):
-            felt = np.diff(force_at(recording, finger, tare, grid + offset), 2, axis=0)
+            felt = np.diff(force_at(grid + offset), 2, axis=0)
             _, rest = _robust_fit(felt[fast], jerks[fast])
             costs[k] += np.bincount(part, rest, N_CLOCK_PARTS)
     whole = costs.sum(axis=1)
@@ -337,20 +338,28 @@ def video_clock(
     return VideoClock(_lowest(offsets, whole), error)
 
 
-def force_at(recording: Recording, finger: str, tare: Tare, times: Array) -> Array:
-    """Return the force of a finger, (n, 3), averaged over each exposure, of usual size 1."""
+def force_of(recording: Recording, finger: str, tare: Tare) -> Callable[[Array], Array]:
+    """Return a function of times [s] that gives the force of a finger, (n, 3), of usual size 1.
+
+    It is averaged over the exposure of each picture. Offsets of the clock are tried by the dozen,
+    so the integral of the force is made once.
+    """
     module = recording.modules[finger]
     force = np.nan_to_num(tared_force(module, tare, offline=True).force)
     lasting = np.diff(module.times)[:, None] * (force[1:] + force[:-1]) / 2
     # The mean over any exposure is a difference of the integral.
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(lasting, axis=0)])
-    half = min(float(np.median(np.diff(times))), EXPOSURE_TIME) / 2
-    ends = [
-        np.stack([np.interp(times + side, module.times, column) for column in total.T], axis=1)
-        for side in (-half, half)
-    ]
     usual = np.quantile(np.linalg.norm(force, axis=1), 0.95) or 1.0
-    return np.asarray((ends[1] - ends[0]) / (2 * half * usual))
+
+    def at(times: Array) -> Array:
+        half = min(float(np.median(np.diff(times))), EXPOSURE_TIME) / 2
+        ends = [
+            np.stack([np.interp(times + side, module.times, column) for column in total.T], axis=1)
+            for side in (-half, half)
+        ]
+        return np.asarray((ends[1] - ends[0]) / (2 * half * usual))
+
+    return at
 
 
 def held_at(labels: tuple[Label, ...], times: Array) -> Mask:
@@ -519,7 +528,7 @@ def _coarse_offset(
     n = max(round(COARSE_TIME / step), 1)
     shares: Array = np.zeros(len(grid) + len(own) - 2 * n - 1)
     for finger, tip in tips.items():
-        force = force_at(recording, finger, tare, own)
+        force = force_of(recording, finger, tare)(own)
         moved, felt = (_cut(values[n:] - values[:-n]) for values in (tip.place, force))
         products = np.array([[correlate(f, m) for f in felt.T] for m in moved.T])
         inverse = np.linalg.pinv(felt.T @ felt)
