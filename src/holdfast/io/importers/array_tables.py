@@ -28,7 +28,8 @@ from holdfast.io.importers.csv_columns import (
     guessed_taxels,
     guessed_time,
 )
-from holdfast.io.importers.generic_csv import (
+from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
+from holdfast.io.importers.table_recordings import (
     ANY_MODULE,
     MAX_MODULES,
     Report,
@@ -36,7 +37,6 @@ from holdfast.io.importers.generic_csv import (
     recordings_of_table,
     reported_once,
 )
-from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
