@@ -5,7 +5,8 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.labelling.rules import propose, video
-from holdfast.labelling.rules.video import VideoRule, change_point, seen_slips, with_slips
+from holdfast.labelling.rules.video import change_point, seen_slips, with_slips
+from holdfast.labelling.rules.video_motion import VideoRule
 from holdfast.metrics.slip_truth import label_slips
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import sensor

@@ -5,6 +5,7 @@ from inspect import signature
 from typing import Any, NamedTuple
 
 from holdfast.labelling.rules import command, signal, tracking, video
+from holdfast.labelling.rules.video_motion import VideoRule
 from holdfast.recordings import Label, Recording
 
 __all__ = ["RULES", "propose"]
@@ -37,7 +38,7 @@ _RULES = {
     "tracking": _Rule(tracking.propose, tracking.TrackingRule),
     "command": _Rule(command.propose),
 }
-_BY_VIDEO = _Rule(video.propose, video.VideoRule)
+_BY_VIDEO = _Rule(video.propose, VideoRule)
 
 
 def propose(

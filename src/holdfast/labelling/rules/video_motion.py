@@ -1,0 +1,220 @@
+"""Motion of fingertips on the object in a video of stickers, and the force that goes with it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.features import Tare
+from holdfast.features.force import tared_force
+from holdfast.labelling.rules.base import check_positive
+from holdfast.labelling.rules.poses import OBJECT
+from holdfast.metrics.masks import Mask, covered, n_samples_of
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array
+
+MIN_SEEN = 0.5
+"""Share of the pictures in which a sticker must be seen."""
+MAX_UNSEEN_TIME = 0.1
+"""Longest time without a picture of a sticker that is bridged [s]."""
+ALIKE_SIZES = 1.6
+"""Ratio by which the stickers may look larger or smaller than their sizes: one is nearer."""
+EXPOSURE_TIME = 1 / 60
+"""Longest time over which the force is averaged for a picture [s]."""
+TURN_TIME = 0.15
+"""Time over which the tilts are averaged: they are 50 times less exact than places [s]."""
+SCALE_TIME = 0.5
+"""Time over which the size of a sticker in the picture is averaged: it is the distance [s]."""
+TURN_SCALE = 30.0
+"""Millimetres that a unit of turn counts in the fit: the lever of a fingertip."""
+
+
+@dataclass(frozen=True)
+class VideoRule:
+    """Thresholds of what remains of the motion, and the sizes of the stickers.
+
+    Attributes:
+        object_size: side of the black square on the object [m].
+        tip_size: the same on fingertips [m].
+        window: time on either side of an instant over which places are averaged [s].
+        step: least difference of the two where something may slide [m]; at least six times noise.
+        slid: least distance between the places before and after a slip [m].
+        before: time before a slip that is fitted as stuck [s].
+    """
+
+    object_size: float = 0.024
+    tip_size: float = 0.015
+    window: float = 0.05
+    step: float = 0.00012
+    slid: float = 0.0002
+    before: float = 0.2
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+
+
+class TipMotion(NamedTuple):
+    """Motion of a fingertip on the object, on a regular grid of pictures.
+
+    Attributes:
+        place: (n, 2) in the plane of the object's sticker, along its sides [mm].
+        turns: (n, 7) turn in the picture and tilts of both bodies [TURN_SCALE mm].
+        seen: (n,) where both stickers are seen.
+    """
+
+    place: Array
+    turns: Array
+    seen: Mask
+
+
+def regular_grid(times: Array) -> Array:
+    """Return times one usual step apart, over those of the pictures [s]."""
+    step = float(np.median(np.diff(times)))
+    return np.asarray(times[0] + step * np.arange(int((times[-1] - times[0]) / step) + 1))
+
+
+def tip_motions(
+    times: Array,
+    places: Mapping[int, Array],
+    stickers: Mapping[str, int],
+    rule: VideoRule,
+    video: Path,
+) -> dict[str, TipMotion]:
+    """Return the motion of the fingers whose stickers are seen.
+
+    Args:
+        times: (n,) of the pictures [s].
+        places: (n, 2, 3) of each sticker, see `holdfast.io.stickers`.
+        stickers: number of that of each body.
+        rule: with the sizes.
+        video: for messages.
+
+    Raises:
+        RecordingError: as `propose`.
+    """
+    shares = {
+        body: float(np.isfinite(places[k][:, 0, 0]).mean()) if k in places else 0.0
+        for body, k in stickers.items()
+    }
+    good = [body for body, share in shares.items() if share >= MIN_SEEN]
+    if len(times) < 3 or OBJECT not in good or len(good) < 2:
+        found = ", ".join(
+            f"{body} ({stickers[body]}) in {share:.0%}" for body, share in shares.items() if share
+        )
+        raise RecordingError(
+            f"{video}: stickers seen in its {len(times)} pictures: {found or 'none'}; that of the "
+            f"object ({stickers[OBJECT]}) and of a finger expected in at least {MIN_SEEN:.0%} "
+            "(`holdfast label markers` prints them)"
+        )
+    grid = regular_grid(times)
+    tracks = {body: _track_at(grid, times, places[stickers[body]]) for body in good}
+    scales = {body: _scale(track, grid) for body, (track, _) in tracks.items()}
+    base, seen = tracks[OBJECT]
+    turn, tilt = _turns(base)
+    across, along = np.cos(turn), np.sin(turn)
+    usual = np.median(base[:, :, :2], axis=0)
+    flatten = np.median(scales[OBJECT]) * np.linalg.inv(usual)  # the camera looks aslant
+    motions = {}
+    for body in good:
+        if body == OBJECT:
+            continue
+        track, tip_seen = tracks[body]
+        looks = np.median(scales[body] / scales[OBJECT]) * rule.object_size / rule.tip_size
+        if not 1 / ALIKE_SIZES < looks < ALIKE_SIZES:
+            raise RecordingError(
+                f"{video}: sticker {stickers[body]} ({body}) looks {looks:.2g} times as large as "
+                f"{1e3 * rule.tip_size:g} mm beside the {1e3 * rule.object_size:g} mm of the "
+                "object; give the sides of the black squares as tip_size and object_size [m]"
+            )
+        # The side of a sticker in the picture tells how long a pixel is at its distance.
+        away = 1e3 * (
+            rule.tip_size * track[:, :, 2] / scales[body][:, None]
+            - rule.object_size * base[:, :, 2] / scales[OBJECT][:, None]
+        )
+        tip_turn, tip_tilt = _turns(track)
+        # In the axes of the object, which turn with it.
+        upright = np.column_stack(
+            [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
+        )
+        place = upright @ flatten.T
+        n = n_samples_of(TURN_TIME, grid[1] - grid[0])
+        turns = np.column_stack([tip_turn - turn, mean_over(np.column_stack([tilt, tip_tilt]), n)])
+        motions[body] = TipMotion(place, TURN_SCALE * turns, seen & tip_seen)
+    return motions
+
+
+def force_of(recording: Recording, finger: str, tare: Tare) -> Callable[[Array], Array]:
+    """Return a function of times [s] that gives the force of a finger, (n, 3), of usual size 1.
+
+    It is averaged over the exposure of each picture. Offsets of the clock are tried by the dozen,
+    so the integral of the force is made once.
+    """
+    module = recording.modules[finger]
+    force = np.nan_to_num(tared_force(module, tare, offline=True).force)
+    lasting = np.diff(module.times)[:, None] * (force[1:] + force[:-1]) / 2
+    # The mean over any exposure is a difference of the integral.
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(lasting, axis=0)])
+    usual = np.quantile(np.linalg.norm(force, axis=1), 0.95) or 1.0
+
+    def at(times: Array) -> Array:
+        half = min(float(np.median(np.diff(times))), EXPOSURE_TIME) / 2
+        ends = [
+            np.stack([np.interp(times + side, module.times, column) for column in total.T], axis=1)
+            for side in (-half, half)
+        ]
+        return np.asarray((ends[1] - ends[0]) / (2 * half * usual))
+
+    return at
+
+
+def robust_fit(known: Array, change: Array) -> tuple[Array, Array]:
+    """Return the (k, 2) map of least distances, and the (n,) distances that it leaves [mm]."""
+    # Squares weighted by 1 / distance make a fit of least distances, which outliers hardly move.
+    weights = np.ones(len(known))
+    for _ in range(15):
+        weighted = known * weights[:, None]
+        # Where nothing turns, the columns of the turns are 0 and the equations singular.
+        ridge = 1e-5 * len(known) * np.median(weights) * np.eye(known.shape[1])
+        fit = np.linalg.solve(weighted.T @ known + ridge, weighted.T @ change)
+        distances = np.linalg.norm(change - known @ fit, axis=1)
+        weights = 1 / np.maximum(distances, 0.02)  # below the noise of a place, all count alike
+    return np.asarray(fit), np.asarray(distances)
+
+
+def _track_at(grid: Array, times: Array, places: Array) -> tuple[Array, Mask]:
+    """Return the places of a sticker (n, 2, 3) on the grid, and where it is seen."""
+    flat = places.reshape(len(places), 6)
+    seen = np.isfinite(flat).all(axis=1)
+    columns = [np.interp(grid, times[seen], column) for column in flat[seen].T]
+    return np.stack(columns, axis=1).reshape(-1, 2, 3), covered(grid, times[seen], MAX_UNSEEN_TIME)
+
+
+def _scale(track: Array, grid: Array) -> Array:
+    """Return the longest side of a sticker in the picture (n,), averaged [pixels]."""
+    from scipy.ndimage import median_filter
+
+    longest = np.linalg.svd(track[:, :, :2], compute_uv=False)[:, 0]
+    n = n_samples_of(SCALE_TIME, grid[1] - grid[0])
+    return mean_over(np.asarray(median_filter(longest, n, mode="nearest")), n)
+
+
+def _turns(track: Array) -> tuple[Array, Array]:
+    """Return the turn in the picture (n,) [rad], and the stretch (n, 3) that tilts cause."""
+    usual = np.median(track[:, :, :2], axis=0)
+    change = track[:, :, :2] @ np.linalg.inv(usual)
+    # Turned back by this angle, the change is symmetric: a stretch.
+    turn = np.arctan2(change[:, 1, 0] - change[:, 0, 1], change[:, 0, 0] + change[:, 1, 1])
+    cos, sin = np.cos(turn), np.sin(turn)
+    stretch = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], -2) @ change
+    shear = (stretch[:, 0, 1] + stretch[:, 1, 0]) / 2
+    return turn, np.column_stack([stretch[:, 0, 0] - 1, stretch[:, 1, 1] - 1, shear])
+
+
+def mean_over(values: Array, n: int) -> Array:
+    """Return the means of values (m, ...) over the n pictures around each."""
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(values, n | 1, axis=0, mode="nearest"))  # odd: centred
