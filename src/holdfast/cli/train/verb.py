@@ -18,7 +18,7 @@ from holdfast.cli.options import (
 from holdfast.cli.scores import KEPT_RULE, print_metrics, print_slips, print_verdict
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
-from holdfast.cli.training_options import TrainingOptions
+from holdfast.cli.train.options import TrainingOptions
 from holdfast.errors import require_extras
 
 LEFT_OUT_UNIT = {
