@@ -24,6 +24,7 @@ from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Arrival, Source
+    from holdfast.live.camera import CameraRecorder
     from holdfast.live.recorder import Recorder
 
 READ_TIMEOUT = 0.1
@@ -59,6 +60,13 @@ def record(
         ),
         RARE,
     ] = False,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="Number of a camera (0 is the first), or a video file that stands for one; its "
+            "video is written beside the recording."
+        ),
+    ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -70,26 +78,32 @@ def record(
     These keys set markers: c closing, l locked,
     d disturbance, r released, space or 1-9 a mark; q stops. If stdin is a pipe, each line is a
     marker. Faults and notices of the source become markers too. If a device disconnects, the
-    recording continues when it reconnects.
+    recording continues when it reconnects. --camera keeps a video on the same clock.
 
     Example:
       holdfast record xela://192.168.1.10:5000 grasps/ --object can --case 2
       holdfast record twin:?object=can can.mcap --seconds 10
+      holdfast record xela://auto pulls.mcap --camera 0
       (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
     from holdfast.cli.terminal.progress import format_size
     from holdfast.devices.sources import open_source
+    from holdfast.live.camera import camera_of
 
     check_seconds(seconds)
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
     path = _output_path(source, out, object_name, force=force)  # before a device is awaited
-    with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
+    with (
+        handle_stop_signals() as stop,
+        camera_of(camera, path, force=force) as film,
+        open_source(source, speed=speed) as opened,
+    ):
         stop.graceful = True  # Ctrl-C from here on closes the file; before, it ends the wait
         recorder = _create_recorder(
             opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
         )
-        _record(opened, recorder, stop, _read(opened, seconds, speed))
+        _record(opened, recorder, stop, _read(opened, seconds, speed), film)
     path, status = recorder.path, recorder.status
     if as_json:
         mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
@@ -126,7 +140,11 @@ def _read(source: "Source", seconds: float | None, speed: float) -> "Iterator[Ar
 
 
 def _record(
-    source: "Source", recorder: "Recorder", stop: StopRequest, arrivals: "Iterator[Arrival | None]"
+    source: "Source",
+    recorder: "Recorder",
+    stop: StopRequest,
+    arrivals: "Iterator[Arrival | None]",
+    film: "CameraRecorder | None",
 ) -> None:
     """Record until the source ends or the user stops it, and close the file.
 
@@ -143,6 +161,8 @@ def _record(
     try:
         with recorder, MarkerKeys() as keys, StatusLine(recorder) as line:
             line.print(KEY_HELP if keys.interactive else "Ctrl-C stops")
+            if film is not None:
+                film.start(recorder, line.print)
             for arrival in arrivals:
                 if arrival is not None:
                     # A recording can wait for a slow disk; a device drops samples.

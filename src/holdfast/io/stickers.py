@@ -39,6 +39,30 @@ CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of a sticker in its own plane, in the order of OpenCV: x right, y down, sides of 1."""
 
 
+def stamps_path(video: Path) -> Path:
+    """Return the path of the times of the pictures of a video, which `record --camera` writes."""
+    return video.with_suffix(".times")
+
+
+def picture_stamps(video: Path) -> Array | None:
+    """Return the times (n,) of the pictures of a video [s]; None if no file beside it has them.
+
+    Raises:
+        RecordingError: the file has something else, or times that do not increase.
+    """
+    path = stamps_path(video)
+    if not path.exists():
+        return None
+    try:
+        # A process that was killed may have written half of the last line.
+        stamps = np.array([float(line) for line in path.read_text().split("\n")[:-1]])
+    except (OSError, ValueError):
+        stamps = np.zeros(2)
+    if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0).any():
+        raise RecordingError(f"{path}: a time in each line [s], each later than the last, expected")
+    return stamps
+
+
 def sticker_places(
     path: Path, fps: float | None = None
 ) -> Iterator[tuple[Array, dict[int, Array]]]:

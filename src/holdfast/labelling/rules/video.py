@@ -22,6 +22,7 @@ from holdfast.contact import Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io.foreign import read_stickers
+from holdfast.io.stickers import picture_stamps
 from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.base import evidence_ratio, label_confidence
 from holdfast.labelling.rules.forces import fitting_tare
@@ -96,7 +97,13 @@ def propose(
     """
     rule, video = rule or VideoRule(), Path(video)
     how = fitting_tare(recording, tare)
-    times, places = read_stickers(video, fps)
+    # The times that `record --camera` has written count; with a rate of 1, the number of a
+    # picture is its time.
+    stamps = picture_stamps(video) if fps is None else None
+    times, places = read_stickers(video, fps if stamps is None else 1.0)
+    if stamps is not None:
+        written = times < len(stamps)
+        times, places = stamps[times[written].astype(int)], {k: p[written] for k, p in places.items()}
     tips = tip_motions(times, places, stickers_of(recording, bodies), rule, video)
     grid = regular_grid(times)
     clock = (

@@ -24,8 +24,6 @@ ALIKE_SIZES = 1.6
 """Ratio by which the stickers may look larger or smaller than their sizes: one is nearer."""
 EXPOSURE_TIME = 1 / 60
 """Longest time over which the force is averaged for a picture [s]."""
-TURN_TIME = 0.15
-"""Time over which the tilts are averaged: they are 50 times less exact than places [s]."""
 SCALE_TIME = 0.5
 """Time over which the size of a sticker in the picture is averaged: it is the distance [s]."""
 TURN_SCALE = 30.0
@@ -140,8 +138,9 @@ def tip_motions(
             [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
         )
         place = upright @ flatten.T
-        n = n_samples_of(TURN_TIME, grid[1] - grid[0])
-        turns = np.column_stack([tip_turn - turn, mean_over(np.column_stack([tilt, tip_tilt]), n)])
+        # Tilts are 50 times less exact than places, but late where they are averaged: a push that
+        # rolls the object would remain as motion.
+        turns = np.column_stack([tip_turn - turn, tilt, tip_tilt])
         motions[body] = TipMotion(place, TURN_SCALE * turns, seen & tip_seen)
     return motions
 
