@@ -1,5 +1,6 @@
 """Video of a recording: the pictures of a camera, beside the samples and on their clock."""
 
+import math
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -113,7 +114,7 @@ class CameraRecorder(Closable):
         with stamps_path(self._path).open("w") as stamps:
             while is_read and not self._closing.is_set():
                 self._read_at, stamp = time.monotonic(), clock()
-                if stamp == stamp:  # NaN: there is no sample yet
+                if math.isfinite(stamp):  # NaN: there is no sample yet
                     self._video.write(picture)
                     stamps.write(f"{stamp:.6f}\n")
                     self.n_pictures += 1

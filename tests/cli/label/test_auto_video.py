@@ -49,6 +49,14 @@ REFUSED = {
         ("tracking", "--video", "a.mp4", "--poses", "POSES"),
         "--poses and --video given; only one of them expected",
     ),
+    "a motion too": (
+        ("tracking", "--video", "a.mp4", "--motion", "a.csv"),
+        "--motion is for the rule tracking, without --poses and --video",
+    ),
+    "a column of nothing": (
+        ("tracking", "--column", "a"),
+        "--column is one of --motion FILE.csv, which is missing",
+    ),
     "words for numbers": (
         ("tracking", "--video", "a.mp4", "--track", "object=/aruco"),
         "--track BODY=NUMBER expected with a video, '/aruco' given",

@@ -108,7 +108,8 @@ def _coarse_offset(
         moved, felt = (_cut(values[n:] - values[:-n]) for values in (tip.place, force))
         products = np.array([[correlate(f, m) for f in felt.T] for m in moved.T])
         inverse = np.linalg.pinv(felt.T @ felt)
-        shares += np.einsum("ijl,jk,ikl->l", products, inverse, products) / (moved**2).sum()
+        explained = np.einsum("ijl,jk,ikl->l", products, inverse, products)
+        shares += explained / max((moved**2).sum(), 1e-12)
     best = int(np.argmax(shares))
     # Motion is smooth, so the offsets beside the best one are nearly as good: they do not count.
     near = round(FINE_REACH / step) + 10
