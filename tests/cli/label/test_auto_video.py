@@ -1,5 +1,6 @@
 """`holdfast label auto tracking` with a video; its content is that of a test."""
 
+import numpy as np
 import pytest
 
 from holdfast.io import load_labels, save_recording
@@ -18,7 +19,8 @@ def pulls(tmp_path, monkeypatch):
 
     def read(path, fps):
         asked.append((path, fps))
-        return places()
+        times, found = places()
+        return times, np.zeros(len(times)), found
 
     monkeypatch.setattr(video, "read_stickers", read)
     path = tmp_path / "pulls.mcap"

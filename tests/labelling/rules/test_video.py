@@ -1,10 +1,12 @@
 """Slips in a video, from places of stickers that a test makes: what moves, and what is felt."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
-from holdfast.labelling.rules import propose, video
+from holdfast.labelling.rules import propose, video, video_clock
 from holdfast.labelling.rules.video import change_point, seen_slips, with_slips
 from holdfast.labelling.rules.video_motion import VideoRule
 from holdfast.metrics.slip_truth import label_slips
@@ -64,8 +66,9 @@ def places(slips=SLIPS, tip_size=15.0, elastic=0.3, tip=2, fps=FPS):
 
 @pytest.fixture
 def film(monkeypatch):
-    def shown(times, found):
-        monkeypatch.setattr(video, "read_stickers", lambda path, fps: (times, found))
+    def shown(times, found, levels=None):
+        levels = np.zeros(len(times)) if levels is None else levels
+        monkeypatch.setattr(video, "read_stickers", lambda path, fps: (times, levels, found))
 
     return shown
 
@@ -334,3 +337,28 @@ def test_motions_that_cannot_be_used(tmp_path, text, column, message):
 def test_something_must_be_measured():
     with pytest.raises(ValueError, match="neither a video nor a motion given"):
         video.propose(recording())
+
+
+def test_a_flash_gives_the_offset_of_clocks(film, monkeypatch):
+    times, found = places()
+    generator = np.random.default_rng(4)
+    levels = 90 + generator.normal(0, 0.2, len(times))
+    # A lamp is switched on at 7 s; the page lights up twice, one picture before its marker.
+    levels[times > 7.0] += 20
+    for start in (1.2, 30.5):
+        levels[(times > start) & (times < start + 0.4)] += 8
+    film(times, found, levels)
+    pulls = recording()
+    markers = [(t + SHIFT + 0.02, "flash") for t in (1.2, 30.5)]
+    marked = replace(pulls, markers=tuple(markers))
+    monkeypatch.setattr(video_clock, "_coarse_offset", None)  # it is not searched
+    labels = propose("tracking", marked, video="run.mp4")
+    assert [label.start for label in slips_of(labels["index"])] == pytest.approx(
+        [s for s, _ in SLIPS], abs=0.02
+    )
+
+
+@pytest.mark.parametrize("levels", [np.zeros(0), np.full(50, 90.0)])
+def test_a_flash_that_is_not_seen_counts_for_nothing(levels):
+    marked = replace(recording(), markers=((3.0, "flash"),))
+    assert video_clock.flash_offset(marked, np.arange(len(levels)) / 60, levels) is None

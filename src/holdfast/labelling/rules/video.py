@@ -27,7 +27,7 @@ from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.base import evidence_ratio, label_confidence
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import OBJECT
-from holdfast.labelling.rules.video_clock import VideoClock, video_clock
+from holdfast.labelling.rules.video_clock import VideoClock, flash_offset, video_clock
 from holdfast.labelling.rules.video_motion import (
     TipMotion,
     VideoRule,
@@ -103,19 +103,21 @@ def propose(
     """
     rule = rule or VideoRule()
     how = fitting_tare(recording, tare)
+    flash = None
     if motion is not None:
         source, kind = Path(motion), "motion"
         grid, moved = measured_motion(source, column)
         tips = dict.fromkeys(recording.modules, moved)
     elif video is not None:
         source, kind = Path(video), "video"
-        times, places = _filmed(source, fps)
+        times, levels, places = _filmed(source, fps)
+        flash = flash_offset(recording, times, levels)
         tips = tip_motions(times, places, stickers_of(recording, bodies), rule, source)
         grid = regular_grid(times)
     else:
         raise ValueError("neither a video nor a motion given")
     clock = (
-        video_clock(recording, tips, grid, how, source)
+        video_clock(recording, tips, grid, how, source, flash)
         if offset is None
         else VideoClock(offset, 0.0)
     )
@@ -137,15 +139,16 @@ def propose(
     return labels
 
 
-def _filmed(video: Path, fps: float | None) -> tuple[Array, dict[int, Array]]:
-    """Return times and places of the stickers, by the stamps of `record --camera` if there are."""
+def _filmed(video: Path, fps: float | None) -> tuple[Array, Array, dict[int, Array]]:
+    """Return times, brightness and stickers, by the stamps of `record --camera` if there are."""
     stamps = picture_stamps(video) if fps is None else None
     if stamps is None:
         return read_stickers(video, fps)
     # With one picture a second, the time of a picture is its number.
-    numbers, places = read_stickers(video, 1.0)
+    numbers, levels, places = read_stickers(video, 1.0)
     kept = numbers < len(stamps)  # a process that was killed may have lost the last stamps
-    return stamps[numbers[kept].astype(int)], {k: place[kept] for k, place in places.items()}
+    times = stamps[numbers[kept].astype(int)]
+    return times, levels[kept], {k: place[kept] for k, place in places.items()}
 
 
 def stickers_of(recording: Recording, bodies: Mapping[str, int] | None = None) -> dict[str, int]:
