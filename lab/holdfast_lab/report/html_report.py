@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from matplotlib.figure import Figure
 
@@ -92,6 +92,14 @@ class Paragraph(NamedTuple):
     lines: list[str]
     is_list: bool
 
+    @classmethod
+    def of(cls, text: str) -> Self:
+        """Return the paragraph of a text; it is a list if all lines begin with "- "."""
+        lines = [line.strip() for line in text.strip().splitlines()]
+        if all(line.startswith("- ") for line in lines):
+            return cls([line[2:] for line in lines], is_list=True)
+        return cls(lines, is_list=False)
+
 
 class NumberedSection(NamedTuple):
     """A section whose tables and figures are numbered through the report."""
@@ -115,6 +123,7 @@ def html_report(title: str, facts: Mapping[str, object], sections: Sequence[Sect
         ValueError: two tables or two figures have the same name, or a name is no file name.
     """
     check_names(sections)
+    # Numbered apart: tables and figures of the body begin at 1 whatever the summary has.
     summary = [section for section in sections if section.title == SUMMARY]
     return render(
         "report.html",
@@ -151,7 +160,7 @@ def _numbered(sections: Sequence[Section]) -> list[NumberedSection]:
     return [
         NumberedSection(
             section.title,
-            [_paragraph(text) for text in section.text.split("\n\n") if text.strip()],
+            [Paragraph.of(text) for text in section.text.split("\n\n") if text.strip()],
             [(next(table_numbers), table_text(table)) for table in section.tables],
             [(next(figure_numbers), figure) for figure in section.figures],
         )
@@ -161,18 +170,12 @@ def _numbered(sections: Sequence[Section]) -> list[NumberedSection]:
 
 def join_lines(text: str) -> str:
     """Join the lines of each paragraph and of each item of a list."""
-    return "\n\n".join(_join_paragraph(part.splitlines()) for part in text.split("\n\n"))
-
-
-def _join_paragraph(lines: Iterable[str]) -> str:
-    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()
-
-
-def _paragraph(text: str) -> Paragraph:
-    lines = [line.strip() for line in text.strip().splitlines()]
-    if all(line.startswith("- ") for line in lines):
-        return Paragraph([line[2:] for line in lines], is_list=True)
-    return Paragraph(lines, is_list=False)
+    paragraphs = []
+    for part in text.split("\n\n"):
+        breaks = ("\n" if line.startswith("- ") else " " for line in part.splitlines())
+        lines = zip(breaks, part.splitlines(), strict=True)
+        paragraphs.append("".join(f"{before}{line}" for before, line in lines).strip())
+    return "\n\n".join(paragraphs)
 
 
 def _fact_lines(value: object) -> list[str]:
