@@ -96,11 +96,8 @@ def _walking(generator: np.random.Generator, ranges: Mapping[str, Any], times: A
         direction * (size * np.sin(speed * times + shift))[:, None]
         for direction, size, speed, shift in accelerations
     )
-    return np.asarray(_bouts(generator, ranges, times)[:, None] * waves)
-
-
-def _bouts(generator: np.random.Generator, ranges: Mapping[str, Any], times: Array) -> Array:
-    """(n,) 1 where the person walks and 0 where it stands; the first is drawn."""
+    # Walking and standing take turns; the first is drawn. The mean over a moving window of the
+    # fade makes each begin and end slowly.
     edges, walks = [0.0], generator.random() < 0.5
     while edges[-1] < times[-1]:
         edges.append(edges[-1] + uniform(generator, ranges["bout"]))
@@ -108,4 +105,5 @@ def _bouts(generator: np.random.Generator, ranges: Mapping[str, Any], times: Arr
     now = states[np.searchsorted(edges, times, side="right") - 1].astype(np.float64)
     n_fade = int(BOUT_FADE * GRID_RATE)
     padded = np.concatenate([np.full(n_fade, now[0]), now])
-    return np.convolve(padded, np.ones(n_fade) / n_fade)[n_fade : n_fade + len(now)]
+    bouts = np.convolve(padded, np.ones(n_fade) / n_fade)[n_fade : n_fade + len(now)]
+    return np.asarray(bouts[:, None] * waves)

@@ -123,7 +123,13 @@ def palm_motion(
     phases = generator.uniform(0, 2 * math.pi, size=(N_VIBRATIONS, 3))
     waves = np.sin(2 * math.pi * rates * times[:, None, None] + phases)
     acceleration = np.asarray(vibration * math.sqrt(2.0 / N_VIBRATIONS) * waves.sum(axis=1))
-    acceleration *= _vibration_factor(segments, times, moving_factor)[:, None]
+    # The vibration grows while the arm moves; it fades in and out at the ends of a segment.
+    factor = np.ones(len(times))
+    for segment in segments:
+        elapsed = times - segment.start
+        edge = np.minimum(elapsed, segment.duration - elapsed) / VIBRATION_FADE
+        factor = np.maximum(factor, 1.0 + (moving_factor - 1.0) * np.clip(edge, 0.0, 1.0))
+    acceleration *= factor[:, None]
     spin, turn = np.zeros((2, len(times), 3))
     for segment in segments:
         rows = (times >= segment.start) & (times < segment.start + segment.duration)
@@ -152,22 +158,13 @@ def _acceleration(segment: Segment, elapsed: Array) -> Array:
         turning = 2 * math.pi * segment.rate
         fade = np.clip(np.minimum(elapsed, segment.duration - elapsed) / 0.3, 0.0, 1.0)
         return -segment.size * turning**2 * np.sin(turning * elapsed) * fade
-    stop = segment.rate * segment.duration  # two half sines of equal area: speed up, then stop
+    # A brake: two half sines of equal area, one to speed up and a shorter one to stop.
+    stop = segment.rate * segment.duration
     start = segment.duration - stop
     rising = elapsed < start
     pace = np.where(rising, elapsed / start, (elapsed - start) / stop)
     length = np.where(rising, start, -stop)
     return segment.size * math.pi / (2 * length) * np.sin(math.pi * pace)
-
-
-def _vibration_factor(segments: list[Segment], times: Array, moving_factor: float) -> Array:
-    """(n,) factor on the vibration: that of motion in a segment, which fades in and out."""
-    factor = np.ones(len(times))
-    for segment in segments:
-        elapsed = times - segment.start
-        edge = np.minimum(elapsed, segment.duration - elapsed) / VIBRATION_FADE
-        factor = np.maximum(factor, 1.0 + (moving_factor - 1.0) * np.clip(edge, 0.0, 1.0))
-    return factor
 
 
 def _down(orientation: Array, spin: Array) -> Array:
@@ -177,6 +174,7 @@ def _down(orientation: Array, spin: Array) -> Array:
     moving = np.flatnonzero(spin.any(axis=1))
     if not len(moving):
         return down
+    # Only the rows that turn are multiplied; the rows between two of them repeat the last.
     steps = Rotation.from_rotvec(-spin[moving] / GRID_RATE).as_matrix()
     now = down[0].copy()
     place = 0

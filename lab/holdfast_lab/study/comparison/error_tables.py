@@ -50,7 +50,14 @@ def force(plan: StudyPlan, results: Results) -> ResultTable:
     for keys, breakdowns in lines:
         for quarter, title in enumerate(QUARTERS):
             for kind in ERROR_KINDS:
-                n, wrong = _counts_of_quarter(breakdowns, edges, quarter, kind)
+                # Samples, and wrong ones, of the fingers in this quarter, by recording.
+                counts = np.zeros((2, len(breakdowns)))
+                for column, errors in enumerate(breakdowns):
+                    for grip in _holding_grips([errors]):
+                        if np.searchsorted(edges, grip.force) == quarter:
+                            missed = grip.stable if kind == STABLE_MISSED else grip.not_stable
+                            counts[:, column] += missed
+                n, wrong = counts
                 figure = keys | {"error": kind, "grip": title}
                 rows.append(ratio_row(figure, wrong, n, plan.seed))
     bounds = ", ".join(f"{edge:.2f}" for edge in edges)
@@ -101,18 +108,6 @@ def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:
 def _holding_grips(breakdowns: Sequence[ErrorBreakdown]) -> Iterator[GripErrors]:
     grips = chain.from_iterable(breakdown.grips for breakdown in breakdowns)
     return (grip for grip in grips if grip.force > CONTACT_FORCE)
-
-
-def _counts_of_quarter(
-    breakdowns: Sequence[ErrorBreakdown], edges: Array, quarter: int, kind: str
-) -> Array:
-    """Return (2, n_recordings) samples, and wrong samples, of the fingers in one quarter."""
-    counts = np.zeros((2, len(breakdowns)))
-    for column, errors in enumerate(breakdowns):
-        for grip in _holding_grips([errors]):
-            if np.searchsorted(edges, grip.force) == quarter:
-                counts[:, column] += grip.stable if kind == STABLE_MISSED else grip.not_stable
-    return counts
 
 
 def _lines(plan: StudyPlan, results: Results) -> Iterator[Line]:
