@@ -33,6 +33,10 @@ class _Point(NamedTuple):
     residuals: Array
     multipliers: Array
 
+    def moved(self, step: "_Point", share: float) -> "_Point":
+        """Return the point after a share of a step."""
+        return _Point(*(now + share * change for now, change in zip(self, step, strict=True)))
+
 
 def fit_svm(
     features: Array,
@@ -60,7 +64,7 @@ def fit_svm(
         bound = point.multipliers.sum() - supported @ supported / 2
         if float((objective - bound) / objective) < LAST_GAP:
             break
-        point = _next(_System(columns, limits, point, margins, supported))
+        point = _System(columns, limits, point, margins, supported).next_point()
     return Solution(point.weights[:-1], float(point.weights[-1]))
 
 
@@ -91,6 +95,20 @@ class _System:
         self._missing = margins + point.residuals - 1.0 - point.slacks
         self._unsupported = supported - point.weights
 
+    def next_point(self) -> _Point:
+        """Return the point after a step of predictor and corrector."""
+        product = self.product()
+        predicted = self.step(0.0, 0.0)
+        left = self.product(predicted, self.longest(predicted))
+        # The better the predicted step, the smaller the target of the corrected one (Mehrotra's
+        # cube). The corrected step takes back the products that the predicted one neglects.
+        target = (left / product) ** 3 * product / (2 * len(self.upper))
+        corrected = self.step(
+            target - predicted.multipliers * predicted.slacks,
+            target + predicted.multipliers * predicted.residuals,
+        )
+        return self.point.moved(corrected, STEP_SHARE * self.longest(corrected))
+
     def step(self, lower_target: float | Array, upper_target: float | Array) -> _Point:
         """Return the step to a_i s_i = `lower_target` and (C_i - a_i) r_i = `upper_target`."""
         from scipy.linalg import cho_solve
@@ -113,7 +131,7 @@ class _System:
         """Return the sum of all a_i s_i and (C_i - a_i) r_i, after a share of a step."""
         point, upper = self.point, self.upper
         if step is not None:
-            point, upper = _moved(point, step, share), upper - share * step.multipliers
+            point, upper = point.moved(step, share), upper - share * step.multipliers
         return float(point.multipliers @ point.slacks + upper @ point.residuals)
 
     def longest(self, step: _Point) -> float:
@@ -125,21 +143,3 @@ class _System:
             float((-step.multipliers / self.point.multipliers).max()),
             float((step.multipliers / self.upper).max()),
         )
-
-
-def _next(system: _System) -> _Point:
-    """Return the point after a step of predictor and corrector."""
-    product = system.product()
-    predicted = system.step(0.0, 0.0)
-    left = system.product(predicted, system.longest(predicted))
-    # The better the predicted step, the smaller the target of the corrected one (Mehrotra's cube).
-    target = (left / product) ** 3 * product / (2 * len(system.upper))
-    corrected = system.step(
-        target - predicted.multipliers * predicted.slacks,
-        target + predicted.multipliers * predicted.residuals,
-    )
-    return _moved(system.point, corrected, STEP_SHARE * system.longest(corrected))
-
-
-def _moved(point: _Point, step: _Point, share: float) -> _Point:
-    return _Point(*(now + share * change for now, change in zip(point, step, strict=True)))

@@ -56,7 +56,7 @@ def _gaps(module: Tactile, origin: float) -> str:
     shown = ", ".join(f"{steps[k]:.3g} s at {module.times[k] - origin:.2f} s" for k in places)
     first = "the longest " if module.n_gaps > MAX_GAPS_SHOWN else ""
     text = f"{module.n_gaps} gap{'s' if module.n_gaps > 1 else ''}: {first}{shown}; features begin "
-    return text + "anew after each: look for lost packets (holdfast doctor SOURCE)"
+    return text + "again after each: look for lost packets (holdfast doctor SOURCE)"
 
 
 def _drifts(modules: dict[str, Tactile], of_bag: object) -> list[Finding]:
