@@ -19,7 +19,6 @@ from holdfast.twin.simulation import generator_of
 from holdfast.twin.steps import hold_wrench
 from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
 from holdfast.twin.world import TruthLog
-from holdfast_lab.randomized.arms import carrying_legs, draw_carrier, person_acceleration
 from holdfast_lab.randomized.drawing import (
     MEASURED,
     SENSOR_KINDS,
@@ -36,7 +35,15 @@ from holdfast_lab.randomized.drawing import (
     with_measured,
 )
 from holdfast_lab.randomized.gripper import GripperWorld, OperatorForce
-from holdfast_lab.randomized.palm import Segment, log_uniform, palm_motion, uniform
+from holdfast_lab.randomized.palm import (
+    Segment,
+    carrying_legs,
+    draw_carrier,
+    log_uniform,
+    palm_motion,
+    person_acceleration,
+    uniform,
+)
 from holdfast_lab.randomized.scenario import Scenario, draw_events
 
 MAX_TRIES = 12

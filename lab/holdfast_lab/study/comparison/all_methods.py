@@ -11,7 +11,6 @@ from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.study.comparison import (
     costs,
-    error_tables,
     event_tables,
     sample_tables,
     strongest,
@@ -49,9 +48,9 @@ TABLES = (
     event_tables.glitches,
     event_tables.glitch_rates,
     sample_tables.splits,
-    error_tables.phases,
-    error_tables.force,
-    error_tables.directions,
+    sample_tables.phases,
+    sample_tables.force,
+    sample_tables.directions,
     sample_tables.reliability,
     costs.table,
 )
@@ -160,17 +159,17 @@ def reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
 def error_figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """Return the errors by grip force and by direction; none without a truth."""
     made = []
-    rows = error_tables.force(plan, results).rows
+    rows = sample_tables.force(plan, results).rows
     groups = {
         kind: _groups(plan, [row for row in rows if row.keys["error"] == kind], "grip")
-        for kind in error_tables.ERROR_KINDS
+        for kind in sample_tables.ERROR_KINDS
     }
     if any(groups.values()):
         caption = (
             "Errors by grip force, by recording. The paper states that grip force has no influence."
         )
         made.append(ReportFigure("grip", caption, draw_groups(groups, "samples [%]")))
-    rows = error_tables.directions(plan, results).rows
+    rows = sample_tables.directions(plan, results).rows
     by_direction = _groups(plan, rows, "direction")
     if by_direction:
         caption = (
@@ -185,7 +184,7 @@ def error_figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
 
 
 def _direction_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:
-    rows = error_tables.directions(plan, results).rows
+    rows = sample_tables.directions(plan, results).rows
     groups = {"direction of the push": _groups(plan, rows, "direction")}
     if not any(groups.values()):
         return None
