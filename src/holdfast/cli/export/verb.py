@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.export_model import HeaderOptions, export_model
-from holdfast.cli.export_recordings import RecordingOptions, export_recordings
+from holdfast.cli.export.models import HeaderOptions, export_model
+from holdfast.cli.export.recordings import RecordingOptions, export_recordings
 from holdfast.cli.extensions import ExporterOptions
 from holdfast.cli.options import ForceOption, JsonOption
 
@@ -47,6 +47,7 @@ def export(
       holdfast export grasp.parquet view/ --format foxglove --model builtin:any
       holdfast export grasp.parquet grasp.csv --format csv
     """
+    # The suffix of `out` decides as well: a wrong model is then refused as a model.
     is_named_so = source.startswith("builtin:") or source.endswith(".json")
     if is_named_so or out.suffix in MODEL_OUTPUTS:
         if recordings != RecordingOptions() or formats.chosen():
