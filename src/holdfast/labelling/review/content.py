@@ -17,8 +17,8 @@ from holdfast.labelling.review.findings import (
     findings_of_scan,
     hidden_labels,
     invalid_readings,
+    with_oddities,
 )
-from holdfast.labelling.review.oddities import with_oddities
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.model import Model
