@@ -13,7 +13,6 @@ from holdfast.classifiers import Onnx
 from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
 from holdfast.errors import ModelError, OutputError
 from holdfast.files import check_keys, read_input, whole_file, write_whole
-from holdfast.model.first_schema import upgraded
 from holdfast.model.heads import Head
 from holdfast.model.parts import FingerModel
 from holdfast.sensors import Sensor
@@ -28,7 +27,6 @@ Fingers = Mapping[str, FingerModel]
 MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
-FIRST_SCHEMA = re.compile(rb'"schema"\s*:\s*"holdfast\.model/1"')
 ONNX_NAME = re.compile(r'"([0-9a-f]{16}\.onnx)"')
 """Name of an ONNX file in a model file, by the digest of its content."""
 
@@ -145,14 +143,10 @@ def encode(model: "Model") -> bytes:
 def decode(data: bytes, kind: type[ModelT]) -> ModelT:
     """Return the model of a JSON text, without the contents of ONNX files.
 
-    A text of the version before is read as well.
-
     Raises:
         ModelError: the fields contradict each other.
         ValueError: the text is no JSON, or of another form.
     """
-    if FIRST_SCHEMA.search(data):
-        data = msgspec.json.encode(upgraded(msgspec.json.decode(data)))
     return msgspec.json.decode(data, type=kind, dec_hook=_decode_array)
 
 
