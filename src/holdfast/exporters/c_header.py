@@ -20,7 +20,7 @@ from holdfast.model import Model
 from holdfast.sensors import Sensor
 
 HEADER_FIELDS = 16
-"""Bytes of a detector beside the memory of the kernel."""
+"""Bytes of a detector beside the memory of the kernel: the id of its header, and padding."""
 
 
 class CHeader(NamedTuple):
@@ -77,8 +77,10 @@ def header_of(
     kernel = kernel_text()
     tables = Tables(kernel, model, plan, single=single)
     state_size = ctypes.sizeof(tables.types["holdfast_detector_memory"]) + HEADER_FIELDS
+    # Names in capitals stand between @ in the template.
     parts = {
         "VERSION": version("holdfast"),
+        # A model may have any name; a C string and a comment may not.
         "MODEL": re.sub(r"[^\w.:-]", "_", model.name or "model"),
         "MODEL_DIGEST": model.digest,
         "FINGERS": ", ".join(
@@ -101,6 +103,7 @@ def header_of(
     # The id depends on all but itself: a state that another header has left is refused by it.
     header_id = f"0x{sha256(text.encode()).hexdigest()[:8]}u"
     text = text.replace("@HEADER_ID@", header_id)
+    # Times stay double: seconds since a boot have no room for milliseconds in 24 bits.
     times = tuple(
         f"{name}.{field.name}"
         for name in ("mask", "track", "motion", "finger_memory", "decision")
@@ -140,14 +143,13 @@ def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     names = [re.sub(r"\W", "_", name, flags=re.ASCII).upper() for name in sensors]
     if len(set(names)) < len(names):
         names = [f"{place}" for place in range(len(names))]
-    yield _enum("HOLDFAST_FINGER_", [(name, place) for place, name in enumerate(names)])
-    yield _enum("HOLDFAST_FIRST_TAXEL_", list(zip(names, first, strict=False)))
-    yield _enum("HOLDFAST_REASON_", [(x.name, place) for place, x in enumerate(Reason)])
-    faults = [(fault.name, 1 << place) for place, fault in enumerate(Fault)]
-    yield _enum("HOLDFAST_FAULT_", faults)
-    yield _enum("HOLDFAST_CAUSE_", [("NONE", 0)])
-
-
-def _enum(prefix: str, members: Sequence[tuple[str, int]]) -> str:
-    lines = ",\n".join(f"    {prefix}{name} = {value}" for name, value in members)
-    return f"enum {{\n{lines}\n}};"
+    # Reasons are codes, faults are bits of a mask, as `Detector` has them.
+    for prefix, members in (
+        ("FINGER", [(name, place) for place, name in enumerate(names)]),
+        ("FIRST_TAXEL", list(zip(names, first, strict=False))),
+        ("REASON", [(reason.name, place) for place, reason in enumerate(Reason)]),
+        ("FAULT", [(fault.name, 1 << place) for place, fault in enumerate(Fault)]),
+        ("CAUSE", [("NONE", 0)]),
+    ):
+        lines = (f"    HOLDFAST_{prefix}_{name} = {value}" for name, value in members)
+        yield "enum {\n" + ",\n".join(lines) + "\n};"

@@ -62,6 +62,7 @@ def structs_of(text: str) -> dict[str, list[Field]]:
         [Field(name='time', kind='double', length=None, is_pointer=False),
          Field(name='m', kind='hf_real', length='3', is_pointer=False)]
     """
+    # Comments hold semicolons and braces too.
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     found = {}
     for body, name in re.findall(r"typedef struct \{([^}]*)\} (holdfast_\w+);", text):
@@ -101,6 +102,7 @@ class Tables:
         own_heads = [{"heads": heads[k : k + n_heads]} for k in range(0, len(heads), n_heads)]
         self.sizes: dict[str, Any] = {k: n for k, n in hand.items() if k.startswith("n_")}
         self.sizes["n_taxels"] = len(baseline)
+        # Lengths of arrays in the kernel are numbers, its own constants, or sizes of the hand.
         names = {name: int(value) for name, value in re.findall(r"(\w+_N_\w+) = (\d+)", kernel)}
         names |= {f"HOLDFAST_{name.upper()}": n for name, n in self.sizes.items()}
         self.types = ctypes_of(self.structs, names, single=single)
@@ -134,7 +136,19 @@ class Tables:
     def _text(self, kind: str, value: Any) -> str:  # noqa: ANN401 (a row, or a number)
         """Return the initializer of a struct or of a number."""
         if kind in self.structs:
-            return f"{{{', '.join(self._field(field, value) for field in self.structs[kind])}}}"
+            parts = []
+            for field in self.structs[kind]:
+                if field.is_pointer:  # to the table of that name, of which there is one hand
+                    part = f"&hf_{field.name}" if field.name == "hand" else f"hf_{field.name}"
+                elif field.length is None:
+                    part = self._text(field.kind, value[field.name])
+                else:
+                    values = value.get(field.name)
+                    if not isinstance(values, list):  # elements of a flat struct of NumPy
+                        values = [value[f"{field.name}[{k}]"] for k in range(int(field.length))]
+                    part = f"{{{', '.join(self._text(field.kind, item) for item in values)}}}"
+                parts.append(part)
+            return f"{{{', '.join(parts)}}}"
         if kind == "bool":
             return "true" if value else "false"
         if kind not in ("hf_real", "double"):
@@ -146,16 +160,6 @@ class Tables:
         # The shortest text that is read back as the same number, in either precision.
         is_single = self._single and kind == "hf_real"
         return f"{np.float32(value)!s}f" if is_single else repr(float(value))
-
-    def _field(self, field: Field, row: Struct) -> str:
-        if field.is_pointer:
-            return f"&hf_{field.name}" if field.name == "hand" else f"hf_{field.name}"
-        if field.length is None:
-            return self._text(field.kind, row[field.name])
-        values = row.get(field.name)
-        if not isinstance(values, list):
-            values = [row[f"{field.name}[{k}]"] for k in range(int(field.length))]
-        return f"{{{', '.join(self._text(field.kind, value) for value in values)}}}"
 
 
 def ctypes_of(
@@ -170,17 +174,15 @@ def ctypes_of(
     """
     found = C_TYPES | {"hf_real": ctypes.c_float if single else ctypes.c_double}
     for name, fields in structs.items():
-        members = [(field.name, _ctype(field, found, names)) for field in fields]
+        members = []
+        for field in fields:
+            # A struct stands after those that it contains, as C needs it: all kinds are found.
+            kind = ctypes.c_void_p if field.is_pointer else found[field.kind]
+            if field.length is not None and not field.is_pointer:
+                kind *= _length(field.length, names)
+            members.append((field.name, kind))
         found[name] = type(name, (ctypes.Structure,), {"_fields_": members})
     return found
-
-
-def _ctype(field: Field, found: Mapping[str, Any], names: Mapping[str, int]) -> Any:  # noqa: ANN401
-    if field.is_pointer:
-        return ctypes.c_void_p
-    if field.length is None:
-        return found[field.kind]
-    return found[field.kind] * _length(field.length, names)
 
 
 def _length(expression: str, names: Mapping[str, int]) -> int:
