@@ -20,7 +20,7 @@ from holdfast.model import Model
 from holdfast.sensors import Sensor
 
 HEADER_FIELDS = 16
-"""Bytes of a detector beside the memory of the kernel: the id of its header, and padding."""
+"""Bytes of a detector beside the memory of the kernel: the id of its header, and the last time."""
 
 
 class CHeader(NamedTuple):
