@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -13,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from holdfast.exporters.output import whole_folder
-from holdfast.io.header import Header, encode_header, header_of
+from holdfast.io.header import encode_header, header_of
 from holdfast.recordings import Recording
-from holdfast_interop.lerobot.columns import ColumnSpec, SharedColumns, arrow_schema, nested
+from holdfast_interop.lerobot.columns import SharedColumns, arrow_schema, nested
 from holdfast_interop.lerobot.frames import ColumnStatistics, EpisodeFrames
 from holdfast_interop.lerobot.layout import (
     DATA_PATH,
@@ -107,6 +106,7 @@ def export(
 def _is_data_set(folder: Path) -> bool:
     """Return whether a folder has the marker, and no file that this export does not write."""
     marker = folder / MARKER_PATH
+    # A link could lead `--force` out of the folder.
     if marker.is_symlink() or not marker.is_file():
         return False
     return all(
@@ -125,12 +125,13 @@ class _Writer(ExitStack):
         self._features = layout.features()
         self._schema = arrow_schema(self._features)
         self._file: pq.ParquetWriter | None = None
+        # After an error as well.
         self.callback(self._close_file)
-        self._path = folder
-        self._n_files = 0
-        self._n_frames = 0
-        self._episodes: list[dict[str, object]] = []
-        self._tasks: dict[str, int] = {}
+        self._path = folder  # of the file that is open; no file before the first episode
+        self._n_files = 0  # begun so far; the newest has the number before it
+        self._n_frames = 0  # of the episodes before, whose rows precede in the data set
+        self._episodes: list[dict[str, object]] = []  # rows of the table of episodes
+        self._tasks: dict[str, int] = {}  # number of each task, in the order of their episodes
         self._stats = {name: ColumnStatistics(spec.shape) for name, spec in self._features.items()}
 
     def append(self, recording: Recording) -> None:
@@ -138,37 +139,38 @@ class _Writer(ExitStack):
         header = header_of(recording, recording.name)
         file = self._file_for_next()
         frames = EpisodeFrames(recording, header, self._layout)
-        task = self._tasks.setdefault(_task(recording), len(self._tasks))
+        name = _task(recording)
+        task = self._tasks.setdefault(name, len(self._tasks))
+        # In parts: windows repeat samples, so that frames are larger than their recording.
         for start in range(0, frames.n, MAX_GROUP_FRAMES):
             part = frames.columns(start, min(start + MAX_GROUP_FRAMES, frames.n))
             n = len(part["frame_index"])
             part["episode_index"] = np.full(n, len(self._episodes), dtype=np.int64)
             part["index"] = part["frame_index"] + self._n_frames
             part["task_index"] = np.full(n, task, dtype=np.int64)
-            for name, values in part.items():
-                self._stats[name].add(values)
-            arrays = [nested(part[name], spec) for name, spec in self._features.items()]
+            for column, values in part.items():
+                self._stats[column].add(values)
+            arrays = [nested(part[column], spec) for column, spec in self._features.items()]
             file.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
-        self._episodes.append(self._episode(recording, header, frames))
-        self._n_frames += frames.n
-
-    def _episode(
-        self, recording: Recording, header: Header, frames: EpisodeFrames
-    ) -> dict[str, Any]:
         chunk, number = divmod(self._n_files - 1, FILES_PER_FOLDER)
-        return {
-            "episode_index": len(self._episodes),
-            "tasks": [_task(recording)],
-            "length": frames.n,
-            "data/chunk_index": chunk,
-            "data/file_index": number,
-            "dataset_from_index": self._n_frames,
-            "dataset_to_index": self._n_frames + frames.n,
-            "meta/episodes/chunk_index": 0,
-            "meta/episodes/file_index": 0,
-            HEADER_COLUMN: encode_header(header).decode(),
-            TEXTS_COLUMN: msgspec.json.encode(frames.texts).decode(),
-        }
+        self._episodes.append(
+            {
+                "episode_index": len(self._episodes),
+                "tasks": [name],
+                "length": frames.n,
+                "data/chunk_index": chunk,
+                "data/file_index": number,
+                "dataset_from_index": self._n_frames,
+                "dataset_to_index": self._n_frames + frames.n,
+                # All episodes are in one file of the table.
+                "meta/episodes/chunk_index": 0,
+                "meta/episodes/file_index": 0,
+                # What LeRobot has no place for; its readers ignore other columns.
+                HEADER_COLUMN: encode_header(header).decode(),
+                TEXTS_COLUMN: msgspec.json.encode(frames.texts).decode(),
+            }
+        )
+        self._n_frames += frames.n
 
     def _file_for_next(self) -> pq.ParquetWriter:
         """Return the file of the next episode; a large file is closed."""
@@ -179,7 +181,10 @@ class _Writer(ExitStack):
         self._path = self._folder / DATA_PATH.format(chunk_index=chunk, file_index=number)
         self._path.parent.mkdir(parents=True, exist_ok=True)
         self._file = pq.ParquetWriter(
-            str(self._path), self._schema, compression="zstd", use_dictionary=False
+            str(self._path),
+            self._schema,
+            compression="zstd",
+            use_dictionary=False,
         )
         self._n_files += 1
         return self._file
@@ -193,12 +198,29 @@ class _Writer(ExitStack):
         episodes = self._folder / EPISODES_PATH.format(chunk_index=0, file_index=0)
         episodes.parent.mkdir(parents=True)
         table = pa.Table.from_pylist(self._episodes)
+        # Small row groups: the importer reads headers of a few recordings at a time.
         pq.write_table(table, str(episodes), compression="zstd", row_group_size=64)
         _write_tasks(self._folder / TASKS_PATH, self._tasks)
         totals = {
             "episodes": len(self._episodes), "frames": self._n_frames, "tasks": len(self._tasks)
         }  # fmt: skip
-        _write_json(self._folder / INFO_PATH, _info(self._layout.fps, self._features, totals))
+        info = {
+            "codebase_version": VERSION,
+            "robot_type": None,
+            **{f"total_{name}": n for name, n in totals.items()},
+            "chunks_size": FILES_PER_FOLDER,
+            "data_files_size_in_mb": MAX_FILE_SIZE,
+            "video_files_size_in_mb": MAX_VIDEO_SIZE,
+            "fps": self._layout.fps,
+            "splits": {"train": f"0:{totals['episodes']}"},
+            "data_path": DATA_PATH,
+            "video_path": None,
+            "features": {
+                name: {"dtype": spec.number, "shape": list(spec.shape), "names": None}
+                for name, spec in self._features.items()
+            },
+        }
+        _write_json(self._folder / INFO_PATH, info)
         _write_json(self._folder / MARKER_PATH, {"writer": "holdfast"})
         stats = {name: stats.result() for name, stats in self._stats.items()}
         _write_json(self._folder / STATS_PATH, stats)
@@ -232,25 +254,6 @@ def _write_tasks(path: Path, tasks: Mapping[str, int]) -> None:
     table = pa.table({"task_index": pa.array(tasks.values(), pa.int64()), "task": list(tasks)})
     metadata = {"pandas": json.dumps(pandas)}
     pq.write_table(table.replace_schema_metadata(metadata), str(path))
-
-
-def _info(fps: int, features: Mapping[str, ColumnSpec], totals: Mapping[str, int]) -> object:
-    return {
-        "codebase_version": VERSION,
-        "robot_type": None,
-        **{f"total_{name}": n for name, n in totals.items()},
-        "chunks_size": FILES_PER_FOLDER,
-        "data_files_size_in_mb": MAX_FILE_SIZE,
-        "video_files_size_in_mb": MAX_VIDEO_SIZE,
-        "fps": fps,
-        "splits": {"train": f"0:{totals['episodes']}"},
-        "data_path": DATA_PATH,
-        "video_path": None,
-        "features": {
-            name: {"dtype": spec.number, "shape": list(spec.shape), "names": None}
-            for name, spec in features.items()
-        },
-    }
 
 
 def _write_json(path: Path, value: object) -> None:

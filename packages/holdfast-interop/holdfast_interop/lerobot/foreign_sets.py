@@ -71,23 +71,20 @@ def read_foreign_set(
         names = [name for name in info.features if name in parquet.schema_arrow.names]
         arrays = arrays_of_columns(file, parquet, names)
         for name, array in arrays.items():
-            arrays[name] = array._replace(columns=_value_names(info.features[name]))
+            feature = info.features[name]
+            # Names are a list, or lists by kind of value; they count if each value has its own.
+            lists = feature.names.values() if isinstance(feature.names, dict) else [feature.names]
+            words = [str(word) for one in lists if isinstance(one, list) for word in one]
+            if not len(words) == prod(feature.shape) == len(set(words)):
+                words = []
+            arrays[name] = array._replace(columns=tuple(words))
         if info.fps is not None:
             arrays["fps"] = in_memory(np.array(info.fps))
+        # A file has rows of many episodes; they are recordings unless the user says otherwise.
         own = columns or Columns()
         if own.episode is None and EPISODE_COLUMN in arrays:
             own = replace(own, episode=EPISODE_COLUMN)
-        once = report if number == 0 else _ignored
+        # The other files are like the first: one report for all.
+        once = report if number == 0 else lambda _: None
         for recording in recordings_of_arrays(file, arrays, sensors, own, once):
             yield replace(recording, name=f"{path.name}{recording.name.removeprefix(file.stem)}")
-
-
-def _ignored(_: str) -> None:
-    """Drop the report about a file that is like the first."""
-
-
-def _value_names(feature: _Feature) -> tuple[str, ...]:
-    """Return the names of the values of a feature; none if they are not one for each value."""
-    lists = feature.names.values() if isinstance(feature.names, dict) else [feature.names]
-    names = [str(name) for one in lists if isinstance(one, list) for name in one]
-    return tuple(names) if len(names) == prod(feature.shape) == len(set(names)) else ()

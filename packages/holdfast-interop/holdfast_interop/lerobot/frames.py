@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.io.header import Header
-from holdfast.io.timed_arrays import ArraySpec, TimedArray, array_specs, arrays_of
+from holdfast.io.timed_arrays import array_specs, arrays_of
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast_interop.lerobot.columns import FrameSpan, SharedColumns
@@ -36,7 +36,11 @@ class EpisodeFrames:
         for spec in array_specs(header):
             self._times[track_name(spec)] = arrays[spec.topic][0]
         for spec in value_specs(array_specs(header)):
-            self._add(spec, arrays[spec.topic])
+            values = arrays[spec.topic][1]
+            if spec.number == "str":  # a data set of numbers has the number of each text
+                self.texts[spec.column], values = text_codes(values)
+            name = feature_name(spec)
+            self._values[name] = values.astype(self._layout.values[name].number)
         self._labels = {
             feature_name(spec): recording.modules[spec.track].label_states
             for spec in array_specs(header)
@@ -44,16 +48,10 @@ class EpisodeFrames:
         }
         self._ends = {track: self._span.ends(times) for track, times in self._times.items()}
 
-    def _add(self, spec: ArraySpec, array: TimedArray) -> None:
-        values = array[1]
-        if spec.number == "str":
-            self.texts[spec.column], values = text_codes(values)
-        name = feature_name(spec)
-        self._values[name] = values.astype(self._layout.values[name].number)
-
     def columns(self, start: int, stop: int) -> dict[str, npt.NDArray[Any]]:
         """Return the columns of the frames from `start` up to `stop`."""
         columns: dict[str, npt.NDArray[Any]] = {}
+        # All columns of the data set, also those of modules that this recording lacks.
         for track, width in self._layout.widths.items():
             ends = self._ends.get(track, np.zeros(self.n, dtype=np.int64))
             rows = window_rows(ends[start:stop], width)
@@ -66,6 +64,7 @@ class EpisodeFrames:
                     columns[name] = windows(self._values.get(name, empty), rows)
             if track in self._layout.labelled:
                 states = self._labels.get(track, np.empty(0, dtype=np.int8))
+                # One label a frame: that of the newest sample, which a policy acts on.
                 label = windows(states.astype(np.int64), rows[:, -1:])
                 columns[self._layout.labelled[track]] = label[:, 0]
         columns["frame_index"] = np.arange(start, stop)
@@ -78,7 +77,7 @@ class ColumnStatistics:
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self._n_frames = 0
-        self._n = np.zeros(shape)
+        self._n = np.zeros(shape)  # finite numbers of each component
         self._sum = np.zeros(shape)
         self._squares = np.zeros(shape)
         self._shift: Array | None = None
@@ -104,6 +103,7 @@ class ColumnStatistics:
 
     def result(self) -> dict[str, object]:
         """Return the statistics; 0 where there is no number."""
+        # JSON has neither NaN nor infinity.
         known, n = self._n > 0, np.maximum(self._n, 1)
         shift = 0.0 if self._shift is None else self._shift
         with np.errstate(over="ignore", invalid="ignore"):

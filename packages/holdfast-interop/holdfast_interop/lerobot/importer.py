@@ -23,7 +23,7 @@ from holdfast.io.timed_arrays import (
 )
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
-from holdfast_interop.lerobot.foreign_sets import MAX_INFO_SIZE, read_foreign_set
+from holdfast_interop.lerobot.foreign_sets import EPISODE_COLUMN, MAX_INFO_SIZE, read_foreign_set
 from holdfast_interop.lerobot.layout import (
     DATA_PATH,
     EPISODES_PATH,
@@ -49,6 +49,8 @@ EPISODES_AT_ONCE = 64
 _EPISODE_COLUMNS = (
     "episode_index", "length", "data/chunk_index", "data/file_index", HEADER_COLUMN, TEXTS_COLUMN
 )  # fmt: skip
+
+_FILE_PARTS = ("chunk", "file")
 
 
 class _Info(msgspec.Struct, frozen=True):
@@ -102,19 +104,29 @@ def read(
     Raises:
         RecordingError: the data set is damaged, or no feature fits a sensor.
     """
-    if sensors or columns or not _has_headers(path):
-        yield from read_foreign_set(path, sensors or {}, columns, report)
-        return
-    for episode in _episodes(path, _info(path)):
-        yield _recording(path, episode)
-
-
-def _has_headers(path: Path) -> bool:
-    """Return whether holdfast wrote the data set: its episodes have headers of recordings."""
     import pyarrow.parquet as pq
 
     files = _episode_files(path)
-    return bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
+    # Only what holdfast wrote has the headers of recordings; options name columns of any set.
+    is_own = bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
+    if sensors or columns or not is_own:
+        yield from read_foreign_set(path, sensors or {}, columns, report)
+        return
+    for episode in _episodes(path, _info(path)):
+        table = _EpisodeTable(episode)
+        specs = array_specs(episode.header)
+        arrays = {spec.topic: table.array(spec) for spec in specs if spec.topic != TRUTH_TIME}
+        if episode.header.truth is not None:
+            times = table.times("truth")
+            arrays[TRUTH_TIME] = (times, times)
+        recording = recording_from(episode.header, arrays, path)
+        # Parquet of other writers has no checksums: the digest finds what was changed since.
+        if recording.digest != episode.header.digest:
+            raise RecordingError(
+                f"{path} is damaged: the samples of episode {episode.number} do not match their "
+                "digest"
+            )
+        yield replace(recording, name=episode.header.name)
 
 
 def _episode_files(path: Path) -> list[Path]:
@@ -155,39 +167,19 @@ def _episodes(path: Path, info: _Info) -> Iterator[_Episode]:
             )
         for batch in parquet.iter_batches(EPISODES_AT_ONCE, columns=list(_EPISODE_COLUMNS)):
             for row in batch.to_pylist():
-                yield _episode(path, row)
+                place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in _FILE_PARTS}
+                yield _Episode(
+                    int(row["episode_index"]),
+                    int(row["length"]),
+                    path / DATA_PATH.format(**place),
+                    decode_header(row[HEADER_COLUMN], path),
+                    msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
+                )
                 n_episodes += 1
     if n_episodes != info.total_episodes:
         raise RecordingError(
             f"{path} is damaged: {n_episodes} episodes, its {INFO_PATH} names {info.total_episodes}"
         )
-
-
-def _episode(path: Path, row: dict[str, Any]) -> _Episode:
-    place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in ("chunk", "file")}
-    file = path / DATA_PATH.format(**place)
-    return _Episode(
-        int(row["episode_index"]),
-        int(row["length"]),
-        file,
-        decode_header(row[HEADER_COLUMN], path),
-        msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
-    )
-
-
-def _recording(path: Path, episode: _Episode) -> Recording:
-    table = _EpisodeTable(episode)
-    specs = array_specs(episode.header)
-    arrays = {spec.topic: table.array(spec) for spec in specs if spec.topic != TRUTH_TIME}
-    if episode.header.truth is not None:
-        times = table.times("truth")
-        arrays[TRUTH_TIME] = (times, times)
-    recording = recording_from(episode.header, arrays, path)
-    if recording.digest != episode.header.digest:
-        raise RecordingError(
-            f"{path} is damaged: the samples of episode {episode.number} do not match their digest"
-        )
-    return replace(recording, name=episode.header.name)
 
 
 class _EpisodeTable:
@@ -201,6 +193,7 @@ class _EpisodeTable:
     """
 
     def __init__(self, episode: _Episode) -> None:
+        import pyarrow.compute as pc
         import pyarrow.parquet as pq
 
         self._episode = episode
@@ -212,7 +205,16 @@ class _EpisodeTable:
         file = pq.ParquetFile(episode.path)
         if missing := [name for name in names if name not in file.schema_arrow.names]:
             raise RecordingError(f"{episode.path}: column {missing[0]!r} is missing")
-        self._table = _rows_of(file, episode.number, names)
+        # Without filters of pyarrow, which use the statistics in the footer: if these are damaged,
+        # they abort the process.
+        groups = [
+            number
+            for number in range(file.num_row_groups)
+            for column in [file.read_row_group(number, columns=[EPISODE_COLUMN])[EPISODE_COLUMN]]
+            if pc.index(column, episode.number).as_py() >= 0
+        ]
+        table = file.read_row_groups(groups, columns=[*names, EPISODE_COLUMN])
+        self._table = table.filter(pc.equal(table[EPISODE_COLUMN], episode.number))
         if len(self._table) != episode.length:
             raise RecordingError(
                 f"{episode.path} is damaged: {len(self._table)} frames of episode "
@@ -257,23 +259,6 @@ class _EpisodeTable:
             raise ValueError(f"column {name!r} has missing values")
         values: npt.NDArray[Any] = array.to_numpy(zero_copy_only=False)
         return values
-
-
-def _rows_of(file: Any, episode: int, names: list[str]) -> Any:  # noqa: ANN401 (of pyarrow)
-    """Return the rows of an episode.
-
-    Filters of pyarrow use the statistics in the footer; if these are damaged, they abort.
-    """
-    import pyarrow.compute as pc
-
-    column = "episode_index"
-    groups = [
-        number
-        for number in range(file.num_row_groups)
-        if pc.index(file.read_row_group(number, columns=[column])[column], episode).as_py() >= 0
-    ]
-    table = file.read_row_groups(groups, columns=[*names, column])
-    return table.filter(pc.equal(table[column], episode))
 
 
 def _memory_type(spec: ArraySpec) -> str:
