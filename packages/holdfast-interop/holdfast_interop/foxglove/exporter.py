@@ -106,6 +106,7 @@ class _MessageFile:
         times = [recording.start, *(time for time, _ in recording.markers)]
         if recording.truth is not None and len(recording.truth.times):
             times.append(float(recording.truth.times[0]))
+        # Times of MCAP are unsigned.
         self._offset = max(0.0, -min(times))
         self._encoder = msgspec.json.Encoder()
         self._schemas: dict[str, int] = {}
@@ -137,10 +138,15 @@ class _MessageFile:
         """Write a message; the schema and the channel of its topic come before the first."""
         topic = message.topic
         if topic not in self._channels:
+            name = schema_of(topic)
+            if name not in self._schemas:
+                text = msgspec.json.encode({"title": name, **SCHEMAS[name]})
+                self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
             self._channels[topic] = self._writer.register_channel(
-                topic, "json", self._schema(schema_of(topic))
+                topic, "json", self._schemas[name]
             )
         document = message.document
+        # Scenes and transforms have the stamp inside each entity, where Foxglove reads it.
         if "entities" not in document and "transforms" not in document:
             document = {"timestamp": self.stamp(message.time), **document}
         time = self._nanoseconds(message.time)
@@ -150,12 +156,6 @@ class _MessageFile:
     def close(self) -> None:
         """Write the end of the file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
-
-    def _schema(self, name: str) -> int:
-        if name not in self._schemas:
-            text = msgspec.json.encode({"title": name, **SCHEMAS[name]})
-            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
-        return self._schemas[name]
 
     def _nanoseconds(self, time: float) -> int:
         return max(0, round((time + self._offset) * 1e9))

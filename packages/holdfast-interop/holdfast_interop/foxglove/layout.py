@@ -55,24 +55,25 @@ def layout(fingers: Collection[str], topics: Collection[str]) -> dict[str, objec
         )
         if topic in topics
     ]
+    # An estimate and its label beside each other, the phase of the experiment below all.
+    named = []
+    for finger in fingers:
+        named.append((finger, finger_topic(STATE_TOPIC, finger)))
+        named.append((f"{finger} (label)", finger_topic(LABEL_TOPIC, finger)))
+    named.append(("phase", PHASE_TOPIC))
     states = [
-        {"value": f"{topic}.state", "label": name}
-        for name, topic in _state_topics(fingers)
-        if topic in topics
+        {"value": f"{topic}.state", "label": name} for name, topic in named if topic in topics
     ]
     if states:
         series = [{**path, "timestampMethod": "receiveTime"} for path in states]
         plots.append(_panel("StateTransitions", "States", {"paths": series, "isSynced": True}))
-    left = _split("column", [(_hand(), 3), (_log(), 1)])
+    shown = {topic: {"visible": True} for topic in (ARROWS_TOPIC, TAXELS_TOPIC)}
+    scene = {"topics": shown, "cameraState": CAMERA, "followTf": ROOT_FRAME}
+    hand = _panel("ThreeDee", "Hand", scene)
+    log = _panel("Log", "Log", {"topicToRender": LOG_TOPIC, "minLogLevel": INFO_LEVEL})
+    left = _split("column", [(hand, 3), (log, 1)])
     right = _split("column", [(panel, 1) for panel in plots])
     return {"version": LAYOUT_VERSION, "content": _split("row", [(left, 1), (right, 1)])}
-
-
-def _state_topics(fingers: Iterable[str]) -> Iterable[tuple[str, str]]:
-    for finger in fingers:
-        yield finger, finger_topic(STATE_TOPIC, finger)
-        yield f"{finger} (label)", finger_topic(LABEL_TOPIC, finger)
-    yield "phase", PHASE_TOPIC
 
 
 def _plot(title: str, topic: str, fingers: Iterable[str]) -> dict[str, object]:
@@ -86,16 +87,6 @@ def _plot(title: str, topic: str, fingers: Iterable[str]) -> dict[str, object]:
         for finger in fingers
     ]
     return _panel("Plot", title, {"paths": paths, "isSynced": True})
-
-
-def _hand() -> dict[str, object]:
-    shown = {topic: {"visible": True} for topic in (ARROWS_TOPIC, TAXELS_TOPIC)}
-    config = {"topics": shown, "cameraState": CAMERA, "followTf": ROOT_FRAME}
-    return _panel("ThreeDee", "Hand", config)
-
-
-def _log() -> dict[str, object]:
-    return _panel("Log", "Log", {"topicToRender": LOG_TOPIC, "minLogLevel": INFO_LEVEL})
 
 
 def _panel(kind: str, title: str, config: dict[str, object]) -> dict[str, object]:
