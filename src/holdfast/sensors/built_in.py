@@ -95,7 +95,7 @@ def flat_sensor(
         [-0.0047, 0.0047, 0.0]
     """
     grid = _grid(name, (n_rows, n_columns), (pitch, pitch), rate, unit=unit)
-    # Sums of decimal pitches have last digits that nobody wrote.
+    # Multiples of a decimal pitch differ from decimal numbers in their last digits.
     return replace(grid, positions=np.round(grid.positions, 9))
 
 
@@ -135,6 +135,7 @@ def anyskin() -> Sensor:
     """Return 5 magnetometers: centre, left, right, up, down; rotated in plane, nominal pitch."""
     pitch = 7e-3
     positions = pitch * np.array([[0, 0, 0], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    # Each chip is rotated in the plane by an angle of its own.
     angles = np.array([-np.pi / 2, -np.pi / 2, np.pi, np.pi / 2, 0.0])
     rotations = np.zeros((5, 3, 3))
     rotations[:, 0, 0] = rotations[:, 1, 1] = np.cos(angles)

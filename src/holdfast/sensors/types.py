@@ -360,6 +360,7 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
     """Return the nearest rotation matrices, by polar decomposition."""
     if np.abs(rotations).max(initial=0.0) > 2:
         raise ValueError(f"{name}: components of rotations from -1 to 1 expected")
+    # Tables have six digits, and what is no exact rotation changes the length of a force.
     left, _, right = np.linalg.svd(rotations)
     exact: Array = left @ right
     error = np.abs(exact - rotations).max(axis=(1, 2))
