@@ -6,7 +6,7 @@ codec decodes them by the definitions in the bag, which are data: nothing from a
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,6 +31,11 @@ MAGICS = {
     ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
 }
 """First bytes of the files of bags, by suffix. MCAP has the profile of ROS 2."""
+_OPENERS: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
+    ".bag": open_ros1,
+    ".db3": open_sqlite,
+    ".mcap": open_mcap,
+}
 MAX_BAG_MESSAGE_SIZE = 1 << 22
 """Maximum size of a message that is decoded [bytes]; one of 368 taxels has some 10 kB."""
 
@@ -107,19 +112,15 @@ class Bag:
         """Return the definition in the bag; if there is none, the one of a known type."""
         # Publishers of a type send the same definition, which is parsed once.
         key = (one.kind, one.definition)
-        if key not in self._definitions:
-            self._definitions[key] = self._parsed(*key)
+        if key not in self._definitions and one.definition.strip():
+            self._definitions[key] = None
+            with suppress(ValueError):  # a topic that cannot be read does not hide the others
+                self._definitions[key] = parse_definition(*key)
+        elif key not in self._definitions:
+            standard = standard_definition(one.kind) if self.ros2 else None
+            # Messages of known sensors first: ROS itself has none of these types.
+            self._definitions[key] = known_definition(one.kind, ros2=self.ros2) or standard
         return self._definitions[key]
-
-    def _parsed(self, kind: str, text: str) -> Definition | None:
-        if text.strip():
-            try:
-                return parse_definition(kind, text)
-            # A topic that cannot be read does not hide the others.
-            except ValueError:
-                return None
-        standard = standard_definition(kind) if self.ros2 else None
-        return known_definition(kind, ros2=self.ros2) or standard
 
 
 def standard_definition(kind: str) -> Definition | None:
@@ -152,7 +153,9 @@ def open_bag(path: Path) -> Iterator[Bag]:
     ros2 = path.suffix != ".bag" or path.is_dir()
     try:
         budget = ReadBudget(path)
-        with _storage(path, budget) as storage:
+        opener: Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]
+        opener = open_folder if path.is_dir() else _OPENERS[path.suffix]
+        with opener(path, budget) as storage:
             yield Bag(storage, budget, ros2=ros2)
     except RecordingError:
         raise
@@ -168,20 +171,6 @@ def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
     """Return the poses of bodies in a bag; see `importer.poses`."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     frames: dict[str, str] = {}
-    for name, frame, row in _poses(path):
-        rows.setdefault(name, []).append(row)
-        frames[name] = frame
-    if missing := [name for name in wanted.values() if name not in rows]:
-        found = ", ".join(sorted(rows)) or "none"
-        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {found}")
-    parents = sorted({frames[name] for name in wanted.values()})
-    if len(parents) > 1:
-        raise RecordingError(f"{path}: poses in one frame expected, {' and '.join(parents)} given")
-    return {body: np.array(rows[name]) for body, name in wanted.items()}
-
-
-def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
-    """Yield topic or child frame, parent frame, and time and pose, of each pose in a bag."""
     with open_bag(path) as bag:
         decoders = {
             topic.number: PoseDecoder(topic.definition, ros2=bag.ros2)
@@ -191,9 +180,17 @@ def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
         topics = [topic for topic in bag.topics if topic.number in decoders]
         for topic, _, data in bag.messages(topics):
             for pose in decoders[topic.number](data):
-                row = (pose.time, *pose.position, *pose.quaternion)
-                bag.keep(0)
-                yield pose.body or topic.name, pose.frame, row
+                name = pose.body or topic.name
+                bag.keep(0)  # a row of numbers counts as an object
+                rows.setdefault(name, []).append((pose.time, *pose.position, *pose.quaternion))
+                frames[name] = pose.frame
+    if missing := [name for name in wanted.values() if name not in rows]:
+        found = ", ".join(sorted(rows)) or "none"
+        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {found}")
+    parents = sorted({frames[name] for name in wanted.values()})
+    if len(parents) > 1:
+        raise RecordingError(f"{path}: poses in one frame expected, {' and '.join(parents)} given")
+    return {body: np.array(rows[name]) for body, name in wanted.items()}
 
 
 def _is_bag(path: Path) -> bool:
@@ -203,14 +200,3 @@ def _is_bag(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return MAGICS[path.suffix].match(file.read(64)) is not None
-
-
-def _storage(path: Path, budget: ReadBudget) -> AbstractContextManager[BagStorage]:
-    if path.is_dir():
-        return open_folder(path, budget)
-    openers: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
-        ".bag": open_ros1,
-        ".db3": open_sqlite,
-        ".mcap": open_mcap,
-    }
-    return openers[path.suffix](path, budget)

@@ -75,7 +75,14 @@ class SqliteBag:
             raise ValueError("two topics with the same number")
         query = "SELECT topic_id, count(*) FROM messages GROUP BY topic_id"
         counts = dict(self._rows(query)) if self.complete else {}
-        definitions = self._definitions()
+        definitions: dict[str, str] = {}
+        if self._rows("PRAGMA table_info(message_definitions)"):  # older bags have none
+            rows = self._rows(
+                "SELECT topic_type, encoded_message_definition FROM message_definitions "
+                "WHERE encoding = 'ros2msg'",
+                MAX_BAG_CONNECTIONS,
+            )
+            definitions = {str(kind): str(text) for kind, text in rows}
         return [
             BagConnection(
                 int(number), str(name), str(kind), definitions.get(kind, ""), counts.get(number, 0)
@@ -103,17 +110,6 @@ class SqliteBag:
                 if not isinstance(time, int) or not isinstance(data, bytes):
                     raise ValueError("a message without a time or without bytes")
                 yield number, time, data
-
-    def _definitions(self) -> dict[str, str]:
-        """Return the texts of definitions by type; older bags have none."""
-        if not self._rows("PRAGMA table_info(message_definitions)"):
-            return {}
-        rows = self._rows(
-            "SELECT topic_type, encoded_message_definition FROM message_definitions "
-            "WHERE encoding = 'ros2msg'",
-            MAX_BAG_CONNECTIONS,
-        )
-        return {str(kind): str(text) for kind, text in rows}
 
     def _rows(self, query: str, max_rows: int | None = None) -> list[tuple[Any, ...]]:
         """Return the rows of a query, which count in the budget."""
