@@ -8,7 +8,7 @@ from holdfast_grip.hands.base import HandDevice
 from holdfast_ros.hands.joint_hand import JointHand, JointOutput, JointSetup, check_home
 from holdfast_ros.hands.joints import JointOrder
 from holdfast_ros.hands.parameters import Parameters
-from holdfast_ros.hands.width_hand import WidthHand, WidthSetup
+from holdfast_ros.hands.scalar_hand import WidthHand, WidthSetup
 from holdfast_ros.link import Link
 from holdfast_ros.topic_messages import FLOAT64, FLOAT_ARRAY, GRIPPER_COMMAND, JOINT_TRAJECTORY
 
