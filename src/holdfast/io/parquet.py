@@ -199,7 +199,21 @@ def write_checksum(path: Path) -> None:
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     budget = ReadBudget(path)
-    _check_ends(path)
+    size = path.stat().st_size
+    if size == 0:
+        raise RecordingError(f"{path} is empty (0 bytes); a Parquet recording expected")
+    with path.open("rb") as file:
+        head = file.read(len(PARQUET_MAGIC))
+        file.seek(max(0, size - len(PARQUET_MAGIC)))
+        tail = file.read()
+    if head != PARQUET_MAGIC:
+        raise RecordingError(f"{path} is no Parquet file, or its first bytes are damaged")
+    # The smallest file is the magic, a length of 4 bytes, and the magic.
+    if tail != PARQUET_MAGIC or size < 3 * len(PARQUET_MAGIC):
+        raise RecordingError(
+            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
+            "from which nothing can be recovered"
+        )
     # The checksum comes first: Arrow may end the process for a file that is damaged.
     try:
         place = _checksum_place(path)
@@ -221,24 +235,6 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     header = (table.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
     budget.keep(JSON_EXPANSION * len(header))
     return decode_header(header, path), table
-
-
-def _check_ends(path: Path) -> None:
-    size = path.stat().st_size
-    if size == 0:
-        raise RecordingError(f"{path} is empty (0 bytes); a Parquet recording expected")
-    with path.open("rb") as file:
-        head = file.read(len(PARQUET_MAGIC))
-        file.seek(max(0, size - len(PARQUET_MAGIC)))
-        tail = file.read()
-    if head != PARQUET_MAGIC:
-        raise RecordingError(f"{path} is no Parquet file, or its first bytes are damaged")
-    # The smallest file is the magic, a length of 4 bytes, and the magic.
-    if tail != PARQUET_MAGIC or size < 3 * len(PARQUET_MAGIC):
-        raise RecordingError(
-            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
-            "from which nothing can be recovered"
-        )
 
 
 def _checksum_place(path: Path) -> int:

@@ -311,7 +311,22 @@ def _module(
     settings: Settings,
     sensors: Mapping[str, Sensor],
 ) -> Tactile:
-    one = sensors.get(name) or sensors.get(ANY_MODULE) or _sensor(name, settings, columns)
+    # What the user gives comes before what the file says.
+    one = sensors.get(name) or sensors.get(ANY_MODULE)
+    if one is None:
+        stated = settings.get(("sensor", name)) or settings.get(("sensor", None))
+        if stated is None:
+            n_taxels = len({taxel for taxel, _ in columns})
+            raise RecordingError(
+                f"the sensor of {name} ({n_taxels} taxels) is missing: --sensor NAME or --sensor "
+                f"FILE.json expected, or a line '# sensor: {name}=NAME' above the header; built in "
+                f"are {', '.join(built_in_sensors())}; `holdfast sensors --template "
+                f"ROWSxCOLUMNS > FILE.json` makes a file of a flat grid"
+            )
+        try:
+            one = sensor(stated)
+        except ValueError as cause:
+            raise RecordingError(str(cause)) from cause
     wanted = [(number, axis) for number in taxel_numbers(range(one.n_taxels)) for axis in "xyz"]
     if set(columns) != set(wanted):
         n_given = len({taxel for taxel, _ in columns})
@@ -325,22 +340,6 @@ def _module(
     readings = with_integer_type(table.columns([columns[key] for key in wanted]))
     shaped = readings.reshape(-1, one.n_taxels, 3)
     return Tactile(one, times, shaped, unit)  # type: ignore[arg-type]
-
-
-def _sensor(name: str, settings: Settings, columns: Mapping[tuple[int, str], str]) -> Sensor:
-    given = settings.get(("sensor", name)) or settings.get(("sensor", None))
-    if given is None:
-        n_taxels = len({taxel for taxel, _ in columns})
-        raise RecordingError(
-            f"the sensor of {name} ({n_taxels} taxels) is missing: --sensor NAME or --sensor "
-            f"FILE.json expected, or a line '# sensor: {name}=NAME' above the header; built in are "
-            f"{', '.join(built_in_sensors())}; `holdfast sensors --template "
-            f"ROWSxCOLUMNS > FILE.json` makes a file of a flat grid"
-        )
-    try:
-        return sensor(given)
-    except ValueError as cause:
-        raise RecordingError(str(cause)) from cause
 
 
 def _labels(
