@@ -10,7 +10,7 @@ import numpy as np
 from attack.result import Result
 from holdfast.contact import ContactState
 from holdfast.devices.sources import Source
-from holdfast.devices.sources.serial import AnySkinDecoder
+from holdfast.devices.sources.anyskin import AnySkinDecoder
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.io.cdr import MessageDecoder, MessageEncoder
@@ -20,7 +20,7 @@ from holdfast.recordings import Recording
 from holdfast.sensors import hand, sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast_ros.sensor_messages import SampleDecoder, known_definition
-from holdfast_ros.sources.topic import MessageAssembler
+from holdfast_ros.sources.message_assembler import MessageAssembler
 
 EPOCH = 1.7e9
 JSON_PARTS = (

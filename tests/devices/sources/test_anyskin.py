@@ -3,7 +3,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from holdfast.devices.sources.serial import AnySkinDecoder
+from holdfast.devices.sources.anyskin import AnySkinDecoder
 
 READING = st.floats(2**-9, 1e6, width=32) | st.floats(-1e6, -(2**-9), width=32) | st.just(0.0)
 CRLF_INSIDE = np.frombuffer(b"\x00\x0d\x0a\x42\x0d\x0a\x00\x42", "<f4")

@@ -9,7 +9,7 @@ from holdfast.io.recording_files import is_recording
 from holdfast.sensors import hand
 from holdfast.synthetic import synthetic_recording
 from holdfast_ros.sensor_messages import DeviceSample
-from holdfast_ros.sources.topic import MessageAssembler
+from holdfast_ros.sources.message_assembler import MessageAssembler
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 

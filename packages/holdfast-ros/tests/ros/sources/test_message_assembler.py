@@ -5,7 +5,7 @@ from holdfast.contact import Fault
 from holdfast.errors import SourceError
 from holdfast.sensors import hand, sensor
 from holdfast_ros.sensor_messages import DeviceSample
-from holdfast_ros.sources.topic import MessageAssembler
+from holdfast_ros.sources.message_assembler import MessageAssembler
 
 EPOCH = 1_619_157_045.0
 
