@@ -228,7 +228,7 @@ def changes_since(check: HealthCheck, last: HealthCheck | None) -> list[str]:
             share = 100 * now.n_zeros / now.n_samples
             found.append(f"{name} reads zeros in one taxel in {share:.2g} % of its samples")
         if len(now.noise) == 1:
-            found.append(f"{name} has one taxel: no field or touch can be told apart")
+            found.append(f"{name} has one taxel: a field and a touch look the same in it")
         then = last.modules.get(name) if last else None
         if last is None or then is None or then.sensor != now.sensor:
             continue
