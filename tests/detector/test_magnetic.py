@@ -46,6 +46,10 @@ TURNS = {
     "of a sensor without a known unit": {
         "field": (200, -150, 90), "name": "uskin-4x4", "press": 900, "noise": 4.0,
     },
+    "that pulls before it is found": {
+        "field": (-300, 40, 20), "name": "uskin-curved", "press": 900, "noise": 4.0,
+        "in_frame": True, "seconds": 5.0,
+    },
 }  # fmt: skip
 
 
@@ -78,6 +82,59 @@ def test_a_shear_of_all_taxels_alike_is_lost():
     recording = turned((40, 0, 0), seconds=0.5)
     trace, times = detect(ANY, recording).fingers["thumb"], recording.modules["thumb"].times
     assert (trace.state[(times > 1) & (times < 8.9)] == NO_CONTACT).all()
+
+
+def shared(name, shares, *, grip=0.0, palm=True):
+    """A hand that turns from 5 to 8 s, and may hold from 2 s on; its palm lies another way."""
+    which, rng, times = sensor(name), np.random.default_rng(4), np.arange(1200) / 100
+    turn = np.interp(times, [5, 8], [0, 1])[:, None]
+    fields = {"thumb": turn * [6, 12, 60], "palm": turn * [12, 60, -6]}  # of equal size
+    modules = {}
+    for finger in ("thumb", "palm") if palm else ("thumb",):
+        readings = rng.normal(size=(1200, which.n_taxels, 3)) + (33_000 if which.range else 0)
+        own = np.resize(shares, which.n_taxels) if finger == "thumb" else np.ones(which.n_taxels)
+        readings += fields[finger][:, None] * own[:, None]
+        if finger == "thumb":
+            load = np.interp(times, [2, 2.5], [0, grip])[:, None, None]
+            readings += load * np.resize(SHARES, which.n_taxels)[:, None] * [0.05, 0.02, 1]
+        modules[finger] = Tactile(which, times, readings)
+    return times, detect(ANY, Recording("shared", modules)).fingers
+
+
+UNLIKE = [1.2, 0.8, 1.0, 0.85, 1.15]
+SHARED = {
+    "gains that differ": ("anyskin", UNLIKE),
+    "along the normal, where the unit is not known": ("uskin-4x4", [1.0]),
+    "both": ("uskin-4x4", UNLIKE),
+}
+
+
+@pytest.mark.parametrize(("name", "shares"), SHARED.values(), ids=SHARED)
+def test_an_open_module_decides_what_may_be_a_field_or_a_load(name, shares):
+    times, fingers = shared(name, shares)
+    assert (fingers["thumb"].state[times > 1] == NO_CONTACT).all()
+    assert not fingers["thumb"].faults.any()
+    alone = shared(name, shares, palm=False)[1]["thumb"]
+    assert (alone.state[times > 9] != NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
+def test_an_open_module_shows_the_field_that_a_load_hides(name):
+    def change(palm):
+        times, fingers = shared(name, [1.0], grip=300, palm=palm)
+        force = fingers["thumb"].force
+        before, after = (force[(times > a) & (times < b)].mean(axis=0) for a, b in ((4, 5), (9, 12)))
+        return float(np.linalg.norm(after - before)) / sensor(name).n_taxels
+
+    assert change(palm=False) > 50 and change(palm=True) < 10  # of 61
+
+
+@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
+def test_a_press_while_another_module_does_not_turn_is_a_load(name):
+    times, fingers = shared(name, [0.0], grip=300)
+    clean = shared(name, [0.0], grip=300, palm=False)[1]["thumb"]
+    assert fingers["thumb"].force == pytest.approx(clean.force, nan_ok=True)
+    assert (fingers["thumb"].state[times > 3] == STABLE).all()
 
 
 def changed(shares, seconds=6.0):
