@@ -123,7 +123,9 @@ def test_an_open_module_shows_the_field_that_a_load_hides(name):
     def change(palm):
         times, fingers = shared(name, [1.0], grip=300, palm=palm)
         force = fingers["thumb"].force
-        before, after = (force[(times > a) & (times < b)].mean(axis=0) for a, b in ((4, 5), (9, 12)))
+        before, after = (
+            force[(times > a) & (times < b)].mean(axis=0) for a, b in ((4, 5), (9, 12))
+        )
         return float(np.linalg.norm(after - before)) / sensor(name).n_taxels
 
     assert change(palm=False) > 50 and change(palm=True) < 10  # of 61
@@ -223,6 +225,35 @@ def test_all_magnetometers_at_zero_are_no_sample():
     trace = estimates(times, readings)
     assert (trace.state[400:405] == UNKNOWN).all()
     assert {faults_of(mask) for mask in trace.faults[400:405].tolist()} == {(Fault.INVALID,)}
+
+
+@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
+@pytest.mark.parametrize(("start", "seconds"), [(0, 10), (400, 2)], ids=["always", "from 4 s"])
+def test_a_stuck_axis_of_one_magnetometer_leaves_it_out(name, start, seconds):
+    """No state changes by it. It is named after 2 s; after 10 s, if it never changed before."""
+    times, _, rng = still_hold(n=1500)
+    which = sensor(name)
+    grip = np.interp(times, [0, 1.5, 2, 14, 14.4], [0, 0, 1, 1, 0])[:, None, None]
+    load = grip * np.resize(SHARES, which.n_taxels)[:, None] * [20, 5, 300]
+    readings = np.rint(33_000 + load + rng.normal(scale=2, size=(1500, which.n_taxels, 3)))
+    clean = estimates(times, readings, which)
+    assert not clean.faults.any()
+    readings[start:, 2, 1] = readings[start, 2, 1]
+    trace = estimates(times, readings, which)
+    named = np.flatnonzero(trace.faulty_taxels == 4)
+    assert 0 <= times[named[0]] - times[start] - seconds < 0.5
+    assert {faults_of(mask) for mask in trace.faults[named].tolist()} == {(Fault.STUCK,)}
+    assert len(named) == 1500 - named[0]  # until the end
+    assert (trace.state[300:1350] == STABLE).all()
+    assert (trace.state == STABLE).sum() == pytest.approx((clean.state == STABLE).sum(), abs=10)
+
+
+def test_whole_counts_that_repeat_are_no_stuck_axis():
+    """One magnetometer has little noise: its counts repeat, for up to a second."""
+    times, readings, rng = still_hold(n=4000)
+    readings = np.rint(readings)
+    readings[:, 3, 0] = 200 + (rng.random(4000) < 0.02)
+    assert not estimates(times, readings).faults.any()
 
 
 def test_a_jump_that_stays_is_accepted_at_the_second_sample():

@@ -266,6 +266,11 @@ typedef struct {
     int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
     int64_t longest_still; /* most successive samples without a change, of those that changed the
                               finger */
+    /* Of each axis of a magnetometer, which is compared every 0.05 s: */
+    hf_real compared[3];     /* reading */
+    int32_t n_same[3];       /* comparisons since it last differed */
+    int32_t longest_same[3]; /* most of these that were no fault */
+    int32_t n_differed[3];   /* comparisons at which it differed */
 } holdfast_taxel;
 
 /* What replaces a taxel that is left out (masks.c). */
@@ -343,6 +348,7 @@ typedef struct {
     uint32_t taxel_faults;  /* faults of single taxels at the last sample that changed a reading */
     uint64_t faulty_taxels; /* bits of those taxels */
     uint64_t noisy_taxels;  /* bits of the noisy ones among them */
+    uint64_t stuck_axes;    /* bits of the magnetometers of which an axis does not change */
     /* Taxels that are left out (masks.c). */
     int64_t n_refused;    /* successive samples of the tare with a reading that is not valid */
     uint64_t lost;        /* bits of the taxels that have no tare */

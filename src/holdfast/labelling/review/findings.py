@@ -39,6 +39,7 @@ FindingKind = Literal[
     "copy",
     "cross_talk",
     "invalid",
+    "stuck",
 ]
 
 
@@ -92,19 +93,27 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
     return found
 
 
-def invalid_readings(name: str, n_invalid: int, n_samples: int) -> Finding | None:
-    """Return a finding if many samples of a module have readings that cannot be true.
+def faulty_readings(
+    name: str, n_invalid: int, n_samples: int, stuck: Sequence[int]
+) -> list[Finding]:
+    """Return findings about taxels of a module whose readings cannot be true.
 
     Args:
         name: of the module.
-        n_invalid: number of samples with the fault `invalid`.
+        n_invalid: number of samples with the fault `invalid`; a few are none.
         n_samples: number of samples.
+        stuck: numbers of the taxels with the fault `stuck`, from 1.
     """
-    if n_invalid <= INVALID_SHARE * n_samples:
-        return None
-    text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that cannot "
-    text += "be true, of one taxel, which is left out: is a magnetometer read before it is ready?"
-    return Finding(name, "invalid", text)
+    found = []
+    if n_invalid > INVALID_SHARE * n_samples:
+        text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that "
+        text += "cannot be true, of one taxel, which is left out: is a magnetometer read before it "
+        found.append(Finding(name, "invalid", text + "is ready?"))
+    if stuck:
+        taxels = f"taxel{'s' if len(stuck) > 1 else ''} {', '.join(map(str, stuck))}"
+        text = f"no change of {taxels}, or of one axis, from some time on: left out since"
+        found.append(Finding(name, "stuck", text))
+    return found
 
 
 def hidden_labels(path: Path) -> Finding | None:

@@ -17,7 +17,7 @@ MAX_GAPS_SHOWN = 2
 DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
-    "dead", "copy", "invalid", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
+    "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
     "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel", "no_contact",
     "no_labels",
 )  # fmt: skip
