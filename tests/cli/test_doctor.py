@@ -149,12 +149,12 @@ def test_the_modules_of_a_source(capsys, tmp_path):
 def test_a_touched_hand_is_one_line(capsys, tmp_path):
     path, history = tmp_path / "touched.parquet", tmp_path / "history.json"
     readings = 33_000 + np.rint(np.random.default_rng(0).normal(0, 3, (300, 16, 3)))
-    readings[150:, 5, 2] += 500
+    readings[200:, 5, 2] += 500  # one step, louder than any noise
     module = Tactile(sensor("uskin-4x4"), np.arange(300) / 100, readings)
     save_recording(Recording("touched", {"index": module}), path)
     assert main(["doctor", str(path), "--history", str(history)]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("holdfast: index was touched at 1.5 s: ") and err.count("\n") == 1
+    assert err.startswith("holdfast: index was touched at 2.1 s: ") and err.count("\n") == 1
     assert not history.exists()
 
 
