@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from command_line import Verb
-from holdfast.cli import record as verb
 from holdfast.contact import Fault
 from holdfast.devices import sources
 from holdfast.devices.sources import Arrival
@@ -23,6 +22,7 @@ from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.live import source_recording
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
@@ -189,7 +189,7 @@ def test_it_stops_after_the_time(capsys, device, tmp_path):
 
 
 def test_it_stops_although_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
-    monkeypatch.setattr(verb, "EXTRA_TIME", 0.1)
+    monkeypatch.setattr(source_recording, "EXTRA_TIME", 0.1)
     device(arrival(0), notice_arrival(0.0, "connection\x1b lost"), ends=False)
     code, _, err = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
     assert code == 0

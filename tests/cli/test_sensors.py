@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 
 from command_line import Verb
 from holdfast.cli import main
-from holdfast.cli.sensors import _ranges
 from holdfast.plots.sensors import plot_hand, plot_sensor
 from holdfast.sensors import Sensor, built_in_hands, built_in_sensors, hand, sensor
 
@@ -139,10 +138,6 @@ def test_refusals(capsys, tmp_path):
     )
     missing = tmp_path / "none.json"
     assert refusal(capsys, missing) == f"{missing}: No such file or directory"
-
-
-def test_ranges():
-    assert _ranges([5, 3, 4, 9]) == "3-5, 9"
 
 
 class TestTemplate:

@@ -11,7 +11,6 @@ import pytest
 from command_line import Verb
 from holdfast.cli import main
 from holdfast.cli import serve as verb
-from holdfast.cli.serve import open_browser
 from holdfast.devices.sources import Source
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
@@ -173,13 +172,6 @@ def test_refusals(capsys, grasp, tmp_path):
         assert refusal(capsys, MODEL, grasp, "--ignore", f"thumb:1,thumb:{taxel}") == (
             f"thumb: taxel {taxel} to be ignored; it has the taxels 1 to 30"
         )
-
-
-def test_no_text_browser_is_opened(monkeypatch):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("holdfast.cli.serve.sys.platform", "linux")
-    assert open_browser("http://127.0.0.1:1/") is False
 
 
 class Slow(Source):

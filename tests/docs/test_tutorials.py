@@ -14,13 +14,6 @@ DOCS = blocks.ROOT / "docs"
 SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
-@pytest.fixture
-def short_grasps(monkeypatch):
-    """Short grasps, simulated in this process."""
-    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
-    return {"holdfast simulate": "holdfast simulate --jobs 1"}
-
-
 def save_grasps(folder, fingers=("thumb", "index")):
     folder.mkdir()
     for seed in range(3):
@@ -45,8 +38,9 @@ def test_your_hand(folder, hand):
     assert (folder / "grasps" / "grasp0.labels.json").exists()
 
 
-def test_from_python(folder, short_grasps, capsys):
-    assert blocks.run_page(DOCS / "tutorials" / "from-python.md", short_grasps) == 10
+def test_from_python(folder, monkeypatch, capsys):
+    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+    assert blocks.run_page(DOCS / "tutorials" / "from-python.md") == 10
     out = capsys.readouterr().out
     assert "STABLE" in out
     assert "{'window': " in out

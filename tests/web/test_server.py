@@ -14,7 +14,7 @@ from holdfast.errors import OutputError
 from holdfast.web import connections, server
 from holdfast.web.connections import ConnectionLimit
 from holdfast.web.guard import SECURITY_HEADERS, Guard
-from holdfast.web.server import run_server
+from holdfast.web.server import open_browser, run_server
 
 
 def app():
@@ -217,3 +217,10 @@ def test_failures_are_one_line_of_log(monkeypatch, caplog):
     assert record.getMessage().startswith("Error handling request")
     assert "\n" not in record.getMessage()
     assert record.exc_info is None
+
+
+def test_no_text_browser_is_opened(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("holdfast.web.server.sys.platform", "linux")
+    assert open_browser("http://127.0.0.1:1/") is False

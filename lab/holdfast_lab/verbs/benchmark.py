@@ -3,12 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
+from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
-    from holdfast_lab.report.result_tables import ResultTable, Row
     from holdfast_lab.study.benchmark.protocol import BenchmarkSplit
 
 
@@ -47,6 +46,7 @@ def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
         RecordingError: the recordings of the benchmark do not exist.
     """
     from holdfast_lab.report.result_tables import to_json
+    from holdfast_lab.report.terminal import print_score_table
     from holdfast_lab.study.benchmark.protocol import protocol
     from holdfast_lab.study.benchmark.scoring import score_submission
     from holdfast_lab.study.benchmark.submission import read_submission
@@ -69,35 +69,7 @@ def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
         })  # fmt: skip
         return
     for table in result.tables:
-        _print_table(table)
-
-
-def _print_table(table: "ResultTable") -> None:
-    """Print a table, with a line for each of its figures."""
-    from holdfast_lab.report.result_tables import digits_of, pivot
-
-    grid = pivot(table)
-    print_line(table.title)
-    lines = []
-    for column, name in enumerate(grid.columns):
-        cells = [line.cells[column] for line in grid.lines]
-        digits = digits_of(table, name)
-        lines.append([name, *(_text(cell, digits) for cell in cells)])
-    print_table(("", *(", ".join(line.heads) for line in grid.lines)), lines)
-    print_line()
-
-
-def _text(row: "Row | None", digits: int) -> str:
-    """Return a value with its interval."""
-    from holdfast_lab.report.result_tables import MISSING, number_text
-
-    if row is None:
-        return MISSING
-    value = number_text(row.ours, digits)
-    if row.interval is None:
-        return value
-    low, high = (number_text(end, digits) for end in row.interval)
-    return f"{value} ({low} to {high})"
+        print_score_table(table)
 
 
 def _simulate(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.options import RARE
 from holdfast.cli.simulate import GraspOptions
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
@@ -34,6 +35,7 @@ class HandOptions:
             help="Mechanisms of real skins and arms for --randomize hands, separated by commas: "
             "scan, filter, noise, vibration, colour, steps, updates, stamps, carry, person; or all."
         ),
+        RARE,
     ] = ""
 
 

@@ -6,13 +6,10 @@ from typing import Annotated, Any
 import typer
 
 from holdfast.cli.options import (
-    RARE,
-    EngineOption,
+    EngineOptions,
     ForceOption,
-    JobsOption,
     JsonOption,
     SeedOption,
-    start_engine,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
@@ -24,6 +21,7 @@ N_TRIALS, N_QUICK_TRIALS = 240, 60
 
 def trial(
     out: OutOption,
+    *,
     laws: Annotated[
         str,
         typer.Option("--laws", help="Laws or reference rows, separated by commas; all by default."),
@@ -31,14 +29,11 @@ def trial(
     model: Annotated[str, typer.Option("--model", help="Model of the detector.")] = "builtin:any",
     quick: QuickOption = False,
     n: Annotated[
-        int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS)), RARE
+        int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS))
     ] = None,
     seed: SeedOption = 0,
-    jobs: JobsOption = -1,
-    plant: Annotated[
-        str, typer.Option("--plant", help="Hand of the twin: mild or hard."), RARE
-    ] = "mild",
-    engine: EngineOption = "loky",
+    plant: Annotated[str, typer.Option("--plant", help="Hand of the twin: mild or hard.")] = "mild",
+    parallel: EngineOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,10 +49,9 @@ def trial(
     docs/study/grip.md describes them.
 
     Example:
-      holdfast trial --out trials --quick
+      holdfast trial --out trials --quick --jobs -1
       holdfast trial --out trials --laws fixed,holdfast --n 12 --json
       holdfast trial --out trials-hard --plant hard
-      holdfast trial --out trials --engine dask:tcp://10.0.0.1:8786
     """
     from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.trial.experiment import COMPARISON, run_trials
@@ -67,7 +61,7 @@ def trial(
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
     plan = TrialPlan(names, number, seed, model, plant)
     check_output_folder(out, COMPARISON, force=force)
-    chosen = start_engine(engine, jobs)
+    chosen = parallel.start()
     try:
         document = run_trials(
             plan, out, chosen, progress=progress, notify=print_message, force=force

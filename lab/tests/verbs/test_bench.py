@@ -6,8 +6,8 @@ import pytest
 from holdfast.cli import main
 from holdfast.cli.terminal.console import print_json
 from holdfast.features import DEFAULT_WINDOW, haar_features
-from holdfast_lab.verbs import bench as verb
-from holdfast_lab.verbs.bench import _pywt_loop, _scipy, _tsflex, benchmark
+from holdfast_lab import speed
+from holdfast_lab.speed import benchmark, pywt_loop, scipy_features, tsflex_task
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +23,7 @@ def test_json(capsys):
 
 
 def test_the_table(capsys, monkeypatch):
-    monkeypatch.setattr(verb, "find_spec", lambda name: None)
+    monkeypatch.setattr(speed, "find_spec", lambda name: None)
     assert main(["bench", "--samples", "1000", "--updates", "1000"]) == 0
     out = capsys.readouterr().out
     assert "batch features of 1,000 samples, window 14" in out
@@ -51,19 +51,19 @@ def force():
 def test_the_pywt_loop_computes_the_same(force):
     pytest.importorskip("pywt")
     expected = haar_features(force, DEFAULT_WINDOW)
-    np.testing.assert_allclose(_pywt_loop(force), expected, rtol=0, atol=1e-9 * 300)
+    np.testing.assert_allclose(pywt_loop(force), expected, rtol=0, atol=1e-9 * 300)
     assert np.isnan(expected[: DEFAULT_WINDOW - 1, 5]).all()
 
 
 def test_scipy_computes_the_same(force):
     full = slice(DEFAULT_WINDOW - 1, None)
     expected = haar_features(force, DEFAULT_WINDOW)[full]
-    np.testing.assert_allclose(_scipy(force)[full], expected, rtol=0, atol=1e-9 * 300)
+    np.testing.assert_allclose(scipy_features(force)[full], expected, rtol=0, atol=1e-9 * 300)
 
 
 def test_tsflex_computes_the_same(force):
     pytest.importorskip("tsflex")
-    (frame,) = _tsflex(force)()
+    (frame,) = tsflex_task(force)()
     table = {name.split("__")[1]: column for name, column in frame.items()}
     expected = haar_features(force, DEFAULT_WINDOW)[DEFAULT_WINDOW - 1 :]
     for name, column in (("m", 4), ("sigma", 5)):
@@ -101,7 +101,7 @@ def test_figures_are_finite_and_consistent(found):
 
 
 def test_peers_that_are_missing_are_left_out(monkeypatch):
-    monkeypatch.setattr(verb, "find_spec", lambda name: None)
+    monkeypatch.setattr(speed, "find_spec", lambda name: None)
     found = benchmark(n_samples=2000, n_updates=1000)
     assert found["batch"]["speedup_over_pywt"] is None
     assert found["batch"]["speedup_over_tsflex"] is None

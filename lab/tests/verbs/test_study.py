@@ -1,5 +1,4 @@
 import json
-from dataclasses import replace
 
 import msgspec
 import pytest
@@ -12,10 +11,9 @@ from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
-from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.study import corpora
 from holdfast_lab.study import run as study_run
 from holdfast_lab.study.paper import experiments, paper_tables
-from holdfast_lab.verbs import study as verb
 
 pytestmark = pytest.mark.slow
 
@@ -64,40 +62,11 @@ def test_own_recordings(capsys, data, tmp_path):
     assert json.loads(printed) == json.loads((out / "study.json").read_text())
 
 
-def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
-    """Without HOLDFAST_DATA there are none; own recordings of a hand are real."""
-    settings = {"seed": 0, "tare": "0.5", "jobs": 1, "quick": True}
-    plan, left_out = verb._plan(data, tmp_path / "out", **settings)
-    assert (plan.real, left_out) == (plan.main, [])
-    recordings = [synthetic_recording(f"grasp-{k}", k) for k in range(2)]
-    twin = [replace(each, metadata={"source": "twin"}) for each in recordings]
-    plan, left_out = verb._plan(written(tmp_path / "twin", twin), tmp_path / "out", **settings)
-    assert plan.real is None
-    assert left_out[0].startswith(
-        "real recordings, because none were found. Download them from github.com/"
-    )
-
-
-def test_the_table_of_real_recordings_fits_a_terminal(capsys):
-    from holdfast_lab.study.comparison.real_counts import CALLED_STABLE, MEAN_AUC, MISSED_SLIPS
-
-    assert {MEAN_AUC, CALLED_STABLE} == set(verb.PRINTED_COLUMNS["real"])
-    keys = {"method": "FFT band energy (Fernandez 2014)", "trained on": "the others"}
-    rows = [
-        Row({**keys, "figure": figure}, 0.5) for figure in (MEAN_AUC, CALLED_STABLE, MISSED_SLIPS)
-    ]
-    table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={MEAN_AUC: 2})
-    verb._print_result_table(table)
-    printed = capsys.readouterr().out.splitlines()
-    assert [line.split()[-2:] for line in printed[2:3]] == [["0.50", "0.5"]]
-    assert max(map(len, printed)) <= 80
-
-
 def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
-    monkeypatch.setattr(verb, "QUICK_CORPORA", {"main": verb.TwinCorpus()})
-    monkeypatch.setattr(verb, "QUICK_REPEATS", {"main": 1})
+    monkeypatch.setattr(corpora, "QUICK_CORPORA", {"main": corpora.TwinCorpus()})
+    monkeypatch.setattr(corpora, "QUICK_REPEATS", {"main": 1})
     known = twin_recordings.plan_grasps
     monkeypatch.setattr(
         twin_recordings, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
@@ -124,25 +93,6 @@ def refusal_after(capsys, *words):
     return err.splitlines()[-1].removeprefix("holdfast: ")
 
 
-def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
-    (tmp_path / "here" / verb.REAL_DATA).mkdir(parents=True)
-    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
-    corpus, left_out = verb.real_corpus(tmp_path / "real")
-    assert corpus is None
-    assert left_out[0].startswith(
-        "real recordings, because those in HOLDFAST_DATA cannot be used ("
-    )
-    assert "the real recordings are left out: " in capsys.readouterr().err
-
-
-def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
-    monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
-    corpus, left_out = verb.real_corpus(tmp_path / "real")
-    assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
-    again, _ = verb.real_corpus(tmp_path / "real")
-    assert again == corpus
-
-
 class TestBadInput:
     def test_recordings_or_twin(self, capsys, data, tmp_path):
         message = "a folder of recordings or --twin expected, {} given"
@@ -151,9 +101,8 @@ class TestBadInput:
         assert "there is no folder" in refusal(capsys, tmp_path / "no", "--out", tmp_path / "out")
 
     def test_numbers(self, capsys, data):
-        message = "a seed of at least 0 and jobs other than 0 expected; "
-        assert refusal(capsys, data, "--seed", -1) == message + "-1 and -1 given"
-        assert refusal(capsys, data, "--jobs", 0) == message + "0 and 0 given"
+        assert refusal(capsys, data, "--seed", -1) == "a seed of at least 0 expected, -1 given"
+        assert refusal(capsys, data, "--jobs", 0) == "jobs other than 0 expected, 0 given"
         assert "tare" in refusal(capsys, data, "--tare", "often")
 
     def test_labels(self, capsys, tmp_path):
@@ -187,47 +136,3 @@ def stable(recording):
         for finger, module in recording.modules.items()
     }
     return recording.with_labels(labels)
-
-
-def test_only_one_split_and_few_columns_are_printed(capsys):
-    """The first split with the most methods is printed, with few columns."""
-    rows = [
-        Row({"on": on, "method": method, "figure": figure}, 1.0, 0.5 if method == "a" else None)
-        for on, methods in (("by object", "a"), ("by recording", "ab"), ("fresh", "ab"))
-        for method in methods
-        for figure in ("AUC", "accuracy [%]", "Brier")
-    ]
-    rows.append(Row({"on": "by recording", "method": "c", "figure": "AUC"}, None))
-    rows += [
-        Row({"on": "by recording", "method": "d", "threshold": "for 1/min", "figure": "AUC"}, 1.0)
-    ]
-    table = ResultTable("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
-    verb._print_result_table(table)
-    assert capsys.readouterr().out.splitlines() == [
-        "Methods (in parentheses: the paper)",
-        "on            method  AUC            accuracy [%]",
-        "by recording  a       1.000 (0.500)  1.0 (0.5)",
-        "by recording  b       1.000          1.0",
-        "by recording  c       –              -",
-        "",
-    ]
-
-
-def test_corpora_of_three_rates_of_glitches():
-    rates = {
-        name: 60 * corpus.glitch_rate
-        for name, corpus in verb.TWIN_CORPORA.items()
-        if corpus.glitch_rate is not None
-    }
-    assert rates == {"glitch-0": 0, "glitch-1": 1, "glitch-7": pytest.approx(7)}
-    assert not set(rates) & set(verb.QUICK_CORPORA)
-
-
-def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
-    given = []
-    monkeypatch.setattr(
-        twin_recordings, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
-    )
-    verb._simulate(tmp_path / "one", verb.TWIN_CORPORA["glitch-1"], 5, 1, 1)
-    assert {grasp.glitch_rate for grasp in given} == {1 / 60}
-    assert {grasp.seed for grasp in given} == {7}

@@ -4,7 +4,7 @@ import math
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -19,8 +19,8 @@ from holdfast.cli.options import (
     StartOptions,
     check_seconds,
 )
-from holdfast.cli.terminal.console import print_line, print_message
-from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.console import print_message
+from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast_grip.options import (
     GripSettings,
     check_armed,
@@ -28,14 +28,6 @@ from holdfast_grip.options import (
     find_source_and_hand,
     open_loop,
 )
-
-if TYPE_CHECKING:
-    from holdfast.devices.sources import Source
-    from holdfast.live.recorder import Recorder
-    from holdfast.live.session import Session
-    from holdfast.live.stream_detector import StreamUpdate
-    from holdfast_grip import GripCommand
-    from holdfast_grip.loop.grip_loop import GripLoop
 
 
 def hold(
@@ -76,6 +68,8 @@ def hold(
         --hand "ros2:plexus?effort=0.1&max_effort=0.3"
     """
     from holdfast.live.session import Session
+    from holdfast_grip.hold_log import HoldLog
+    from holdfast_grip.loop.runner import LoopRunner, run_session
 
     settings.check()
     check_seconds(seconds)
@@ -88,92 +82,13 @@ def hold(
         watchdog = connect_hand(stack, settings, commanded)
         stack.enter_context(opened)
         stream = options.create_stream(loaded, opened, start)
-        log = _new_log(stack, record, opened, as_json=as_json)
+        log = HoldLog.open(stack, record, opened, as_json=as_json)
         session = stack.enter_context(Session(stream))  # ends after the loop, which reads it
         loop = stack.enter_context(open_loop(settings, commanded, stream, watchdog, log.event))
         stop.graceful = True
-        _run(loop, session, log, seconds, stop)
-    _report(loop, settings)
-
-
-class _Log:
-    """Log of the loop: lines on the terminal, and markers of the recording."""
-
-    def __init__(self, recorder: "Recorder | None", *, as_json: bool) -> None:
-        self._recorder = recorder
-        self._as_json = as_json
-        self._last: GripCommand | None = None
-
-    def event(self, text: str, at: float) -> None:
-        """Log an event of the loop."""
-        if self._recorder is not None:
-            self._recorder.add_marker(text, at)
-        if not self._as_json:
-            print_line(f"{at:10.3f} s  {text}")
-
-    def update(self, update: "StreamUpdate", *, wait: bool = False) -> None:
-        """Record the samples, and print the notices of the source; a listener of a session."""
-        if update.arrival is None:
-            return
-        for notice in update.arrival.notices:
-            print_message(notice)
-        if self._recorder is not None:
-            self._recorder.put(update.arrival, wait=wait)
-
-    def command(self, command: "GripCommand") -> None:
-        """Print a command that differs from the last one."""
-        last, self._last = self._last, command
-        changed = last is None or (last.state, last.fingers) != (command.state, command.fingers)
-        if self._as_json and changed:
-            import msgspec
-
-            print_line(msgspec.json.encode(command).decode())
-
-
-def _new_log(stack: ExitStack, record: Path | None, source: "Source", *, as_json: bool) -> _Log:
-    if record is None:
-        return _Log(None, as_json=as_json)
-    from holdfast.live.recorder import Recorder
-
-    if record.suffix != ".mcap":
-        raise ValueError(f"--record: NAME.mcap expected, {record} given")
-    recorder = Recorder(record, source.sensors, metadata=dict(source.metadata))
-    return _Log(stack.enter_context(recorder), as_json=as_json)
-
-
-def _run(
-    loop: "GripLoop", session: "Session", log: _Log, seconds: float | None, stop: StopRequest
-) -> None:
-    """Step the loop until the source ends, the time is over, or Ctrl-C."""
-    from holdfast_grip.loop.runner import LoopRunner
-
-    source = session.source
-    runner = LoopRunner(loop, source.speed if source.paced else 0.0, log.command)
-    end = math.inf if seconds is None else time.monotonic() + seconds
-
-    def is_over() -> bool:
-        return stop.requested or time.monotonic() >= end
-
-    if not source.paced:
-        # Read the source and step the loop in turn, so that the same seed gives the same
-        # commands.
-        stream = session.stream
-        while not (is_over() or stream.source.ended):
-            update = stream.read()
-            log.update(update, wait=True)
-            runner.process(update)
-        runner.process(stream.finish())
-        return
-    # Reads of the source may block for longer than the loop may wait.
-    session.add_listener(log.update)
-    session.add_listener(runner.put)
-    session.start()
-    runner.run(lambda: session.ended or is_over())
-    if session.failure is not None:
-        raise session.failure
-
-
-def _report(loop: "GripLoop", settings: GripSettings) -> None:
+        runner = LoopRunner(loop, opened.speed if opened.paced else 0.0, log.command)
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        run_session(runner, session, log.update, lambda: stop.requested or time.monotonic() >= end)
     hand, state = settings.hand, loop.controller.state
     if not settings.armed:
         print_message(f"dry run: nothing was sent to {hand}; the loop ended in {state}")

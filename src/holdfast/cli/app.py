@@ -1,8 +1,8 @@
 """Run a verb of the command line, and report its failure in one line.
 
-A verb is a function in the file of its name (`train.py`: `train`; `import_.py`: `import_`). It
-is imported only when it is used. To add a verb, write the file and add a line to `VERBS`; a verb
-with commands is a folder, and its commands are in `SUB_VERBS`.
+A verb is a function in the file of its name (`tune.py`: `tune`; `import_.py`: `import_`), or in
+`verb.py` of the folder of its name, if it has more files. It is imported only when it is used. To
+add a verb, write the file and add a line to `VERBS`; the commands of a verb are in `SUB_VERBS`.
 """
 
 import inspect

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import RARE
-from holdfast.cli.sensors import find_sensor
 from holdfast.cli.terminal.console import print_message
 
 if TYPE_CHECKING:
@@ -94,6 +93,8 @@ def parse_sensors(texts: Sequence[str]) -> "dict[str, Sensor]":
     Raises:
         ValueError: a module has two sensors, or a sensor is unknown or not valid.
     """
+    from holdfast.sensors.files import find_sensor
+
     sensors: dict[str, Sensor] = {}
     for text in texts:
         module, equals, name = text.rpartition("=")

@@ -8,15 +8,13 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
-    EngineOption,
-    JobsOption,
+    EngineOptions,
     JsonOption,
     ModelArgument,
     PlotOptions,
     SeedOption,
     StartOptions,
     report_handling,
-    start_engine,
 )
 from holdfast.cli.scores import print_metrics, print_slips, print_verdict, warn_about_recordings
 from holdfast.cli.terminal.console import print_json, print_line
@@ -37,8 +35,7 @@ def evaluate(
     *,
     csv: CsvOptions,
     seed: SeedOption = 0,
-    engine: EngineOption = "loky",
-    jobs: JobsOption = 1,
+    parallel: EngineOptions,
     figure: PlotOptions,
     start: StartOptions,
     as_json: JsonOption = False,
@@ -57,7 +54,6 @@ def evaluate(
       holdfast evaluate model.json recordings/
       holdfast evaluate builtin:twin recordings/ --json
       holdfast evaluate builtin:any press.csv --sensor sensor.json
-      holdfast evaluate model.json recordings/ --engine dask:tcp://hub:8786
     """
     require_extras("train")
     import msgspec
@@ -74,7 +70,7 @@ def evaluate(
 
     figure.check()  # before the evaluation, which may take minutes
     loaded = Model.load(model)
-    started = start_engine(engine, jobs)
+    started = parallel.start()
     path = started.path(data)
     recordings: Sequence[Recording] = (
         list(map(start.of, csv.read(path))) if csv.fits(str(path)) else start.load_dataset(path)

@@ -83,13 +83,11 @@ FpsOption = Annotated[
     RARE,
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers."), RARE]
+DEFAULT_JOBS = 1
+"""Value of `--jobs` of every verb, as in scikit-learn: other processes take seconds to start, and
+each has the memory of its own recordings. Results do not depend on it."""
 JobsOption = Annotated[
-    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor."), RARE
-]
-EngineOption = Annotated[
-    str,
-    typer.Option("--engine", help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
-    RARE,
+    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
 ]
 _TARE = typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s].")
 TareOption = Annotated[str, _TARE]
@@ -174,6 +172,34 @@ class StartOptions:
         from holdfast.live.stream_detector import StreamDetector
 
         return StreamDetector(model, source, in_contact=self.in_contact, **options)
+
+
+@dataclass(frozen=True)
+class EngineOptions:
+    """Group of options: where the work is done, and by how many processes."""
+
+    engine: Annotated[
+        str,
+        typer.Option(help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
+        RARE,
+    ] = "loky"
+    jobs: JobsOption = DEFAULT_JOBS
+
+    def start(self) -> "Engine":
+        """Return the engine, after a connection to it.
+
+        Raises:
+            ValueError: there is no such engine, or no jobs.
+            EngineError: no cluster answers at the address, or a worker has another version.
+            MissingExtra: dask is not installed.
+        """
+        from holdfast.parallel import Engine
+
+        if self.jobs == 0:
+            raise ValueError("jobs other than 0 expected, 0 given")
+        started = Engine.parse(self.engine, self.jobs)
+        started.check()  # a wrong address is reported now, not after the data are read
+        return started
 
 
 @dataclass(frozen=True)
@@ -332,23 +358,6 @@ class PlotOptions:
         with whole_file(self.plot, force=self.force) as part:  # a failure leaves no half figure
             figure.savefig(part)
         print_message(f"{self.plot} written")
-
-
-def start_engine(engine: str, jobs: int) -> "Engine":
-    """Return the engine of `--engine` and `--jobs`, after a connection to it.
-
-    Raises:
-        ValueError: there is no such engine, or no jobs.
-        EngineError: no cluster answers at the address, or a worker has another version.
-        MissingExtra: dask is not installed.
-    """
-    from holdfast.parallel import Engine
-
-    if jobs == 0:
-        raise ValueError("jobs other than 0 expected, 0 given")
-    started = Engine.parse(engine, jobs)
-    started.check()  # a wrong address is reported now, not after the data are read
-    return started
 
 
 def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, object]) -> None:

@@ -1,7 +1,6 @@
 """`holdfast play`: a simulated XELA server that sends a recording or the twin."""
 
 import sys
-import time
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,15 +20,11 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.terminal.console import message_if_slow, print_json, print_message
 from holdfast.cli.terminal.control import handle_stop_signals
+from holdfast.cli.terminal.progress import show_clients
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source
-
-END_POLL_INTERVAL = 0.2
-"""Time between two checks whether the server has ended [s]."""
-PLAY_REFRESH_INTERVAL = 1.0
-"""Time between two updates of the rate on a terminal [s]."""
 
 
 def play(
@@ -71,9 +66,7 @@ def play(
 
     Example:
       holdfast play twin:?object=can
-      holdfast play grasp.parquet --once --separate --version 1.7
-      holdfast play twin:?object=can \
-        --hand "ros2:plexus?effort=0.1&max_effort=0.3"
+      holdfast play grasp.parquet --once
       holdfast detect builtin:any xela://127.0.0.1:5000
     """
     check_speed(source, speed)
@@ -81,14 +74,20 @@ def play(
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
     if source.startswith("twin:"):
         require_extras("twin", "parquet")
-    once = once or bool(players.chosen())
+    chosen = players.chosen()  # its source plays once
+    once = once or bool(chosen)
     with ExitStack() as stack:
         # The imports are inside: they are part of the wait.
         with message_if_slow(awaited(source)):
+            from holdfast.devices.sources import open_source
             from holdfast.devices.sources.xela.encoder import is_part_of_hand
             from holdfast.live.publishers.xela_server import XelaServer
 
-            opened = stack.enter_context(_open(source, players, speed, loop=not once))
+            if chosen:
+                _, player, values = chosen[0]
+                opened: Source = stack.enter_context(player.source(source, values, speed=speed))
+            else:
+                opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
         whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
             opened, version=version, host=host, port=port, whole_hand=whole,
@@ -102,43 +101,13 @@ def play(
                 print_json(
                     {"uri": server.uri, "version": version, "sensors": modules, "source": source}
                 )
-                sys.stdout.flush()
+                sys.stdout.flush()  # a program that reads the pipe waits for the address
             print_message(
                 f"{server.uri} sends {source} as a XELA server {version}; Ctrl-C stops it"
             )
-            # A terminal has one line that is overwritten; a file gets a line only at a change.
-            updated_at, n_sent, n_clients = time.monotonic(), 0, -1
-            while not server.wait(END_POLL_INTERVAL):
-                now = time.monotonic()
-                if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
-                    rate = (server.n_packets - n_sent) / (now - updated_at)
-                    clients = _clients(server.n_clients, server.port)
-                    # `\033[K` erases the rest of a longer line.
-                    sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
-                    updated_at, n_sent = now, server.n_packets
-                elif not sys.stderr.isatty() and server.n_clients != n_clients:
-                    n_clients = server.n_clients
-                    print_message(_clients(n_clients, server.port))
-            if sys.stderr.isatty():
-                print_message("")  # ends the line that was overwritten
+            show_clients(server)
     if server.failure is not None:
         raise server.failure
     if as_json:
         print_json({"packets": server.n_packets})
     print_message(f"{server.n_packets} packets sent")
-
-
-def _open(source: str, players: PlayerOptions, speed: float, *, loop: bool) -> "Source":
-    """Return the source; that of a player, if its options are given. It plays once."""
-    for _, player, options in players.chosen():
-        opened: Source = player.source(source, options, speed=speed)
-        return opened
-    from holdfast.devices.sources import open_source
-
-    return open_source(source, speed=speed, loop=loop)
-
-
-def _clients(number: int, port: int) -> str:
-    if not number:
-        return f"waiting for a client on port {port}"
-    return "1 client" if number == 1 else f"{number} clients"

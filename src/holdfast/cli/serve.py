@@ -1,13 +1,9 @@
 """`holdfast serve`: the estimates of a source on a web page and for other programs."""
 
-import os
 import sys
-import webbrowser
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-from urllib.parse import quote
+from typing import Annotated
 
 import typer
 
@@ -28,13 +24,6 @@ from holdfast.cli.options import (
     report_missing_slip_rules,
 )
 from holdfast.cli.terminal.console import message_if_slow, print_json, print_message
-
-if TYPE_CHECKING:
-    from holdfast.devices.sources import Source
-    from holdfast.live.panels import Panel, PanelOpener
-    from holdfast.live.session import Session
-    from holdfast.model import Model
-    from holdfast.web.guard import Guard
 
 ADDRESS = ServerOptions(LOCALHOST, port=8080)
 
@@ -72,12 +61,14 @@ def serve(
     Example:
       holdfast serve builtin:any twin:?object=can
       holdfast serve model.json xela://auto --ros2
-      holdfast serve builtin:any twin:?object=can --hand twin: --armed
       holdfast serve model.json grasp.parquet --host 0.0.0.0 \
         --token-file secret.txt
     """
     from holdfast.devices.sources import open_source
+    from holdfast.live.session import Session, publishing
+    from holdfast.live.web.service import run_page
     from holdfast.web.guard import Guard
+    from holdfast.web.server import page_url
 
     openers = [
         plugin.panel(chosen, source, speed=speed, loop=not once)
@@ -101,116 +92,20 @@ def serve(
     made = [opener.source() for opener in openers]
     own = next((one for one in made if one is not None), None)
     unopened = own or open_source(source, speed=speed, loop=not once)
-    with (
-        _open_session(options, start, loaded, unopened, openers) as (session, shown),
-        _publish(session, shown, publishers),
-    ):
-        run_page(
-            session, announce, host=access.host, port=access.port,
-            guard=guard, folder=record_to, panels=shown, stay=not once,
-        )  # fmt: skip
-
-
-@contextmanager
-def _open_session(
-    options: DetectorOptions,
-    start: StartOptions,
-    model: "Model",
-    source: "Source",
-    openers: "Sequence[PanelOpener]",
-) -> "Iterator[tuple[Session, Sequence[Panel]]]":
-    """Yield the session of a source, and the panels that run beside it."""
-    from holdfast.live.session import Session
-
     with ExitStack() as stack:
         for opener in openers:
-            opener.connect(stack)
-        with message_if_slow(awaited(source.name)):
-            stack.enter_context(source)
-        session = stack.enter_context(Session(options.create_stream(model, source, start)))
-        yield session, [stack.enter_context(opener.open(session)) for opener in openers]
-
-
-@contextmanager
-def _publish(
-    session: "Session", shown: "Sequence[Panel]", options: PublisherOptions
-) -> "Iterator[None]":
-    """Publish the estimates of a session; at the end, print how many are missing."""
-    panels = {panel.name: panel for panel in shown}
-    with ExitStack() as stack:
-        publishers = [
-            stack.enter_context(plugin.publisher(session.stream, panels, chosen))
-            for _, plugin, chosen in options.chosen()
+            opener.connect(stack)  # before the source is open: its samples wait for nothing
+        with message_if_slow(awaited(unopened.name)):
+            stack.enter_context(unopened)
+        session = stack.enter_context(Session(options.create_stream(loaded, unopened, start)))
+        panel_list = [stack.enter_context(opener.open(session)) for opener in openers]
+        shown = {panel.name: panel for panel in panel_list}
+        sinks = [
+            plugin.publisher(session.stream, shown, chosen)
+            for _, plugin, chosen in publishers.chosen()
         ]
-        for publisher in publishers:
-            session.add_listener(publisher.put)
-        yield
-        for publisher in publishers:
-            if publisher.n_failed or publisher.n_dropped:
-                print_message(
-                    f"{type(publisher).__name__}: {publisher.n_failed} estimates were refused, "
-                    f"{publisher.n_dropped} were dropped because it was too slow"
-                )
-
-
-def run_page(
-    session: "Session",
-    announce: Callable[[str], None],
-    *,
-    host: str = LOCALHOST,
-    port: int,
-    guard: "Guard | None" = None,
-    folder: Path,
-    panels: "Sequence[Panel]" = (),
-    stay: bool,
-) -> None:
-    """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
-
-    Args:
-        session: it is started here; the caller stops it.
-        announce: function that is called with the URL when the page can be opened.
-        host: address to listen on.
-        port: port to listen on; 0 selects a free one.
-        guard: access control; by default only this machine can connect.
-        folder: folder for recordings.
-        panels: that run beside the session.
-        stay: continue when the source has ended.
-
-    Raises:
-        OutputError: the address is not available.
-        Exception: the failure of the session.
-    """
-    from holdfast.live.web.service import LiveService
-    from holdfast.web.guard import Guard
-    from holdfast.web.server import run_server
-
-    service = LiveService(session, guard or Guard(host), folder, print_message, panels)
-    session.start()
-    run_server(
-        service.app, host, port, announce,
-        # A page that stays still ends when the session fails.
-        lambda: session.ended and not (stay and session.failure is None),
-    )  # fmt: skip
-    if session.failure is not None:
-        raise session.failure
-
-
-def page_url(url: str, token: str | None) -> str:
-    """Return the URL of a page with the token that it requires."""
-    return url if token is None else f"{url}?token={quote(token, safe='')}"
-
-
-def has_browser() -> bool:
-    """Return whether this machine may have a graphical browser."""
-    desktop = sys.platform in ("win32", "darwin")
-    return bool(desktop or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def open_browser(url: str) -> bool:
-    """Open a page in a graphical browser; return False if there is none."""
-    if not has_browser():
-        return False
-    try:
-        return webbrowser.open(url)
-    except webbrowser.Error:
-        return False
+        stack.enter_context(publishing(session, sinks, print_message))
+        run_page(
+            session, announce, host=access.host, port=access.port, guard=guard, folder=record_to,
+            report=print_message, panels=panel_list, stay=not once,
+        )  # fmt: skip

@@ -244,6 +244,31 @@ SLIP_FEATURES = (
 """Features of the slip rule of `builtin:twin`."""
 
 
+TAUGHT_LAGS = (0.0067, 0.0133, 0.0267, 0.0533)
+"""Spacings of second differences of a taught head: one to eight samples at 150 Hz [s]."""
+
+TAUGHT_FEATURES = (
+    *ANY_FEATURES,
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in kinds_of("second")
+        for seconds in TAUGHT_LAGS
+    ),
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in kinds_of("mean_second")
+        for seconds in TAUGHT_LAGS[:2]
+    ),
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in kinds_of("ratio")
+        for seconds in SLIP_LAGS
+    ),
+)
+"""Features of a head that is taught by slips of the user's own hand: every family without a unit.
+The lags of `any` are among them, because the model that keeps its other heads computes those."""
+
+
 NAMED_FEATURES = {"holdfast": HOLDFAST_FEATURES, "any": ANY_FEATURES}
 """Lists of features by name."""
 

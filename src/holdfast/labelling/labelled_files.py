@@ -1,6 +1,6 @@
 """Recordings to label, by their paths, and the label files that are written beside them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.io import labels_to_csv, load_dataset, load_recording
 from holdfast.io.label_files import SUFFIX, labels_for, labels_path, load_labels
 from holdfast.io.recording_files import SUFFIXES
-from holdfast.labelling.review.compare import RecordingAgreement, compare
+from holdfast.labelling.review.compare import Agreement, RecordingAgreement, compare, pool
 from holdfast.labelling.review.content import label_seconds
 from holdfast.labelling.review.spans import doubtful, state_name
 from holdfast.labelling.rules import RULES
@@ -98,20 +98,33 @@ def recordings_to_compare(a: Path, b: Path) -> list[Path]:
     )
 
 
-def compare_file(
-    path: Path, labels_of_a: LabelsOf, labels_of_b: LabelsOf
-) -> tuple[str, RecordingAgreement | str]:
-    """Return the name of a recording, with the agreement of A and B or why it is left out."""
-    try:
-        recording = load_recording(path, labels=False)
-        a, b = labels_of_a(recording, path), labels_of_b(recording, path)
-        if not (any(a.values()) and any(b.values())):
-            side = "B" if any(a.values()) else "A"
-            return recording.name, f"{side} has no labels of this recording"
-        times = {name: module.times for name, module in recording.modules.items()}
-        return recording.name, compare(a, b, times, recording.name)
-    except RecordingError as cause:
-        return path.stem, str(cause)
+def compare_files(
+    files: Iterable[Path], labels_of_a: LabelsOf, labels_of_b: LabelsOf
+) -> tuple[Agreement, dict[str, str]]:
+    """Return the agreement of A and B, and why recordings are left out, by their names.
+
+    Raises:
+        RecordingError: all recordings are left out.
+    """
+    compared: dict[str, RecordingAgreement] = {}
+    left_out: dict[str, str] = {}
+    for path in files:
+        try:
+            recording = load_recording(path, labels=False)
+            a, b = labels_of_a(recording, path), labels_of_b(recording, path)
+            if any(a.values()) and any(b.values()):
+                times = {name: module.times for name, module in recording.modules.items()}
+                compared[recording.name] = compare(a, b, times, recording.name)
+            else:
+                side = "B" if any(a.values()) else "A"
+                left_out[recording.name] = f"{side} has no labels of this recording"
+        except RecordingError as cause:
+            left_out[path.stem] = str(cause)
+    if not compared:
+        name, text = next(iter(left_out.items()))
+        more = f" (and {len(left_out) - 1} other recordings)" if len(left_out) > 1 else ""
+        raise RecordingError(f"nothing to compare: {name}: {text}{more}")
+    return pool([*compared.values()]), left_out
 
 
 def check_no_manual_labels(files: Sequence[Path]) -> None:

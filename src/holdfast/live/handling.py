@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
@@ -12,6 +12,7 @@ from holdfast.errors import HoldfastError, SourceError, StreamError
 from holdfast.live.recorder import output_path
 from holdfast.live.recording_buffer import ModuleBuffer
 from holdfast.live.session import Session
+from holdfast.live.source_recording import EXTRA_TIME
 from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamUpdate
 from holdfast.live.web.schema import CalibrationDocument, CalibrationState
 from holdfast.model import Model
@@ -34,6 +35,8 @@ MAX_HANDLING_BYTES = 1 << 28
 """Size of the samples at which it ends by itself [bytes]."""
 LONGEST_STEP = 0.1
 """A longer step between two estimates of a finger is not held time [s]."""
+PROGRESS_STEP = 3.0
+"""Held time between two lines of progress [s]."""
 SAFETY_SECONDS = 0.5
 """Held time beyond the least that is wanted before it may end [s]: the calibration leaves out
 samples at the edges of gaps."""
@@ -113,6 +116,40 @@ class HandlingBuffer:
                 modules[name] = Tactile(self._stream.fingers[name], times, kept)
         name = time.strftime("handling-%Y%m%d-%H%M%S")
         return Recording(name, modules, metadata=dict(self._metadata or {}))
+
+
+def record_handling(
+    stream: StreamDetector,
+    seconds: float,
+    speed: float,
+    is_over: Callable[[], bool],
+    report: Callable[[str], None],
+) -> Recording:
+    """Return the handling of an open source, and report how much of it is held.
+
+    Args:
+        stream: detector of the source.
+        seconds: duration by the clock of the source [s].
+        speed: of the source; 0 if it is not paced.
+        is_over: returns whether the recording ends early.
+        report: called with a line after every few seconds that are held.
+
+    Raises:
+        SourceError: no samples arrived.
+    """
+    buffer, shown = HandlingBuffer(stream), 0.0
+    # A source that falls silent is not awaited for ever.
+    end = time.monotonic() + (seconds / speed + EXTRA_TIME if speed else math.inf)
+    while not (stream.source.ended or is_over() or time.monotonic() > end):
+        buffer.put(stream.read())
+        if buffer.seconds >= shown + PROGRESS_STEP:
+            shown = buffer.seconds
+            report(f"held {shown:.0f} of {ENOUGH_HANDLING:g} s")
+        if buffer.duration >= seconds:
+            break
+    if not buffer.has_samples:
+        raise SourceError(f"{stream.source.name} sent no samples: nothing was recorded")
+    return buffer.recording()
 
 
 class SessionCalibration:

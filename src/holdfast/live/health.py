@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from holdfast.devices.sources import Source
+from holdfast.devices.sources import Source, open_source
 from holdfast.errors import SourceError
 from holdfast.files import write_whole
 from holdfast.recordings import GAP_PERIODS
@@ -122,6 +122,31 @@ def check_health(source: Source, seconds: float) -> HealthCheck:
         for name, samples in kept.items()
     }
     return HealthCheck(date.today().isoformat(), n_lost, modules)
+
+
+def check_and_keep(
+    uri: str, seconds: float, path: Path
+) -> tuple[HealthCheck, HealthCheck | None, list[str]]:
+    """Check a source, compare it with the last check that a file keeps, and keep this one.
+
+    Args:
+        uri: of the source, or path of a recording.
+        seconds: duration of the check [s].
+        path: of the file.
+
+    Returns:
+        This check, the last one (None if there is none), and what is wrong or has become worse.
+
+    Raises:
+        SourceError: as `check_health`; or the file is none of checks.
+    """
+    earlier = read_history(path)  # a wrong file is refused before a device is awaited
+    with open_source(uri, speed=0) as source:
+        check = check_health(source, seconds)
+    last = earlier[-1] if earlier else None
+    findings = changes_since(check, last)
+    keep(path, earlier, check)
+    return check, last, findings
 
 
 def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> ModuleHealth:

@@ -4,12 +4,13 @@ import gc
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import ExitStack, contextmanager
 from math import isclose
 from threading import Event, Lock, Thread
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -289,3 +290,28 @@ class Session:
     def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:
             listener(update)
+
+
+@contextmanager
+def publishing(
+    session: Session, publishers: Sequence[Any], report: Callable[[str], None]
+) -> Iterator[None]:
+    """Publish the updates of a session; at the end, report how many estimates are missing.
+
+    Args:
+        session: whose updates are published.
+        publishers: of plug-ins, not open yet: context managers with `put`, `n_failed` and
+            `n_dropped`.
+        report: called with one line for each publisher that did not publish all.
+    """
+    with ExitStack() as stack:
+        opened = [stack.enter_context(publisher) for publisher in publishers]
+        for publisher in opened:
+            session.add_listener(publisher.put)
+        yield
+        for publisher in opened:
+            if publisher.n_failed or publisher.n_dropped:
+                report(
+                    f"{type(publisher).__name__}: {publisher.n_failed} estimates were refused, "
+                    f"{publisher.n_dropped} were dropped because it was too slow"
+                )

@@ -27,3 +27,19 @@ def taxel_numbers(indices: Iterable[int]) -> tuple[int, ...]:
 def taxel_index(number: int) -> int:
     """Return the index in the readings of the taxel with a number."""
     return number - FIRST_TAXEL
+
+
+def index_ranges(indices: Iterable[int]) -> str:
+    """Return indices as ranges.
+
+    Example:
+        >>> index_ranges([5, 3, 4, 9])
+        '3-5, 9'
+    """
+    runs: list[list[int]] = []
+    for index in sorted(indices):
+        if runs and index == runs[-1][1] + 1:
+            runs[-1][1] = index
+        else:
+            runs.append([index, index])
+    return ", ".join(f"{a}-{b}" if a < b else f"{a}" for a, b in runs)

@@ -289,6 +289,19 @@ class Hand:
         """Number of taxels of all modules."""
         return sum(module.sensor.n_taxels for module in self.modules.values())
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the hand as plain data: of each module its sensor, link and flat indices."""
+        modules = {
+            name: {
+                "sensor": module.sensor.name,
+                "n_taxels": module.sensor.n_taxels,
+                "link": module.link,
+                "flat_indices": module.flat_indices,
+            }
+            for name, module in self.modules.items()
+        }
+        return {"name": self.name, "n_taxels": self.n_taxels, "modules": modules}
+
     def split(self, flat: npt.ArrayLike) -> dict[str, npt.NDArray[Any]]:
         """Split flat packets into the readings of each module.
 

@@ -44,6 +44,16 @@ CALIBRATED_SUFFIX = ", calibrated"
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
+COMPARED_FIGURES = (
+    ("STABLE in the held samples [%]", "stable", 1),
+    ("alarms per minute of holding", "alarms_per_minute", 1),
+    ("threshold of STABLE", "threshold", 3),
+    ("slip reported in the held samples [%]", "raised", 1),
+    ("threshold of a slip", "slip_threshold", 3),
+)
+"""Text, field of the figures and number of digits of each row of the comparison."""
+
+
 class HandlingSummary(msgspec.Struct, frozen=True):
     """What a calibration saw of one sensor.
 
@@ -90,6 +100,17 @@ class HandlingSummary(msgspec.Struct, frozen=True):
             "from those of the default."
         )
 
+    def rows(self) -> list[tuple[str, str, str]]:
+        """Return the figures before and after as rows of a table; a dash for unknown ones."""
+        return [
+            (
+                title,
+                "-" if (old := getattr(self.before, field)) is None else f"{old:.{digits}f}",
+                "-" if (new := getattr(self.after, field)) is None else f"{new:.{digits}f}",
+            )
+            for title, field, digits in COMPARED_FIGURES
+        ]
+
     @property
     def change(self) -> str:
         """The figures before and after, as a text."""
@@ -117,8 +138,11 @@ class CalibratedModel:
     sensors: tuple[HandlingSummary, ...]
     warnings: tuple[str, ...]
 
-    def check(self) -> None:
+    def check(self, hint: str = "") -> None:
         """Check that the arm moved, and that decisions about the handling are no worse than before.
+
+        Args:
+            hint: end of the message, such as what saves the model all the same.
 
         Raises:
             TrainingError: it hardly moved, or they are worse on a sensor.
@@ -127,11 +151,12 @@ class CalibratedModel:
             if summary.still and summary.load_change < STILL_CHANGE:  # not if it is unknown
                 raise TrainingError(
                     f"{summary.sensor}: the arm hardly moved; move the arm as it will move later"
+                    f"{hint}"
                 )
             if summary.after.worse_than(summary.before):
                 raise TrainingError(
                     f"{summary.sensor}: worse on this handling than before ({summary.change}); "
-                    "move the arm as it will move later"
+                    f"move the arm as it will move later{hint}"
                 )
 
 

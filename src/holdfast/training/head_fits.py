@@ -42,6 +42,7 @@ def fit_slip(
     *,
     is_any: bool,
     squares: bool = False,
+    n_min: int = MIN_SLIDING_SAMPLES,
 ) -> Head | None:
     """Fit the head `slip` to the samples that are in no unit that is left out.
 
@@ -54,6 +55,7 @@ def fit_slip(
         features: of the samples.
         is_any: whether the model is for any hand.
         squares: whether the head has squares of the features.
+        n_min: number of sliding samples from which a head is fitted.
 
     Returns:
         The head, with a threshold of 0.5; None with too few samples that slide, or none that hold
@@ -61,7 +63,7 @@ def fit_slip(
     """
     kept = samples.kept(left_out)
     slides = np.asarray(samples.values[kept], dtype=bool)
-    if slides.all() or slides.sum() < MIN_SLIDING_SAMPLES:
+    if slides.all() or slides.sum() < n_min:
         return None
     classes = Samples(samples.features[kept], slides, samples.units[kept])
     recipe = LogisticRegression()

@@ -1,10 +1,14 @@
-"""Run a web application until it is interrupted."""
+"""Run a web application until it is interrupted, and open its page in a browser."""
 
 import asyncio
+import os
 import signal
+import sys
+import webbrowser
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from typing import Any
+from urllib.parse import quote
 
 from aiohttp import web
 
@@ -157,3 +161,24 @@ async def _listen(
         )
     except (OSError, OverflowError) as cause:
         raise listen_error(host, port, cause) from cause
+
+
+def page_url(url: str, token: str | None) -> str:
+    """Return the URL of a page with the token that it requires."""
+    return url if token is None else f"{url}?token={quote(token, safe='')}"
+
+
+def has_browser() -> bool:
+    """Return whether this machine may have a graphical browser."""
+    desktop = sys.platform in ("win32", "darwin")
+    return bool(desktop or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def open_browser(url: str) -> bool:
+    """Open a page in a graphical browser; return False if there is none."""
+    if not has_browser():
+        return False
+    try:
+        return webbrowser.open(url)
+    except webbrowser.Error:
+        return False

@@ -119,3 +119,27 @@ def test_a_quick_task_shows_no_bar(capsys, monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     assert list(progress(iter("ab"), "counting", total=2)) == ["a", "b"]
     assert capsys.readouterr() == ("", "")
+
+
+class PlayedServer:
+    """Server that has another number of clients at each look, then ends."""
+
+    port, n_packets = 5000, 0
+
+    def __init__(self, *numbers):
+        self.left = list(numbers)
+        self.n_clients = None
+
+    def wait(self, timeout):
+        if self.left:
+            self.n_clients = self.left.pop(0)
+            return False
+        return True
+
+
+def test_each_number_of_clients_is_a_line(capsys):
+    module.show_clients(PlayedServer(0, 0, 1, 1, 2, 0))
+    assert capsys.readouterr().err.splitlines() == [
+        "waiting for a client on port 5000", "1 client", "2 clients",
+        "waiting for a client on port 5000",
+    ]  # fmt: skip

@@ -9,7 +9,7 @@ from threading import Event
 from typing import NamedTuple
 
 from holdfast.contact import ContactState, HandEstimate
-from holdfast.live.session import RequestQueue
+from holdfast.live.session import RequestQueue, Session
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast_grip.command import GripCommand, GripReason
 from holdfast_grip.loop.grip_loop import GripLoop
@@ -151,6 +151,43 @@ class LoopRunner:
         result = self._requests.append(work, cancellable=False)
         self._wake.set()
         return result
+
+
+def run_session(
+    runner: LoopRunner,
+    session: Session,
+    listener: Callable[..., None],
+    is_over: Callable[[], bool],
+) -> None:
+    """Step the loop of a runner with a session until `is_over`, or the source ends.
+
+    Args:
+        runner: steps the loop.
+        session: of the source; it is started only if the source is paced.
+        listener: gets each update first; `wait=True` if it may wait, as nothing keeps real time.
+        is_over: returns whether the loop should end.
+
+    Raises:
+        HandError: as `GripLoop.step`.
+        Exception: the failure of the session.
+    """
+    if not session.source.paced:
+        # Read the source and step the loop in turn, so that the same seed gives the same
+        # commands.
+        stream = session.stream
+        while not (is_over() or stream.source.ended):
+            update = stream.read()
+            listener(update, wait=True)
+            runner.process(update)
+        runner.process(stream.finish())
+        return
+    # Reads of the source may block for longer than the loop may wait.
+    session.add_listener(listener)
+    session.add_listener(runner.put)
+    session.start()
+    runner.run(lambda: session.ended or is_over())
+    if session.failure is not None:
+        raise session.failure
 
 
 def _estimates(arrived: Sequence[_Arrived]) -> list[HandEstimate]:

@@ -7,7 +7,7 @@ where this could be compared, or that of a pointer of Git LFS in the repository.
 
 from functools import cache
 from importlib import resources
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 
@@ -86,6 +86,28 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"{self.name}: an importer and an address with / at the end expected")
         if len({file.path for file in self.files}) < len(self.files):
             raise ValueError(f"{self.name}: two files have the same path")
+
+    def document(self) -> dict[str, Any]:
+        """Return the facts of a set, with the counts of its files."""
+        fields = [
+            "name",
+            "title",
+            "sensors",
+            "n_modules",
+            "rate",
+            "labels",
+            "licence",
+            "page",
+            "size",
+        ]
+        return {
+            **{field: getattr(self, field) for field in fields},
+            "importer": self.importer,
+            "n_files": len(self.files),
+            "n_checksums": sum(file.sha256 is not None for file in self.files),
+            "tried": self.tried,
+            "reason": self.reason,
+        }
 
 
 class Registry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

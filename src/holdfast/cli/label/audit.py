@@ -9,7 +9,14 @@ from holdfast.cli.label.inputs import (
     PathsArgument,
     RuleOptions,
 )
-from holdfast.cli.options import RARE, BrowserOption, JobsOption, JsonOption, ServerOptions
+from holdfast.cli.options import (
+    DEFAULT_JOBS,
+    RARE,
+    BrowserOption,
+    JobsOption,
+    JsonOption,
+    ServerOptions,
+)
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.errors import require_extras
 
@@ -20,7 +27,7 @@ def audit(
     options: Annotated[RuleOptions, RARE],
     page: PageOption = False,
     author: AuthorOption = None,
-    jobs: Annotated[JobsOption, RARE] = -1,
+    jobs: Annotated[JobsOption, RARE] = DEFAULT_JOBS,
     access: Annotated[ServerOptions, RARE] = LABEL_ADDRESS,
     browser: Annotated[BrowserOption, RARE] = None,
     as_json: JsonOption = False,

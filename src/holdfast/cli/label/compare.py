@@ -47,10 +47,8 @@ def compare(
     require_extras("label")
     from msgspec import to_builtins
 
-    from holdfast.errors import RecordingError
     from holdfast.labelling.exchange.read_labels import read_labels
-    from holdfast.labelling.labelled_files import compare_file, is_rule, recordings_to_compare
-    from holdfast.labelling.review.compare import pool
+    from holdfast.labelling.labelled_files import compare_files, is_rule, recordings_to_compare
 
     def labels_of(place: Path) -> "LabelsOf":
         if is_rule(place):
@@ -58,15 +56,7 @@ def compare(
         return lambda recording, _: read_labels(place, recording, annotator)
 
     files = recordings_to_compare(a, b)
-    both = labels_of(a), labels_of(b)
-    results = dict(compare_file(path, *both) for path in progress(files, "comparing"))
-    compared = [result for result in results.values() if not isinstance(result, str)]
-    left_out = {name: text for name, text in results.items() if isinstance(text, str)}
-    if not compared:
-        name, text = next(iter(left_out.items()))
-        more = f" (and {len(left_out) - 1} other recordings)" if len(left_out) > 1 else ""
-        raise RecordingError(f"nothing to compare: {name}: {text}{more}")
-    agreement = pool(compared)
+    agreement, left_out = compare_files(progress(files, "comparing"), labels_of(a), labels_of(b))
     if as_json:
         document = to_builtins(agreement)
         print_json({"a": str(a), "b": str(b), **document, "left_out": left_out})

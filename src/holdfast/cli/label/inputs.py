@@ -57,7 +57,6 @@ class RuleOptions:
             help="Topic or frame of a body in the bag, or number of its sticker; BODY is object or "
             "a finger.",
         ),
-        RARE,
     ] = None
     parameters: Annotated[
         list[str] | None,

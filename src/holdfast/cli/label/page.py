@@ -13,7 +13,6 @@ from holdfast.cli.label.inputs import (
     login_name,
 )
 from holdfast.cli.options import ServerOptions
-from holdfast.cli.serve import open_browser, page_url
 from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def show_label_page(
     from holdfast.labelling.server.service import LabellingService
     from holdfast.labelling.server.workspace import Workspace
     from holdfast.web.guard import Guard
-    from holdfast.web.server import run_server
+    from holdfast.web.server import open_browser, page_url, run_server
 
     token = access.find_token()
     guard = Guard(access.host, token)

@@ -15,7 +15,14 @@ from holdfast.cli.label.inputs import (
     RuleOptions,
     SaveOptions,
 )
-from holdfast.cli.options import RARE, BrowserOption, JobsOption, JsonOption, ServerOptions
+from holdfast.cli.options import (
+    DEFAULT_JOBS,
+    RARE,
+    BrowserOption,
+    JobsOption,
+    JsonOption,
+    ServerOptions,
+)
 from holdfast.errors import require_extras
 
 
@@ -62,7 +69,7 @@ def label(
     author: AuthorOption = None,
     saving: Annotated[SaveOptions, RARE],
     annotator: Annotated[AnnotatorOption, RARE] = None,
-    jobs: Annotated[JobsOption, RARE] = -1,
+    jobs: Annotated[JobsOption, RARE] = DEFAULT_JOBS,
     access: Annotated[ServerOptions, RARE] = LABEL_ADDRESS,
     browser: BrowserOption = None,
     as_json: JsonOption = False,

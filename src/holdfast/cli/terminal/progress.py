@@ -1,4 +1,4 @@
-"""Progress bars, and the status line of a recording, on stderr."""
+"""Progress bars, and the status lines of a recording and of a server, on stderr."""
 
 import math
 import sys
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.progress import Progress
 
+    from holdfast.live.publishers.xela_server import XelaServer
     from holdfast.live.recorder import Recorder, RecorderStatus
 
 T = TypeVar("T")
@@ -36,6 +37,10 @@ REFRESH_INTERVAL = 0.25
 """Time between two updates of the status line on a terminal [s]."""
 STATUS_INTERVAL = 10.0
 """Time between two status lines where stderr is no terminal [s]."""
+END_POLL_INTERVAL = 0.2
+"""Time between two checks whether a server has ended [s]."""
+PLAY_REFRESH_INTERVAL = 1.0
+"""Time between two updates of the rate of a server on a terminal [s]."""
 
 
 def progress(
@@ -248,3 +253,27 @@ def format_size(n_bytes: int) -> str:
         ('0.9 kB', '2.5 MB')
     """
     return f"{n_bytes / 1e3:.1f} kB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.1f} MB"
+
+
+def show_clients(server: "XelaServer") -> None:
+    """Show the number of clients of a server until it ends.
+
+    A terminal has one line that is overwritten, with the rate; elsewhere each change is a line.
+    """
+    on_terminal = sys.stderr.isatty()
+    updated_at, n_sent, n_clients = time.monotonic(), 0, -1
+    while not server.wait(END_POLL_INTERVAL):
+        now, number = time.monotonic(), server.n_clients
+        clients = "1 client" if number == 1 else f"{number} clients"
+        if not number:
+            clients = f"waiting for a client on port {server.port}"
+        if on_terminal and now - updated_at >= PLAY_REFRESH_INTERVAL:
+            rate = (server.n_packets - n_sent) / (now - updated_at)
+            # `\033[K` erases the rest of a longer line.
+            sys.stderr.write(f"\r{clients}, {rate:.1f} packets/s \033[K")
+            updated_at, n_sent = now, server.n_packets
+        elif not on_terminal and number != n_clients:
+            n_clients = number
+            print_message(clients)
+    if on_terminal:
+        print_message("")  # ends the line that was overwritten

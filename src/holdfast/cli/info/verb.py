@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.info_tables import print_folder, print_model, print_recording
-from holdfast.cli.options import RARE, JsonOption, PlotOptions, TareOption
+from holdfast.cli.info.tables import print_folder, print_model, print_recording
+from holdfast.cli.options import JsonOption, PlotOptions, TareOption
 from holdfast.cli.terminal.console import print_error, print_json
 from holdfast.cli.terminal.progress import progress
 
@@ -24,7 +24,6 @@ def info(
     model: Annotated[
         str | None,
         typer.Option(help="Model whose decisions about slips the figure shows, beside the truth."),
-        RARE,
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

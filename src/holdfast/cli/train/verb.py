@@ -7,18 +7,16 @@ import typer
 
 from holdfast.cli.options import (
     RARE,
-    EngineOption,
+    EngineOptions,
     ForceOption,
-    JobsOption,
     JsonOption,
     ModelOutput,
     StartOptions,
-    start_engine,
 )
 from holdfast.cli.scores import KEPT_RULE, print_metrics, print_slips, print_verdict
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
-from holdfast.cli.training_options import TrainingOptions
+from holdfast.cli.train.options import TrainingOptions
 from holdfast.errors import require_extras
 
 LEFT_OUT_UNIT = {
@@ -41,8 +39,7 @@ def train(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue a search that was stopped."), RARE
     ] = False,
-    engine: EngineOption = "loky",
-    jobs: JobsOption = 1,
+    parallel: EngineOptions,
     force: ForceOption = False,
     start: StartOptions,
     as_json: JsonOption = False,
@@ -60,11 +57,9 @@ def train(
     Example:
       holdfast train recordings/ -o model.json
       holdfast train recordings/ -o model.json --split object --classifier svm
-      holdfast train recordings/ -o model.json --features holdfast --hold 0.1
       holdfast train recordings/ -o model.json --features holdfast \
         --own-slip-features
       holdfast train recordings/ -o model.json --init builtin:any
-      holdfast train recordings/ -o model.json --engine dask:tcp://hub:8786
     """
     require_extras("train")
     from holdfast.files import refuse_overwrite
@@ -75,7 +70,7 @@ def train(
 
     setting = options.setting(init)
     refuse_overwrite(model, force=force)  # before a training, which may take hours
-    started = start_engine(engine, jobs)
+    started = parallel.start()
     if resume and started.scheduler is not None:
         raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
     recordings = start.load_dataset(started.path(data))

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.export_model import HeaderOptions, export_model
-from holdfast.cli.export_recordings import RecordingOptions, export_recordings
+from holdfast.cli.export.models import HeaderOptions, export_model
+from holdfast.cli.export.recordings import RecordingOptions, export_recordings
 from holdfast.cli.extensions import ExporterOptions
 from holdfast.cli.options import ForceOption, JsonOption
 

@@ -1,0 +1,88 @@
+from dataclasses import replace
+
+import pytest
+
+from holdfast import twin_recordings
+from holdfast.cli.terminal.console import print_message
+from holdfast.cli.terminal.progress import progress
+from holdfast.io import save_recording
+from holdfast.synthetic import synthetic_recording
+from holdfast_lab.study import corpora
+from holdfast_lab.study.corpora import plan_study
+
+pytestmark = pytest.mark.slow
+
+SHOWN = {"notify": print_message, "steps": progress}
+
+
+@pytest.fixture(autouse=True)
+def nowhere(monkeypatch, tmp_path):
+    """No real recordings."""
+    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
+
+
+@pytest.fixture
+def data(tmp_path):
+    return written(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
+
+
+def written(folder, recordings):
+    folder.mkdir()
+    for recording in recordings:
+        save_recording(recording, folder / f"{recording.name}.parquet")
+    return folder
+
+
+def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
+    """Without HOLDFAST_DATA there are none; own recordings of a hand are real."""
+    settings = {"seed": 0, "tare": "0.5", "jobs": 1, "quick": True, **SHOWN}
+    plan, left_out = plan_study(data, tmp_path / "out", **settings)
+    assert (plan.real, left_out) == (plan.main, [])
+    recordings = [synthetic_recording(f"grasp-{k}", k) for k in range(2)]
+    twin = [replace(each, metadata={"source": "twin"}) for each in recordings]
+    plan, left_out = plan_study(written(tmp_path / "twin", twin), tmp_path / "out", **settings)
+    assert plan.real is None
+    assert left_out[0].startswith(
+        "real recordings, because none were found. Download them from github.com/"
+    )
+
+
+def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
+    (tmp_path / "here" / corpora.REAL_DATA).mkdir(parents=True)
+    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
+    corpus, left_out = corpora.real_corpus(tmp_path / "real", print_message)
+    assert corpus is None
+    assert left_out[0].startswith(
+        "real recordings, because those in HOLDFAST_DATA cannot be used ("
+    )
+    assert "the real recordings are left out: " in capsys.readouterr().err
+
+
+def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
+    monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
+    corpus, left_out = corpora.real_corpus(tmp_path / "real", print_message)
+    assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
+    again, _ = corpora.real_corpus(tmp_path / "real", print_message)
+    assert again == corpus
+
+
+def test_corpora_of_three_rates_of_glitches():
+    rates = {
+        name: 60 * corpus.glitch_rate
+        for name, corpus in corpora.TWIN_CORPORA.items()
+        if corpus.glitch_rate is not None
+    }
+    assert rates == {"glitch-0": 0, "glitch-1": 1, "glitch-7": pytest.approx(7)}
+    assert not set(rates) & set(corpora.QUICK_CORPORA)
+
+
+def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setattr(
+        twin_recordings, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
+    )
+    corpora.simulate_corpus(
+        tmp_path / "one", corpora.TWIN_CORPORA["glitch-1"], 5, 1, 1, print_message, progress
+    )
+    assert {grasp.glitch_rate for grasp in given} == {1 / 60}
+    assert {grasp.seed for grasp in given} == {7}

@@ -1,0 +1,118 @@
+"""`holdfast demo`: a real recording, then the whole chain on simulated data."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from holdfast.cli.demo.replay import show_page, watch
+from holdfast.cli.options import (
+    BrowserOption,
+    ForceOption,
+    JsonOption,
+    SeedOption,
+    SpeedOption,
+    check_speed,
+)
+from holdfast.cli.scores import print_verdict
+from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
+from holdfast.cli.terminal.progress import progress
+from holdfast.errors import require_extras
+
+DEMO_MODEL = "builtin:twin"
+"""The model of the demo: the best one that ships for the sensor of the simulated hand."""
+DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS = "mug,carton", "1,2", 1
+"""Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
+
+
+def demo(
+    out: Annotated[
+        Path, typer.Argument(help="Folder for the results; it is created if missing.")
+    ] = Path("holdfast-demo"),
+    speed: SpeedOption = 1.0,
+    seed: SeedOption = 0,
+    browser: BrowserOption = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Detect on real and simulated recordings; train; replay live.
+
+    Run the detector on a recording of a real robot that loses a box, as holdfast detect does.
+    Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships
+    with holdfast on them; it has not seen these objects. Train a model with the features of the
+    paper on them. Replay one recording sample by sample, as a hand would send it, on a web page
+    or in the terminal.
+
+    Example:
+      holdfast demo
+      holdfast demo --no-browser
+      holdfast demo results/ --speed 0 --json
+    """
+    require_extras("twin", "train", "parquet")
+    from holdfast.files import refuse_overwrite
+    from holdfast.io import load_dataset, load_recording
+    from holdfast.model import Model
+    from holdfast.parallel import Engine
+    from holdfast.recorded import BOX_SLIPS
+    from holdfast.training import Setting, train
+    from holdfast.training.evaluation import evaluate_recordings
+    from holdfast.twin.objects import OTHER_OBJECTS
+    from holdfast.twin_recordings import path_of, plan_grasps, simulate_grasps
+    from holdfast.web.server import has_browser
+
+    check_speed("twin:", speed)
+    start = time.monotonic()
+    folder, model = out / "recordings", out / "model.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    refuse_overwrite(model, force=force)  # before minutes of simulation
+    grasps = plan_grasps(
+        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
+    )
+    print_message("1/5  a real recording: a robot carries a box between two uSkin sensors")
+    real = watch("builtin:any", BOX_SLIPS, speed)
+    labels = load_recording(BOX_SLIPS).modules["finger1"].labels
+    causes = ", ".join(f"{label.cause} at {label.start:.3f} s" for label in labels if label.cause)
+    print_message(f"     the authors of the recording label: {causes}")
+    print_message(f"2/5  simulating {len(grasps)} grasps of {DEMO_OBJECTS}, Allegro hand, uSkin")
+    simulate_grasps(
+        grasps, folder, engine=Engine(-1), force=force, notify=print_message, steps=progress
+    )
+    recordings = load_dataset(folder)
+    print_message(f"3/5  evaluating {DEMO_MODEL}, which was not trained on these objects")
+    evaluation = evaluate_recordings(Model.load(DEMO_MODEL), recordings)
+    print_message("4/5  training a model with the features of the paper, one grasp left out")
+    trained = train(recordings, Setting(trials=0, seed=seed))
+    trained.model.save(model, force=force)
+    shown = path_of(recordings.names[-1], folder)
+    print_message(f"5/5  replaying {shown.stem} sample by sample")
+    wanted = has_browser() and sys.stdin.isatty() if browser is None else browser
+    # At speed 0 a page would show only the end.
+    page = wanted and speed and not as_json
+    replayed = None if page else watch(DEMO_MODEL, shown, speed, fingers=False)
+    if page:
+        show_page(DEMO_MODEL, shown, out / "recorded", speed)
+    seconds = time.monotonic() - start
+    if as_json:
+        print_json({
+            "real": real, "recordings": folder, "model": model,
+            "accuracy": trained.cross_validation.pooled.accuracy,
+            "shipped": {"model": DEMO_MODEL, "metrics": evaluation.metrics},
+            "replay": replayed, "seconds": seconds,
+        })  # fmt: skip
+        return
+    print_line()
+    print_line(f"{DEMO_MODEL} on {len(recordings)} grasps of objects that it was not trained on:")
+    print_verdict(evaluation.verdict or "")
+    print_line("a model of the paper's features, trained here, each grasp left out once:")
+    print_verdict(trained.verdict or "")
+    print_line(f"finished in {seconds:.0f} s; recordings and model.json are in {out}/. Next:")
+    for command, purpose in (
+        (f"info {shown} --plot grasp.png", "a picture of this grasp"),
+        (f"evaluate {DEMO_MODEL} {folder}", "all figures"),
+        (f"serve {DEMO_MODEL} 'twin:?object=can'", "a live page of the twin"),
+        ("serve builtin:any xela://auto", "a live page of your own hand"),
+        ("import --help", "your own recordings"),
+    ):
+        print_lines((f"  # {purpose}", f"  holdfast {command}"))

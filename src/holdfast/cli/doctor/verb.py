@@ -1,0 +1,97 @@
+"""`holdfast doctor`: check the installation and the live sources, or the modules of a source."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from holdfast.cli.options import JsonOption, PlotOptions, check_seconds
+from holdfast.cli.terminal.console import print_json, print_line, print_paragraph, print_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HEALTHY = "nothing is wrong, and nothing is worse than at the last check"
+
+
+def doctor(
+    context: typer.Context,
+    source: Annotated[
+        str | None, typer.Argument(help="Source or recording whose modules are checked.")
+    ] = None,
+    *,
+    figure: PlotOptions,
+    seconds: Annotated[float, typer.Option(help="Duration of the check [s].")] = 10.0,
+    history: Annotated[
+        Path | None,
+        typer.Option(help="File of the checks of this source; by default in the state folder."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check the installation and the sources, or the modules of one.
+
+    Report Python, the packages, the extras and how to install them, the kernel, the
+    live sources that can be reached, which limits hold for imports (time, time of the processor,
+    memory), the plug-ins of other packages, the configuration file of
+    the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
+
+    With SOURCE, read ten seconds of the open hand, which nothing touches, and report for each
+    module the rate, the jitter, the gaps, the noise by axis and of the loudest taxel, dead and
+    stuck taxels, zeros, the range, and the magnetic field, if you turn the hand. The check is
+    kept, and compared with the last one.
+
+    Example:
+      holdfast doctor
+      holdfast doctor --json
+      holdfast doctor xela://auto --plot health.png
+    """
+    if source is not None:
+        check_modules(source, seconds, history, figure, as_json=as_json)
+        return
+    if figure.plot is not None or history is not None:
+        raise ValueError("--plot and --history are for the modules of a source; SOURCE expected")
+    from holdfast.cli.doctor.installation import installation, print_installation
+
+    report = installation(context.obj)
+    print_json(report) if as_json else print_installation(report)
+
+
+def check_modules(
+    uri: str, seconds: float, history: Path | None, figure: PlotOptions, *, as_json: bool
+) -> None:
+    """Check the modules of a source, and print what is wrong or worse than at the last check.
+
+    Args:
+        uri: of the source, or path of a recording.
+        seconds: duration of the check [s].
+        history: file of the checks; by default in the state folder.
+        figure: of the noise of each taxel.
+        as_json: print JSON.
+
+    Raises:
+        SourceError: too few samples arrive, something touches a module, or the file is no history.
+    """
+    from msgspec import to_builtins
+
+    from holdfast.live.health import check_and_keep, history_path, table_of
+
+    def draw() -> "Figure":
+        from holdfast.plots.sensors import plot_noise
+
+        return plot_noise({name: module.noise for name, module in check.modules.items()})
+
+    check_seconds(seconds)
+    figure.check()  # before ten seconds are read
+    path = history_path(uri) if history is None else history
+    check, last, findings = check_and_keep(uri, seconds, path)
+    figure.save(draw)
+    if as_json:
+        report = to_builtins(check) | {"last": last and last.date, "findings": findings}
+        print_json(report | {"history": str(path)})
+        return
+    header = ("module", "rate [Hz]", "jitter [ms]", "gaps", "zeros", "noise x y z",
+              "loudest (taxel)", "readings", "field")  # fmt: skip
+    print_table(header, table_of(check.modules))
+    print_line()
+    for finding in findings or [HEALTHY]:
+        print_paragraph(finding, "- ", "  ")
