@@ -225,6 +225,7 @@ class SessionCalibration:
         Raises:
             StreamError: no calibration is running, or too little was held so far.
         """
+        # Without the lock: if another thread ends this buffer meanwhile, `_fit_soon` does nothing.
         buffer = self._buffer
         if buffer is None:
             raise StreamError("no calibration is running: start one, and hold an object")

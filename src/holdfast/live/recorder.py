@@ -200,7 +200,7 @@ class Recorder(Closable):
 
     def session_time(self) -> float:
         """Return the time now, on the clock of the samples [s]; NaN before the first one."""
-        # The quickest of the newest arrivals waited least on its way.
+        # The quickest of the newest arrivals waited least on its way. A copy, as `put` appends.
         return time.monotonic() + max(self._ahead.copy(), default=math.nan)
 
     def add_marker(self, text: str, time: float | None = None) -> None:
@@ -279,6 +279,7 @@ class Recorder(Closable):
             self._writer.sync()
         self._check_file()
         self._n_bytes = self._writer.n_bytes
+        # Two counts stay at least: the newest, and the last one that is a period old.
         counts = self._counts
         counts.append((time.monotonic(), self._buffer.n_samples))
         while len(counts) > 2 and counts[-1][0] - counts[1][0] >= _RATE_PERIOD:
