@@ -142,6 +142,7 @@ def _timeline(
         # A repeated marker changes nothing, but a person who begins a push twice has forgotten to
         # end one: what lies between is less certain.
         command, end = group[0], following[0].time
+        # `disturbance end` is read as `locked`; a push may also lose the object.
         ended = len(group) == 1 and following[0].word in ("locked", "lost")
         open_ended = command.word == "disturbance" and not ended
         ratio = OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
