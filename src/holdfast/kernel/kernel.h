@@ -302,7 +302,7 @@ typedef struct {
 
 /* Load and noise of a finger with relative features (motion.c). */
 typedef struct {
-    int64_t n_samples;       /* since the last gap that is not bridged */
+    int64_t n_samples;       /* since the last fault, or gap that is not bridged */
     hf_real least_normal;    /* normal force of the reference: the least so far, at most 0 */
     hf_real reference[3];    /* F_tip at the least normal force */
     hf_real load;            /* force beyond the reference */

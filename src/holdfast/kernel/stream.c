@@ -322,7 +322,7 @@ static void hf_compute_of_hand(const holdfast_hand *hand, holdfast_memory *memor
     }
 }
 
-/* Fill Phi = [F_a, F_x, F_y, F_z, m, sigma], or what the model asks for, of one finger. */
+/* Fill Phi = [F_a, F_x, F_y, F_z, m, sigma], or the features of the model, of one finger. */
 static void hf_fill_features(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
 {
     const size_t width = HF_N_FEATURES(hand);
