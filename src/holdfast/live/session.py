@@ -19,7 +19,7 @@ from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
 Work = Callable[[], None]
 MAX_LATENCIES = 8192
-"""Number of newest latencies from which the percentiles are computed."""
+"""Number of newest latencies from which the percentiles are computed: 55 s at 150 Hz."""
 SWITCH_INTERVAL = 5e-4
 """Python's thread switch interval while a session runs [s]; a tenth of the default, so that
 other busy threads delay the detector less."""

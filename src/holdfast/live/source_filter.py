@@ -22,7 +22,8 @@ from holdfast.resampling import MIN_UPDATE_RATE, Resampler, UpdateFilter, rows_p
 from holdfast.sensors import Sensor
 
 MAX_RATE_CHANGE = 0.2
-"""A rate that differs by more than this from that at the start has changed."""
+"""A rate that differs by more than this share from that at the start has changed. That of a model
+may differ by as much (`RATE_TOLERANCE`)."""
 RATE_CHECK_INTERVAL = 0.3
 """Time over which the rate is measured again [s]; longer for rates below 33 Hz."""
 MIN_STEPS = 10

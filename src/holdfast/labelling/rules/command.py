@@ -152,9 +152,9 @@ def _timeline(
         if command.word == "released":
             timeline.set_state(inside & (times >= command.time + opening), NO_CONTACT, None, ratio)
     if finger.threshold is not None:
-        # Not every finger takes part in every grasp: its force outranks the marker where it shows
-        # no contact. Where it shows contact against the marker, the label is only in doubt: a
-        # baseline may have drifted.
+        # Not every finger takes part in every grasp: a force without contact counts more than the
+        # marker. Where it shows contact against the marker, the label is only in doubt: a baseline
+        # may have drifted.
         held = np.isin(timeline.codes, (STABLE, UNSTABLE))
         free = (times >= commands[0].time) & ~finger.contact & held
         timeline.set_state(free, NO_CONTACT, None, CLEAR_RATIO)

@@ -32,7 +32,8 @@ LOADED_SECONDS = 0.25
 CREEP_LEVEL = 0.2
 """Share of the grip force below which a released elastomer may still keep a load (creep)."""
 CREEP_RATE = 0.1
-"""Share of the grip force per second below which a change of the force is creep [1/s]."""
+"""Share of the grip force per second below which a change of the force is creep [1/s]. Both are
+from one recording of each profile of the twin (docs/study/labels-by-rules.md)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,7 +118,7 @@ def propose(
         grasp = _GraspLabeller(hand, change, changing, slice(start, end), rule)
         for name in hand.fingers:
             grasp.label(name, timelines[name])
-    # Where it begins in contact no threshold says when contact ends: only a final drop does.
+    # Where it begins in contact no threshold shows when contact ends: only a final drop does.
     loaded = all(finger.threshold is None for finger in hand.fingers.values())
     if loaded and (drop := final_drop(hand)) is not None:
         after = np.arange(len(hand.times)) >= drop

@@ -193,7 +193,7 @@ class _FingerLabeller:
     ) -> None:
         self._finger, self._times, self._rule = finger, times, rule
         self._contact = finger.contact.copy()
-        # With a threshold, the force itself says when contact ends.
+        # With a threshold, the force itself shows when contact ends.
         self._drop = None if finger.threshold is not None else drop
         if self._drop is not None:
             self._contact[self._drop :] = False
