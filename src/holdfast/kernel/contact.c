@@ -37,7 +37,9 @@ enum { HF_IN_CONTACT, HF_UNSTEADY, HF_WITHOUT_CONTACT };
 /* How the load came over the threshold of contact. */
 enum { HF_NO_EXCESS, HF_TOUCH, HF_DRIFT };
 
-/* Return whether a load is below the threshold of contact, which is lower while in contact. */
+/* Return whether a load is below the threshold of contact, which is lower while in contact.
+ *
+ * latest: the state of the last sample, before the minimum duration. */
 static bool hf_is_unloaded(hf_real load, hf_real peak, hf_real threshold, int32_t latest)
 {
     /* In contact: load < max(0.7 threshold, 0.08 peak); else load < max(threshold, 0.12 peak). */
