@@ -6,11 +6,12 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from math import isnan, nan
 from operator import attrgetter, itemgetter
+from pathlib import Path
 from typing import Any
 
 from msgspec.json import Encoder
 
-from holdfast.cli.detect.estimates import EstimateChunk
+from holdfast.cli.detect.estimates import EstimateChunk, chunk_from_stream
 from holdfast.cli.terminal.console import (
     print_json,
     print_line,
@@ -29,8 +30,11 @@ from holdfast.contact import (
 )
 from holdfast.detector import HAND
 from holdfast.detector.slips import DetectedSlip, SlipWatch
+from holdfast.devices.sources import open_source
 from holdfast.live.documents import estimate_line
 from holdfast.live.fault_notices import FAULT_TEXTS
+from holdfast.live.stream_detector import StreamDetector
+from holdfast.model import Model
 from holdfast.recordings import shown_origin
 
 HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
@@ -321,3 +325,26 @@ def print_summary(chunks: Iterator[EstimateChunk], model: str, *, as_json: bool)
         print_json({"model": model, **summary.to_dict()})
     else:
         summary.print()
+
+
+def watch(model: str, path: Path, speed: float, *, fingers: bool = True) -> dict[str, Any]:
+    """Play a recording as a live source; print its changes and slips on stderr.
+
+    Args:
+        model: name of the model.
+        path: of the recording.
+        speed: 1 is real time, 0 as fast as possible.
+        fingers: print the lines of the fingers as well, not only those of the hand.
+
+    Returns:
+        The summary, as JSON values.
+    """
+    lines, summary = ChangeLines(from_first=True), DetectionSummary()
+    with open_source(str(path), speed=speed) as source:
+        stream = StreamDetector(Model.load(model), source)
+        while not source.ended:
+            chunk = chunk_from_stream(path.stem, stream.read().estimates)
+            summary.add(chunk)
+            for line in lines.add(chunk if fingers else chunk._replace(fingers={})):
+                print_message(line)
+    return summary.to_dict()
