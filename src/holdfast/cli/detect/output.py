@@ -1,7 +1,7 @@
 """Output of `holdfast detect`: JSON lines, a summary, or lines of changes, from estimates."""
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -88,8 +88,12 @@ def print_tables(document: Mapping[str, Any], start: float) -> None:
     )
     if len(events) > MAX_EVENTS_SHOWN:
         print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
-    if slips is None:  # a model without a slip rule
-        return
+    if slips is not None:  # a model without a slip rule has none to count
+        print_slips(slips, origin)
+
+
+def print_slips(slips: Sequence[Mapping[str, Any]], origin: float) -> None:
+    """Print a table of the first slips, with times since `origin` [s]."""
     print_line()
     if not slips:
         print_line("no slips")
