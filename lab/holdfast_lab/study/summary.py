@@ -43,7 +43,7 @@ def accuracy_lines(rows: list[Row]) -> Iterator[str]:
         accuracies = [
             (name, row)
             for name in CLASSIFIERS
-            for row in _select(rows, {"classifier": name, "on": on, "figure": "accuracy"})
+            for row in _matching(rows, {"classifier": name, "on": on, "figure": "accuracy"})
         ]
         if accuracies:
             parts = []
@@ -56,8 +56,8 @@ def accuracy_lines(rows: list[Row]) -> Iterator[str]:
 
 def strongest_lines(rows: list[Row]) -> Iterator[str]:
     """Yield a sentence on our method and the strongest baseline."""
-    ours = _select(rows, {**STRONGEST, "figure": "holdfast [%]"})
-    baseline = _select(rows, {**STRONGEST, "figure": "baseline [%]"})
+    ours = _matching(rows, {**STRONGEST, "figure": "holdfast [%]"})
+    baseline = _matching(rows, {**STRONGEST, "figure": "baseline [%]"})
     # Without a baseline there is nothing to compare.
     for mine, other in zip(ours, baseline, strict=False):
         yield (
@@ -71,8 +71,8 @@ def event_lines(rows: list[Row]) -> Iterator[str]:
     parts = [
         f"{method} {_value(missed)} % (with {_value(false)} false alarms per minute)"
         for method in SUMMARY_METHODS
-        for missed in _select(rows, EVENTS | {"method": method, "figure": "missed at 100 ms [%]"})
-        for false in _select(rows, EVENTS | {"method": method, "figure": "false alarms per minute"})
+        for missed in _matching(rows, EVENTS | {"method": method, "figure": "missed at 100 ms [%]"})
+        for false in _matching(rows, EVENTS | {"method": method, "figure": "false alarms per minute"})
     ]
     if parts:
         yield (
@@ -81,7 +81,7 @@ def event_lines(rows: list[Row]) -> Iterator[str]:
         )
 
 
-def _select(rows: list[Row], keys: dict[str, str]) -> list[Row]:
+def _matching(rows: list[Row], keys: dict[str, str]) -> list[Row]:
     return [row for row in rows if keys.items() <= row.keys.items() and row.ours is not None]
 
 

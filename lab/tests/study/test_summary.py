@@ -2,7 +2,7 @@ from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.study.summary import EVENTS, STRONGEST, summary_text
 
 
-def table(name, rows):
+def table_of(name, rows):
     return ResultTable(name, name, "", rows, tuple(rows[0].keys)[:-1])
 
 
@@ -10,7 +10,7 @@ def row(ours, paper=None, n=None, **keys):
     return Row(keys, ours, paper, n)
 
 
-CONFUSION = table(
+CONFUSION = table_of(
     "confusion",
     [
         row(94.84, 95.3, 24, classifier="LogReg", on="held out", figure="accuracy"),
@@ -37,7 +37,7 @@ def test_the_strongest_baseline():
         Row({**keys, "figure": "holdfast [%]"}, 2.0, n=14),
         Row({**keys, "figure": "baseline [%]"}, 4.0, n=14),
     ]
-    assert summary_text([table("strongest", rows)]) == (
+    assert summary_text([table_of("strongest", rows)]) == (
         "- On unseen objects our own method has 2.0 % errors by samples of hands, the strongest "
         "rival (trees) 4.0 %; 14 recordings."
     )
@@ -49,7 +49,7 @@ def test_events():
         Row({**keys, "figure": "missed at 100 ms [%]"}, 3.04),
         Row({**keys, "figure": "false alarms per minute"}, 1.5),
     ]
-    assert summary_text([table("events", rows)]) == (
+    assert summary_text([table_of("events", rows)]) == (
         "- Events on unseen objects that are missed within 0.1 s: holdfast 3.0 % "
         "(with 1.5 false alarms per minute), at thresholds for 1 in training."
     )
@@ -57,4 +57,4 @@ def test_events():
 
 def test_without_these_tables_there_is_no_summary():
     assert summary_text([]) == ""
-    assert summary_text([table("other", [row(1.0, m="a", figure="x")])]) == ""
+    assert summary_text([table_of("other", [row(1.0, m="a", figure="x")])]) == ""
