@@ -161,7 +161,7 @@ def print_slips(
     print_paragraph(f"Of one finger: {support}.{NEVER_NOTE}")
     if summary.intervals is not None:
         print_line()
-        print_paragraph(_intervals(summary.intervals, chosen=summary.threshold_chosen))
+        print_paragraph(format_intervals(summary.intervals, chosen=summary.threshold_chosen))
 
 
 def slips_origin(metrics: "SlipMetrics") -> str:
@@ -187,7 +187,7 @@ def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
+def format_intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
     """Return the intervals of the row of all fingers, and whether they include the choice."""
     from holdfast.metrics.summary import LEVEL
 

@@ -60,7 +60,7 @@ def export_model(
     """
     from holdfast.exporters import export as write
     from holdfast.exporters import fingers_of_sensor
-    from holdfast.exporters.c_compiler import code_size
+    from holdfast.exporters.c_header import code_size
     from holdfast.io import load_recording
     from holdfast.model import Model
 

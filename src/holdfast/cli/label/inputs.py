@@ -71,6 +71,19 @@ class RuleOptions:
         ),
     ] = None
     fps: FpsOption = None
+    motion: Annotated[
+        Path | None,
+        typer.Option(
+            help="Motion of the object for the rule tracking, measured by another instrument: a "
+            "CSV file of positions or quaternions."
+        ),
+        RARE,
+    ] = None
+    column: Annotated[
+        str | None,
+        typer.Option(help="Column of --motion that counts: of an encoder or a stage, in metres."),
+        RARE,
+    ] = None
 
     @cached_property
     def tracking(self) -> "Poses | None":
@@ -122,6 +135,13 @@ class RuleOptions:
             if rule != "tracking":
                 raise ValueError(f"--video is for the rule tracking; rule {rule!r} given")
             arguments["video"] = self.video
+        if self.motion is not None:
+            if rule != "tracking" or self.video or self.poses:
+                raise ValueError("--motion is for the rule tracking, without --poses and --video")
+            arguments["motion"] = self.motion
+            arguments["column"] = self.column
+        elif self.column is not None:
+            raise ValueError("--column is one of --motion FILE.csv, which is missing")
         return arguments
 
     def propose(
@@ -143,7 +163,8 @@ class RuleOptions:
         arguments = self.arguments(rule)
         beside = None if path is None else path.with_suffix(".mp4")
         # A default: the video of the option, which `arguments` has, is not replaced.
-        if rule == "tracking" and self.poses is None and beside is not None and beside.exists():
+        given = self.poses or self.motion
+        if rule == "tracking" and not given and beside is not None and beside.exists():
             arguments.setdefault("video", beside)
         if "video" in arguments:
             require_extras("video")

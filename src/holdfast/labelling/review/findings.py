@@ -45,6 +45,7 @@ FindingKind = Literal[
     "copy",
     "cross_talk",
     "invalid",
+    "stuck",
 ]
 
 
@@ -98,19 +99,27 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
     return found
 
 
-def invalid_readings(name: str, n_invalid: int, n_samples: int) -> Finding | None:
-    """Return a finding if many samples of a module have readings that cannot be true.
+def faulty_readings(
+    name: str, n_invalid: int, n_samples: int, stuck: Sequence[int]
+) -> list[Finding]:
+    """Return findings about taxels of a module whose readings cannot be true.
 
     Args:
         name: of the module.
-        n_invalid: number of samples with the fault `invalid`.
+        n_invalid: number of samples with the fault `invalid`; a few are none.
         n_samples: number of samples.
+        stuck: numbers of the taxels with the fault `stuck`, from 1.
     """
-    if n_invalid <= INVALID_SHARE * n_samples:
-        return None
-    text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that cannot "
-    text += "be true, of one taxel, which is left out: is a magnetometer read before it is ready?"
-    return Finding(name, "invalid", text)
+    found = []
+    if n_invalid > INVALID_SHARE * n_samples:
+        text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that "
+        text += "cannot be true, of one taxel, which is left out: is a magnetometer read before it "
+        found.append(Finding(name, "invalid", text + "is ready?"))
+    if stuck:
+        taxels = f"taxel{'s' if len(stuck) > 1 else ''} {', '.join(map(str, stuck))}"
+        text = f"no change of {taxels}, or of one axis, from some time on: left out since"
+        found.append(Finding(name, "stuck", text))
+    return found
 
 
 def hidden_labels(path: Path) -> Finding | None:
@@ -197,7 +206,7 @@ MAX_GAPS_SHOWN = 2
 DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
-    "dead", "copy", "invalid", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
+    "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
     "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel", "no_contact",
     "no_labels",
 )  # fmt: skip
