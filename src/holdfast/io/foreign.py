@@ -354,7 +354,14 @@ def _next_answer(values: Iterator[tuple[bytes, Arrays]], path: Path) -> _Answer:
             return _Answer("value")
     except Exception as cause:
         text = str(cause)[:MAX_TEXT].encode(errors="backslashreplace").decode()
-        return _Answer("memory" if _is_of_memory(cause) else "error", text)
+        # A library may hide that no memory is left behind an error of its own.
+        inner: BaseException | None = cause
+        while inner is not None and not isinstance(inner, MemoryError):
+            # The file of values has reached its limit, FSIZE.
+            if isinstance(inner, OSError) and inner.errno == errno.EFBIG:
+                break
+            inner = inner.__cause__ or inner.__context__
+        return _Answer("error" if inner is None else "memory", text)
     return _Answer("end")
 
 
@@ -463,13 +470,3 @@ def _limit(name: str, value: int) -> None:
         hard = resource.getrlimit(kind)[1]
         value = value if hard == resource.RLIM_INFINITY else min(value, hard)
         resource.setrlimit(kind, (value, hard))
-
-
-def _is_of_memory(cause: BaseException | None) -> bool:
-    """Return whether an error, or what caused it, is that no memory is left, or no file for it."""
-    while cause is not None and not isinstance(cause, MemoryError):
-        # The file of values has reached its limit, FSIZE.
-        if isinstance(cause, OSError) and cause.errno == errno.EFBIG:
-            return True
-        cause = cause.__cause__ or cause.__context__
-    return cause is not None
