@@ -174,7 +174,9 @@ def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> M
     period = float(np.median(steps))
     is_gap = steps > GAP_PERIODS * period
     still = ~(np.nan_to_num(changes) != 0).any(axis=0)
-    field = _common_field(name, sensor, times, valid, noise)
+    # Of white noise, but not of a single step: a touch makes no noise.
+    usual = 1.05 * np.nanmedian(np.abs(changes), axis=0)
+    field = _common_field(name, sensor, times, valid, usual)
     axes = [(i, a) for i, a in np.argwhere(still & ~still.all(axis=1)[:, None]).tolist()]
     return ModuleHealth(
         sensor=sensor.name,

@@ -37,6 +37,8 @@ _YIELD_TIME = 1e-4
 """Pause after each module of a chunk, so that other threads can run [s]."""
 _RATE_PERIOD = 1.0
 """Period over which the rate is measured [s]."""
+_N_CLOCK_ARRIVALS = 256
+"""Newest arrivals of which the quickest gives the time of the session."""
 _FILE_NAME = re.compile(r"\w[\w .-]{0,99}", re.ASCII)
 
 
@@ -139,6 +141,7 @@ class Recorder(Closable):
         # `put` and `add_marker` append, the thread of the recorder takes out.
         self._queue: deque[Arrival | _QueuedMarker] = deque()
         self._newest_time = math.nan
+        self._ahead: deque[float] = deque(maxlen=_N_CLOCK_ARRIVALS)
         self._n_dropped = self._n_dropped_reported = self._n_markers = 0
         # What `status` returns is set by the thread of the recorder, after each write.
         self._n_bytes = self._writer.n_bytes
@@ -192,7 +195,13 @@ class Recorder(Closable):
             return
         if arrival.samples:
             self._newest_time = arrival.time
+            self._ahead.append(arrival.time - arrival.received)
         self._queue.append(arrival)
+
+    def session_time(self) -> float:
+        """Return the time now, on the clock of the samples [s]; NaN before the first one."""
+        # The quickest of the newest arrivals waited least on its way.
+        return time.monotonic() + max(self._ahead.copy(), default=math.nan)
 
     def add_marker(self, text: str, time: float | None = None) -> None:
         """Add a marker.

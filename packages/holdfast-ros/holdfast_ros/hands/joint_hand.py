@@ -10,7 +10,7 @@ import numpy as np
 from holdfast.sensors.types import Array
 from holdfast_grip.command import GripCommand
 from holdfast_grip.errors import HandError
-from holdfast_grip.limits import Limits
+from holdfast_grip.limits import SLACK, Limits
 from holdfast_ros.hands.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
 from holdfast_ros.hands.ros_hand import RosHand
 from holdfast_ros.link import Link
@@ -22,9 +22,6 @@ from holdfast_ros.topic_messages import (
     joint_message,
     trajectory_message,
 )
-
-SLACK = 1e-9
-"""Rounding by which a torque may exceed its ceiling, as a share of it."""
 
 
 class JointOutput(StrEnum):

@@ -9,7 +9,7 @@ import numpy as np
 from holdfast_grip.command import GripCommand
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands.local import largest_scale
-from holdfast_grip.limits import Limits
+from holdfast_grip.limits import SLACK, Limits
 from holdfast_ros.hands.ros_hand import RosHand
 from holdfast_ros.link import Link
 from holdfast_ros.topic_messages import (
@@ -24,8 +24,6 @@ from holdfast_ros.topic_messages import (
     trajectory_message,
 )
 
-SLACK = 1e-9
-"""Rounding by which a value may exceed its ceiling, as a share of it."""
 HOME = "home"
 """Word that opens an Allegro hand, for its drivers."""
 

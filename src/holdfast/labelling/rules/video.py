@@ -22,16 +22,18 @@ from holdfast.contact import Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io.foreign import read_stickers
+from holdfast.io.stickers import picture_stamps
 from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.base import evidence_ratio, label_confidence
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import OBJECT
-from holdfast.labelling.rules.video_clock import VideoClock, video_clock
+from holdfast.labelling.rules.video_clock import VideoClock, flash_offset, video_clock
 from holdfast.labelling.rules.video_motion import (
     TipMotion,
     VideoRule,
     force_of,
     mean_over,
+    measured_motion,
     regular_grid,
     robust_fit,
     tip_motions,
@@ -72,12 +74,14 @@ class SeenSlip(NamedTuple):
 
 def propose(
     recording: Recording,
-    video: str | Path,
+    video: str | Path | None = None,
     tare: TareArgument | Tare | None = None,
     fps: float | None = None,
     offset: float | None = None,
     bodies: Mapping[str, int] | None = None,
     rule: VideoRule | None = None,
+    motion: str | Path | None = None,
+    column: str | None = None,
 ) -> dict[str, tuple[Label, ...]]:
     """Return labels of the fingers in view: the slips that are seen, and the rest by the force.
 
@@ -90,17 +94,30 @@ def propose(
         bodies: number of the sticker of `object` and of fingers; by default 0 for the object, and
             1, 2, ... in the order of the recording.
         rule: thresholds and sizes.
+        motion: path of a CSV file of another instrument, instead of a video. Its motion is that
+            of the object against a hand at rest, so of all fingers; see `measured_motion`.
+        column: the one column of it that counts.
 
     Raises:
         RecordingError: stickers are missing or of another size, or the clocks cannot be aligned.
     """
-    rule, video = rule or VideoRule(), Path(video)
+    rule = rule or VideoRule()
     how = fitting_tare(recording, tare)
-    times, places = read_stickers(video, fps)
-    tips = tip_motions(times, places, stickers_of(recording, bodies), rule, video)
-    grid = regular_grid(times)
+    flash = None
+    if motion is not None:
+        source, kind = Path(motion), "motion"
+        grid, moved = measured_motion(source, column)
+        tips = dict.fromkeys(recording.modules, moved)
+    elif video is not None:
+        source, kind = Path(video), "video"
+        times, levels, places = _filmed(source, fps)
+        flash = flash_offset(recording, times, levels)
+        tips = tip_motions(times, places, stickers_of(recording, bodies), rule, source)
+        grid = regular_grid(times)
+    else:
+        raise ValueError("neither a video nor a motion given")
     clock = (
-        video_clock(recording, tips, grid, how, video)
+        video_clock(recording, tips, grid, how, source, flash)
         if offset is None
         else VideoClock(offset, 0.0)
     )
@@ -109,7 +126,7 @@ def propose(
     for finger, tip in tips.items():
         held = held_at(base[finger], at) & tip.seen
         force = force_of(recording, finger, how)(at)
-        slips, stuck = [], held
+        slips, stuck, rest = [], held, tip.place
         for time in FIT_TIMES:
             n = n_samples_of(time, grid[1] - grid[0])
             rest = unexplained(tip, force, stuck, n)
@@ -117,9 +134,24 @@ def propose(
             stuck = held.copy()
             for slip in slips:
                 stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
-        note = f"video {video.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
-        labels[finger] = with_slips(base[finger], slips, note)
+        note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
+        # What no picture shows is as doubtful as what the pictures show too little of.
+        doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
+        doubtful |= ~tip.seen
+        labels[finger] = without_cause(with_slips(base[finger], slips, note), at, doubtful)
     return labels
+
+
+def _filmed(video: Path, fps: float | None) -> tuple[Array, Array, dict[int, Array]]:
+    """Return times, brightness and stickers, by the stamps of `record --camera` if there are."""
+    stamps = picture_stamps(video) if fps is None else None
+    if stamps is None:
+        return read_stickers(video, fps)
+    # With one picture a second, the time of a picture is its number.
+    numbers, levels, places = read_stickers(video, 1.0)
+    kept = numbers < len(stamps)  # a process that was killed may have lost the last stamps
+    times = stamps[numbers[kept].astype(int)]
+    return times, levels[kept], {k: place[kept] for k, place in places.items()}
 
 
 def stickers_of(recording: Recording, bodies: Mapping[str, int] | None = None) -> dict[str, int]:
@@ -212,6 +244,51 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         ratio = away / max(1e3 * rule.slid, 6 * noise)
         slips.append(SeenSlip(onset, error, until, 1e-3 * distance, 2e-3 * noise, float(ratio)))
     return slips
+
+
+def may_slide(rest: Array, held: Mask, rule: VideoRule, n: int) -> Mask:
+    """Return where so much motion remains that a slip is possible, too small to be found.
+
+    Args:
+        rest: (n, 2) from `unexplained` [mm].
+        held: (n,) where the finger holds the object.
+        rule: thresholds.
+        n: values on either side of a step.
+    """
+    moved = np.where(held, _step_size(rest, n), 0.0)
+    noise = float(np.median(moved[held])) if held.any() else 0.0
+    return hysteresis(moved / max(1e3 * rule.step / 2, 2.5 * noise), 0.7, 1.0)
+
+
+def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
+    """Return labels whose disturbances have no cause where the finger may slide.
+
+    A disturbance trains and scores the head `slip` as no slip. What is unstable without a cause is
+    neither.
+
+    Args:
+        labels: of one finger.
+        times: (n,) of the pictures, on the clock of the labels [s].
+        doubtful: (n,) where it may slide; before and after the pictures it may too.
+    """
+    spans = [(-np.inf, float(times[0])), *((times[a], times[b - 1]) for a, b in runs(doubtful))]
+    made: list[Label] = []
+    for label in labels:
+        if label.cause is not Cause.DISTURBANCE:
+            made.append(label)
+            continue
+        at = label.start
+        for start, end in (*spans, (times[-1], np.inf)):
+            first, last = max(float(start), at), min(float(end), label.end)
+            if first >= last:
+                continue
+            if first > at:
+                made.append(replace(label, start=at, end=first))
+            made.append(replace(label, start=first, end=last, cause=None))
+            at = last
+        if label.end > at:
+            made.append(replace(label, start=at))
+    return tuple(made)
 
 
 def _for_good(rest: Array, moving: Mask, n: int, slid: float, step: float) -> Mask:
