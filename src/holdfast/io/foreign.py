@@ -384,7 +384,8 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
             _limit("CPU", int(end) + 1)
 
 
-def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the recordings in a file, and the reports about them."""
     from holdfast.io.importers import extra_of, importer, takes_sensors
     from holdfast.io.importers.csv_columns import Columns
 
@@ -417,7 +418,8 @@ def _texts(lines: list[str]) -> Iterator[tuple[bytes, Arrays]]:
         yield os.fsencode(lines.pop(0)), []
 
 
-def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def poses_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the poses of bodies in a file as one value."""
     from holdfast.io.importers import importer
 
     source = importer(str(request.options["format"]))
@@ -426,7 +428,8 @@ def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     yield msgspec.json.encode(list(poses)), list(poses.values())
 
 
-def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def stickers_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the places of stickers in a video, part by part."""
     from holdfast.io.stickers import sticker_places
 
     import_module("cv2")
@@ -435,7 +438,8 @@ def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
         yield msgspec.json.encode(list(places)), [times, levels, *places.values()]
 
 
-def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def limits_task(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield which limits hold; that of memory is tried."""
     _limit_memory(request)
     try:
         # Twice the limit, so that it must fail where the limit holds.
@@ -448,10 +452,10 @@ def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
-    "import": _import,
-    "poses": _poses,
-    "stickers": _stickers,
-    "limits": _try_limits,
+    "import": import_task,
+    "poses": poses_task,
+    "stickers": stickers_task,
+    "limits": limits_task,
 }
 
 
