@@ -12,7 +12,6 @@ import stat
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -92,8 +91,13 @@ def download(
         registry={file.path: file.sha256 and f"sha256:{file.sha256}" for file in files},
         urls={path: f"{base}{remote}" for path, remote in remotes.items()},
     )
-    with _quiet_log():
+    logger = pooch.get_logger()
+    before = logger.level
+    logger.setLevel("ERROR")  # else pooch prints a line for each file
+    try:
         return [_fetch(public, storage, file, folder, report) for file in files]
+    finally:
+        logger.setLevel(before)
 
 
 def download_files(
@@ -405,17 +409,3 @@ def _in_time(call: Callable[[], _T]) -> _T:
     except TimeoutError as cause:
         result.add_done_callback(close_late)
         raise requests.Timeout(f"less than {DOWNLOAD_CHUNK} bytes in time") from cause
-
-
-@contextmanager
-def _quiet_log() -> Iterator[None]:
-    """Keep pooch from printing a line for each file."""
-    import pooch
-
-    logger = pooch.get_logger()
-    before = logger.level
-    logger.setLevel("ERROR")
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
