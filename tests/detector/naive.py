@@ -317,6 +317,10 @@ class Finger:
             if other.last is not None and self.last - other.last <= 0.10001
         )
 
+    def fits_another(self, is_turned):
+        own = float(np.linalg.norm(self.speeds[int(is_turned)]))
+        return self.another_turns(own / 1.25, own * 1.25)
+
     def follow_field(self, readings, kept, limit):
         if len(kept) < 4:
             self.is_deep = False
@@ -357,11 +361,10 @@ class Finger:
         alike, followed = clear, False
         self.is_shared = self.is_shared and small
         if not clear or load:
-            own = np.linalg.norm(self.speeds, axis=1)
-            if first:
-                self.is_turned = bool(own[1] ** 2 > 1.01 * own[0] ** 2)
-            own = float(own[int(self.is_turned)])
-            followed = self.another_turns(own / 1.25, own * 1.25)
+            followed = self.fits_another(self.is_turned)
+            small = float(np.linalg.norm(self.field)) <= 16 * self.noise / n
+            if not followed and small and self.fits_another(not self.is_turned):
+                followed, self.is_turned, self.field = True, not self.is_turned, np.zeros(3)
             self.is_shared = self.is_shared or followed
         if self.is_shared:
             alike, load = apart <= 0.0625 * squares + noise, False

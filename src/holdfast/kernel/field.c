@@ -134,6 +134,13 @@ static bool hf_another_turns(const hf_finger *f, hf_real low, hf_real high)
     return false;
 }
 
+/* Return whether what the taxels have in common moves as fast in a frame as another's field. */
+static bool hf_fits_another(const hf_finger *f, bool is_turned)
+{
+    const hf_real speed = hf_sqrt(hf_square(f->state->speed + (is_turned ? 3 : 0)));
+    return hf_another_turns(f, speed / HF_SPEED_TOLERANCE, speed * HF_SPEED_TOLERANCE);
+}
+
 /* Update the field of a finger by what its taxels have in common. Return whether it may be either
  * a field or a load. */
 static bool hf_update_field(const hf_finger *f, const hf_common *common)
@@ -203,13 +210,15 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     bool is_alike = is_clear, is_followed = false;
     s->is_shared = s->is_shared && is_small;
     if (!is_clear || is_load) {
-        /* In the frame of the field; of the first one, in that which moves more. */
-        const hf_real plain = hf_square(s->speed), turned = hf_square(s->speed + 3);
-        if (is_first) {
-            s->field_is_turned = turned > (hf_real)1.01 * plain;
+        /* In the frame of the field; while that is small, in the other if only that fits. */
+        const hf_real small = HF_FIRST_FIELD * HF_FIELD_TO_NOISE * s->noise / common->n;
+        is_followed = hf_fits_another(f, s->field_is_turned);
+        if (!is_followed && hf_square(s->field) <= small * small &&
+            hf_fits_another(f, !s->field_is_turned)) {
+            s->field_is_turned = !s->field_is_turned;
+            hf_fill(s->field, 3, 0);
+            is_followed = true;
         }
-        const hf_real own = hf_sqrt(s->field_is_turned ? turned : plain);
-        is_followed = hf_another_turns(f, own / HF_SPEED_TOLERANCE, own * HF_SPEED_TOLERANCE);
         s->is_shared |= is_followed;
     }
     const hf_real nearly = HF_LOAD_SHARE * HF_LOAD_SHARE;
