@@ -284,6 +284,9 @@ class Finger:
         most = max(steps.values())
         if len(others) == n and most < 0.9 * sum(steps.values()):
             return set()
+        fallen = any(step > 0 for i, step in steps.items() if i not in others)
+        if math.isnan(self.noise) and not fallen:
+            noise = max(0.0, sum(steps.values()) - most) / max(len(others) - 1, 1)
         usual = max(noise, sum(others.values()) / max(len(others), 1))
         zeros = {i for i in self.used if i not in others and 0 < steps[i] > 400 * usual}
         quiet = 9 * noise * (len(others) - 1)

@@ -204,9 +204,10 @@ def test_readings_of_one_sample_change_no_state(value, in_contact):
     assert (trace.state[300:850] == STABLE).all()
 
 
-def test_zeros_before_the_noise_is_known_are_found():
+@pytest.mark.parametrize("value", SPOILED.values(), ids=SPOILED)
+def test_readings_before_the_noise_is_known_are_found(value):
     times, readings, _ = still_hold()
-    readings[5, 2] = readings[20, 3] = 0
+    readings[5, 2] = readings[20, 3] = value
     assert np.flatnonzero(estimates(times, readings).faults).tolist() == [5, 20]
     trace = estimates(times, readings, sensor("anyskin"))
     assert np.flatnonzero(trace.faults).tolist() == [5, 20]

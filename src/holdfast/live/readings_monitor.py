@@ -90,7 +90,8 @@ class ReadingsMonitor:
 
     def update_recording(self, part: Recording) -> list[str]:
         """Look at the next part of a recording; return new notices."""
-        notices: list[str] = []
+        alike = self._comparison.update_recording(part)
+        notices = [f"{each.module} {each.text}" for each in alike]
         for name in self._fingers.keys() & part.modules.keys():
             module = part.modules[name]
             stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
