@@ -230,23 +230,23 @@ def test_all_magnetometers_at_zero_are_no_sample():
 
 
 @pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
-@pytest.mark.parametrize(("start", "seconds"), [(0, 10), (400, 2)], ids=["always", "from 4 s"])
+@pytest.mark.parametrize(("start", "seconds"), [(0, 30), (400, 2)], ids=["always", "from 4 s"])
 def test_a_stuck_axis_of_one_magnetometer_leaves_it_out(name, start, seconds):
-    """No state changes by it. It is named after 2 s; after 10 s, if it never changed before."""
-    times, _, rng = still_hold(n=1500)
+    """No state changes by it. It is named after 2 s, or 30 s if it never changed before."""
+    times, _, rng = still_hold(n=3500)
     which = sensor(name)
-    grip = np.interp(times, [0, 1.5, 2, 14, 14.4], [0, 0, 1, 1, 0])[:, None, None]
+    grip = np.interp(times, [0, 1.5, 2, 34, 34.4], [0, 0, 1, 1, 0])[:, None, None]
     load = grip * np.resize(SHARES, which.n_taxels)[:, None] * [20, 5, 300]
-    readings = np.rint(33_000 + load + rng.normal(scale=2, size=(1500, which.n_taxels, 3)))
+    readings = np.rint(33_000 + load + rng.normal(scale=2, size=(3500, which.n_taxels, 3)))
     clean = estimates(times, readings, which)
     assert not clean.faults.any()
     readings[start:, 2, 1] = readings[start, 2, 1]
     trace = estimates(times, readings, which)
     named = np.flatnonzero(trace.faulty_taxels == 4)
-    assert 0 <= times[named[0]] - times[start] - seconds < 0.5
+    assert 0 <= times[named[0]] - times[start] - seconds < 1.5
     assert {faults_of(mask) for mask in trace.faults[named].tolist()} == {(Fault.STUCK,)}
-    assert len(named) == 1500 - named[0]  # until the end
-    assert (trace.state[300:1350] == STABLE).all()
+    assert len(named) == 3500 - named[0]  # until the end
+    assert (trace.state[300:3350] == STABLE).all()
     assert (trace.state == STABLE).sum() == pytest.approx((clean.state == STABLE).sum(), abs=10)
 
 
