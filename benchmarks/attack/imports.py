@@ -61,7 +61,7 @@ def attack_videos(n_tried: int) -> CpuResult:
         data = path.read_bytes()
         for k in range(n_tried):
             path.write_bytes(damaged(data, chance) if k % 4 else cut(data, chance))
-            result.timed(lambda: bool(read_stickers(path)[1]), RecordingError)
+            result.timed(lambda: bool(read_stickers(path)[2]), RecordingError)
     return result
 
 

@@ -407,3 +407,33 @@ def test_a_file_that_another_program_writes_is_refused(capsys, grasp, tmp_path, 
         text = refusal(capsys, grasp, out, "--speed", "0", *words)
     assert text.startswith(f"{out} ")
     assert load_recording(out).modules["thumb"].n_samples == 2
+
+
+def test_a_camera_is_recorded_beside_the_samples(grasp, tmp_path, capsys):
+    cv2 = pytest.importorskip("cv2")
+    film = tmp_path / "camera.avi"
+    writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
+    for _ in range(20):
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+    writer.release()
+    out = tmp_path / "run.mcap"
+    assert run(capsys, grasp, out, "--camera", film, "--seconds", "1")[0] == 0
+    recording = load_recording(out)
+    stamps = np.array((tmp_path / "run.times").read_text().split(), float)
+    # On the clock of the samples, which does not begin at 0, one picture each 20 ms.
+    assert len(stamps) > 10
+    assert recording.start - 0.1 < stamps[0] < stamps[-1] < recording.end + 0.2
+    assert [text for _, text in recording.markers if "camera" in text] == [
+        f"note: the camera ended after {len(stamps)} pictures"
+    ]
+    assert (tmp_path / "run.mp4").stat().st_size > 0
+
+
+def test_a_missing_camera_is_one_line_and_nothing_is_recorded(grasp, tmp_path, capsys):
+    pytest.importorskip("cv2")
+    words = (grasp, tmp_path / "a.mcap", "--camera", "none.mp4")
+    assert Verb("record").refusal(capsys, *words) == (
+        "no camera none.mp4: the number of a camera (0 is the first), or a video file or stream "
+        "expected"
+    )
+    assert not list(tmp_path.iterdir())

@@ -45,7 +45,8 @@ def film(tmp_path_factory):
 
 
 def test_places_are_exact_to_hundredths_of_a_pixel(film):
-    times, places = read_stickers(film)
+    times, levels, places = read_stickers(film)
+    assert levels == pytest.approx(np.full(N, levels[0]), rel=0.1)
     assert times == pytest.approx(np.arange(N) / 30)
     assert sorted(places) == [0, 1]
     truth = np.array([middle(k, 0) for k in range(N)])
@@ -56,7 +57,7 @@ def test_places_are_exact_to_hundredths_of_a_pixel(film):
 
 
 def test_a_covered_sticker_is_not_seen_and_comes_back(film):
-    _, places = read_stickers(film)
+    _, _, places = read_stickers(film)
     seen = np.isfinite(places[1][:, 0, 0])
     assert seen[:20].all()
     assert not seen[21:24].any()
@@ -71,8 +72,8 @@ def test_parts_join_to_the_whole(film, monkeypatch):
     whole = read_stickers(film)
     monkeypatch.setattr(stickers, "PICTURES_PER_PART", 7)
     parts = list(sticker_places(film))
-    assert [len(times) for times, _ in parts] == [7, 7, 7, 7, 7, 5]
-    assert np.concatenate([times for times, _ in parts]) == pytest.approx(whole[0])
+    assert [len(times) for times, _, _ in parts] == [7, 7, 7, 7, 7, 5]
+    assert np.concatenate([times for times, _, _ in parts]) == pytest.approx(whole[0])
 
 
 @pytest.mark.parametrize("content", [b"", b"no video\n" * 99, b"\0\0\0\x18ftypmp42" + b"\xff" * 99])
@@ -88,7 +89,7 @@ def test_a_damaged_film_ends(film, tmp_path):
     content[2000:9000] = bytes(7000)
     path = tmp_path / "run.mp4"
     path.write_bytes(content)
-    times, _ = read_stickers(path)
+    times, _, _ = read_stickers(path)
     assert len(times) <= N
 
 

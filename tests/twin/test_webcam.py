@@ -42,7 +42,7 @@ def film(tmp_path_factory):
 
 
 def test_all_stickers_are_read(film):
-    times, places = film
+    times, _, places = film
     assert sorted(places) == [0, 2, 3, 4]  # the thumb is behind the object
     assert times == pytest.approx(np.arange(len(times)) / 30)
     assert all(np.isfinite(place).all() for place in places.values())
@@ -52,7 +52,7 @@ def test_all_stickers_are_read(film):
 
 
 def test_motion_is_that_of_the_truth_on_a_clock_of_its_own(film):
-    times, places = film
+    times, _, places = film
     shift = clock_shift(grasp())
     share = np.clip((times + shift + 0.010) / ((N - 1) / 150), 0, 1)
     moved = places[0][:, 0, 2] - places[0][:1, 0, 2]

@@ -44,6 +44,13 @@ def record(
         ),
         RARE,
     ] = False,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="Number of a camera (0 is the first), or a video file that stands for one; its "
+            "video is written beside the recording."
+        ),
+    ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,16 +61,19 @@ def record(
     twin:, or the path of a recording. It is recorded for --seconds, or until q, Ctrl-C or SIGTERM.
     These keys set markers: c closing, l locked, d disturbance, r released, space or 1-9 a mark;
     q stops. If stdin is a pipe, each line is a marker. Faults and notices of the source become
-    markers too. If a device disconnects, the recording continues when it reconnects.
+    markers too. If a device disconnects, the recording continues when it reconnects. --camera
+    keeps a video on the same clock.
 
     Example:
       holdfast record xela://192.168.1.10:5000 grasps/ --object can --case 2
       holdfast record twin:?object=can can.mcap --seconds 10
+      holdfast record xela://auto pulls.mcap --camera 0
       (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
     from holdfast.cli.terminal.progress import StatusLine, format_size
     from holdfast.devices.sources import open_source
     from holdfast.live import source_recording as library
+    from holdfast.live.camera import camera_of
     from holdfast.live.recording_buffer import marker_text
 
     check_seconds(seconds)
@@ -71,7 +81,11 @@ def record(
     metadata = library.typed_metadata(object_name, case, note, settings or [])
     # Before a device is awaited.
     path = library.recording_path(source, out, object_name, force=force)
-    with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
+    with (
+        handle_stop_signals() as stop,
+        camera_of(camera, path, force=force) as film,
+        open_source(source, speed=speed) as opened,
+    ):
         stop.graceful = True  # Ctrl-C from here on closes the file; before, it ends the wait
         recorder = library.create_recorder(
             opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
@@ -81,6 +95,8 @@ def record(
             library.recording(opened, recorder), MarkerKeys() as keys, StatusLine(recorder) as line
         ):  # fmt: skip
             line.print(KEY_HELP if keys.interactive else "Ctrl-C stops")
+            if film is not None:
+                film.start(recorder, line.print)
             for arrival in library.arrivals_for(opened, seconds, speed):
                 if arrival is not None:
                     # A recording can wait for a slow disk; a device drops samples.

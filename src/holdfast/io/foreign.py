@@ -139,8 +139,8 @@ def read_foreign_arrays(
 
 def read_stickers(
     path: Path, fps: float | None = None
-) -> tuple[npt.NDArray[np.float64], dict[int, npt.NDArray[np.float64]]]:
-    """Return the times (n,) of the pictures of a video, and the places (n, 2, 3) of its stickers.
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], dict[int, npt.NDArray[np.float64]]]:
+    """Return times and brightness (n,) of the pictures of a video, and places of its stickers.
 
     They are as `holdfast.io.stickers.sticker_places` yields them, in a child process.
 
@@ -150,19 +150,23 @@ def read_stickers(
     if not path.is_file():
         raise RecordingError(f"{path} does not exist; a video expected")
     times: list[npt.NDArray[np.float64]] = []
+    levels: list[npt.NDArray[np.float64]] = []
     parts: list[dict[int, npt.NDArray[np.float64]]] = []
-    for document, (part_times, *places) in _values("stickers", path, {"fps": fps}):
+    for document, (part_times, part_levels, *places) in _values("stickers", path, {"fps": fps}):
         numbers = msgspec.json.decode(document, type=list[int])
         times.append(part_times)
+        levels.append(part_levels)
         parts.append(dict(zip(numbers, places, strict=True)))
     # A part names only the stickers that are seen in it.
     unseen = [np.full((len(part), 2, 3), np.nan) for part in times]
-    return np.concatenate([np.zeros(0), *times]), {
+    places_of = {
         number: np.concatenate(
             [part.get(number, gap) for part, gap in zip(parts, unseen, strict=True)]
         )
         for number in sorted({number for part in parts for number in part})
     }
+    empty = np.zeros(0)
+    return np.concatenate([empty, *times]), np.concatenate([empty, *levels]), places_of
 
 
 def limits() -> dict[str, bool]:
@@ -275,8 +279,13 @@ class _Child:
 
     def _answer(self, timeout: float) -> _Answer | None:
         """Return the next answer; None if there is none in time, and the process has ended."""
+
+        def give_up() -> None:
+            self._is_late = True
+            self._process.kill()
+
         # Not every system reads a pipe with a timeout; the end of the process ends the reading.
-        timer = Timer(timeout, self._give_up)
+        timer = Timer(timeout, give_up)
         # The timer must not keep this process alive after its end.
         timer.daemon = True
         timer.start()
@@ -286,10 +295,6 @@ class _Child:
             return None
         finally:
             timer.cancel()
-
-    def _give_up(self) -> None:
-        self._is_late = True
-        self._process.kill()
 
 
 _idle: list[_Child] = []
@@ -419,8 +424,8 @@ def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
     import_module("cv2")
     _limit_memory(request)
-    for times, places in sticker_places(path, request.options["fps"]):
-        yield msgspec.json.encode(list(places)), [times, *places.values()]
+    for times, levels, places in sticker_places(path, request.options["fps"]):
+        yield msgspec.json.encode(list(places)), [times, levels, *places.values()]
 
 
 def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:

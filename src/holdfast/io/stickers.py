@@ -39,18 +39,43 @@ CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of a sticker in its own plane, in the order of OpenCV: x right, y down, sides of 1."""
 
 
+def stamps_path(video: Path) -> Path:
+    """Return the path of the times of the pictures of a video, which `record --camera` writes."""
+    return video.with_suffix(".times")
+
+
+def picture_stamps(video: Path) -> Array | None:
+    """Return the times (n,) of the pictures of a video [s]; None if no file beside it has them.
+
+    Raises:
+        RecordingError: the file has something else, or times that do not increase.
+    """
+    path = stamps_path(video)
+    if not path.exists():
+        return None
+    try:
+        # A process that was killed may have written half of the last line.
+        stamps = np.array([float(line) for line in path.read_text().split("\n")[:-1]])
+    except (OSError, ValueError):
+        stamps = np.zeros(2)
+    if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0).any():
+        raise RecordingError(f"{path}: a time in each line [s], each later than the last, expected")
+    return stamps
+
+
 def sticker_places(
     path: Path, fps: float | None = None
-) -> Iterator[tuple[Array, dict[int, Array]]]:
-    """Yield times and places of all stickers, part by part.
+) -> Iterator[tuple[Array, Array, dict[int, Array]]]:
+    """Yield times, brightness and places of all stickers, part by part.
 
     Args:
         path: of the video.
         fps: pictures per second; None takes the stamps of the file, which may be irregular.
 
     Yields:
-        (n,) times [s], and by number (n, 2, 3) affine maps from the plane of a sticker, with sides
-        of 1, to the picture [pixels] from its middle; NaN where it is not seen.
+        (n,) times [s], (n,) brightness of the pictures, and by number (n, 2, 3) affine maps from
+        the plane of a sticker, with sides of 1, to the picture [pixels] from its middle; NaN where
+        it is not seen.
 
     Raises:
         RecordingError: the file is no video that can be decoded here, or too large.
@@ -79,6 +104,7 @@ def sticker_places(
     middle = (np.array(size_of) - 1) / 2
     search = _Search()
     times: list[float] = []
+    levels: list[float] = []
     places: list[dict[int, Array]] = []
     n = 0
     while film.grab():
@@ -90,18 +116,22 @@ def sticker_places(
             continue  # damaged, or out of order
         times.append(stamp)
         seen = search.next(np.ascontiguousarray(picture[:, :, 1]))  # green is the sharpest
+        levels.append(float(picture[::8, ::8, 1].mean()))
         places.append({k: place - [[0, 0, middle[0]], [0, 0, middle[1]]] for k, place in seen})
         if len(times) > PICTURES_PER_PART:  # the last one stays, as the time before the next
-            yield _part(times[:-1], places[:-1])
-            times, places = times[-1:], places[-1:]
+            yield _part(times[:-1], levels[:-1], places[:-1])
+            times, levels, places = times[-1:], levels[-1:], places[-1:]
     if times:
-        yield _part(times, places)
+        yield _part(times, levels, places)
 
 
-def _part(times: list[float], places: list[dict[int, Array]]) -> tuple[Array, dict[int, Array]]:
+def _part(
+    times: list[float], levels: list[float], places: list[dict[int, Array]]
+) -> tuple[Array, Array, dict[int, Array]]:
     unseen = np.full((2, 3), np.nan)
     numbers = sorted({k for seen in places for k in seen})
-    return np.array(times), {k: np.array([s.get(k, unseen) for s in places]) for k in numbers}
+    tracks = {k: np.array([s.get(k, unseen) for s in places]) for k in numbers}
+    return np.array(times), np.array(levels), tracks
 
 
 class _Search:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 FLUSH_INTERVAL = 0.2
 """Time between two writes to disk [s]."""
 SYNC_INTERVAL = 0.5
-"""Time between two waits for the disk with `fsync`; the first write after it waits [s]."""
+"""Time between two waits for the disk with `fsync`; the first write after it waits [s]. With
+`FLUSH_INTERVAL`, a power failure loses at most 0.7 s and one wait (docs/reliability.md)."""
 MAX_QUEUED_ARRIVALS = 4096
 """Maximum number of arrivals that wait for the disk: some 30 MB of a whole hand, or 27 s at
 150 Hz."""
@@ -37,6 +38,8 @@ _YIELD_TIME = 1e-4
 """Pause after each module of a chunk, so that other threads can run [s]."""
 _RATE_PERIOD = 1.0
 """Period over which the rate is measured [s]."""
+_N_CLOCK_ARRIVALS = 256
+"""Newest arrivals of which the quickest gives the time of the session: 1.7 s at 150 Hz."""
 _FILE_NAME = re.compile(r"\w[\w .-]{0,99}", re.ASCII)
 
 
@@ -139,6 +142,7 @@ class Recorder(Closable):
         # `put` and `add_marker` append, the thread of the recorder takes out.
         self._queue: deque[Arrival | _QueuedMarker] = deque()
         self._newest_time = math.nan
+        self._ahead: deque[float] = deque(maxlen=_N_CLOCK_ARRIVALS)
         self._n_dropped = self._n_dropped_reported = self._n_markers = 0
         # What `status` returns is set by the thread of the recorder, after each write.
         self._n_bytes = self._writer.n_bytes
@@ -192,7 +196,13 @@ class Recorder(Closable):
             return
         if arrival.samples:
             self._newest_time = arrival.time
+            self._ahead.append(arrival.time - arrival.received)
         self._queue.append(arrival)
+
+    def session_time(self) -> float:
+        """Return the time now, on the clock of the samples [s]; NaN before the first one."""
+        # The quickest of the newest arrivals waited least on its way. A copy, as `put` appends.
+        return time.monotonic() + max(self._ahead.copy(), default=math.nan)
 
     def add_marker(self, text: str, time: float | None = None) -> None:
         """Add a marker.
@@ -270,6 +280,7 @@ class Recorder(Closable):
             self._writer.sync()
         self._check_file()
         self._n_bytes = self._writer.n_bytes
+        # Two counts stay at least: the newest, and the last one that is a period old.
         counts = self._counts
         counts.append((time.monotonic(), self._buffer.n_samples))
         while len(counts) > 2 and counts[-1][0] - counts[1][0] >= _RATE_PERIOD:

@@ -63,9 +63,17 @@ class ModuleBuffer:
             return False
         if self._dtype is None and readings.dtype.name in NUMBER_TYPES:
             self._dtype = readings.dtype
-        kept = readings if readings.dtype == self._dtype else _cast(readings, self._dtype)
-        if kept is None:
-            return False
+        kept = readings
+        if readings.dtype != self._dtype:
+            if self._dtype is None or readings.dtype.kind not in "biuf":
+                return False
+            with np.errstate(invalid="ignore", over="ignore"):
+                kept = readings.astype(self._dtype)
+                back = kept.astype(readings.dtype)  # comparing int64 with float64 rounds
+            # A file has one number type: what does not keep its value in it is not stored.
+            nan = self._dtype.kind == "f"
+            if not all(np.array_equal(one, readings, equal_nan=nan) for one in (kept, back)):
+                return False
         self._times.append(time)
         self._readings.append(kept)
         self._last_time = time
@@ -115,6 +123,7 @@ class RecordingBuffer:
         self.faults: Counter[Fault] = Counter()
         # By module: the faults that last, so that a marker is set where one begins only.
         self._active_faults: dict[str, tuple[Fault, ...]] = {}
+        # When an arrival reported each fault last, for `recent_faults`.
         self._fault_times: dict[tuple[str, Fault], float] = {}
         # When each text became a marker last: a notice that repeats fills no file.
         self._notice_times: dict[str, float] = {}
@@ -220,14 +229,3 @@ def marker_text(text: str) -> str:
     """Return a text as one line of printable characters, at most `MAX_MARKER_LENGTH` long."""
     line = " ".join(text.split())[:MAX_MARKER_LENGTH]
     return "".join(character if character.isprintable() else "?" for character in line)
-
-
-def _cast(readings: npt.NDArray[Any], dtype: np.dtype[Any] | None) -> npt.NDArray[Any] | None:
-    """Return the readings in a dtype that holds all of them exactly; else None."""
-    if dtype is None or readings.dtype.kind not in "biuf":
-        return None
-    with np.errstate(invalid="ignore", over="ignore"):
-        cast = readings.astype(dtype)
-        back = cast.astype(readings.dtype)  # comparing int64 with float64 rounds
-    same = all(np.array_equal(one, readings, equal_nan=dtype.kind == "f") for one in (cast, back))
-    return cast if same else None

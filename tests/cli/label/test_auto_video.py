@@ -1,5 +1,6 @@
 """`holdfast label auto tracking` with a video; its content is that of a test."""
 
+import numpy as np
 import pytest
 
 from holdfast.io import load_labels, save_recording
@@ -18,7 +19,8 @@ def pulls(tmp_path, monkeypatch):
 
     def read(path, fps):
         asked.append((path, fps))
-        return places()
+        times, found = places()
+        return times, np.zeros(len(times)), found
 
     monkeypatch.setattr(video, "read_stickers", read)
     path = tmp_path / "pulls.mcap"
@@ -48,6 +50,14 @@ REFUSED = {
     "both": (
         ("tracking", "--video", "a.mp4", "--poses", "POSES"),
         "--poses and --video given; only one of them expected",
+    ),
+    "a motion too": (
+        ("tracking", "--video", "a.mp4", "--motion", "a.csv"),
+        "--motion is for the rule tracking, without --poses and --video",
+    ),
+    "a column of nothing": (
+        ("tracking", "--column", "a"),
+        "--column is one of --motion FILE.csv, which is missing",
     ),
     "words for numbers": (
         ("tracking", "--video", "a.mp4", "--track", "object=/aruco"),

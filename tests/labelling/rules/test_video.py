@@ -1,10 +1,12 @@
 """Slips in a video, from places of stickers that a test makes: what moves, and what is felt."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
-from holdfast.labelling.rules import propose, video
+from holdfast.labelling.rules import propose, video, video_clock
 from holdfast.labelling.rules.video import change_point, seen_slips, with_slips
 from holdfast.labelling.rules.video_motion import VideoRule
 from holdfast.metrics.slip_truth import label_slips
@@ -64,8 +66,9 @@ def places(slips=SLIPS, tip_size=15.0, elastic=0.3, tip=2, fps=FPS):
 
 @pytest.fixture
 def film(monkeypatch):
-    def shown(times, found):
-        monkeypatch.setattr(video, "read_stickers", lambda path, fps: (times, found))
+    def shown(times, found, levels=None):
+        levels = np.zeros(len(times)) if levels is None else levels
+        monkeypatch.setattr(video, "read_stickers", lambda path, fps: (times, levels, found))
 
     return shown
 
@@ -229,3 +232,196 @@ def test_slips_cut_held_labels_only():
         (0, 1, "None"), (1, 2, "closing"), (2, 3, "None"), (3, 3.5, "slip"), (3.5, 5, "None"),
     ]  # fmt: skip
     assert with_slips(made, [])[:2] == made[:2]
+
+
+def stamped(tmp_path, film, lines):
+    """A film of which a tenth of the pictures was lost, with no gap in the stamps of its file."""
+    times, found = places()
+    kept = np.random.default_rng(3).random(len(times)) > 0.1
+    n = kept.sum()
+    film(np.arange(n) / 1.0, {number: place[kept] for number, place in found.items()})
+    # On the clock of the samples, as `record --camera` writes them.
+    text = "".join(f"{time:.6f}\n" for time in times[kept] + SHIFT)
+    (tmp_path / "run.times").write_text(text + lines)
+    return tmp_path / "run.mp4"
+
+
+def test_the_stamps_of_a_recorded_camera_count(film, tmp_path):
+    labels = propose("tracking", recording(), video=stamped(tmp_path, film, "39.1"))
+    found = slips_of(labels["index"])
+    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.03)
+    assert float(found[0].evidence.split("later by ")[1].split()[0]) == pytest.approx(0, abs=0.008)
+
+
+@pytest.mark.parametrize("lines", ["no time\n", "3.0\n", "nan\n"])
+def test_stamps_that_are_none(film, tmp_path, lines):
+    with pytest.raises(RecordingError, match=r"run\.times: a time in each line \[s\], each later"):
+        propose("tracking", recording(), video=stamped(tmp_path, film, lines))
+
+
+def measured(names, scale=1e-3):
+    """Return lines of a CSV file of another instrument, which sees the same motion."""
+    times, found = places()
+    moved = (found[2][:, :, 2] - found[0][:, :, 2]) / PIXELS
+    away = scale * (moved - moved[0])
+    turned = moved[:, 0] - moved[0, 0]
+    half = turned / 10 / 2  # at a lever of 10 mm
+    flip = np.where(np.arange(len(times)) % 7 < 3, -1, 1)
+    values = {
+        "time": times,
+        "x": away[:, 0],
+        "y": away[:, 1],
+        "z": 0 * times,
+        "stage": away[:, 0],
+        "qw": flip * np.cos(half),
+        "qx": 0 * times,
+        "qy": 0 * times,
+        "qz": flip * np.sin(half),
+    }
+    rows = np.column_stack([values[name] for name in names])
+    return "\n".join([",".join(names), *(",".join(f"{x:.9f}" for x in row) for row in rows)])
+
+
+@pytest.mark.parametrize(
+    ("names", "column"),
+    [
+        (("time", "x", "y", "z"), None),
+        (("time", "stage"), "stage"),
+        (("time", "qw", "qx", "qy", "qz"), None),
+        (("time", "x", "y", "z", "qw", "qx", "qy", "qz"), "x"),
+    ],
+    ids=["places", "a stage", "a motion sensor", "one of many"],
+)
+def test_other_instruments_give_the_same_onsets(tmp_path, names, column):
+    path = tmp_path / "stage.csv"
+    path.write_text(measured(names))
+    labels = propose("tracking", recording(), motion=path, column=column)
+    assert list(labels) == ["thumb", "index"]  # the object moves against the whole hand
+    for finger in labels:
+        found = slips_of(labels[finger])
+        assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.03)
+        sizes = [float(label.evidence.split()[1]) for label in found]
+        assert sizes == pytest.approx([size for _, size in SLIPS], abs=0.15)
+        assert "motion stage.csv, later by 0.23" in found[0].evidence
+
+
+BAD_MOTIONS = {
+    "no motion": ("time,a\n" + "1,2\n" * 200, None, r"has the columns time, a; time and x,y,z or "),
+    "no such column": (
+        "time,a\n" + "1,2\n" * 200,
+        "b",
+        "column 'b' is missing; it has 'time', 'a'",
+    ),
+    "too short": ("time,a\n1,2\n", "a", r"stage\.csv has 1 times; at least 100 expected"),
+    "no turns": (
+        "time,qw,qx,qy,qz\n" + "".join(f"{k},3,0,0,0\n" for k in range(200)),
+        None,
+        r"stage\.csv: unit quaternions qw,qx,qy,qz expected in each row",
+    ),
+    "at rest": (
+        "time,a\n" + "".join(f"{k / 50},0\n" for k in range(1000)),
+        "a",
+        "its motion is not that of recording 'pulls' at any offset",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "column", "message"), BAD_MOTIONS.values(), ids=BAD_MOTIONS)
+def test_motions_that_cannot_be_used(tmp_path, text, column, message):
+    path = tmp_path / "stage.csv"
+    path.write_text(text)
+    with pytest.raises(RecordingError, match=message):
+        propose("tracking", recording(), motion=path, column=column)
+
+
+def test_something_must_be_measured():
+    with pytest.raises(ValueError, match="neither a video nor a motion given"):
+        video.propose(recording())
+
+
+def test_a_flash_gives_the_offset_of_clocks(film, monkeypatch):
+    times, found = places()
+    generator = np.random.default_rng(4)
+    levels = 90 + generator.normal(0, 0.2, len(times))
+    # A lamp is switched on at 7 s; the page lights up twice, one picture before its marker.
+    levels[times > 7.0] += 20
+    for start in (1.2, 30.5):
+        levels[(times > start) & (times < start + 0.4)] += 8
+    film(times, found, levels)
+    pulls = recording()
+    markers = [(t + SHIFT + 0.02, "flash") for t in (1.2, 30.5)]
+    marked = replace(pulls, markers=tuple(markers))
+    monkeypatch.setattr(video_clock, "_coarse_offset", None)  # it is not searched
+    labels = propose("tracking", marked, video="run.mp4")
+    assert [label.start for label in slips_of(labels["index"])] == pytest.approx(
+        [s for s, _ in SLIPS], abs=0.02
+    )
+
+
+@pytest.mark.parametrize("levels", [np.zeros(0), np.full(50, 90.0)])
+def test_a_flash_that_is_not_seen_counts_for_nothing(levels):
+    marked = replace(recording(), markers=((3.0, "flash"),))
+    assert video_clock.flash_offset(marked, np.arange(len(levels)) / 60, levels) is None
+
+
+class TestDoubt:
+    """What may slide is unstable without a cause: no example of a disturbance."""
+
+    TIMES = np.arange(0.0, 10.0, 0.1)
+    PUSH = Label(2.0, 8.0, "UNSTABLE", "disturbance")
+    HOLD = Label(8.0, 9.0, "STABLE")
+
+    def spans(self, *doubtful, labels=(PUSH, HOLD), times=TIMES):
+        mask = np.zeros(len(times), dtype=bool)
+        for first, last in doubtful:
+            mask[first:last] = True
+        made = video.without_cause(labels, times, mask)
+        return [(round(x.start, 3), round(x.end, 3), x.cause) for x in made]
+
+    @pytest.mark.parametrize(
+        ("doubtful", "parts"),
+        [
+            ((), [(2.0, 8.0, "disturbance")]),
+            (
+                ((30, 41),),
+                [(2.0, 3.0, "disturbance"), (3.0, 4.0, None), (4.0, 8.0, "disturbance")],
+            ),
+            (((0, 31),), [(2.0, 3.0, None), (3.0, 8.0, "disturbance")]),
+            (((0, 100),), [(2.0, 8.0, None)]),
+        ],
+    )
+    def test_a_disturbance_is_cut(self, doubtful, parts):
+        assert self.spans(*doubtful) == [*parts, (8.0, 9.0, None)]
+
+    def test_before_and_after_the_pictures_it_may_slide(self):
+        assert self.spans(times=self.TIMES[30:61]) == [
+            (2.0, 3.0, None), (3.0, 6.0, "disturbance"), (6.0, 8.0, None), (8.0, 9.0, None)
+        ]  # fmt: skip
+
+    def test_a_motion_too_small_for_a_slip_is_doubtful(self):
+        generator = np.random.default_rng(0)
+        times = np.arange(0.0, 10.0, 1 / 60)
+        rest = generator.normal(0, 0.003, (len(times), 2))
+        rest[300:, 0] += 0.1  # half of the least distance of a slip
+        held, rule = np.ones(len(times), dtype=bool), VideoRule()
+        assert seen_slips(times, rest, held, rule) == []
+        doubtful = np.flatnonzero(video.may_slide(rest, held, rule, 3))
+        assert len(doubtful)
+        assert np.abs(doubtful - 300).max() <= 3
+        assert not video.may_slide(rest, np.zeros_like(held), rule, 3).any()
+
+    def test_what_no_picture_shows_is_doubtful(self, film, monkeypatch):
+        times, found = places()
+        film(times, found)
+        seen = video.tip_motions
+
+        def half_seen(*arguments):
+            tips = seen(*arguments)
+            tips["index"] = tips["index"]._replace(seen=times < 20)
+            return tips
+
+        monkeypatch.setattr(video, "tip_motions", half_seen)
+        labels = video.propose(recording(), "run.mp4")["index"]
+        pushes = [x for x in labels if x.state == "UNSTABLE" and x.start > 20.5 and x.end < 36]
+        assert pushes
+        assert not any(x.cause for x in pushes)

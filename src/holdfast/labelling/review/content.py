@@ -18,8 +18,8 @@ from holdfast.labelling.review.findings import (
     faulty_readings,
     findings_of_scan,
     hidden_labels,
+    with_oddities,
 )
-from holdfast.labelling.review.oddities import with_oddities
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.model import Model

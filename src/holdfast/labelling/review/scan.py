@@ -47,8 +47,8 @@ class ModuleScan:
         """Add the next samples."""
         labels = list(module.labels)
         if labels and self.labels and self._end < self.labels[-1].end:
-            # The label goes on after the last sample of the part before: if it begins anew with
-            # the first sample here, and is the same else, the parts have cut it.
+            # The label goes on after the last sample of the part before: if it begins again
+            # with the first sample here, and is the same else, the parts have cut it.
             before, after = self.labels[-1], labels[0]
             is_cut = after.start <= float(module.times[0])
             if is_cut and replace(after, start=before.start, end=before.end) == before:

@@ -26,6 +26,7 @@ class _Rule(NamedTuple):
 
     @property
     def arguments(self) -> list[str]:
+        # Without the recording, and without the thresholds, whose fields are given one by one.
         return [name for name in list(signature(self.propose).parameters)[1:] if name != "rule"]
 
     @property
@@ -52,8 +53,8 @@ def propose(
         rule: one of `RULES`.
         recording: the recording. Its labels are ignored.
         parameters: arguments of the function `propose` of the rule, and fields of its `SignalRule`
-            or `TrackingRule`. With `video`, the rule `tracking` is that of `rules/video.py`, with
-            the fields of `VideoRule`.
+            or `TrackingRule`. With `video` or `motion`, the rule `tracking` is that of
+            `rules/video.py`, with the fields of `VideoRule`.
 
     Raises:
         RecordingError: the recording lacks what the rule needs.
@@ -61,7 +62,8 @@ def propose(
     """
     if rule not in _RULES:
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
-    chosen = _BY_VIDEO if rule == "tracking" and "video" in parameters else _RULES[rule]
+    by_video = rule == "tracking" and not {"video", "motion"}.isdisjoint(parameters)
+    chosen = _BY_VIDEO if by_video else _RULES[rule]
     known = [*chosen.arguments, *chosen.threshold_names]
     if unknown := sorted(set(parameters) - set(known)):
         raise ValueError(

@@ -18,25 +18,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import Cause, ContactState
+from holdfast.contact import UNSTABLE_MARGIN, Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io.foreign import read_stickers
+from holdfast.io.stickers import picture_stamps
 from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.base import evidence_ratio, label_confidence
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import OBJECT
-from holdfast.labelling.rules.video_clock import VideoClock, video_clock
+from holdfast.labelling.rules.video_clock import VideoClock, flash_offset, video_clock
 from holdfast.labelling.rules.video_motion import (
     TipMotion,
     VideoRule,
     force_of,
     mean_over,
+    measured_motion,
     regular_grid,
     robust_fit,
     tip_motions,
 )
-from holdfast.metrics.masks import Mask, fill_short_gaps, hysteresis, n_samples_of, runs
+from holdfast.metrics.masks import Mask, fill_short_gaps, hysteresis, n_samples_of, runs, widen_runs
 from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Array
 
@@ -72,12 +74,14 @@ class SeenSlip(NamedTuple):
 
 def propose(
     recording: Recording,
-    video: str | Path,
+    video: str | Path | None = None,
     tare: TareArgument | Tare | None = None,
     fps: float | None = None,
     offset: float | None = None,
     bodies: Mapping[str, int] | None = None,
     rule: VideoRule | None = None,
+    motion: str | Path | None = None,
+    column: str | None = None,
 ) -> dict[str, tuple[Label, ...]]:
     """Return labels of the fingers in view: the slips that are seen, and the rest by the force.
 
@@ -90,17 +94,30 @@ def propose(
         bodies: number of the sticker of `object` and of fingers; by default 0 for the object, and
             1, 2, ... in the order of the recording.
         rule: thresholds and sizes.
+        motion: path of a CSV file of another instrument, instead of a video. Its motion is that
+            of the object against a hand at rest, so of all fingers; see `measured_motion`.
+        column: the one column of it that counts.
 
     Raises:
         RecordingError: stickers are missing or of another size, or the clocks cannot be aligned.
     """
-    rule, video = rule or VideoRule(), Path(video)
+    rule = rule or VideoRule()
     how = fitting_tare(recording, tare)
-    times, places = read_stickers(video, fps)
-    tips = tip_motions(times, places, stickers_of(recording, bodies), rule, video)
-    grid = regular_grid(times)
+    flash = None
+    if motion is not None:
+        source, kind = Path(motion), "motion"
+        grid, moved = measured_motion(source, column)
+        tips = dict.fromkeys(recording.modules, moved)
+    elif video is not None:
+        source, kind = Path(video), "video"
+        times, levels, places = _filmed(source, fps)
+        flash = flash_offset(recording, times, levels)
+        tips = tip_motions(times, places, stickers_of(recording, bodies), rule, source)
+        grid = regular_grid(times)
+    else:
+        raise ValueError("neither a video nor a motion given")
     clock = (
-        video_clock(recording, tips, grid, how, video)
+        video_clock(recording, tips, grid, how, source, flash)
         if offset is None
         else VideoClock(offset, 0.0)
     )
@@ -109,7 +126,7 @@ def propose(
     for finger, tip in tips.items():
         held = held_at(base[finger], at) & tip.seen
         force = force_of(recording, finger, how)(at)
-        slips, stuck = [], held
+        slips, stuck, rest = [], held, tip.place
         for time in FIT_TIMES:
             n = n_samples_of(time, grid[1] - grid[0])
             rest = unexplained(tip, force, stuck, n)
@@ -117,9 +134,24 @@ def propose(
             stuck = held.copy()
             for slip in slips:
                 stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
-        note = f"video {video.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
-        labels[finger] = with_slips(base[finger], slips, note)
+        note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
+        # What no picture shows is as doubtful as what the pictures show too little of.
+        doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
+        doubtful = widen_runs(doubtful | ~tip.seen, at, UNSTABLE_MARGIN)
+        labels[finger] = without_cause(with_slips(base[finger], slips, note), at, doubtful)
     return labels
+
+
+def _filmed(video: Path, fps: float | None) -> tuple[Array, Array, dict[int, Array]]:
+    """Return times, brightness and stickers, by the stamps of `record --camera` if there are."""
+    stamps = picture_stamps(video) if fps is None else None
+    if stamps is None:
+        return read_stickers(video, fps)
+    # With one picture a second, the time of a picture is its number.
+    numbers, levels, places = read_stickers(video, 1.0)
+    kept = numbers < len(stamps)  # a process that was killed may have lost the last stamps
+    times = stamps[numbers[kept].astype(int)]
+    return times, levels[kept], {k: place[kept] for k, place in places.items()}
 
 
 def stickers_of(recording: Recording, bodies: Mapping[str, int] | None = None) -> dict[str, int]:
@@ -160,7 +192,7 @@ def unexplained(tip: TipMotion, force: Array, held: Mask, n: int) -> Array:
     known = np.column_stack([force, tip.turns])
     both = held[n:] & held[:-n]
     if both.sum() < 4 * known.shape[1]:
-        # Too few for a fit: no motion remains, and so no slip.
+        # Too few changes for a fit: no motion remains, and so no slip.
         return tip.place - tip.place
     change = known[n:] - known[:-n]
     fit, _ = robust_fit(change[both], (tip.place[n:] - tip.place[:-n])[both])
@@ -182,7 +214,8 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
     n = max(round(rule.window / step), 2)
     moved, noise = _step_size(rest, n), 0.0
     if held.any():
-        noise = float(np.median(moved[held])) / 1.18  # of a component of two
+        # Of a component: the median length of a normal pair is 1.18 standard deviations.
+        noise = float(np.median(moved[held])) / 1.18
     # A step is the difference of two means of n values: the noise of one value is larger.
     single = noise * np.sqrt(n / 2)
     least = max(1e3 * rule.step, 6 * noise)
@@ -197,13 +230,14 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         # What is fitted as stuck must not reach into the slip before.
         start, free = max(first - round(rule.before / step), free), last - n
         if away < max(1e3 * rule.slid, 6 * noise):
-            continue  # it came back: nothing slid
+            continue  # a part of a longer motion that came back by itself: nothing slid
         gone = np.linalg.norm(rest[first:last] - before, axis=1)
         far = np.flatnonzero(gone > min(max(1e3 * rule.slid, 6 * single), 0.8 * away))
         end = first + (int(far[0]) if len(far) else len(gone) - 1)
-        start = max(min(start, end - 4), 0)
+        start = max(min(start, end - 4), 0)  # a change point needs four values or more
         along = rest[end] - before
         line = (rest[start : end + 1] - before) @ along / max(float(np.linalg.norm(along)), 1e-9)
+        # Noise of at least 0.005 mm: the place of a sticker is exact to 0.01 mm.
         onset, error = change_point(times[start : end + 1], line, max(single, 0.005))
         path = np.linalg.norm(np.diff(mean_over(rest[first:last], 3), axis=0), axis=1).sum()
         distance = max(float(path), float(away))
@@ -212,6 +246,51 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         ratio = away / max(1e3 * rule.slid, 6 * noise)
         slips.append(SeenSlip(onset, error, until, 1e-3 * distance, 2e-3 * noise, float(ratio)))
     return slips
+
+
+def may_slide(rest: Array, held: Mask, rule: VideoRule, n: int) -> Mask:
+    """Return where so much motion remains that a slip is possible, too small to be found.
+
+    Args:
+        rest: (n, 2) from `unexplained` [mm].
+        held: (n,) where the finger holds the object.
+        rule: thresholds.
+        n: values on either side of a step.
+    """
+    moved = np.where(held, _step_size(rest, n), 0.0)
+    noise = float(np.median(moved[held])) if held.any() else 0.0
+    return hysteresis(moved / max(1e3 * rule.step / 2, 2.5 * noise), 0.7, 1.0)
+
+
+def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
+    """Return labels whose disturbances have no cause where the finger may slide.
+
+    A disturbance trains and scores the head `slip` as no slip. What is unstable without a cause is
+    neither.
+
+    Args:
+        labels: of one finger.
+        times: (n,) of the pictures, on the clock of the labels [s].
+        doubtful: (n,) where it may slide; before and after the pictures it may too.
+    """
+    spans = [(-np.inf, float(times[0])), *((times[a], times[b - 1]) for a, b in runs(doubtful))]
+    made: list[Label] = []
+    for label in labels:
+        if label.cause is not Cause.DISTURBANCE:
+            made.append(label)
+            continue
+        at = label.start
+        for start, end in (*spans, (times[-1], np.inf)):
+            first, last = max(float(start), at), min(float(end), label.end)
+            if first >= last:
+                continue
+            if first > at:
+                made.append(replace(label, start=at, end=first))
+            made.append(replace(label, start=first, end=last, cause=None))
+            at = last
+        if label.end > at:
+            made.append(replace(label, start=at))
+    return tuple(made)
 
 
 def _for_good(rest: Array, moving: Mask, n: int, slid: float, step: float) -> Mask:
@@ -276,6 +355,7 @@ def with_slips(
             )
             if made and made[-1].evidence == text:  # it goes on over an edge of the labels
                 start = made.pop().start
+            # A slip of the least distance has an evidence ratio of 2, a confidence up to 0.75.
             ratio = float(evidence_ratio(slip.ratio, 0.5))
             sure = round(label_confidence(ratio, end - start), 3)
             made.append(

@@ -21,6 +21,11 @@ CLEAR_PEAK = 2.0
 twin: 2.5 to 13 for the own video, 1.0 to 1.5 for another one."""
 COARSE_TIME = 0.05
 """Time between the two ends of the changes by which the clocks are compared first [s]."""
+FLASH_MARKER = "flash"
+"""Marker of the moment at which the page of `serve` lights up."""
+CLEAR_RISE, MIN_RISE = 12.0, 0.1
+"""Rise of the brightness from one picture to the next that is a flash, as a multiple of the usual
+one, which is at least `MIN_RISE` of 255 steps."""
 FAST_SHARE = 0.05
 """Share of the pictures, those with the largest accelerations, by which the clocks are compared:
 slow motion lags behind the force, because skins creep and objects roll."""
@@ -39,16 +44,58 @@ class VideoClock(NamedTuple):
     error: float
 
 
+def flash_offset(recording: Recording, times: Array, levels: Array) -> float | None:
+    """Return the offset at which the pictures light up where the page of `serve` flashed [s].
+
+    It is exact to a picture and to what screen and browser take: motion refines it.
+
+    Args:
+        recording: with markers `flash`.
+        times: (n,) of the pictures [s].
+        levels: (n,) their brightness.
+
+    Returns:
+        The offset; None without a marker, or where no picture lights up.
+    """
+    flashes = np.array([time for time, text in recording.markers if text == FLASH_MARKER])
+    rises = np.diff(levels)
+    if not len(flashes) or not len(rises):
+        return None
+    usual = max(float(np.median(np.abs(rises))), MIN_RISE)
+    steps = times[1:][rises > CLEAR_RISE * usual]
+    # All flashes of a recording have one offset: that at which most of them light up a picture.
+    offsets = (flashes[:, None] - steps).ravel()
+    if not len(offsets):
+        return None
+    near = np.abs(offsets[:, None] - offsets) < FINE_REACH
+    return float(np.median(offsets[near[np.argmax(near.sum(axis=1))]]))
+
+
 def video_clock(
-    recording: Recording, tips: Mapping[str, TipMotion], grid: Array, tare: Tare, video: Path
+    recording: Recording,
+    tips: Mapping[str, TipMotion],
+    grid: Array,
+    tare: Tare,
+    video: Path,
+    coarse: float | None = None,
 ) -> VideoClock:
     """Return the offset of the clock of a video, by what the camera sees and the fingers feel.
+
+    Args:
+        recording: of the fingers.
+        tips: their motion.
+        grid: (n,) times of the motion, on the clock of the video [s].
+        tare: of the forces.
+        video: for messages.
+        coarse: offset that is known to `FINE_REACH` [s]; by default it is searched.
 
     Raises:
         RecordingError: nothing moves alike, or the error is too large.
     """
     step = float(grid[1] - grid[0])
-    coarse, clear = _coarse_offset(recording, tips, grid, tare)
+    clear = CLEAR_PEAK
+    if coarse is None:
+        coarse, clear = _coarse_offset(recording, tips, grid, tare)
     if clear < CLEAR_PEAK:
         raise RecordingError(
             f"{video}: its motion is not that of recording {recording.name!r} at any offset (the "
@@ -74,6 +121,7 @@ def video_clock(
     whole = costs.sum(axis=1)
     if not whole.any():
         raise RecordingError(f"{video}: no finger with a sticker is loaded while it is filmed")
+    # Fast pictures are cut into parts in order of time; each fit leaves out one of them.
     parts = np.array([_lowest(offsets, whole - costs[:, k]) for k in range(N_CLOCK_PARTS)])
     # The variance of a jackknife is n - 1 times that of the results without one part.
     error = float(np.sqrt((N_CLOCK_PARTS - 1) * parts.var() + step**2 / 144))
@@ -108,7 +156,8 @@ def _coarse_offset(
         moved, felt = (_cut(values[n:] - values[:-n]) for values in (tip.place, force))
         products = np.array([[correlate(f, m) for f in felt.T] for m in moved.T])
         inverse = np.linalg.pinv(felt.T @ felt)
-        shares += np.einsum("ijl,jk,ikl->l", products, inverse, products) / (moved**2).sum()
+        explained = np.einsum("ijl,jk,ikl->l", products, inverse, products)
+        shares += explained / max((moved**2).sum(), 1e-12)
     best = int(np.argmax(shares))
     # Motion is smooth, so the offsets beside the best one are nearly as good: they do not count.
     near = round(FINE_REACH / step) + 10

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,8 +11,10 @@ import numpy as np
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.force import tared_force
+from holdfast.io.importers.table import read_table
 from holdfast.labelling.rules.base import check_positive
-from holdfast.labelling.rules.poses import OBJECT
+from holdfast.labelling.rules.poses import OBJECT, POSE_COLUMNS
+from holdfast.labelling.rules.tracking import SPIN_LEVER
 from holdfast.metrics.masks import Mask, covered, n_samples_of
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
@@ -19,13 +22,13 @@ from holdfast.sensors.types import Array
 MIN_SEEN = 0.5
 """Share of the pictures in which a sticker must be seen."""
 MAX_UNSEEN_TIME = 0.1
-"""Longest time without a picture of a sticker that is bridged [s]."""
+"""Longest time without a picture of a sticker, or another measurement, that is bridged [s]."""
+MIN_MEASURED = 100
+"""Least number of measurements of another instrument."""
 ALIKE_SIZES = 1.6
 """Ratio by which the stickers may look larger or smaller than their sizes: one is nearer."""
 EXPOSURE_TIME = 1 / 60
 """Longest time over which the force is averaged for a picture [s]."""
-TURN_TIME = 0.15
-"""Time over which the tilts are averaged: they are 50 times less exact than places [s]."""
 SCALE_TIME = 0.5
 """Time over which the size of a sticker in the picture is averaged: it is the distance [s]."""
 TURN_SCALE = 30.0
@@ -60,8 +63,10 @@ class TipMotion(NamedTuple):
     """Motion of a fingertip on the object, on a regular grid of pictures.
 
     Attributes:
-        place: (n, 2) in the plane of the object's sticker, along its sides [mm].
-        turns: (n, 7) turn in the picture and tilts of both bodies [TURN_SCALE mm].
+        place: (n, 2) in the plane of the object's sticker, along its sides [mm]; of another
+            measurement (n, 1) or (n, 3).
+        turns: (n, 7) turn in the picture and tilts of both bodies [TURN_SCALE mm]; of another
+            measurement (n, 3) or (n, 0).
         seen: (n,) where both stickers are seen.
     """
 
@@ -129,7 +134,7 @@ def tip_motions(
                 f"{1e3 * rule.tip_size:g} mm beside the {1e3 * rule.object_size:g} mm of the "
                 "object; give the sides of the black squares as tip_size and object_size [m]"
             )
-        # The side of a sticker in the picture tells how long a pixel is at its distance.
+        # The side of a sticker in the picture gives the length of a pixel at its distance.
         away = 1e3 * (
             rule.tip_size * track[:, :, 2] / scales[body][:, None]
             - rule.object_size * base[:, :, 2] / scales[OBJECT][:, None]
@@ -140,10 +145,57 @@ def tip_motions(
             [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
         )
         place = upright @ flatten.T
-        n = n_samples_of(TURN_TIME, grid[1] - grid[0])
-        turns = np.column_stack([tip_turn - turn, mean_over(np.column_stack([tilt, tip_tilt]), n)])
+        # Tilts are 50 times less exact than places, but not averaged: averages are late, and a push
+        # that rolls the object would remain as motion.
+        turns = np.column_stack([tip_turn - turn, tilt, tip_tilt])
         motions[body] = TipMotion(place, TURN_SCALE * turns, seen & tip_seen)
     return motions
+
+
+def measured_motion(path: Path, column: str | None = None) -> tuple[Array, TipMotion]:
+    """Return times (n,) [s] and motion of the object that another instrument has measured.
+
+    Args:
+        path: of a CSV file with a column `time` [s], and positions x, y, z [m], or quaternions qw,
+            qx, qy, qz of a motion sensor, or both.
+        column: the one column that counts instead, as of an encoder or a linear stage [m].
+
+    Raises:
+        RecordingError: the file cannot be read, or has neither.
+    """
+    from scipy.spatial.transform import Rotation
+
+    table, _ = read_table(path)
+    kinds: list[tuple[str, ...]] = [
+        names for names in (POSE_COLUMNS[1:4], POSE_COLUMNS[4:]) if {*names} <= {*table.names}
+    ]
+    if column is not None:
+        kinds = [(column,)]
+    if not kinds:
+        raise RecordingError(
+            f"{path} has the columns {', '.join(table.names)}; time and x,y,z or qw,qx,qy,qz "
+            "expected, or another one by --column"
+        )
+    values = table.columns(("time", *chain(*kinds)))
+    values = values[np.isfinite(values).all(axis=1)]
+    times, first = np.unique(values[:, 0], return_index=True)
+    if len(times) < MIN_MEASURED:
+        raise RecordingError(f"{path} has {len(times)} times; at least {MIN_MEASURED} expected")
+    values = values[first, 1:]
+    if len(kinds[-1]) == 4:  # q and -q are one rotation, but between them is none
+        flips = np.cumsum((values[1:, -4:] * values[:-1, -4:]).sum(axis=1) < 0) % 2
+        values[1:, -4:] *= 1 - 2 * flips[:, None]
+    grid = regular_grid(times)
+    known = np.stack([np.interp(grid, times, part) for part in values.T], axis=1)
+    place, turns = 1e3 * known[:, : len(kinds[0])], known[:, :0]
+    if len(kinds[-1]) == 4:  # quaternions, with their scalar first
+        if not (np.abs(np.linalg.norm(values[:, -4:], axis=1) - 1) < 0.1).all():
+            raise RecordingError(f"{path}: unit quaternions qw,qx,qy,qz expected in each row")
+        turned = Rotation.from_quat(np.roll(known[:, -4:], -1, axis=1))
+        turns = TURN_SCALE * (turned * turned[0].inv()).as_rotvec()
+    if len(kinds[0]) == 4:  # no places: what turns slides at the edge of the contact
+        place, turns = 1e3 * SPIN_LEVER / TURN_SCALE * turns, turns[:, :0]
+    return grid, TipMotion(place, turns, covered(grid, times, MAX_UNSEEN_TIME))
 
 
 def force_of(recording: Recording, finger: str, tare: Tare) -> Callable[[Array], Array]:

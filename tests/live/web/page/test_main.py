@@ -463,6 +463,23 @@ def test_markers(visit, service):
     assert page.evaluate("holdfast.plots.markers.length") == 2
 
 
+def test_a_flash_lights_up_the_page_and_is_marked_then(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.evaluate("""() => {
+      window.seen = [];
+      const look = () => seen.push(getComputedStyle(document.body, "::after").backgroundColor);
+      new MutationObserver(look).observe(document.body, { attributeFilter: ["data-flash"] });
+    }""")
+    page.keyboard.press("l")
+    until(page, "seen.length === 3")
+    black, white, gone = page.evaluate("seen")
+    assert (black, white) == ("rgb(0, 0, 0)", "rgb(255, 255, 255)")
+    assert gone not in (black, white)
+    assert [json.loads(body) for _, _, body in service.calls] == [{"text": "flash"}]
+    assert page.evaluate("holdfast.plots.markers.length") == 1
+
+
 def test_help(visit, service):
     page = visit(service.url)
     wait_for_samples(page)

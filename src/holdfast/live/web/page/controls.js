@@ -6,6 +6,9 @@ import { clock, fileSize } from "./format.js";
 
 const TOAST_TIME = 6000; // [ms]
 const MAX_TOASTS = 4;
+const FLASH_TIME = 400; // [ms], dark and then bright
+// The first callback comes before the page is painted, the second one after it.
+const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 /** Why tare, thresholds and model cannot be changed while the hand is armed. */
 export const LOCKED = "The hand is armed: the tare, the thresholds and the model are locked";
 
@@ -106,6 +109,23 @@ export class Controls {
     return this.request(byId("mark"), async () => {
       await callService("POST", "markers", { text: text || "marker" });
       this.onMarker(text);
+    });
+  }
+
+  /** Light up the page for a camera, and mark when: `label auto` then has the offset of its clock. */
+  flash() {
+    return this.request(byId("mark"), async () => {
+      const shown = (name) => { document.body.dataset.flash = name; return painted(); };
+      try {
+        await shown("dark");
+        await new Promise((done) => setTimeout(done, FLASH_TIME));
+        await shown("bright");
+        await callService("POST", "markers", { text: "flash" });
+        this.onMarker("flash");
+        await new Promise((done) => setTimeout(done, FLASH_TIME));
+      } finally {
+        delete document.body.dataset.flash;
+      }
     });
   }
 

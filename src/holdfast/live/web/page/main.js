@@ -48,7 +48,7 @@ class Page {
     byId("pause").addEventListener("click", () => this.togglePause());
     listenToKeys({
       " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
-      m: () => this.controls.mark(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
+      m: () => this.controls.mark(), l: () => this.controls.flash(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
       p: () => this.threshold.toggle(), c: () => this.calibration.press(), k: () => this.togglePause(),
       digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
     });
