@@ -270,7 +270,7 @@ typedef struct {
     int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
     int64_t longest_still; /* most successive samples without a change, of those that changed the
                               finger */
-    /* Of each axis of a magnetometer, which is compared every 0.05 s: */
+    /* Of each axis of a magnetometer, which is compared every 0.15 s: */
     hf_real compared[3];     /* reading */
     int32_t n_same[3];       /* comparisons since it last differed */
     int32_t longest_same[3]; /* most of these that were no fault */
@@ -352,7 +352,7 @@ typedef struct {
     uint32_t taxel_faults;  /* faults of single taxels at the last sample that changed a reading */
     uint64_t faulty_taxels; /* bits of those taxels */
     uint64_t noisy_taxels;  /* bits of the noisy ones among them */
-    uint64_t stuck_axes;    /* bits of the magnetometers of which an axis does not change */
+    uint64_t stuck_axes[3]; /* bits of the magnetometers of which this axis does not change */
     /* Taxels that are left out (masks.c). */
     int64_t n_refused;    /* successive samples of the tare with a reading that is not valid */
     uint64_t lost;        /* bits of the taxels that have no tare */
@@ -370,7 +370,7 @@ typedef struct {
     bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
     hf_real common[6];      /* the readings' mean beyond the tare in both frames, smoothed */
     hf_real speed[6];       /* of these, smoothed, too [unit of the readings / s] */
-    hf_real field_speed;    /* of the field, if the finger is open and it moves; else 0 */
+    hf_real field_speed;    /* square of the field's, if it moves and the finger is open; else 0 */
     bool field_is_load;     /* the taxels moved alike, as no field does */
     bool is_shared;         /* the field was found by the help of another module */
     bool is_deep;           /* a load hides the field */

@@ -208,9 +208,9 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
     if (steps.largest < HF_LONE_SHARE * steps.total && !hf_has_zeros(f, scan)) {
         return 0;
     }
-    /* Steps of noise: two samples in three axes. Not known before the noise is. */
+    /* Steps of noise: two samples in three axes. Before it is known, those of the others. */
     const size_t n = f->n;
-    const hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
+    hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
     uint64_t bits = 0;
     hf_real n_others = f->finger->n_used;
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -221,6 +221,9 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
             n_others -= 1;
             bits |= hf_square(fallen) > 0 ? hf_bit(i) : 0;
         }
+    }
+    if (isnan(s->noise) && !bits) {
+        of_noise = hf_max(0, steps.total - steps.largest) / hf_max(n_others - 1, 1);
     }
     /* Zero: |f_i(k-1)|^2 > (20)^2 max(mean |df|^2 of the others, of noise). */
     const hf_real typical = hf_max(of_noise, hf_max(0, steps.total) / hf_max(n_others, 1));

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.recordings import Recording
+
 CHECK_INTERVAL = 0.05
 """Time between the samples that are compared [s]; more would cost time and show nothing else."""
 BLOCK_SECONDS = 1.0
@@ -143,6 +145,24 @@ class ModuleComparison:
         new = [each for each in found if (each.module, each.other) not in self._reported]
         self._reported.update((each.module, each.other) for each in new)
         return new
+
+    def update_recording(self, part: Recording) -> list[Likeness]:
+        """Compare the modules of the next part of a recording; return what is new."""
+        modules = {name: m for name, m in part.modules.items() if m.n_samples}
+        if len(modules) < 2:
+            return []
+        first = max(m.times[0] for m in modules.values())
+        times = np.arange(first, min(m.times[-1] for m in modules.values()), CHECK_INTERVAL)
+        rows = {n: np.searchsorted(m.times, times, side="right") - 1 for n, m in modules.items()}
+        found = []
+        for k, time in enumerate(times.tolist()):
+            samples = {
+                name: m.readings[rows[name][k]]
+                for name, m in modules.items()
+                if time - m.times[rows[name][k]] < CHECK_INTERVAL
+            }
+            found += self.update(samples, time)
+        return found
 
     def _compare(
         self, names: list[str], values: Mapping[str, npt.NDArray[np.float64]], time: float

@@ -90,11 +90,9 @@ class ReadingsMonitor:
         return notices
 
     def update_recording(self, part: Recording) -> list[str]:
-        """Look at the next part of a recording; return new notices.
-
-        Modules are compared with each other by `labelling/review/scan.py`.
-        """
-        notices: list[str] = []
+        """Look at the next part of a recording; return new notices."""
+        alike = self._comparison.update_recording(part)
+        notices = [f"{each.module} {each.text}" for each in alike]
         for name in self._fingers.keys() & part.modules.keys():
             module = part.modules[name]
             stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
