@@ -15,7 +15,7 @@ from holdfast.openable import Closable
 
 STALL_TIME = 1.0
 """Time without a picture after which a camera is reported [s]."""
-DEFAULT_RATE = 30.0
+UNSTATED_RATE = 30.0
 """Rate that is written to the file if the camera gives none [Hz]. The stamps are exact."""
 
 
@@ -53,7 +53,7 @@ class CameraRecorder(Closable):
                 f"no camera {camera}: the number of a camera (0 is the first), or a video file "
                 "or stream expected"
             )
-        self._rate = self._film.get(cv2.CAP_PROP_FPS) or DEFAULT_RATE
+        self._rate = self._film.get(cv2.CAP_PROP_FPS) or UNSTATED_RATE
         # A file has all its pictures at once; a camera sends them one period apart.
         self._pause = 1 / self._rate if Path(camera).is_file() else 0.0
         self.n_pictures = 0
