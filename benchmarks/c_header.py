@@ -27,7 +27,7 @@ from exporters.c_detector import both, compare, random_samples  # noqa: E402
 from holdfast.classifiers import Linear  # noqa: E402
 from holdfast.detector import Detector  # noqa: E402
 from holdfast.exporters import header_of  # noqa: E402
-from holdfast.exporters.c_compiler import code_size  # noqa: E402
+from holdfast.exporters.c_header import code_size  # noqa: E402
 from holdfast.features import DEPLOYED_FEATURES, parse_features  # noqa: E402
 from holdfast.model import FingerModel, Head, Model  # noqa: E402
 from holdfast.sensors import sensor  # noqa: E402

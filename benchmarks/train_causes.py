@@ -19,7 +19,6 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.causes import fit_causes
 from holdfast.contact import Cause
 from holdfast.features.stream import extract
 from holdfast.io import load_dataset
@@ -28,6 +27,7 @@ from holdfast.model import Head, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import true_updates
 from holdfast.sensors.types import Array, Integers
+from holdfast.training.head_fits import fit_causes
 
 MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""

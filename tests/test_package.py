@@ -19,6 +19,7 @@ PUBLIC = [
     *(
         "Setting",
         "StabilityClassifier",
+        "teach",
         "train",
         "calibrate",
         "evaluate",

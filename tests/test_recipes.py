@@ -222,7 +222,7 @@ def test_add_a_sensor(copy_of):
     copy = copy_of("Add a sensor")
     copy.change(
         "holdfast/sensors/built_in.py",
-        ('    "anyskin": _anyskin,\n', '    "anyskin": _anyskin,\n    "pad": _pad,\n'),
+        ('    "anyskin": anyskin,\n', '    "anyskin": anyskin,\n    "pad": _pad,\n'),
         ("SENSORS = {", PAD + "SENSORS = {"),
     )  # fmt: skip
     shown = json.loads(copy.run(*VERB, "sensors", "pad", "--json"))

@@ -48,7 +48,7 @@ def _closure(roots: Iterable[str], without: tuple[str, ...]) -> dict[str, Path]:
     waiting = [name for root in roots for name in (root, *_members(root))]
     while waiting:
         name = waiting.pop()
-        path = _module_files().get(name)
+        path = module_files().get(name)
         if (
             path is None
             or name in files
@@ -57,13 +57,20 @@ def _closure(roots: Iterable[str], without: tuple[str, ...]) -> dict[str, Path]:
         ):
             continue
         files[name] = path
-        files.update(_data_files(path.parent))
-        waiting += _imported_modules(name)
+        # Data beside the module, and in sub-folders that are no packages.
+        for folder in (path.parent, *(sub for sub in path.parent.iterdir() if sub.is_dir())):
+            if folder == path.parent or not (folder / "__init__.py").exists():
+                files |= {
+                    f"{path.parent.name}/{data.relative_to(path.parent).as_posix()}": data
+                    for data in folder.iterdir()
+                    if data.suffix in DATA_SUFFIXES
+                }
+        waiting += imported_modules(name)
     return files
 
 
 @lru_cache
-def _module_files() -> dict[str, Path]:
+def module_files() -> dict[str, Path]:
     """Return the file of each module of the packages, by its name."""
     files = {}
     for package in PACKAGES:
@@ -76,12 +83,15 @@ def _module_files() -> dict[str, Path]:
 
 
 @lru_cache
-def _imported_modules(name: str) -> tuple[str, ...]:
+def imported_modules(name: str) -> tuple[str, ...]:
     """Return the names that a module may import, with the packages that contain them."""
-    tree = ast.parse(_module_files()[name].read_text("utf-8"))
+    tree = ast.parse(module_files()[name].read_text("utf-8"))
     names = set(_imports(tree))
-    if name not in PACKAGES and _imports_by_name(tree):
-        is_package = _module_files()[name].stem == "__init__"
+    # A name that is computed can be any module of the folder. Not of a whole package, whose
+    # `__init__` imports its names late: everything would depend on everything.
+    by_name = any(isinstance(n, ast.Name) and n.id == "import_module" for n in ast.walk(tree))
+    if name not in PACKAGES and by_name:
+        is_package = module_files()[name].stem == "__init__"
         names.update(_members(name if is_package else name.rpartition(".")[0]))
     parts = [module.split(".") for module in names]
     return tuple({".".join(words[:n]) for words in parts for n in range(1, len(words) + 1)})
@@ -100,22 +110,6 @@ def _imports(node: ast.AST) -> Iterator[str]:
         yield from _imports(child)
 
 
-def _imports_by_name(tree: ast.AST) -> bool:
-    return any(isinstance(node, ast.Name) and node.id == "import_module" for node in ast.walk(tree))
-
-
 def _members(package: str) -> list[str]:
     """Return the names of all modules inside a package."""
-    return [name for name in _module_files() if name.startswith(f"{package}.")]
-
-
-def _data_files(folder: Path) -> dict[str, Path]:
-    """Return the data files of a folder, and of its sub-folders that are no packages."""
-    folders = [folder, *(sub for sub in folder.iterdir() if sub.is_dir())]
-    return {
-        f"{folder.name}/{path.relative_to(folder).as_posix()}": path
-        for data_folder in folders
-        if data_folder == folder or not (data_folder / "__init__.py").exists()
-        for path in data_folder.iterdir()
-        if path.suffix in DATA_SUFFIXES
-    }
+    return [name for name in module_files() if name.startswith(f"{package}.")]

@@ -97,9 +97,8 @@ class TaskRunner:
         if len(missing) < len(by_key):
             self.notify(f"{len(by_key) - len(missing)} of {len(by_key)} tasks are already done")
         total = sum(task.cost for task in missing)
-        for task, result in self.progress(
-            self._run_missing(missing, keys), "working", total, _cost
-        ):
+        done = self._run_missing(missing, keys)
+        for task, result in self.progress(done, "working", total, lambda pair: pair[0].cost):
             results[keys[task.name]] = result
         return {name: results[key] for name, key in keys.items()}
 
@@ -108,10 +107,15 @@ class TaskRunner:
     ) -> Iterator[tuple[Task, Any]]:
         """Yield each task with its result, after storing it."""
         by_name = {task.name: task for task in sorted(tasks, key=lambda task: -task.cost)}
-        source = source_digest()
+        source = source_digest()  # sent along, because a worker may have another version
         calls = ((name, (source, *task[:3])) for name, task in by_name.items())
         for name, data in self.engine.map_unordered(_call, calls):
-            result = _decoded(data, by_name[name])
+            # Decoded before it is stored: a result of another type than promised is no result.
+            try:
+                result = msgpack.decode(data, type=by_name[name].result)
+            except MsgspecError as cause:
+                kind = by_name[name].result
+                raise TypeError(f"{name} returned no {kind}: {cause}") from cause
             stored = StoredResult(name, sha256(data).hexdigest(), Raw(data))
             write_whole(self._path(keys[name]), msgpack.encode(stored), force=True)
             yield by_name[name], result
@@ -139,23 +143,18 @@ class StoredResult(Struct, frozen=True):
 
 def _keys(tasks: Sequence[Task]) -> dict[str, str]:
     """Return a digest of what each result depends on, by the name of the task."""
-    keys = {task.name: _key(task) for task in tasks}
+    keys = {}
+    for task in tasks:
+        function = f"{task.function.__module__}.{task.function.__qualname__}"
+        version = task.version or source_digest((task.function.__module__,))
+        contents = (version, function, task.arguments)
+        # Mappings are encoded in the order of their keys, not in the order of their making.
+        keys[task.name] = sha256(msgpack.encode(contents, order="deterministic")).hexdigest()
     if len(keys) < len(tasks):
         names = [task.name for task in tasks]
         repeated = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"two tasks are called {repeated}")
     return keys
-
-
-def _key(task: Task) -> str:
-    function = f"{task.function.__module__}.{task.function.__qualname__}"
-    version = task.version or source_digest((task.function.__module__,))
-    contents = (version, function, task.arguments)
-    return sha256(msgpack.encode(contents, order="deterministic")).hexdigest()
-
-
-def _cost(done: tuple[Task, Any]) -> float:
-    return done[0].cost
 
 
 def _call(
@@ -181,10 +180,3 @@ def _to_builtin(value: Any) -> Any:  # noqa: ANN401 (NumPy's numbers and arrays)
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"a {type(value).__name__} cannot be stored")
-
-
-def _decoded(data: bytes, task: Task) -> Any:  # noqa: ANN401 (any function's)
-    try:
-        return msgpack.decode(data, type=task.result)
-    except MsgspecError as cause:
-        raise TypeError(f"{task.name} returned no {task.result}: {cause}") from cause

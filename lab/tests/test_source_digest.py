@@ -41,8 +41,8 @@ def toy(tmp_path, monkeypatch):
 
 def clear():
     module.source_digest.cache_clear()
-    module._module_files.cache_clear()
-    module._imported_modules.cache_clear()
+    module.module_files.cache_clear()
+    module.imported_modules.cache_clear()
 
 
 def changes(folder, name, root="toy.made.result", without=()):

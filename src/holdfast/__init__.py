@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from holdfast.training import StabilityClassifier as StabilityClassifier
     from holdfast.training import calibrate as calibrate
     from holdfast.training import evaluate as evaluate
+    from holdfast.training import teach as teach
     from holdfast.training import train as train
 
 _NAMES = {
@@ -79,7 +80,7 @@ _NAMES = {
     ),
     "live.stream_detector": ("StreamDetector",),
     "devices.sources": ("Arrival", "Source", "open_source"),
-    "training": ("Setting", "StabilityClassifier", "calibrate", "evaluate", "train"),
+    "training": ("Setting", "StabilityClassifier", "calibrate", "evaluate", "teach", "train"),
     "metrics": ("event_metrics", "sample_metrics"),
     "errors": (
         "EngineError",

@@ -140,7 +140,8 @@ UNSTABLE_MARGIN = 0.1
 MIN_CONTACT_DURATION = 0.1
 """A contact, or a loss of contact, that is shorter is not labelled [s]."""
 GLITCH_DURATION = 0.1
-"""Time after a glitch of the hand's controller in which it is the cause of a disturbance [s]."""
+"""A disturbance that begins within this time after a glitch of the hand's controller has the glitch
+as its cause [s]."""
 
 
 class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
@@ -154,8 +155,8 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
         instability: sigma, the standard deviation of the Haar details [unit of the readings];
             NaN without a full window.
         force: F_tip = (F_x, F_y, F_z) in the fingertip frame [unit of the readings].
-        faults: faults of the readings, or of their arrival. The state may be known: a finger goes
-            on without faulty taxels that carry less than half of its load.
+        faults: faults of the readings, or of their arrival. A finger with faults may have a state:
+            taxels that carry less than half of its load are left out.
         faulty_taxels: indices in the readings of the module, from 0, of the taxels that are
             faulty by themselves; empty where the finger as a whole is faulty. Documents and
             messages have the numbers of these taxels, from 1 (`sensors.taxel_numbers`).

@@ -242,26 +242,20 @@ def install_command(extra: str) -> str:
 def package_versions() -> dict[str, dict[str, str | None]]:
     """Return the version of each required package, by extra ("" without one); None if missing."""
     import re
-    from importlib.metadata import requires
+    from importlib.metadata import PackageNotFoundError, requires, version
 
     requirement = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
     versions: dict[str, dict[str, str | None]] = {}
     for match in filter(None, map(requirement.match, requires("holdfast") or [])):
         if match["package"] != "holdfast":
             group = versions.setdefault(match["extra"] or "", {})
-            group[match["package"]] = _version(match["package"])
+            try:
+                group[match["package"]] = version(match["package"])
+            except PackageNotFoundError:
+                group[match["package"]] = None
     # "all" requires other extras of this package, not packages
     others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra not in ("all", "deep"))
     return versions | {"all": {name: found for group in others for name, found in group.items()}}
-
-
-def _version(package: str) -> str | None:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def listen_error(host: str, port: int, cause: Exception) -> OutputError:

@@ -230,15 +230,15 @@ def check_keys(text: bytes) -> None:
         ValueError: a key is given twice, or the text is not JSON.
         RecursionError: the text is nested too deep.
     """
-    json.loads(text, object_pairs_hook=_check_pairs)
 
+    def check_pairs(pairs: list[tuple[str, object]]) -> None:
+        seen: set[str] = set()
+        for key, _ in pairs:
+            if key in seen:
+                raise ValueError(f"the key {key!r} is given twice")
+            seen.add(key)
 
-def _check_pairs(pairs: list[tuple[str, object]]) -> None:
-    seen: set[str] = set()
-    for key, _ in pairs:
-        if key in seen:
-            raise ValueError(f"the key {key!r} is given twice")
-        seen.add(key)
+    json.loads(text, object_pairs_hook=check_pairs)
 
 
 def _new_file_beside(target: Path) -> Path:

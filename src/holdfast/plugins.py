@@ -157,9 +157,18 @@ class PluginGroup(Generic[T]):
         # Of two with one name the first counts, whatever the order of folders on the path.
         points.sort(key=lambda point: (point.name, _package(point)))
         first: dict[str, EntryPoint] = {}
+        found: list[tuple[EntryPoint, str]] = []
         for point in points:
-            first.setdefault(point.name, point)
-        return [(point, self._refusal(point, first[point.name])) for point in points]
+            owner = _package(first.setdefault(point.name, point))
+            if point.name in self._built_in:
+                reason = f"holdfast itself has {point.name}; another name expected"
+            elif owner != _package(point):
+                reason = f"{owner} has {point.name} as well; another name expected"
+            else:
+                known = point.dist
+                reason = "" if known is None else other_version(known.name, known.version)
+            found.append((point, reason))
+        return found
 
     def _usable_points(self) -> "dict[str, EntryPoint]":
         """Return the entry points by name; report those whose name is taken."""
@@ -170,14 +179,6 @@ class PluginGroup(Generic[T]):
             else:
                 usable[point.name] = point
         return usable
-
-    def _refusal(self, point: "EntryPoint", first: "EntryPoint") -> str:
-        """Return why the name of a plug-in cannot be used; empty if it can."""
-        if point.name in self._built_in:
-            return f"holdfast itself has {point.name}; another name expected"
-        if _package(first) != _package(point):
-            return f"{_package(first)} has {point.name} as well; another name expected"
-        return "" if point.dist is None else other_version(point.dist.name, point.dist.version)
 
     def _report(self, point: "EntryPoint", reason: str) -> None:
         """Report that a plug-in is skipped, each reason once."""

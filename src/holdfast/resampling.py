@@ -99,7 +99,13 @@ def true_updates(recording: Recording) -> Recording:
         The same object if a sensor does not hold its samples, or updates too slowly.
     """
     modules = {name: module for name, module in recording.modules.items() if module.n_samples}
-    held = {name: rows_per_update(_changed_rows(module)) for name, module in modules.items()}
+    held: dict[str, float] = {}
+    for name, module in modules.items():
+        readings = module.readings[:HELD_ROWS]
+        newer, older = readings[1:], readings[:-1]
+        differ = (newer != older) & ~(np.isnan(newer) & np.isnan(older))
+        # The first row is an update whatever it is.
+        held[name] = rows_per_update(np.append(True, differ.any(axis=(1, 2))))
     if not held or min(held.values()) == 1.0:
         return recording
     if min(module.rate / held[name] for name, module in modules.items()) < MIN_UPDATE_RATE:
@@ -112,14 +118,6 @@ def true_updates(recording: Recording) -> Recording:
         times, readings = module.times[kept], module.readings[kept]
         updates[name] = replace(module, times=times, readings=readings)
     return replace(recording, modules={**recording.modules, **updates})
-
-
-def _changed_rows(module: Tactile) -> Flags:
-    """Return whether each of the first rows differs from the one before; the first one does."""
-    readings = module.readings[:HELD_ROWS]
-    newer, older = readings[1:], readings[:-1]
-    differ = (newer != older) & ~(np.isnan(newer) & np.isnan(older))
-    return np.append(True, differ.any(axis=(1, 2)))
 
 
 def at_rate(recording: Recording, rate: float | None) -> Recording:

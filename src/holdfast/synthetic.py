@@ -24,6 +24,18 @@ FREE_TIME, CLOSING_TIME, HELD_TIME, SHAKEN_TIME, RELEASED_TIME = 1.5, 0.8, 3.0, 
 """Duration of each part of the schedule [s]."""
 
 
+_STATES = (
+    (ContactState.NO_CONTACT, None),
+    (ContactState.UNSTABLE, Cause.CLOSING),
+    (ContactState.STABLE, None),
+    (ContactState.UNSTABLE, Cause.DISTURBANCE),
+    (ContactState.STABLE, None),
+    (ContactState.UNSTABLE, Cause.RELEASED),
+    (ContactState.NO_CONTACT, None),
+)
+"""State and cause of each part of the schedule."""
+
+
 def synthetic_recording(
     name: str, seed: int, fingers: Sequence[str] = ("thumb", "index", "middle")
 ) -> Recording:
@@ -65,7 +77,12 @@ def _finger(generator: np.random.Generator, grip: float) -> Tactile:
     rest = np.array(READING_BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
     noise = generator.normal(0.0, READING_NOISE, size=in_taxels.shape)
     readings = np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
-    return Tactile(tip, times, readings, labels=_labels(ends))
+    starts = [0.0, *ends[:-1].tolist()]
+    labels = [
+        Label(start, float(end), state, cause, evidence="schedule", author="synthetic")
+        for start, end, (state, cause) in zip(starts, ends, _STATES, strict=True)
+    ]
+    return Tactile(tip, times, readings, labels=tuple(labels))
 
 
 def _force(generator: np.random.Generator, times: Array, ends: Array, grip: float) -> Array:
@@ -80,23 +97,6 @@ def _force(generator: np.random.Generator, times: Array, ends: Array, grip: floa
     shaking = 0.05 * np.sin(angle).sum(axis=1) * shaken[:, None]
     direction = np.array([1.0, *generator.normal(0.0, 0.2, size=2)])
     return np.asarray(level[:, None] * (direction + shaking))
-
-
-def _labels(ends: Array) -> tuple[Label, ...]:
-    states = (
-        (ContactState.NO_CONTACT, None),
-        (ContactState.UNSTABLE, Cause.CLOSING),
-        (ContactState.STABLE, None),
-        (ContactState.UNSTABLE, Cause.DISTURBANCE),
-        (ContactState.STABLE, None),
-        (ContactState.UNSTABLE, Cause.RELEASED),
-        (ContactState.NO_CONTACT, None),
-    )
-    starts = [0.0, *ends[:-1].tolist()]
-    return tuple(
-        Label(start, float(end), state, cause, evidence="schedule", author="synthetic")
-        for start, end, (state, cause) in zip(starts, ends, states, strict=True)
-    )
 
 
 def _ramp(x: Array) -> Array:

@@ -4,7 +4,7 @@ The same call continues a run that was stopped, as recordings that exist are kep
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +14,7 @@ from holdfast.files import file_stem, whole_file
 from holdfast.io import load_recording, save_recording
 from holdfast.parallel import Engine
 from holdfast.twin import simulation
+from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.objects import load_objects
 from holdfast.twin.profile import GRASP_ATTEMPTS
 from holdfast.twin.profile import profile as check_profile
@@ -38,11 +39,12 @@ def plan_grasps(
     *,
     server: bool = False,
     table: Path | None = None,
+    faults: str = "",
 ) -> list[Grasp]:
     """Return the grasps of all objects, cases and repeats.
 
     Raises:
-        ValueError: an unknown object, case or profile, or a number out of range.
+        ValueError: an unknown object, case, profile or fault, or a number out of range.
     """
     names = [name.strip() for name in objects.split(",")] if objects else list(load_objects(table))
     check_profile(profile)
@@ -50,9 +52,9 @@ def plan_grasps(
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
     check_numbers(repeats, seed)
     chosen = sorted({int(case) for case in cases.split(",")})
-    source = None if table is None else str(table)
+    source, troubles = None if table is None else str(table), MagneticFaults.parse(faults)
     grasps = [
-        Grasp(name, case, repeat, profile, seed, server=server, table=source)
+        Grasp(name, case, repeat, profile, seed, server=server, table=source, faults=troubles)
         for name, case, repeat in product(names, chosen, range(1, repeats + 1))
     ]
     for grasp in grasps:
@@ -193,7 +195,9 @@ def _is_finished(grasp: Grasp, out: Path) -> bool:
 
 
 def _exists(grasp: Grasp, path: Path) -> bool:
-    return is_recorded(path, {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server})
+    faults = None if grasp.faults.changes_nothing else asdict(grasp.faults)
+    expected = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
+    return is_recorded(path, expected | {"magnetic_faults": faults})
 
 
 def film_all(

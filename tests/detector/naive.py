@@ -182,9 +182,12 @@ class Finger:
         self.samples = []  # every finite sample: (time, readings)
         self.frames, self.rest_readings = [], None
         self.jumped = set()
-        self.field = self.still_field = self.common = np.zeros(3)
+        self.axes, self.stuck_axes = {}, set()
+        self.field = self.still_field = np.zeros(3)
+        self.common, self.speeds = np.zeros((2, 3)), np.zeros((2, 3))
         self.is_turned, self.is_load, self.n_unclear = False, False, 0
-        self.n_skipped = 0
+        self.others, self.field_speed, self.is_shared = (), 0.0, False
+        self.is_deep, self.n_skipped = False, 0
         self.stretch = []  # forces since the last interruption
         self.last = None
         self.gapped = False
@@ -219,7 +222,7 @@ class Finger:
         readings = np.zeros_like(given)
         readings[self.used] = given[self.used]
         fresh = self.last is not None and time - self.last > 3.0003 * self.period
-        self.last = time
+        self.last, self.field_speed = time, 0.0
         self.force, self.sigma = (NAN, NAN, NAN), NAN
         low, high = self.sensor.range or (-math.inf, math.inf)
         faults, invalid = set(self.lost_faults), set(self.lost)
@@ -295,53 +298,85 @@ class Finger:
             return False
         limit = 130.0 if self.sensor.name == "anyskin" else math.inf
         kept = [i for i in self.used if i not in left_out]
-        self.n_skipped -= 1
-        if self.n_skipped < 0:
-            unclear = len(kept) >= 4 and self.follow_field(readings, kept, limit)
+        if self.is_deep and self.n_skipped < 3 and not self.another_turns(0, math.inf):
+            self.n_skipped += 1
+        else:
+            unclear = self.follow_field(readings, kept, limit)
             self.n_unclear = self.n_unclear + 1 if unclear else 0
+            self.n_skipped = 0
         for i in self.used:
             turn = self.sensor.rotations[i].T if self.is_turned else np.eye(3)
             readings[i] = readings[i] - turn @ self.field
         return self.n_unclear * self.period >= 0.1
 
+    def another_turns(self, low, high):
+        """Whether the field of another finger changes at a speed between two."""
+        return any(
+            other.field_speed > 0 and low <= other.field_speed <= high
+            for other in self.others
+            if other.last is not None and self.last - other.last <= 0.10001
+        )
+
     def follow_field(self, readings, kept, limit):
+        if len(kept) < 4:
+            self.is_deep = False
+            return False
         plain = readings[kept] - self.baseline[kept]
         turned = np.einsum("ijk,ik->ij", self.sensor.rotations[kept], plain)
-        n, means = len(kept), (plain.mean(axis=0), turned.mean(axis=0))
-        is_turned = bool(means[1] @ means[1] > 1.01 * (means[0] @ means[0]))
-        mean = means[is_turned]
-        apart = float((((turned if is_turned else plain) - mean) ** 2).sum())
-        same = is_turned == self.is_turned
-        motion = mean - self.common if same else np.zeros(3)
-        self.common = mean - (1 - min(1, self.period / 0.05)) * motion
-        change = mean - self.field if same else mean
-        first = limit == math.inf and not self.field.any()
-        least, moved = ((16 if first else 4) * self.noise / n) ** 2, float(motion @ motion)
+        n, means = len(kept), np.array([plain.mean(axis=0), turned.mean(axis=0)])
+        frame = int(means[1] @ means[1] > 1.01 * (means[0] @ means[0]))
+        mean = means[frame]
+        apart = float((((plain, turned)[frame] - mean) ** 2).sum())
+        elapsed = self.period * (self.n_skipped + 1)
+        motions = means - self.common
+        steps = min(1, elapsed / 0.05) * motions
+        self.common = self.common + steps
+        self.speeds = self.speeds + min(1, elapsed / 0.1) * (steps / elapsed - self.speeds)
+        change = mean - self.field if frame == self.is_turned else mean
+        first = not self.field.any()
+        least = ((16 if first and limit == math.inf else 4) * self.noise / n) ** 2
+        moved, size = float(motions[frame] @ motions[frame]), float(change @ change)
         if moved <= least:
             self.still_field = self.field
-        size = float(change @ change)
+        speed, noise = float(np.linalg.norm(self.speeds[frame])), 12 * self.noise**2
+        squares = n * max(float(mean @ mean), size)
+        clear = apart <= 0.01 * squares + noise
+        self.is_deep = apart > 16 * (0.01 * squares + noise)
+        turning = speed * n > 6 * self.noise * math.sqrt(3 * self.period / (0.01 * 0.15))
         if size <= least:
             self.is_load = False
+            self.field_speed = speed if turning and clear else 0.0
             return False
-        along = float(change @ self.sensor.normal) if is_turned else float(change[2])
+        along = float(change @ self.sensor.normal) if frame else float(change[2])
         fast, strong = moved > (0.15 * limit) ** 2, mean @ mean > limit**2
         press = along**2 >= 0.49 * size and (along > 0 or limit == math.inf)
         small = size < self.field @ self.field / 4
-        load = press and not (small or is_turned)
+        load = press and not (small or frame)
         if limit < math.inf:
             load = press and (fast or strong or self.is_load)
-        noise = 12 * self.noise**2
-        if apart > (alike := n * 0.01 * max(mean @ mean, size) + noise):
-            self.is_load = False
-            if apart > 16 * alike:
-                self.n_skipped = 3
-            return not load and apart <= n * 0.0625 * size
-        self.is_load = load
+        alike, followed = clear, False
+        self.is_shared = self.is_shared and small
+        if not clear or load:
+            own = np.linalg.norm(self.speeds, axis=1)
+            if first:
+                self.is_turned = bool(own[1] ** 2 > 1.01 * own[0] ** 2)
+            own = float(own[int(self.is_turned)])
+            followed = self.another_turns(own / 1.25, own * 1.25)
+            self.is_shared = self.is_shared or followed
+        if self.is_shared:
+            alike, load = apart <= 0.0625 * squares + noise, False
+        self.is_load = load and alike
+        if not alike:
+            if followed:
+                self.field = self.field + steps[int(self.is_turned)]
+            return not load and not self.is_shared and apart <= n * 0.0625 * size
         if load and limit < math.inf and fast:
             self.field = self.still_field
         if load or strong:
             return not load
-        self.field, self.is_turned = (mean if moved > 2.25 * least else self.common), is_turned
+        self.field = mean if moved > 2.25 * least else self.common[frame]
+        self.is_turned = bool(frame)
+        self.field_speed = speed if turning and not self.is_shared else 0.0
         return False
 
     def untrue(self, readings):
@@ -446,10 +481,32 @@ class Finger:
                 dead.add(i)
             elif not ((now[i] <= low) | (now[i] >= high)).any():
                 stuck.add(i)
+        if self.sensor.magnetic and self.n_news % max(1, round(0.05 / self.period)) == 0:
+            self.compare_axes(now, low, high)
+        stuck |= self.stuck_axes
         noisy = self.noisy_taxels = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}
         self.wrong = {fault for fault, taxels in named.items() if taxels}
         self.wrong_taxels = {i for i in dead | stuck | noisy if i < 63}
+
+    def compare_axes(self, now, low, high):
+        """Find magnetometers of which one axis is the same for long, while those of others move."""
+        self.stuck_axes = set()
+        for axis in range(3):
+            pasts = {i: self.axes.setdefault((i, axis), [0.0, 0, 0, 0]) for i in self.used}
+            moving = [longest for _, same, longest, n in pasts.values() if n >= 10 and same < 5]
+            for i, past in pasts.items():
+                value, same, longest, n = past
+                others = max(moving, default=0) if n < 10 else 0
+                limit = max(200 if n < 10 else 40, 10 * (max(longest, others) + 1))
+                if now[i][axis] != value:
+                    kept = longest if same >= limit else max(longest, same)
+                    past[:] = [now[i][axis], 0, kept, n + 1]
+                    continue
+                past[1] += 1
+                inside = low < value < high
+                if same >= limit and inside and len(moving) >= 0.8 * len(self.used):
+                    self.stuck_axes |= {i} if i < 63 else set()
 
     def moves(self, taxel):
         long = 0.5 / self.period
@@ -703,6 +760,8 @@ class Hand:
             name: Finger(which, model.finger(name), model.window, tare, 1 / rate, bad.get(name, ()))
             for name, which in sensors.items()
         }
+        for finger in self.fingers.values():
+            finger.others = [x for x in self.fingers.values() if x is not finger]
 
     def update(self, samples, time):
         for name, finger in self.fingers.items():

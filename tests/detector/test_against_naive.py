@@ -113,30 +113,47 @@ def test_equals_the_naive_detector(options, seed):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("name", ["anyskin", "other"])  # the unit of one is known
 def test_equals_the_naive_detector_in_a_field(name, seed):
-    """Fields that turn, presses, both at once, and magnetometers that are read too early."""
+    """Fields that turn, presses, both at once, and magnetometers that are read too early.
+
+    One finger stays open, is missing for a while, and loses an axis: the other follows the field
+    by it.
+    """
     rng = np.random.default_rng(seed)
     which = sensor(6, name, limits=None, magnetic=True)
     values = 300 * rng.normal(size=(6, 3)) + rng.normal(size=(900, 6, 3))
+    other = 300 * rng.normal(size=(6, 3)) + rng.normal(size=(900, 6, 3))
     frames = which.rotations if seed % 2 else np.broadcast_to(np.eye(3), (6, 3, 3))
-    for start in rng.integers(40, 800, size=6):
+    for start in rng.integers(140, 800, size=6):
         ramp = np.clip((np.arange(900) - start) / rng.integers(1, 100), 0, 1)
         field = rng.normal(size=3) * rng.choice([5, 40, 90])
         values += ramp[:, None, None] * np.einsum("ikj,k->ij", frames, field)
+        other += ramp[:, None, None] * np.einsum("ikj,k->ij", frames, np.roll(field, 1))
         end = np.clip((start + 90 - np.arange(900)) / 20, 0, 1)
         press = rng.uniform(0, 1, (6, 1)) ** rng.choice([0.0, 0.3, 1.0]) * [10, 5, 150]
         values += (ramp * end)[:, None, None] * press
-    for k in rng.integers(5, 900, size=40):
+    # Pressed while both turn.
+    turn = np.interp(np.arange(900), [60, 90, 110], [0, 1, 0])
+    values += turn[:, None, None] * np.einsum("ikj,k->ij", frames, [50, -40, 20])
+    other += turn[:, None, None] * np.einsum("ikj,k->ij", frames, [20, 50, 40])
+    held = np.interp(np.arange(900), [40, 50, 120, 130], [0, 1, 1, 0])
+    values += held[:, None, None] * rng.uniform(0, 1, (6, 1)) * [10, 5, 150]
+    for k in rng.integers(25, 900, size=40):
         values[k, rng.integers(6)] = rng.choice([0.0, 1500.0])
     values[rng.integers(100, 800) :][:80, 2] = 0
-    hand_model = model(("thumb",), tare="0.2", threshold=25.0, which=which)
+    other[300:, 4, 2] = other[300, 4, 2]
+    hand_model = model(("thumb", "index"), tare="0.2", threshold=25.0, which=which)
     detector = Detector(hand_model)
-    slow = naive.Hand(hand_model, {"thumb": which}, Tare.parse("0.2"), RATE)
-    seen = set()
+    slow = naive.Hand(hand_model, dict.fromkeys(("thumb", "index"), which), Tare.parse("0.2"), RATE)
+    seen, missing = set(), rng.integers(300, 800)
     for k, readings in enumerate(values):
-        estimate = detector.update({"thumb": readings}, k / RATE)
-        same(estimate, slow.update({"thumb": readings}, k / RATE))
-        seen |= {*estimate.fingers["thumb"].faults, *estimate.fingers["thumb"].state}
-    assert Fault.INVALID in seen
+        samples = {"thumb": readings, "index": other[k]}
+        if missing <= k < missing + 60:
+            del samples["index"]
+        estimate = detector.update(samples, k / RATE)
+        same(estimate, slow.update(samples, k / RATE))
+        seen |= {*estimate.fingers["thumb"].faults, *estimate.fingers["index"].faults}
+        seen |= {"shared"} if slow.fingers["thumb"].is_shared else set()
+    assert {Fault.INVALID, Fault.STUCK, "shared"} <= seen
 
 
 def test_equals_the_naive_detector_with_contact_by_noise():

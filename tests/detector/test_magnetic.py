@@ -46,6 +46,10 @@ TURNS = {
     "of a sensor without a known unit": {
         "field": (200, -150, 90), "name": "uskin-4x4", "press": 900, "noise": 4.0,
     },
+    "that pulls before it is found": {
+        "field": (-300, 40, 20), "name": "uskin-curved", "press": 900, "noise": 4.0,
+        "in_frame": True, "seconds": 5.0,
+    },
 }  # fmt: skip
 
 
@@ -78,6 +82,61 @@ def test_a_shear_of_all_taxels_alike_is_lost():
     recording = turned((40, 0, 0), seconds=0.5)
     trace, times = detect(ANY, recording).fingers["thumb"], recording.modules["thumb"].times
     assert (trace.state[(times > 1) & (times < 8.9)] == NO_CONTACT).all()
+
+
+def shared(name, shares, *, grip=0.0, palm=True):
+    """A hand that turns from 5 to 8 s, and may hold from 2 s on; its palm lies another way."""
+    which, rng, times = sensor(name), np.random.default_rng(4), np.arange(1200) / 100
+    turn = np.interp(times, [5, 8], [0, 1])[:, None]
+    fields = {"thumb": turn * [6, 12, 60], "palm": turn * [12, 60, -6]}  # of equal size
+    modules = {}
+    for finger in ("thumb", "palm") if palm else ("thumb",):
+        readings = rng.normal(size=(1200, which.n_taxels, 3)) + (33_000 if which.range else 0)
+        own = np.resize(shares, which.n_taxels) if finger == "thumb" else np.ones(which.n_taxels)
+        readings += fields[finger][:, None] * own[:, None]
+        if finger == "thumb":
+            load = np.interp(times, [2, 2.5], [0, grip])[:, None, None]
+            readings += load * np.resize(SHARES, which.n_taxels)[:, None] * [0.05, 0.02, 1]
+        modules[finger] = Tactile(which, times, readings)
+    return times, detect(ANY, Recording("shared", modules)).fingers
+
+
+UNLIKE = [1.2, 0.8, 1.0, 0.85, 1.15]
+SHARED = {
+    "gains that differ": ("anyskin", UNLIKE),
+    "along the normal, where the unit is not known": ("uskin-4x4", [1.0]),
+    "both": ("uskin-4x4", UNLIKE),
+}
+
+
+@pytest.mark.parametrize(("name", "shares"), SHARED.values(), ids=SHARED)
+def test_an_open_module_decides_what_may_be_a_field_or_a_load(name, shares):
+    times, fingers = shared(name, shares)
+    assert (fingers["thumb"].state[times > 1] == NO_CONTACT).all()
+    assert not fingers["thumb"].faults.any()
+    alone = shared(name, shares, palm=False)[1]["thumb"]
+    assert (alone.state[times > 9] != NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
+def test_an_open_module_shows_the_field_that_a_load_hides(name):
+    def change(palm):
+        times, fingers = shared(name, [1.0], grip=300, palm=palm)
+        force = fingers["thumb"].force
+        before, after = (
+            force[(times > a) & (times < b)].mean(axis=0) for a, b in ((4, 5), (9, 12))
+        )
+        return float(np.linalg.norm(after - before)) / sensor(name).n_taxels
+
+    assert change(palm=False) > 50 and change(palm=True) < 10  # of 61
+
+
+@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
+def test_a_press_while_another_module_does_not_turn_is_a_load(name):
+    times, fingers = shared(name, [0.0], grip=300)
+    clean = shared(name, [0.0], grip=300, palm=False)[1]["thumb"]
+    assert fingers["thumb"].force == pytest.approx(clean.force, nan_ok=True)
+    assert (fingers["thumb"].state[times > 3] == STABLE).all()
 
 
 def changed(shares, seconds=6.0):
@@ -166,6 +225,35 @@ def test_all_magnetometers_at_zero_are_no_sample():
     trace = estimates(times, readings)
     assert (trace.state[400:405] == UNKNOWN).all()
     assert {faults_of(mask) for mask in trace.faults[400:405].tolist()} == {(Fault.INVALID,)}
+
+
+@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
+@pytest.mark.parametrize(("start", "seconds"), [(0, 10), (400, 2)], ids=["always", "from 4 s"])
+def test_a_stuck_axis_of_one_magnetometer_leaves_it_out(name, start, seconds):
+    """No state changes by it. It is named after 2 s; after 10 s, if it never changed before."""
+    times, _, rng = still_hold(n=1500)
+    which = sensor(name)
+    grip = np.interp(times, [0, 1.5, 2, 14, 14.4], [0, 0, 1, 1, 0])[:, None, None]
+    load = grip * np.resize(SHARES, which.n_taxels)[:, None] * [20, 5, 300]
+    readings = np.rint(33_000 + load + rng.normal(scale=2, size=(1500, which.n_taxels, 3)))
+    clean = estimates(times, readings, which)
+    assert not clean.faults.any()
+    readings[start:, 2, 1] = readings[start, 2, 1]
+    trace = estimates(times, readings, which)
+    named = np.flatnonzero(trace.faulty_taxels == 4)
+    assert 0 <= times[named[0]] - times[start] - seconds < 0.5
+    assert {faults_of(mask) for mask in trace.faults[named].tolist()} == {(Fault.STUCK,)}
+    assert len(named) == 1500 - named[0]  # until the end
+    assert (trace.state[300:1350] == STABLE).all()
+    assert (trace.state == STABLE).sum() == pytest.approx((clean.state == STABLE).sum(), abs=10)
+
+
+def test_whole_counts_that_repeat_are_no_stuck_axis():
+    """One magnetometer has little noise: its counts repeat, for up to a second."""
+    times, readings, rng = still_hold(n=4000)
+    readings = np.rint(readings)
+    readings[:, 3, 0] = 200 + (rng.random(4000) < 0.02)
+    assert not estimates(times, readings).faults.any()
 
 
 def test_a_jump_that_stays_is_accepted_at_the_second_sample():

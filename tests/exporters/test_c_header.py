@@ -24,7 +24,7 @@ from holdfast.contact import ContactState, Fault
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
 from holdfast.exporters import header_of
-from holdfast.exporters.c_tables import structs_of
+from holdfast.exporters.c_header import structs_of
 from holdfast.io.importers import import_recordings
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording

@@ -9,7 +9,7 @@ from exporters.models import HAND, built_in, paper, rich
 from holdfast.classifiers import Onnx
 from holdfast.errors import ModelError
 from holdfast.exporters import export
-from holdfast.exporters.onnx_head import onnx_of
+from holdfast.exporters.model_export import onnx_of
 
 pytest.importorskip("onnx", reason="onnx is not installed")
 onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")

@@ -15,7 +15,7 @@ from holdfast.contact import Cause
 from holdfast.detector import Detector
 from holdfast.detector.tables import ESTIMATE, estimate_rows, rules_of
 from holdfast.errors import StreamError
-from holdfast.exporters.c_tables import ctypes_of, kernel_text, structs_of
+from holdfast.exporters.c_header import ctypes_of, kernel_text, structs_of
 from holdfast.kernel import _extension
 
 N = 3000

@@ -19,7 +19,7 @@ from detector.build import cause_head, finger_model, speed_head, squared_head
 from holdfast.contact import Cause
 from holdfast.detector import tables
 from holdfast.detector.detection import makers
-from holdfast.exporters.c_tables import Tables, kernel_text
+from holdfast.exporters.c_header import Tables, kernel_text
 from holdfast.features.specs import RELATIVE_KINDS, FeatureSpec
 from holdfast.features.stream import FeatureStream
 from holdfast.kernel import _extension

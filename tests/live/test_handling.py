@@ -102,7 +102,7 @@ def test_the_model_is_that_of_the_same_recording(tmp_path):
 def test_the_text_says_what_was_seen_and_what_changes():
     _, document = held_until_finish(handled())
     assert document.text.startswith("pad: held 21 s; the arm moved (the force changed by ")
-    assert " of 31 features are scaled anew, and 9" in document.text
+    assert " of 31 features have a new scale, and 9" in document.text
     assert document.warnings == ["pad: 21 s of holding; 30 s or more are better"]
     _, document = held_until_finish(handled(sway=0.001))
     assert (document.calibrated, document.refused) == (False, True)

@@ -101,7 +101,7 @@ def test_one_taxel_is_said():
     one = type(PATCH)("one", PATCH.positions[:1], PATCH.rotations[:1], PATCH.normal, 100.0)
     readings = 500 + np.random.default_rng(0).normal(0, 3, (1000, 1, 3))
     found = changes_since(check("2026-11-26", index=health(readings, one)), None)
-    assert found == ["index has one taxel: no field or touch can be told apart"]
+    assert found == ["index has one taxel: a field and a touch look the same in it"]
 
 
 def test_a_source_is_read_for_some_seconds(tmp_path):

@@ -5,7 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from holdfast.labelling.review.findings import findings_of, invalid_readings
+from holdfast.features import Tare
+from holdfast.io import save_recording
+from holdfast.labelling.review.content import content_of
+from holdfast.labelling.review.findings import faulty_readings, findings_of
 from holdfast.live.module_checks import HoldDrift, Likeness, ModuleComparison
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -91,11 +94,30 @@ def test_without_a_hold_there_is_no_drift(amplitude):
     assert math.isnan(drift_of(values, times[: len(values)]).per_minute)
 
 
-def test_many_invalid_readings_are_a_finding():
-    assert invalid_readings("index", 2, 1000) is None
-    finding = invalid_readings("index", 25, 1000)
-    assert (finding.module, finding.kind) == ("index", "invalid")
-    assert finding.text == (
-        "25 samples (2.5 %) have a reading that cannot be true, of one taxel, which is left out: "
-        "is a magnetometer read before it is ready?"
-    )
+def test_faulty_readings_are_findings():
+    assert faulty_readings("index", 2, 1000, []) == []
+    assert faulty_readings("index", 25, 1000, [2, 7]) == [
+        (
+            "index",
+            "invalid",
+            "25 samples (2.5 %) have a reading that cannot be true, of one taxel, which is left "
+            "out: is a magnetometer read before it is ready?",
+        ),
+        (
+            "index",
+            "stuck",
+            "no change of taxels 2, 7, or of one axis, from some time on: left out since",
+        ),
+    ]
+
+
+def test_a_stuck_axis_is_found_in_a_recording(tmp_path):
+    which, times = sensor("anyskin"), np.arange(1000) / 100
+    readings = np.rint(np.random.default_rng(0).normal(300, 3, size=(1000, 5, 3)))
+    readings[300:, 2, 1] = 301
+    path = tmp_path / "axis.parquet"
+    save_recording(Recording("axis", {"thumb": Tactile(which, times, readings)}), path)
+    report = content_of(path, Tare.parse("0.5"))
+    assert report["modules"]["thumb"]["faults"].keys() == {"stuck"}
+    [text] = [each["text"] for each in report["findings"] if each["kind"] == "stuck"]
+    assert text.startswith("no change of taxel 3, or of one axis")

@@ -139,7 +139,7 @@ CHANGES = {
     "extra field of a feature": ((*STABLE, "features", 0), {"colour": 1},
                                  "Object contains unknown field `colour`"),
     "extra field of a sensor": (("sensors", "tiny"), {"colour": 1}, "unknown fields ['colour']"),
-    "schema": ((), {"schema": "holdfast.model/3"}, "Invalid enum value 'holdfast.model/3'"),
+    "schema": ((), {"schema": "holdfast.model/1"}, "Invalid enum value 'holdfast.model/1'"),
     "name of a head": (STABLE, {"name": "rolls"}, "Invalid enum value 'rolls'"),
     "link of a head": (STABLE, {"link": "probit"}, "Invalid enum value 'probit'"),
     "link of another head": (STABLE, {"link": "square"},

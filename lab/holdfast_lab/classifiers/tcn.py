@@ -147,6 +147,7 @@ class TemporalConvolution:
             )
         steps = samples.features.reshape(-1, self.n_channels)
         mean, scale = steps.mean(axis=0, dtype=np.float64), steps.std(axis=0, dtype=np.float64)
+        # A channel that never changes would be divided by zero.
         scale[np.ptp(steps, axis=0) == 0] = 1.0
         windows = torch.from_numpy(_windows(samples.features, mean, scale))
         with _one_thread(torch):
@@ -198,7 +199,7 @@ def forward(
         for layer in range(2):
             inner = _convolve(inner, weights, f"block{block}/{layer}")
             inner = inner if dropout is None else dropout(inner)
-        if not block:
+        if not block:  # the input has another number of channels than the filters
             values = functional.conv1d(values, weights["match"], weights["match/bias"])
         values = functional.selu(values + inner)
     values = values[:, :, -1]
@@ -262,6 +263,7 @@ def validation_rows(samples: Samples, seed: int) -> npt.NDArray[np.bool_]:
     names = np.unique(samples.groups)
     groups = names[shuffled(len(names), seed)]
     n_left_out = max(1, round(VALIDATION_SHARE * len(groups)))
+    # The groups in a ring: the next choice is tried where a class is missing on one side.
     for start in range(len(groups) if len(groups) > n_left_out else 0):
         left_out = np.isin(samples.groups, np.roll(groups, -start)[:n_left_out])
         if not samples.take(left_out).one_class and not samples.take(~left_out).one_class:
@@ -274,32 +276,30 @@ def _train(
 ) -> Weights:
     generator = torch.Generator().manual_seed(seed)
     weights = {
-        n: _initial_weights(generator, n, s) for n, s in weight_shapes(windows.shape[1]).items()
+        n: initial_weights(generator, n, s) for n, s in weight_shapes(windows.shape[1]).items()
     }
     optimiser = torch.optim.Adam(weights.values(), lr=parameters["learning_rate"])
     classes = torch.from_numpy(samples.positive.astype(np.int64))
     rng = np.random.default_rng(seed)
-    dropout = partial(_drop_channels, fraction=parameters["dropout"], generator=generator)
+    dropout = partial(drop_channels, fraction=parameters["dropout"], generator=generator)
     patience = parameters.get("patience", 0)
     left_out = validation_rows(samples, seed) if patience else np.zeros(len(samples.positive), bool)
     fitted, stopping = np.flatnonzero(~left_out), EarlyStopping(patience)
-    best = _copied(weights)
+    # Copied, because the optimiser changes the tensors in place.
+    best = {name: tensor.detach().numpy().copy() for name, tensor in weights.items()}
     for _ in range(parameters["n_epochs"]):
-        order = torch.from_numpy(fitted[_balanced_rows(samples.positive[fitted], rng)])
+        order = torch.from_numpy(fitted[balanced_rows(samples.positive[fitted], rng)])
         for rows in order.split(BATCH_SIZE):
             optimiser.zero_grad()
             scores = forward(windows[rows], weights, dropout)
             torch.nn.functional.cross_entropy(scores, classes[rows]).backward()
             optimiser.step()
+        # Without held-out groups there is no loss to compare: the last weights are kept.
         if not left_out.any() or stopping.update(_loss(torch, windows, classes, weights, left_out)):
-            best = _copied(weights)
+            best = {name: tensor.detach().numpy().copy() for name, tensor in weights.items()}
         if left_out.any() and stopping.is_over:
             break
     return best
-
-
-def _copied(weights: Mapping[str, Tensor]) -> Weights:
-    return {name: tensor.detach().numpy().copy() for name, tensor in weights.items()}
 
 
 def _loss(
@@ -320,7 +320,7 @@ def _loss(
     return float((losses[stable].mean() + losses[~stable].mean()) / 2)
 
 
-def _drop_channels(values: Tensor, fraction: float, generator: TorchGenerator) -> Tensor:
+def drop_channels(values: Tensor, fraction: float, generator: TorchGenerator) -> Tensor:
     """Set a random fraction of the channels of each window to 0, and scale up the others."""
     import torch
 
@@ -328,7 +328,7 @@ def _drop_channels(values: Tensor, fraction: float, generator: TorchGenerator) -
     return values * kept / (1.0 - fraction)
 
 
-def _initial_weights(generator: TorchGenerator, name: str, shape: tuple[int, ...]) -> Tensor:
+def initial_weights(generator: TorchGenerator, name: str, shape: tuple[int, ...]) -> Tensor:
     """Draw kernels by He's rule, normal with variance 2 / fan-in; gains are 1, the others 0."""
     import torch
 
@@ -339,9 +339,7 @@ def _initial_weights(generator: TorchGenerator, name: str, shape: tuple[int, ...
     return start.requires_grad_()
 
 
-def _balanced_rows(
-    stable: npt.NDArray[np.bool_], rng: np.random.Generator
-) -> npt.NDArray[np.int64]:
+def balanced_rows(stable: npt.NDArray[np.bool_], rng: np.random.Generator) -> npt.NDArray[np.int64]:
     """Return the rows of an epoch in random order: as many of each class as the rarer one has."""
     kinds = [rng.permutation(np.flatnonzero(stable == kind)) for kind in (False, True)]
     n = min(len(kind) for kind in kinds)

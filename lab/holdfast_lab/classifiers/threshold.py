@@ -109,6 +109,7 @@ def best_cut(
     excess = stable_below * len(stable) - n_below * n_stable
     gains = {"below": excess, "above": -excess, "either": np.abs(excess)}[side]
     best = int(np.argmax(gains))
+    # With `either`, the sign of the excess says on which side more are stable than by chance.
     below = side == "below" or (side == "either" and excess[best] > 0)
     left, right = ordered[edges[best]], ordered[edges[best] + 1]
     return Cut(float(left / 2 + right / 2), -1 if below else 1, int(gains[best]))

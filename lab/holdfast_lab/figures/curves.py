@@ -1,6 +1,6 @@
 """Figures of curves: over a parameter, over thresholds, over probabilities."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from itertools import chain
 from typing import NamedTuple
 
@@ -68,7 +68,13 @@ def draw_lines(
         axes.grid(color=FAINT, linewidth=0.5)
         for name, curve in curves.items():
             _draw_curve(axes, curve, styles[name])
-        _set_ticks(axes, curves.values(), log)
+        # Few values of x all get a tick; a logarithmic axis has plain numbers, not powers of ten.
+        values = sorted({float(value) for curve in curves.values() for value in curve.x})
+        if 0 < len(values) <= MAX_TICKS:
+            axes.set_xticks(values, [f"{value:g}" for value in values])
+            axes.xaxis.set_minor_locator(NullLocator())
+        elif log:
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         add_labels(axes, x, y)
     add_legend(figure, legend_handles(styles, groups.values()), per_row=5)
     return figure
@@ -159,17 +165,8 @@ def _draw_curve(axes: Axes, curve: PlottedCurve, style: SeriesStyle, *, dots: bo
     if curve.low is not None and curve.high is not None:
         axes.fill_between(curve.x, curve.low, curve.high, color=color, alpha=0.13, linewidth=0)
     if curve.chosen is not None:
+        # Above all curves and over the edge of the panel, so that no other mark hides it.
         axes.plot(
             curve.x[curve.chosen], curve.y[curve.chosen], color=color, marker=marker,
             markersize=6, markeredgecolor="white", markeredgewidth=0.7, clip_on=False, zorder=4,
         )  # fmt: skip
-
-
-def _set_ticks(axes: Axes, curves: Iterable[PlottedCurve], log: bool) -> None:
-    """Name every value of x if there are few; use plain numbers on a logarithmic axis."""
-    values = sorted({float(value) for curve in curves for value in curve.x})
-    if 0 < len(values) <= MAX_TICKS:
-        axes.set_xticks(values, [f"{value:g}" for value in values])
-        axes.xaxis.set_minor_locator(NullLocator())
-    elif log:
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

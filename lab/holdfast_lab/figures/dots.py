@@ -46,7 +46,13 @@ def draw_dots(
             the paper's value is a hollow diamond.
         strong: methods whose names are bold.
     """
-    names = _ordered(groups)
+    # By the value in the first panel, the lowest first; those without one are below.
+    first: Mapping[str, IntervalEstimate] = next(iter(groups.values()), {})
+    names = sorted(
+        dict.fromkeys(chain.from_iterable(groups.values())),
+        key=lambda name: _number(first[name].value if name in first else None, -np.inf),
+        reverse=True,
+    )[::-1]  # not ascending at once: of equal values, the first stays on top
     figure = page_figure(0.8 + 0.21 * max(len(names), 3))
     grid = figure.subplots(1, max(len(groups), 1), squeeze=False, sharey=True)[0]
     for axes, (x, values) in zip(grid, groups.items(), strict=False):
@@ -81,41 +87,23 @@ def draw_groups(
     figure, grid = panels(len(groups), per_row, 2.6, sharey=True)
     styles = series_styles(chain.from_iterable(groups.values()))
     for k, (axes, (x, methods)) in enumerate(zip(grid, groups.items(), strict=True)):
-        _draw_panel(axes, methods, styles)
+        names = list(dict.fromkeys(chain.from_iterable(methods.values())))
+        axes.grid(axis="y", color=FAINT, linewidth=0.5)
+        for rank, (method, values) in enumerate(methods.items()):
+            # The methods of a group share 0.7 of its width; the rest parts it from the next.
+            shift = 0.7 * ((rank + 0.5) / len(methods) - 0.5)
+            at = np.array([names.index(name) for name in values]) + shift
+            _draw_intervals(axes, at, list(values.values()), styles[method])
+        axes.set_xticks(range(len(names)), map(literal, names))
+        axes.set_xlim(-0.5, len(names) - 0.5)
+        for edge in range(1, len(names)):
+            axes.axvline(edge - 0.5, color=FAINT, linewidth=0.5)
+        axes.tick_params(axis="x", length=0)
         add_labels(axes, x, y if k % max(per_row, 1) == 0 else None)
     if grid:
         grid[0].set_ylim(bottom=0)
     add_legend(figure, legend_handles(styles, groups.values(), lines=False), per_row=5)
     return figure
-
-
-def _draw_panel(
-    axes: Axes,
-    methods: Mapping[str, Mapping[str, IntervalEstimate]],
-    styles: Mapping[str, SeriesStyle],
-) -> None:
-    names = list(dict.fromkeys(chain.from_iterable(methods.values())))
-    axes.grid(axis="y", color=FAINT, linewidth=0.5)
-    for rank, (method, values) in enumerate(methods.items()):
-        shift = 0.7 * ((rank + 0.5) / len(methods) - 0.5)
-        x = np.array([names.index(name) for name in values]) + shift
-        _draw_intervals(axes, x, list(values.values()), styles[method])
-    axes.set_xticks(range(len(names)), map(literal, names))
-    axes.set_xlim(-0.5, len(names) - 0.5)
-    for edge in range(1, len(names)):
-        axes.axvline(edge - 0.5, color=FAINT, linewidth=0.5)
-    axes.tick_params(axis="x", length=0)
-
-
-def _ordered(groups: Mapping[str, Mapping[str, IntervalEstimate]]) -> list[str]:
-    """Return all names by their value in the first panel, the lowest first."""
-    first: Mapping[str, IntervalEstimate] = next(iter(groups.values()), {})
-
-    def value(name: str) -> float:
-        return _number(first[name].value if name in first else None, -np.inf)
-
-    names = dict.fromkeys(chain.from_iterable(groups.values()))
-    return sorted(names, key=value, reverse=True)[::-1]
 
 
 def _draw_dot(axes: Axes, row: int, estimate: IntervalEstimate, *, bold: bool) -> None:

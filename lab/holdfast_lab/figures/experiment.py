@@ -115,18 +115,16 @@ def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, StateCod
         for state, colour in STATE_COLOURS.items():
             bars = [(start, end - start) for first, start, end in spans if codes[first] == state]
             axes.broken_barh(bars, (row - 0.4, 0.8), facecolors=colour, linewidth=0)
-        names.append(
-            name if name == LABEL_STRIP else f"{literal(name)}\n{_accuracy(series.labels, codes)}"
-        )
+        if name == LABEL_STRIP:
+            names.append(name)
+            continue
+        # Where both are known; samples without a label or without an estimate do not count.
+        known = (series.labels != UNKNOWN) & (codes != UNKNOWN)
+        correct = ((series.labels == STABLE) == (codes == STABLE))[known]
+        accuracy = f"{100 * np.mean(correct):.1f} % correct" if known.any() else "no label"
+        names.append(f"{literal(name)}\n{accuracy}")
     axes.set_yticks(range(len(strips)), names)
     axes.set_ylim(len(strips) - 0.5, -0.5)
-
-
-def _accuracy(labels: StateCodes, codes: StateCodes) -> str:
-    known = (labels != UNKNOWN) & (codes != UNKNOWN)
-    if not known.any():
-        return "no label"
-    return f"{100 * np.mean((labels == STABLE)[known] == (codes == STABLE)[known]):.1f} % correct"
 
 
 def _finish(figure: Figure, rows: Sequence[Axes], series: FingerSeries) -> None:

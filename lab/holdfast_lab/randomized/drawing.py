@@ -127,6 +127,7 @@ def with_measured(
         mechanisms: from `MEASURED`.
         generator: of all that is drawn.
     """
+    # All is drawn before it is asked what is used: a mechanism leaves the draws of the others.
     span, period = measured_ranges(), 1 / drawn.sensor.rate
     time = period * uniform(generator, span["scan"]["time"])
     line = int(generator.integers(span["scan"]["line"][0], span["scan"]["line"][1] + 1))
@@ -141,33 +142,23 @@ def with_measured(
     if "noise" in mechanisms:
         noise = drawn.parameters.noise_counts * (weak if kind in _WEAK else 1.0)
         changes |= {"noise_by_axis": (1.0, 1.0, normal), "noise_counts": noise}
+    # Slow noise and drift.
+    colour = span["colour"]
+    is_slow = generator.random() < colour["share"]
+    slow, walk = uniform(generator, colour["slow"]), log_uniform(generator, colour["walk"])
+    slow_time = log_uniform(generator, colour["time"])
+    if "colour" in mechanisms:
+        share = slow if is_slow else 0.0
+        changes |= {"slow_share": share, "slow_time": slow_time, "walk": walk}
+    # The step of the readings is relative to their noise, which another mechanism may have changed.
+    ratio = log_uniform(generator, span["steps"]["ratio"])
+    has_still = generator.random() < span["steps"]["still_sensors"]
+    if "steps" in mechanisms:
+        noise = changes.get("noise_counts", drawn.parameters.noise_counts)
+        share = span["steps"]["still_taxels"] if has_still else 0.0
+        changes |= {"step": max(1, round(noise / ratio)), "still_share": share}
     read = replace(drawn.parameters, **changes)
-    read = replace(read, **_colour(mechanisms, generator), **_steps(read, mechanisms, generator))
     return replace(drawn, parameters=read, stream=_stream(mechanisms, generator))
-
-
-def _colour(mechanisms: Collection[str], generator: np.random.Generator) -> dict[str, Any]:
-    """Draw slow noise and drift."""
-    span = measured_ranges()["colour"]
-    is_slow = generator.random() < span["share"]
-    slow, walk = uniform(generator, span["slow"]), log_uniform(generator, span["walk"])
-    time = log_uniform(generator, span["time"])
-    if "colour" not in mechanisms:
-        return {}
-    return {"slow_share": slow if is_slow else 0.0, "slow_time": time, "walk": walk}
-
-
-def _steps(
-    parameters: UskinParameters, mechanisms: Collection[str], generator: np.random.Generator
-) -> dict[str, Any]:
-    """Draw the step of the readings, and the share of taxels without noise."""
-    span = measured_ranges()["steps"]
-    ratio = log_uniform(generator, span["ratio"])
-    has_still = generator.random() < span["still_sensors"]
-    if "steps" not in mechanisms:
-        return {}
-    step = max(1, round(parameters.noise_counts / ratio))
-    return {"step": step, "still_share": span["still_taxels"] if has_still else 0.0}
 
 
 def _stream(mechanisms: Collection[str], generator: np.random.Generator) -> StreamEffects:
@@ -236,6 +227,7 @@ def draw_object(generator: np.random.Generator, grip: float, n_opposite: int) ->
     """
     span = ranges()["object"]
     static = uniform(generator, span["friction"])
+    # Friction acts on both sides, mu (N_thumb + N_fingers) = 2 mu n N, and holds 3 m g.
     largest = 2 * static * grip * n_opposite / (3 * 9.81)
     low, high = span["mass"]
     mass = log_uniform(generator, (low, max(min(high, largest), 1.01 * low)))
@@ -277,8 +269,7 @@ def draw_layout(
         surface = flat_patch(known.positions, _PITCH.get(kind, 6e-3))
         normal, point = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     room = max(item.half_height - (0.012 if n_pads == 2 else 0.034), 0.0)
-    middle = float(item.foot[2]) + item.half_height
-    height = middle + room * uniform(generator, ranges()["object"]["off_centre"])
+    height = item.middle + room * uniform(generator, ranges()["object"]["off_centre"])
     return pad_layout(surface, normal, point, n_pads, item, height)
 
 

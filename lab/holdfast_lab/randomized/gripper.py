@@ -125,7 +125,11 @@ def pad_layout(
     sides = np.array([1.0, *[-1.0] * len(spread)])
     heights = height + np.array([0.0, *spread])
     outward = sides[:, None] * [1.0, 0.0, 0.0]
-    reach = np.array([_reach(item, *pair) for pair in zip(outward, heights, strict=True)])
+    reach = np.array([reach_of(item, *pair) for pair in zip(outward, heights, strict=True)])
+    for height_of_pad in heights[np.isnan(reach)]:
+        raise ValueError(
+            f"the pad at {1e3 * height_of_pad:.0f} mm does not reach the object {item.name!r}"
+        )
     points = outward * reach[:, None] + heights[:, None] * [0.0, 0.0, 1.0]
     frames = np.array([_frame(normal, -out) for out in outward])
     return PadLayout(surface, contact_point, frames, points, outward)
@@ -139,20 +143,12 @@ def _frame(normal: Array, inward: Array) -> Array:
     return np.column_stack([inward, np.cross(across, inward), across])  # curved: normal along x
 
 
-def _reach(item: GraspObject, outward: Array, height: float) -> float:
-    """Return the distance at which a pad meets the object, along a direction at a height [m]."""
-    reach = reach_of(item, outward, height)
-    if np.isnan(reach):
-        raise ValueError(
-            f"the pad at {1e3 * height:.0f} mm does not reach the object {item.name!r}"
-        )
-    return reach
-
-
 def gripper_model(
     layout: PadLayout, item: GraspObject, drives: Drives, timestep: float
 ) -> HandModel:
     """Build the pads and the object for MuJoCo, in the palm frame."""
+    # Without gravity and without MuJoCo's own contacts: `advance` sets the apparent gravity of the
+    # palm, and skin and object meet in contact.c.
     bodies = "".join(_pad_xml(layout, i, drives) for i in range(layout.n_pads))
     model = mujoco.MjModel.from_xml_string(f"""<mujoco model="gripper">
   <compiler angle="radian"/>
@@ -170,6 +166,7 @@ def _pad_xml(layout: PadLayout, i: int, drives: Drives) -> str:
     place = layout.points[i] + OPEN_GAP * layout.outward[i] - frame @ layout.contact_point
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
+    # A pad slides along its closing line and, on side springs, along two axes across it.
     axes = [frame.T @ -layout.outward[i]]
     axes.append(np.roll(axes[0], 1) if abs(axes[0]).max() > 0.99 else np.eye(3)[0])
     axes.append(np.cross(axes[0], axes[1]))
@@ -217,7 +214,12 @@ class GripperWorld(ContactWorld):
         rate: float,
     ) -> None:
         self.layout, self.drives = layout, drives
-        self.n_substeps = max(1, int(np.ceil(_step_rate(layout, item, drives, skin) / rate)))
+        # As many steps as the stiffest contact on the lightest body needs: all pads press on the
+        # object with their skin, or with 2 cm^2 of it where it is larger.
+        area = min(float(layout.surface.areas.sum()), 2e-4)
+        stiffness = layout.n_pads * skin.stiffness * area
+        fastest = np.sqrt(stiffness / min(item.mass, drives.mass))  # [rad/s]
+        self.n_substeps = max(1, int(np.ceil(max(STEP_RATE, 1.2 * fastest) / rate)))
         self.timestep = 1 / (rate * self.n_substeps)
         super().__init__(
             gripper_model(layout, item, drives, self.timestep), item, layout.surface, skin
@@ -249,7 +251,14 @@ class GripperWorld(ContactWorld):
             row: time since the lock [s]; negative before.
         """
         model, data = self.hand.model, self.hand.data
-        self._draw_glitch()
+        # A glitch: the set-point of one pad jumps and comes back within 20 ms.
+        if self.time >= self._jump_until:
+            self._jump[:] = 0.0
+        period = self.n_substeps * self.timestep
+        if self._generator.random() < self.drives.glitch_rate * period:
+            pad = int(self._generator.integers(self.layout.n_pads))
+            self._jump[pad] = self._generator.normal(0.0, self.drives.glitch_size)
+            self._jump_until = self.time + self._generator.uniform(0.006, 0.020)
         noise = self.drives.noise * self._generator.standard_normal(self.layout.n_pads)
         self.set_point_error = float(np.abs(self._jump).max())
         drives, damping = slice(0, N_PAD_JOINTS * len(noise), N_PAD_JOINTS), self.drives.damping
@@ -260,7 +269,15 @@ class GripperWorld(ContactWorld):
             fill_bodies(self.hand.arrays, self.bodies)
             touch(self.contact, self.constants, self.bodies, self.timestep)
             operator.fill(self.bodies[-1], self.outside, k * self.timestep)
-            self._limit_torque()
+            # The damping of a person's hand is stiff beside the inertia of a small object: its
+            # torque stays below what would turn the object too fast for a step.
+            spin = float(np.linalg.norm(self.bodies[-1, 15:18]))
+            largest = (
+                float(self.item.inertia.min()) * (MAX_TURN_CHANGE + 0.5 * spin) / self.timestep
+            )
+            torque = float(np.linalg.norm(self.outside[3:]))
+            if torque > largest:
+                self.outside[3:] *= largest / torque
             self._wrench[:] = on_object(
                 self.contact.wrench, self.outside, self.bodies[-1], self.item.inertia,
                 self.item.mass, palm.spin[at], palm.turn[at],
@@ -273,37 +290,6 @@ class GripperWorld(ContactWorld):
             )
             mujoco.mj_step2(model, data)
         self.time += self.n_substeps * self.timestep
-
-    def _limit_torque(self) -> None:
-        """Keep the operator's torque below what would turn the object too fast for a step.
-
-        The damping of a hand is stiff beside the inertia of a small object.
-        """
-        spin = float(np.linalg.norm(self.bodies[-1, 15:18]))
-        largest = float(self.item.inertia.min()) * (MAX_TURN_CHANGE + 0.5 * spin) / self.timestep
-        torque = float(np.linalg.norm(self.outside[3:]))
-        if torque > largest:
-            self.outside[3:] *= largest / torque
-
-    def _draw_glitch(self) -> None:
-        if self.time >= self._jump_until:
-            self._jump[:] = 0.0
-        period = self.n_substeps * self.timestep
-        if self._generator.random() < self.drives.glitch_rate * period:
-            pad = int(self._generator.integers(self.layout.n_pads))
-            self._jump[pad] = self._generator.normal(0.0, self.drives.glitch_size)
-            self._jump_until = self.time + self._generator.uniform(0.006, 0.020)
-
-
-def _step_rate(layout: PadLayout, item: GraspObject, drives: Drives, skin: Skin) -> float:
-    """Return the rate that the stiffest contact on the lightest body needs [Hz].
-
-    All pads press on the object with their skin, or with 2 cm^2 of it where it is larger.
-    """
-    area = min(float(layout.surface.areas.sum()), 2e-4)
-    stiffness = layout.n_pads * skin.stiffness * area
-    fastest = np.sqrt(stiffness / min(item.mass, drives.mass))  # [rad/s]
-    return float(max(STEP_RATE, 1.2 * fastest))
 
 
 class OperatorForce:

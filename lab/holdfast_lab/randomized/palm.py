@@ -1,12 +1,13 @@
 """Motion of the palm that carries a held object, and what the object feels of it.
 
 Everything is simulated in the frame of the palm. A palm that accelerates changes the apparent
-gravity there; a palm that turns also turns the object against its own inertia.
+gravity there; a palm that turns also turns the object against its own inertia. What carries a
+hand all the time is an arm as of the boxes, or a person.
 """
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -123,7 +124,13 @@ def palm_motion(
     phases = generator.uniform(0, 2 * math.pi, size=(N_VIBRATIONS, 3))
     waves = np.sin(2 * math.pi * rates * times[:, None, None] + phases)
     acceleration = np.asarray(vibration * math.sqrt(2.0 / N_VIBRATIONS) * waves.sum(axis=1))
-    acceleration *= _vibration_factor(segments, times, moving_factor)[:, None]
+    # The vibration grows while the arm moves; it fades in and out at the ends of a segment.
+    factor = np.ones(len(times))
+    for segment in segments:
+        elapsed = times - segment.start
+        edge = np.minimum(elapsed, segment.duration - elapsed) / VIBRATION_FADE
+        factor = np.maximum(factor, 1.0 + (moving_factor - 1.0) * np.clip(edge, 0.0, 1.0))
+    acceleration *= factor[:, None]
     spin, turn = np.zeros((2, len(times), 3))
     for segment in segments:
         rows = (times >= segment.start) & (times < segment.start + segment.duration)
@@ -152,22 +159,13 @@ def _acceleration(segment: Segment, elapsed: Array) -> Array:
         turning = 2 * math.pi * segment.rate
         fade = np.clip(np.minimum(elapsed, segment.duration - elapsed) / 0.3, 0.0, 1.0)
         return -segment.size * turning**2 * np.sin(turning * elapsed) * fade
-    stop = segment.rate * segment.duration  # two half sines of equal area: speed up, then stop
+    # A brake: two half sines of equal area, one to speed up and a shorter one to stop.
+    stop = segment.rate * segment.duration
     start = segment.duration - stop
     rising = elapsed < start
     pace = np.where(rising, elapsed / start, (elapsed - start) / stop)
     length = np.where(rising, start, -stop)
     return segment.size * math.pi / (2 * length) * np.sin(math.pi * pace)
-
-
-def _vibration_factor(segments: list[Segment], times: Array, moving_factor: float) -> Array:
-    """(n,) factor on the vibration: that of motion in a segment, which fades in and out."""
-    factor = np.ones(len(times))
-    for segment in segments:
-        elapsed = times - segment.start
-        edge = np.minimum(elapsed, segment.duration - elapsed) / VIBRATION_FADE
-        factor = np.maximum(factor, 1.0 + (moving_factor - 1.0) * np.clip(edge, 0.0, 1.0))
-    return factor
 
 
 def _down(orientation: Array, spin: Array) -> Array:
@@ -177,6 +175,7 @@ def _down(orientation: Array, spin: Array) -> Array:
     moving = np.flatnonzero(spin.any(axis=1))
     if not len(moving):
         return down
+    # Only the rows that turn are multiplied; the rows between two of them repeat the last.
     steps = Rotation.from_rotvec(-spin[moving] / GRID_RATE).as_matrix()
     now = down[0].copy()
     place = 0
@@ -186,3 +185,103 @@ def _down(orientation: Array, spin: Array) -> Array:
         place = row
     down[place:] = now
     return down
+
+
+CARRIERS = ("carry", "person")
+"""Mechanisms of what carries a hand; a hand has one of them at most."""
+N_TREMOR_WAVES = 8
+"""Sinusoids that make up the tremor of a person's hand."""
+BOUT_FADE = 0.5
+"""Time in which a person begins and stops walking, and in which the tremor begins [s]."""
+
+
+def draw_carrier(
+    generator: np.random.Generator, ranges: Mapping[str, Mapping[str, Any]]
+) -> str | None:
+    """Draw one of `CARRIERS`, or None for a hand that only moves in events."""
+    place = generator.random()
+    if place < ranges["carry"]["share"]:
+        return "carry"
+    return "person" if place > 1 - ranges["person"]["share"] else None
+
+
+def carrying_legs(
+    generator: np.random.Generator, ranges: Mapping[str, Any], orientation: Array, duration: float
+) -> list[Segment]:
+    """Draw straight level motions to and fro, with rests between them.
+
+    Args:
+        generator: of all that is drawn.
+        ranges: `way`, `duration` and `rest`.
+        orientation: (3, 3) rotation from the palm frame to the world.
+        duration: that they fill [s].
+    """
+    angle = generator.uniform(0, 2 * math.pi)
+    direction = orientation.T @ [math.cos(angle), math.sin(angle), 0.0]
+    way = uniform(generator, ranges["way"])
+    legs: list[Segment] = []
+    start = uniform(generator, ranges["rest"])
+    while start < duration:
+        side = 1.0 if len(legs) % 2 == 0 else -1.0
+        time = uniform(generator, ranges["duration"])
+        legs.append(Segment("carry", start, time, side * direction, way, 0.0))
+        start += time + uniform(generator, ranges["rest"])
+    return legs
+
+
+def person_acceleration(
+    generator: np.random.Generator, ranges: Mapping[str, Any], orientation: Array, duration: float
+) -> Array:
+    """Compute the acceleration of a person's hand that carries something, in the palm frame.
+
+    It trembles all the time, and walks in bouts: up and down with each step, half as far to the
+    fore, and half as far to the side with every second step. Both begin within half a second.
+
+    Args:
+        generator: of all that is drawn.
+        ranges: of `person` in `measured.toml`.
+        orientation: (3, 3) rotation from the palm frame to the world.
+        duration: [s].
+
+    Returns:
+        (n, 3) at steps of 1 / GRID_RATE [m/s^2].
+    """
+    times = np.arange(int(duration * GRID_RATE) + 1) / GRID_RATE
+    tremor = log_uniform(generator, ranges["tremor"])
+    low, high = ranges["tremor_rate"]
+    rates = 2 * math.pi * generator.uniform(low, high, size=(N_TREMOR_WAVES, 3))
+    phases = generator.uniform(0, 2 * math.pi, size=(N_TREMOR_WAVES, 3))
+    waves = np.sin(rates * times[:, None, None] + phases).sum(axis=1)
+    trembling = tremor * math.sqrt(2 / N_TREMOR_WAVES) * waves
+    begun = np.minimum(times / BOUT_FADE, 1.0)[:, None]
+    return np.asarray(begun * (trembling + _walking(generator, ranges, times) @ orientation))
+
+
+def _walking(generator: np.random.Generator, ranges: Mapping[str, Any], times: Array) -> Array:
+    """(n, 3) acceleration in the world [m/s^2]."""
+    rise = log_uniform(generator, ranges["rise"])
+    rate = 2 * math.pi * uniform(generator, ranges["step_rate"])
+    heading = generator.uniform(0, 2 * math.pi)
+    phase, beat = generator.uniform(0, 2 * math.pi, size=2)
+    fore = np.array([math.cos(heading), math.sin(heading), 0.0])
+    side = np.array([-fore[1], fore[0], 0.0])
+    accelerations = (
+        (np.array([0.0, 0.0, 1.0]), rise * rate**2, rate, 0.0),
+        (fore, rise / 2 * rate**2, rate, phase),
+        (side, rise / 2 * (rate / 2) ** 2, rate / 2, beat),
+    )
+    waves = sum(
+        direction * (size * np.sin(speed * times + shift))[:, None]
+        for direction, size, speed, shift in accelerations
+    )
+    # Walking and standing take turns; the first is drawn. The mean over a moving window of the
+    # fade makes each begin and end slowly.
+    edges, walks = [0.0], generator.random() < 0.5
+    while edges[-1] < times[-1]:
+        edges.append(edges[-1] + uniform(generator, ranges["bout"]))
+    states = (np.arange(len(edges)) + walks) % 2
+    now = states[np.searchsorted(edges, times, side="right") - 1].astype(np.float64)
+    n_fade = int(BOUT_FADE * GRID_RATE)
+    padded = np.concatenate([np.full(n_fade, now[0]), now])
+    bouts = np.convolve(padded, np.ones(n_fade) / n_fade)[n_fade : n_fade + len(now)]
+    return np.asarray(bouts[:, None] * waves)

@@ -205,13 +205,16 @@ class Scenario(OperatorForce):
     def __init__(self, events: list[Event], tremors: Array, tremor: float) -> None:
         self._events = events
         self._tremors, self._tremor = tremors, tremor
-        self._place = -1
+        self._place = -1  # index of the present event, or of the one that is awaited
+        # Of the present event: how far the object slid [m] and turned [rad] while it slid, when it
+        # ended [s] (its effects go away after that), and the object when it began.
         self._slid = self._turned = 0.0
         self._ended_at = math.inf
         self._origin = np.zeros(12)
+        # Added weight [N] and a changed grip stay until the end of the hold.
         self._weight = np.zeros(3)
         self._base_grip = 1.0
-        self._now = 0.0
+        self._now = 0.0  # of the last `step`, since the lock [s]
         self.spare = 0.0
         self.grip_scale = self.friction_scale = 1.0
         self.acting = False
@@ -229,7 +232,15 @@ class Scenario(OperatorForce):
         self._now = since
         event = self.event
         if event is None or since >= event.start + event.duration + RECOVERY_TIME:
-            self._next(since, body)
+            # Begin the next event, if it is time; added weight and a changed grip stay.
+            coming = self._events[self._place + 1 : self._place + 2]
+            if not coming or coming[0].start <= since:
+                self.friction_scale = 1.0
+            if coming and coming[0].start <= since:
+                self._place += 1
+                self._slid = self._turned = 0.0
+                self._ended_at = math.inf
+                self._origin[:] = body[:12]
             event = self.event
         if event is None or since < event.start:
             self.acting = False
@@ -237,6 +248,7 @@ class Scenario(OperatorForce):
         self._slid += slip * period if slip > 0.001 else 0.0
         self._turned += abs(float(spin @ event.direction)) * period if slip > 0.001 else 0.0
         slid = self._turned if event.kind == "twist" else self._slid
+        # A provoked slip ends the event at the distance that was drawn, else its time does.
         over = slid >= event.until or since >= event.start + event.duration
         if over and self._ended_at == math.inf:
             self._ended_at = since
@@ -248,6 +260,8 @@ class Scenario(OperatorForce):
                 self._base_grip = self.grip_scale
         elif event.kind == "loosen":
             end = min(since, self._ended_at) - event.start
+            # Down to a little less than touch, so that the object slides in the end; then back, to
+            # a tenth more than before.
             low = max(1.0 - event.rate * end, -0.1)
             back = min(max(since - self._ended_at, 0.0) / RECOVERY_TIME, 1.0)
             self.grip_scale = self._base_grip * (low + (1.1 - low) * back)
@@ -257,6 +271,7 @@ class Scenario(OperatorForce):
             fallen = min(elapsed / event.rate, 1.0)
             back = min(max(since - self._ended_at, 0.0) / RECOVERY_TIME, 1.0)
             self.friction_scale = 1.0 - (1.0 - event.size) * fallen * (1.0 - back)
+        # A weight that was put in is load, not a disturbance, once it has settled.
         self.acting = event.kind in OPERATOR_KINDS and (
             event.kind != "weight" or since < event.start + event.duration
         )
@@ -265,18 +280,6 @@ class Scenario(OperatorForce):
     def event(self) -> Event | None:
         """The present or the next event."""
         return self._events[self._place] if 0 <= self._place < len(self._events) else None
-
-    def _next(self, since: float, body: Array) -> None:
-        """Begin the next event, if it is time; added weight and a changed grip stay."""
-        coming = self._events[self._place + 1 : self._place + 2]
-        if coming and coming[0].start > since:
-            return
-        self.friction_scale = 1.0
-        if coming:
-            self._place += 1
-            self._slid = self._turned = 0.0
-            self._ended_at = math.inf
-            self._origin[:] = body[:12]
 
     def fill(self, body: Array, out: Array, ahead: float) -> None:
         """Fill the operator's force and torque: see `OperatorForce`."""

@@ -1,6 +1,5 @@
 """From a seed and a number to a recording of a randomized hand, with exact truth."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,8 +9,8 @@ import numpy.typing as npt
 
 from holdfast.contact import Phase
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
-from holdfast.recordings import Label, Recording, Tactile
-from holdfast.sensors.types import Array, Integers
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors.types import Array
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.operator import draw_tremor
 from holdfast.twin.profile import profile
@@ -20,7 +19,6 @@ from holdfast.twin.simulation import generator_of
 from holdfast.twin.steps import hold_wrench
 from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
 from holdfast.twin.world import TruthLog
-from holdfast_lab.randomized.arms import carrying_legs, draw_carrier, person_acceleration
 from holdfast_lab.randomized.drawing import (
     MEASURED,
     SENSOR_KINDS,
@@ -37,7 +35,15 @@ from holdfast_lab.randomized.drawing import (
     with_measured,
 )
 from holdfast_lab.randomized.gripper import GripperWorld, OperatorForce
-from holdfast_lab.randomized.palm import Segment, log_uniform, palm_motion, uniform
+from holdfast_lab.randomized.palm import (
+    Segment,
+    carrying_legs,
+    draw_carrier,
+    log_uniform,
+    palm_motion,
+    person_acceleration,
+    uniform,
+)
 from holdfast_lab.randomized.scenario import Scenario, draw_events
 
 MAX_TRIES = 12
@@ -127,6 +133,8 @@ def _run(hold: RandomHold) -> "_Run":
         drawn = with_measured(drawn, kind, hold.measured, hold.hand.generator("measured"))
     n_pads = int(generator.choice(span["hand"]["pads"]))
     grip = log_uniform(generator, span["hand"]["grip"])
+    # Drives and skin belong to the hand: with several grasps they are drawn before the numbers of
+    # the grasp begin. With one they come after the object, an order that keeps old seeds valid.
     if hold.grasp is not None:
         drives, skin = draw_drives(generator), draw_skin(generator)
         generator = hold.generator("grasp")
@@ -183,11 +191,22 @@ class _Run:
         vibration = log_uniform(generator, span["arm"]["vibration"])
         orientation = random_rotation(generator)
         duration = plan.profile.hold + 1.0
-        self.carrier = _carrier(hold)
-        legs, acceleration = _carried(hold, self.carrier, orientation, duration)
+        self.carrier = carrier_of(hold)
+        legs: list[Segment] = []
+        acceleration: Array | float = 0.0
+        if self.carrier is not None:
+            carried = measured_ranges()[self.carrier]
+            draws = hold.generator(self.carrier)
+            if self.carrier == "carry":
+                legs = carrying_legs(draws, carried, orientation, duration)
+            else:
+                acceleration = person_acceleration(draws, carried, orientation, duration)
+        moving = 1.0  # factor on the vibration of the arm while it moves
+        if "vibration" in hold.measured:
+            moving = draw_moving_vibration(hold.hand.generator("vibration")) / vibration
         self.palm = palm_motion(
-            generator, segments + legs, orientation, vibration, duration,
-            _moving_factor(hold, vibration), acceleration,
+            generator, segments + legs, orientation, vibration, duration, max(1.0, moving),
+            acceleration,
         )  # fmt: skip
         self.holder = _Holder(world, self.scenario, tremors[0], plan.profile.tremor)
         uskin = hold.hand.generator("skin")
@@ -220,7 +239,14 @@ class _Run:
                 if holding and since < self.plan.profile.hold:
                     self.scenario.step(since, self.world.slip, body[15:18], body, self.period)
                     self.scenario.set_down(self.palm.gravity[self.palm.at(since)])
-            self._advance(command, since, touch_depths)
+            travels = OPEN_GAP - command.depths
+            if touch_depths is not None and command.phase is Phase.LOCKED:
+                # Only the part beyond the touch makes force, so only that part is scaled.
+                pressed = travels - (OPEN_GAP - touch_depths)
+                travels = OPEN_GAP - touch_depths + self.scenario.grip_scale * pressed
+            self.world.scale_friction(self.scenario.friction_scale)
+            self.holder.command(command, self.protocol.anchor, since, self.world.time)
+            self.world.advance(travels, self.holder, self.palm, since)
             self._log(command)
             k += 1
             lost_at = self.protocol.lost_at
@@ -228,19 +254,11 @@ class _Run:
             if self.protocol.is_over(time) or lost or time > MAX_SECONDS:
                 return
 
-    def _advance(self, command: Command, since: float, touch_depths: Array | None) -> None:
-        travels = OPEN_GAP - command.depths
-        if touch_depths is not None and command.phase is Phase.LOCKED:
-            pressed = travels - (OPEN_GAP - touch_depths)
-            travels = OPEN_GAP - touch_depths + self.scenario.grip_scale * pressed
-        self.world.scale_friction(self.scenario.friction_scale)
-        self.holder.command(command, self.protocol.anchor, since, self.world.time)
-        self.world.advance(travels, self.holder, self.palm, since)
-
     def _log(self, command: Command) -> None:
         world = self.world
         acting = self.scenario.acting or command.hold > 0
         force = world.outside[:3] * acting
+        # The truth has forces alone: a torque counts as a push, or a twist would be no disturbance.
         if self.scenario.acting and np.linalg.norm(world.outside[3:]) > 0.002:
             force = force + 0.06 * np.array([0.0, 0.0, 1.0])
         self._truth_log.add(
@@ -274,15 +292,33 @@ class _Run:
         server = generator.random() < ranges()["sensor"]["server"]
         for finger, skin, pile in zip(fingers, self.skins, self._forces, strict=True):
             stamps: Array = times
-            readings = _readings(skin, np.array(pile), times, generator)
-            readings = readings[_shown(self.drawn, times)]
+            readings: npt.NDArray[Any] = skin.counts(np.array(pile), times, generator)
+            if skin.sensor.unit == "N":
+                parameters = skin.parameters
+                above = readings.astype(np.float64) - parameters.baseline
+                readings = np.asarray((above / parameters.counts_per_newton).astype(np.float32))
+            effects = self.drawn.stream
+            if effects.rows_per_update != 1.0:
+                # Each row shows the last update of the sensor.
+                rate = self.drawn.sensor.rate / effects.rows_per_update
+                readings = readings[last_updates(times, rate, effects.update_phase)]
             if server:
                 stamps, readings = with_server_effects(
                     times, readings, generator, jitter=0.1 * self.period
                 )
-            stamps, readings = _sent(self.hold, self.drawn, stamps, readings)
-            labels = _until(
-                stamps[-1] + self.period, labels_from_truth(truth, finger, LabelRule(margin=0.0))
+            if effects.jitter:
+                # Made anew for each finger: all fingers of a hold have the same stamps and gaps.
+                draws = self.hold.generator("stamps")
+                kept = kept_in_gaps(stamps, effects.gap_rate, effects.gap, draws)
+                jitter = effects.jitter / self.drawn.sensor.rate
+                unsteady, _ = with_server_effects(stamps, stamps, draws, jitter, repeat_share=0.0)
+                stamps, readings = unsteady[kept], readings[kept]
+            # No label lasts beyond the last sample that was sent.
+            end = stamps[-1] + self.period
+            labels = tuple(
+                replace(label, end=min(label.end, end))
+                for label in labels_from_truth(truth, finger, LabelRule(margin=0.0))
+                if label.start < end
             )
             modules[finger] = Tactile(skin.sensor, stamps, readings, skin.sensor.unit, labels)
         whole = Recording(self.hold.name, modules, self._metadata(), truth)
@@ -328,57 +364,10 @@ class _Run:
         }
 
 
-def _moving_factor(hold: RandomHold, vibration: float) -> float:
-    """Return the factor on the vibration of an arm [m/s^2] while it moves, at least 1."""
-    if "vibration" not in hold.measured:
-        return 1.0
-    return max(1.0, draw_moving_vibration(hold.hand.generator("vibration")) / vibration)
-
-
-def _carrier(hold: RandomHold) -> str | None:
+def carrier_of(hold: RandomHold) -> str | None:
     """Return what carries the hand all the time, of the mechanisms of the hold."""
     drawn = draw_carrier(hold.hand.generator("carrier"), measured_ranges())
     return drawn if drawn in hold.measured else None
-
-
-def _carried(
-    hold: RandomHold, carrier: str | None, orientation: Array, duration: float
-) -> tuple[list[Segment], Array | float]:
-    """Return motions of the arm, and an acceleration, by what carries the hand [m/s^2]."""
-    if carrier is None:
-        return [], 0.0
-    generator, span = hold.generator(carrier), measured_ranges()[carrier]
-    if carrier == "carry":
-        return carrying_legs(generator, span, orientation, duration), 0.0
-    return [], person_acceleration(generator, span, orientation, duration)
-
-
-def _shown(drawn: SensorDraw, times: Array) -> Integers:
-    """Return the sample that each row shows: the last update of the sensor."""
-    effects = drawn.stream
-    if effects.rows_per_update == 1.0:
-        return np.arange(len(times))
-    rate = drawn.sensor.rate / effects.rows_per_update
-    return last_updates(times, rate, effects.update_phase)
-
-
-def _until(end: float, labels: Sequence[Label]) -> tuple[Label, ...]:
-    """Return labels that end with the last sample that was sent, at the latest."""
-    return tuple(replace(label, end=min(label.end, end)) for label in labels if label.start < end)
-
-
-def _sent(
-    hold: RandomHold, drawn: SensorDraw, times: Array, readings: npt.NDArray[Any]
-) -> tuple[Array, npt.NDArray[Any]]:
-    """Return stamps and readings with jitter and gaps, the same for all fingers of a hold."""
-    effects = drawn.stream
-    if not effects.jitter:
-        return times, readings
-    generator = hold.generator("stamps")
-    kept = kept_in_gaps(times, effects.gap_rate, effects.gap, generator)
-    jitter = effects.jitter / drawn.sensor.rate
-    stamps, _ = with_server_effects(times, times, generator, jitter, repeat_share=0.0)
-    return stamps[kept], readings[kept]
 
 
 class _Holder(OperatorForce):
@@ -410,15 +399,3 @@ class _Holder(OperatorForce):
             out += held
             gravity = self._world.hand.model.opt.gravity
             out[:3] -= self._hold * self._weight_of * gravity
-
-
-def _readings(
-    skin: Uskin, forces: Array, times: Array, generator: np.random.Generator
-) -> npt.NDArray[Any]:
-    """Compute what the sensor sends: counts, or newtons with the model's calibration."""
-    counts = skin.counts(forces, times, generator)
-    if skin.sensor.unit == "count":
-        return counts
-    parameters = skin.parameters
-    newtons = (counts.astype(np.float64) - parameters.baseline) / parameters.counts_per_newton
-    return np.asarray(newtons.astype(np.float32))

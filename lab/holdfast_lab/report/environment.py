@@ -27,8 +27,12 @@ def versions() -> dict[str, str | None]:
 def machine() -> dict[str, Any]:
     """Return what the time depends on: processor, usable cores, memory [GiB], system."""
     memory = physical_memory()
+    # `platform.processor` is empty on many Linux systems; the kernel has the name of the model.
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text(errors="replace").splitlines() if cpuinfo.exists() else []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return {
-        "processor": _processor(),
+        "processor": next(names, platform.processor() or platform.machine()),
         "cores": usable_processors(),
         "memory": None if memory is None else round(memory / GIB, 1),
         "system": f"{platform.system()} {platform.machine()}",
@@ -70,13 +74,6 @@ def _version(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
-
-
-def _processor() -> str:
-    cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text(errors="replace").splitlines() if cpuinfo.exists() else []
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.processor() or platform.machine())
 
 
 def physical_memory() -> int | None:

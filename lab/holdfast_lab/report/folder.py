@@ -9,7 +9,7 @@ import msgspec
 
 from holdfast.errors import OutputError
 from holdfast_lab.report.html_report import Section, html_report
-from holdfast_lab.report.result_tables import ResultTable, to_csv, to_json
+from holdfast_lab.report.result_tables import to_csv, to_json
 from holdfast_lab.report.table_layouts import to_latex, to_markdown
 
 TEMPORARY = ".report."
@@ -70,6 +70,7 @@ def write_report(
     check_output_folder(target, kind, force=force)
     try:
         target.mkdir(exist_ok=True)
+        # Inside the target: files are only renamed at the end, which works within one disk.
         with tempfile.TemporaryDirectory(prefix=TEMPORARY, dir=target) as name:
             new, old = Path(name, "new"), Path(name, "old")
             new.mkdir()
@@ -79,19 +80,15 @@ def write_report(
             for other, data in (others or {}).items():
                 (new / other).write_bytes(data)
             _write_tables_and_figures(new, sections)
-            _replace(target, new, old, kind)
+            # The summary marks a complete folder: the old one goes first, the new one comes last.
+            for output in reversed(kind.outputs):
+                if (target / output).exists():
+                    (target / output).rename(old / output)
+            for output in kind.outputs:
+                if (new / output).exists():
+                    (new / output).rename(target / output)
     except OSError as cause:
         raise OutputError(f"cannot write {target}: {cause.strerror or cause}") from cause
-
-
-def _replace(target: Path, new: Path, old: Path, kind: ReportKind) -> None:
-    """Move old outputs away, then new outputs into their place."""
-    for output in reversed(kind.outputs):
-        if (target / output).exists():
-            (target / output).rename(old / output)
-    for output in kind.outputs:
-        if (new / output).exists():
-            (new / output).rename(target / output)
 
 
 def check_output_folder(out: str | Path, kind: ReportKind, *, force: bool = False) -> None:
@@ -106,7 +103,9 @@ def check_output_folder(out: str | Path, kind: ReportKind, *, force: bool = Fals
         raise OutputError(f"cannot write {target}: the folder {target.parent} does not exist")
     if target.exists() and not target.is_dir():
         raise OutputError(f"{target} is a file; a {kind.noun} is written to a folder")
-    held = _held(target)
+    names = {path.name for path in target.iterdir()} if target.is_dir() else set()
+    # A temporary folder is what a run that was killed leaves behind.
+    held = {name for name in names if name not in KEPT and not name.startswith(TEMPORARY)}
     if not held:
         return
     others = held - set(kind.outputs)
@@ -121,35 +120,26 @@ def check_output_folder(out: str | Path, kind: ReportKind, *, force: bool = Fals
         )
 
 
-def _held(target: Path) -> set[str]:
-    if not target.is_dir():
-        return set()
-    names = {path.name for path in target.iterdir()}
-    return {name for name in names if name not in KEPT and not name.startswith(TEMPORARY)}
-
-
 def _write_tables_and_figures(folder: Path, sections: Sequence[Section]) -> None:
-    (folder / "tables").mkdir()
-    (folder / "figures").mkdir()
+    tables, figures = folder / "tables", folder / "figures"
+    tables.mkdir()
+    figures.mkdir()
     for section in sections:
         for table in section.tables:
-            _write_table(folder / "tables", table)
+            document = {
+                "name": table.name,
+                "title": table.title,
+                "note": table.note,
+                "rows": to_json(table),
+            }
+            (tables / f"{table.name}.json").write_bytes(_json(document))
+            # RFC 4180 ends lines by CR LF; without `newline` Windows would write CR CR LF.
+            (tables / f"{table.name}.csv").write_text(to_csv(table), encoding="utf-8", newline="")
+            (tables / f"{table.name}.tex").write_text(to_latex(table), encoding="utf-8")
+            (tables / f"{table.name}.md").write_text(to_markdown(table), encoding="utf-8")
         for figure in section.figures:
             for suffix, data in figure.files().items():
-                (folder / "figures" / f"{figure.name}.{suffix}").write_bytes(data)
-
-
-def _write_table(folder: Path, table: ResultTable) -> None:
-    document = {
-        "name": table.name,
-        "title": table.title,
-        "note": table.note,
-        "rows": to_json(table),
-    }
-    (folder / f"{table.name}.json").write_bytes(_json(document))
-    (folder / f"{table.name}.csv").write_text(to_csv(table), encoding="utf-8", newline="")
-    (folder / f"{table.name}.tex").write_text(to_latex(table), encoding="utf-8")
-    (folder / f"{table.name}.md").write_text(to_markdown(table), encoding="utf-8")
+                (figures / f"{figure.name}.{suffix}").write_bytes(data)
 
 
 def _json(value: object) -> bytes:

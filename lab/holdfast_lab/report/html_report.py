@@ -1,15 +1,97 @@
-"""The report: one HTML file that needs no other file, to read on a screen or on paper."""
+"""The report: one HTML file that needs no other file, to read on a screen or on paper.
 
+Its Matplotlib figures are elements of the document, and files beside it.
+"""
+
+import base64
+import io
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from holdfast_lab.report.images import InlineImage, inline_image, png_of, svg_of
 from holdfast_lab.report.rendering import render
 from holdfast_lab.report.result_tables import FILE_NAME, ResultTable
 from holdfast_lab.report.table_layouts import TableText, table_text
+
+MAX_INLINE_SVG = 400_000
+"""A larger SVG [bytes] is replaced by a PNG in the report."""
+PNG_RESOLUTION = 200
+"""Of a PNG [dots per inch]."""
+
+_ID = re.compile(r'(?<= id=")(?=[^"]+")')
+_REFERENCE = re.compile(r'(?<=url\(#)|(?<=href="#)')
+_OPENING = re.compile(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>')
+_PATH = re.compile(r' d="[^"]*"')
+_EXTRA_DIGITS = re.compile(r"(?<=\.\d\d)\d+")
+"""Digits beyond 0.01 pt."""
+_NOT_NEEDED = re.compile(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", re.DOTALL)
+
+
+def svg_of(figure: Figure, name: str) -> str:
+    """Return the figure as an SVG document, the same for the same figure and name.
+
+    Args:
+        figure: to write.
+        name: from which the ids of its elements are made.
+    """
+    file = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    return file.getvalue()
+
+
+def png_of(figure: Figure) -> bytes:
+    """Return the figure as a PNG file."""
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=PNG_RESOLUTION, metadata={"Software": None})
+    return file.getvalue()
+
+
+class InlineImage(NamedTuple):
+    """A figure inside an HTML document.
+
+    Attributes:
+        view_box: of the `svg` element.
+        svg: contents of the `svg` element and its end; empty if the image is of another kind.
+        data: of an `img` element, in base64; empty if the image is an SVG.
+        kind: of the data: "png" or "webp".
+    """
+
+    view_box: str
+    svg: str
+    data: str
+    kind: str = "png"
+
+    @classmethod
+    def of(cls, data: bytes, kind: str) -> Self:
+        """Return the image for the content of a file."""
+        return cls("", "", base64.b64encode(data).decode(), kind)
+
+
+def inline_image(figure: Figure, name: str) -> InlineImage:
+    """Return the figure for an HTML document: as SVG, or as PNG if the SVG would be large.
+
+    Args:
+        figure: to draw.
+        name: begins every id of the SVG, so that ids of two figures differ.
+    """
+    # The viewBox and the contents of an SVG document, without metadata.
+    document = svg_of(figure, name)
+    opening = _OPENING.search(document)
+    if opening is None:
+        raise ValueError(f"figure {name}: an SVG with a viewBox expected, none given")
+    inner = _NOT_NEEDED.sub("", document[opening.end() :]).replace("xlink:href", "href")
+    inner = re.sub(r"\n\s*", "\n", inner)
+    inner = _PATH.sub(lambda path: _EXTRA_DIGITS.sub("", path[0]), inner)
+    view_box, svg = opening[1], _REFERENCE.sub(f"{name}-", _ID.sub(f"{name}-", inner))
+    if len(svg) <= MAX_INLINE_SVG:
+        return InlineImage(view_box, svg, "")
+    return InlineImage.of(png_of(figure), "png")
+
 
 SUMMARY = "Summary"
 """Title of the section that comes before the contents."""
@@ -92,6 +174,14 @@ class Paragraph(NamedTuple):
     lines: list[str]
     is_list: bool
 
+    @classmethod
+    def of(cls, text: str) -> Self:
+        """Return the paragraph of a text; it is a list if all lines begin with "- "."""
+        lines = [line.strip() for line in text.strip().splitlines()]
+        if all(line.startswith("- ") for line in lines):
+            return cls([line[2:] for line in lines], is_list=True)
+        return cls(lines, is_list=False)
+
 
 class NumberedSection(NamedTuple):
     """A section whose tables and figures are numbered through the report."""
@@ -115,6 +205,7 @@ def html_report(title: str, facts: Mapping[str, object], sections: Sequence[Sect
         ValueError: two tables or two figures have the same name, or a name is no file name.
     """
     check_names(sections)
+    # Numbered apart: tables and figures of the body begin at 1 whatever the summary has.
     summary = [section for section in sections if section.title == SUMMARY]
     return render(
         "report.html",
@@ -151,7 +242,7 @@ def _numbered(sections: Sequence[Section]) -> list[NumberedSection]:
     return [
         NumberedSection(
             section.title,
-            [_paragraph(text) for text in section.text.split("\n\n") if text.strip()],
+            [Paragraph.of(text) for text in section.text.split("\n\n") if text.strip()],
             [(next(table_numbers), table_text(table)) for table in section.tables],
             [(next(figure_numbers), figure) for figure in section.figures],
         )
@@ -161,18 +252,12 @@ def _numbered(sections: Sequence[Section]) -> list[NumberedSection]:
 
 def join_lines(text: str) -> str:
     """Join the lines of each paragraph and of each item of a list."""
-    return "\n\n".join(_join_paragraph(part.splitlines()) for part in text.split("\n\n"))
-
-
-def _join_paragraph(lines: Iterable[str]) -> str:
-    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()
-
-
-def _paragraph(text: str) -> Paragraph:
-    lines = [line.strip() for line in text.strip().splitlines()]
-    if all(line.startswith("- ") for line in lines):
-        return Paragraph([line[2:] for line in lines], is_list=True)
-    return Paragraph(lines, is_list=False)
+    paragraphs = []
+    for part in text.split("\n\n"):
+        breaks = ("\n" if line.startswith("- ") else " " for line in part.splitlines())
+        lines = zip(breaks, part.splitlines(), strict=True)
+        paragraphs.append("".join(f"{before}{line}" for before, line in lines).strip())
+    return "\n\n".join(paragraphs)
 
 
 def _fact_lines(value: object) -> list[str]:

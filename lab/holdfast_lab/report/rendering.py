@@ -75,7 +75,13 @@ def escape_html(text: str) -> Markup:
         >>> print(escape_html("F_a & sigma < 3"))
         <i>F</i><sub>a</sub> &amp; <i>σ</i> &lt; 3
     """
-    return Markup(SYMBOL.sub(_html_symbol, str(Markup.escape(text))))
+
+    def symbol(match: re.Match[str]) -> str:
+        letter, index = match.groups()
+        return f"<i>{letter}</i><sub>{index}</sub>" if letter else "<i>σ</i>"
+
+    # Escaped first, or the elements of the symbols would be escaped too.
+    return Markup(SYMBOL.sub(symbol, str(Markup.escape(text))))
 
 
 def escape_latex(text: str) -> str:
@@ -87,9 +93,17 @@ def escape_latex(text: str) -> str:
         >>> print(escape_latex("F_a at 5 % & my_file"))
         $F_{a}$ at 5 \% \& my\_file
     """
-    pieces, end = [], 0
+    # Symbols are not escaped, the text between them is: `_` and `{` would lose their meaning.
+    pieces: list[str] = []
+    end = 0
     for match in SYMBOL.finditer(text):
-        pieces += [*map(_latex_character, text[end : match.start()]), _latex_symbol(match)]
+        letter, index = match.groups()
+        pieces += map(_latex_character, text[end : match.start()])
+        if not letter:
+            pieces.append(r"$\sigma$")
+        else:  # an index of several letters is a word, not a product of variables
+            word = index if len(index) == 1 else rf"\mathrm{{{index}}}"
+            pieces.append(f"${letter}_{{{word}}}$")
         end = match.end()
     return "".join([*pieces, *map(_latex_character, text[end:])])
 
@@ -123,8 +137,11 @@ def _latex_environment() -> Environment:
     """Return an environment whose delimiters LaTeX does not use; every value is escaped."""
     return Environment(
         loader=PackageLoader("holdfast_lab.report"),
+        # Jinja escapes for HTML only: LaTeX is escaped by the last function on each value.
         autoescape=True,
-        finalize=_finalize_latex,
+        finalize=lambda value: (
+            value if isinstance(value, Markup) else Markup(escape_latex(str(value)))
+        ),
         undefined=StrictUndefined,
         block_start_string="<%",
         block_end_string="%>",
@@ -138,22 +155,6 @@ def _latex_environment() -> Environment:
     )
 
 
-def _finalize_latex(value: object) -> Markup:
-    return value if isinstance(value, Markup) else Markup(escape_latex(str(value)))
-
-
-def _html_symbol(match: re.Match[str]) -> str:
-    letter, index = match.groups()
-    return f"<i>{letter}</i><sub>{index}</sub>" if letter else "<i>σ</i>"
-
-
-def _latex_symbol(match: re.Match[str]) -> str:
-    letter, index = match.groups()
-    if not letter:
-        return r"$\sigma$"
-    return f"${letter}_{{{index}}}$" if len(index) == 1 else rf"${letter}_{{\mathrm{{{index}}}}}$"
-
-
 def _latex_character(letter: str) -> str:
     if letter in _LATEX_CHARACTERS:
         return _LATEX_CHARACTERS[letter]
@@ -161,6 +162,7 @@ def _latex_character(letter: str) -> str:
         return " "
     if letter in _LATIN and letter.isprintable():
         return letter
+    # The letter without its accent; a letter that has no such form is a question mark.
     nearest = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
     return (
         "".join(_LATEX_CHARACTERS.get(each, each) for each in nearest if each.isprintable()) or "?"

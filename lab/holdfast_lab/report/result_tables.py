@@ -6,7 +6,6 @@ A row is one value: what it is about, ours, the paper's. CSV and JSON write the 
 
 import math
 import re
-from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import msgspec
@@ -87,16 +86,32 @@ class ResultTable(msgspec.Struct, frozen=True):
             raise ValueError(f"a table's name is letters, digits, - and _; {self.name!r} given")
         if not self.lines:
             raise ValueError(f"table {self.name}: no key names its lines")
-        reserved = [key for key in _keys(self.rows) if key in RESERVED_KEYS]
+        reserved = [key for key in self.keys if key in RESERVED_KEYS]
         if reserved:
             raise ValueError(f"table {self.name}: a key may not be called {reserved[0]!r}")
         seen = set()
         for row in self.rows:
             if self.column not in row.keys:
                 raise ValueError(f"table {self.name}: a row has no {self.column!r}: {row.keys}")
-            if (cell := _cell(self, row)) in seen:
+            if (cell := self.cell(row)) in seen:
                 raise ValueError(f"table {self.name}: two rows for {' / '.join(cell)}")
             seen.add(cell)
+
+    @property
+    def keys(self) -> list[str]:
+        """All keys of the rows, in the order in which they first appear."""
+        return list(dict.fromkeys(key for row in self.rows for key in row.keys))
+
+    def cell(self, row: Row) -> tuple[str, ...]:
+        """Return the position of a row in the layout: the heads of its line, and its column."""
+        values = [row.keys.get(key, "") for key in (*self.lines, self.column)]
+        return tuple(f"{value:g}" if isinstance(value, float) else str(value) for value in values)
+
+    def values(self, row: Row) -> dict[str, float | None]:
+        """Return the values of a row, by the names that they have in files."""
+        if self.has_paper:
+            return {"ours": row.ours, "paper": row.paper, "difference": row.difference}
+        return {"value": row.ours}
 
 
 class TableLine(NamedTuple):
@@ -133,7 +148,7 @@ def pivot(table: ResultTable) -> TableGrid:
     cells: dict[tuple[str, ...], dict[str, Row]] = {}
     columns: dict[str, None] = {}
     for row in table.rows:
-        *heads, column = _cell(table, row)
+        *heads, column = table.cell(row)
         cells.setdefault(tuple(heads), {})[column] = row
         columns[column] = None
     firsts = list(dict.fromkeys(heads[0] for heads in cells))
@@ -158,6 +173,7 @@ def number_text(value: float | None, digits: int, *, signed: bool = False) -> st
     if math.isinf(value):
         return INFINITE if value > 0 else MINUS + INFINITE
     text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
+    # A value that is rounded to zero has no sign.
     if not any(digit in text for digit in "123456789"):
         text = text.lstrip("+-")
     return text.replace("-", MINUS)
@@ -175,7 +191,19 @@ def to_json(table: ResultTable) -> list[dict[str, Any]]:
     null, as in every output of the commands. A row whose value is infinite has
     `"infinite": true`.
     """
-    return [_flat(table, row) for row in table.rows]
+    rows = []
+    for row in table.rows:
+        flat: dict[str, Any] = {
+            key: _finite(value) if isinstance(value, float) else value
+            for key, value in row.keys.items()
+        }
+        flat |= {name: _finite(value) for name, value in table.values(row).items()}
+        flat["n"] = row.n
+        flat["interval"] = None if row.interval is None else [_finite(end) for end in row.interval]
+        if row.ours is not None and math.isinf(row.ours):
+            flat["infinite"] = True
+        rows.append(flat)
+    return rows
 
 
 def to_csv(table: ResultTable) -> str:
@@ -184,55 +212,15 @@ def to_csv(table: ResultTable) -> str:
     The columns are the keys, then `ours,paper,difference,n,low,high`, or without a paper
     `value,n,low,high`. An empty field is unknown, `inf` is infinite.
     """
-    keys = _keys(table.rows)
-    names = list(_values(table, Row({}, None)))
-    lines: list[list[object]] = [[*keys, *names, "n", "low", "high"]]
+    # Of a row without keys, because the header does not depend on the rows.
+    names = list(table.values(Row({}, None)))
+    lines: list[list[object]] = [[*table.keys, *names, "n", "low", "high"]]
     for row in table.rows:
-        values = (*_values(table, row).values(), row.n, *(row.interval or (None, None)))
-        known = [row.keys.get(key, "") for key in keys]
-        lines.append([*known, *(_csv_field(value) for value in values)])
+        values = (*table.values(row).values(), row.n, *(row.interval or (None, None)))
+        fields = ("" if value is None or math.isnan(value) else value for value in values)
+        lines.append([*(row.keys.get(key, "") for key in table.keys), *fields])
     return csv_text(lines)
-
-
-def _values(table: ResultTable, row: Row) -> dict[str, float | None]:
-    """Return the values of a row, by the names that they have in files."""
-    if table.has_paper:
-        return {"ours": row.ours, "paper": row.paper, "difference": row.difference}
-    return {"value": row.ours}
-
-
-def _flat(table: ResultTable, row: Row) -> dict[str, Any]:
-    interval = None if row.interval is None else [_finite(end) for end in row.interval]
-    flat: dict[str, Any] = {key: _json_key(value) for key, value in row.keys.items()}
-    flat |= {name: _finite(value) for name, value in _values(table, row).items()}
-    flat |= {"n": row.n, "interval": interval}
-    if row.ours is not None and math.isinf(row.ours):
-        flat["infinite"] = True
-    return flat
 
 
 def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
-
-
-def _json_key(value: Key) -> Key | None:
-    return _finite(value) if isinstance(value, float) else value
-
-
-def _csv_field(value: float | None) -> float | str:
-    return "" if value is None or math.isnan(value) else value
-
-
-def _keys(rows: Iterable[Row]) -> list[str]:
-    """Return all keys, in the order in which they first appear."""
-    return list(dict.fromkeys(key for row in rows for key in row.keys))
-
-
-def _cell(table: ResultTable, row: Row) -> tuple[str, ...]:
-    """Return the position of a row in the layout: the heads of its line, and its column."""
-    return tuple(_head(row.keys, key) for key in (*table.lines, table.column))
-
-
-def _head(keys: Mapping[str, Key], key: str) -> str:
-    value = keys.get(key, "")
-    return f"{value:g}" if isinstance(value, float) else str(value)

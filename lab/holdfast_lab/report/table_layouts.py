@@ -4,8 +4,7 @@ Each cell holds our value and its interval, and where there is one the paper's v
 difference, ours minus the paper's.
 """
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from holdfast_lab.report.rendering import escape_markdown, render
 from holdfast_lab.report.result_tables import (
@@ -42,6 +41,20 @@ class CellText(NamedTuple):
     paper: str = ""
     difference: str = ""
     exists: bool = False
+
+    @classmethod
+    def of(cls, row: Row | None, digits: int) -> Self:
+        """Return the texts of a row, or of no row."""
+        if row is None:
+            return cls()
+        ours, interval = number_text(row.ours, digits), _interval_text(row, digits)
+        if row.paper is None:
+            return cls(ours, interval, exists=True)
+        paper = number_text(row.paper, digits)
+        if row.ours is None:  # nothing to subtract
+            return cls(ours, interval, paper, exists=True)
+        difference = number_text(row.difference, digits, signed=True)
+        return cls(ours, interval, paper, difference, exists=True)
 
     @property
     def paper_text(self) -> str:
@@ -133,7 +146,15 @@ def to_markdown(table: ResultTable) -> str:
     lines = [[escape_markdown(head) for head in heads]]
     lines.append(["---"] * len(text.keys) + ["--:"] * len(text.columns))
     for line in text.lines:
-        cells = [_markdown_cell(cell) for cell in line.cells]
+        cells = []
+        for cell in line.cells:
+            # A cell that has only the paper's value does not begin with a dash for ours.
+            parts = [] if cell.paper and not cell.difference else [cell.ours]
+            if cell.interval:
+                parts.append(f"<sub>{cell.interval}</sub>")
+            if cell.paper:
+                parts.append(f"*paper {cell.paper_text}*")
+            cells.append("<br>".join(parts))
         lines.append([*map(escape_markdown, line.heads), *cells, *line.n_recordings])
     body = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
     below = " ".join(escape_markdown(_sentence(note)) for note in text.notes)
@@ -147,8 +168,12 @@ def table_text(table: ResultTable) -> TableText:
     digits = [digits_of(table, column) for column in grid.columns]
     lines = []
     for before, line in zip((None, *grid.lines), grid.lines, strict=False):
-        cells = [_cell_text(row, n) for row, n in zip(line.cells, digits, strict=True)]
-        n_recordings = [_n_text(line.cells)] if n_varies else []
+        cells = [CellText.of(row, n) for row, n in zip(line.cells, digits, strict=True)]
+        n_recordings = []
+        if n_varies:  # one number, or the smallest and the largest of the line
+            counts = sorted({r.n for r in line.cells if r is not None and r.n is not None})
+            ends = dict.fromkeys([*counts[:1], *counts[-1:]])
+            n_recordings = ["–".join(map(str, ends)) or MISSING]
         lines.append(LineText(list(line.heads), _n_repeated(line, before), cells, n_recordings))
     return TableText(
         name=table.name,
@@ -176,44 +201,16 @@ def notes(table: ResultTable) -> list[str]:
     return [note for note in (table.note.strip(), " ".join(sentences)) if note]
 
 
-def _cell_text(row: Row | None, digits: int) -> CellText:
-    if row is None:
-        return CellText()
-    ours = number_text(row.ours, digits)
-    interval = _interval_text(row, digits)
-    if row.paper is None:
-        return CellText(ours, interval, exists=True)
-    paper = number_text(row.paper, digits)
-    if row.ours is None:
-        return CellText(ours, interval, paper, exists=True)
-    difference = number_text(row.difference, digits, signed=True)
-    return CellText(ours, interval, paper, difference, exists=True)
-
-
-def _markdown_cell(cell: CellText) -> str:
-    paper_only = cell.paper and not cell.difference
-    parts = [] if paper_only else [cell.ours]
-    if cell.interval:
-        parts.append(f"<sub>{cell.interval}</sub>")
-    if cell.paper:
-        parts.append(f"*paper {cell.paper_text}*")
-    return "<br>".join(parts)
-
-
 def _interval_text(row: Row, digits: int) -> str:
     if row.interval is None:
         return ""
     low, high = (number_text(end, digits).replace(INFINITE, "∞") for end in row.interval)
-    if (low, high) in ((MISSING, MISSING), ("∞", "∞")):
+    if (low, high) in ((MISSING, MISSING), ("∞", "∞")):  # it says nothing that the value does not
         return ""
     if MISSING in (low, high):
         return f"from {low}" if high == MISSING else f"to {high}"
+    # A dash between two numbers would look like a minus before the second.
     return f"{low} to {high}" if MINUS in low + high else f"{low}–{high}"
-
-
-def _n_text(cells: Iterable[Row | None]) -> str:
-    counts = sorted({row.n for row in cells if row is not None and row.n is not None})
-    return "–".join(str(n) for n in dict.fromkeys([*counts[:1], *counts[-1:]])) or MISSING
 
 
 def _n_repeated(line: TableLine, before: TableLine | None) -> int:

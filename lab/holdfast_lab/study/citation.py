@@ -117,9 +117,9 @@ def methods_text(plan: StudyPlan, summary: Mapping[str, Any], tables: Sequence[R
     paragraphs = [
         "# Methods",
         "\n".join([f"**Data**: {source}.", "", *data]),
-        _protocol_text(plan),
+        protocol_text(plan),
         "\n".join(["**Methods**:", "", *methods]),
-        _comparisons_text(tables),
+        comparisons_text(tables),
         f"**Software**: {', '.join(versions)}.{quick}",
     ]
     return "\n\n".join(paragraphs) + "\n"
@@ -142,7 +142,8 @@ def compares_methods(keys: Iterable[str]) -> bool:
     return not COMPARED_KEYS.isdisjoint(keys)
 
 
-def _protocol_text(plan: StudyPlan) -> str:
+def protocol_text(plan: StudyPlan) -> str:
+    """Return the paragraph on the protocol."""
     effort = method_effort(plan, next(iter(METHODS)))
     return (
         f"**Protocol**: The features of Kitouni et al. [@kitouni] ({', '.join(DEPLOYED_FEATURES)}) "
@@ -158,13 +159,15 @@ def _protocol_text(plan: StudyPlan) -> str:
     )
 
 
-def _comparisons_text(tables: Sequence[ResultTable]) -> str:
+def comparisons_text(tables: Sequence[ResultTable]) -> str:
+    """Return the paragraph on the number of comparisons."""
     counts = {
         table.name: sum(row.interval is not None for row in table.rows)
         for table in tables
         if table.rows and compares_methods(table.rows[0].keys)
     }
     n_all = sum(row.interval is not None for table in tables for row in table.rows)
+    # Intervals are not corrected for their number, so the reader is told how many there are.
     named = ", ".join(f"{name} {n}" for name, n in counts.items())
     beside = f" Tables that compare methods have {sum(counts.values())} of them ({named})."
     return (

@@ -1,7 +1,7 @@
 """Values that a worker keeps in memory, because many tasks of a study use them."""
 
 import os
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
@@ -59,13 +59,10 @@ def recording_bytes(recording: Recording) -> int:
     """Return the size of the arrays of a recording [byte]."""
     n_bytes = sum(m.times.nbytes + m.readings.nbytes for m in recording.modules.values())
     if (truth := recording.truth) is not None:
-        n_bytes += truth.times.nbytes + _total(truth.hand)
-        n_bytes += sum(_total(arrays) for arrays in truth.fingers.values())
+        n_bytes += truth.times.nbytes
+        for arrays in (truth.hand, *truth.fingers.values()):
+            n_bytes += sum(array.nbytes for array in arrays.values())
     return n_bytes
-
-
-def _total(arrays: Mapping[str, Any]) -> int:
-    return sum(array.nbytes for array in arrays.values())
 
 
 def usable_memory(limit: Path = CONTAINER_LIMIT) -> int:

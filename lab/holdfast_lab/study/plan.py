@@ -162,12 +162,19 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
             f"{folder}: one recording with labels given ({labelled[0]}); at least two are "
             "needed, because test recordings must not be used for training"
         )
+    fingers = tuple(f for f, counts in n_labelled.items() if counts[True] and counts[False])
+    if not fingers:
+        stable, other = (sum(n[kind] for n in n_labelled.values()) for kind in (True, False))
+        raise TrainingError(
+            f"{folder}: {stable} samples labelled stable and {other} labelled not stable given; "
+            "a finger with both is needed"
+        )
     return Corpus(
         name=name,
         folder=str(Path(folder).resolve()),
         recordings=dataset.names,
         digest=digest.hexdigest(),
-        fingers=_fingers_of_both_classes(n_labelled, folder),
+        fingers=fingers,
         rate=scan.rate,
         tare=str(Tare.parse(tare)),
         n_samples=sum(n_samples),
@@ -188,21 +195,3 @@ def content_digest(recording: Recording) -> bytes:
             state.update(f"{key} {array.dtype} {array.shape}".encode())
             state.update(np.ascontiguousarray(array).tobytes())
     return state.digest()
-
-
-def _fingers_of_both_classes(
-    n_labelled: dict[str, Counter[bool]], folder: str | Path
-) -> tuple[str, ...]:
-    """Return the fingers with labels of both classes.
-
-    Raises:
-        TrainingError: there is no such finger.
-    """
-    fingers = tuple(f for f, counts in n_labelled.items() if counts[True] and counts[False])
-    if not fingers:
-        stable, other = (sum(n[kind] for n in n_labelled.values()) for kind in (True, False))
-        raise TrainingError(
-            f"{folder}: {stable} samples labelled stable and {other} labelled not stable given; "
-            "a finger with both is needed"
-        )
-    return fingers

@@ -27,14 +27,15 @@ def summary_text(tables: Iterable[ResultTable]) -> str:
     """Return the main results as a list, with a line for each that the tables have."""
     rows = {table.name: table.rows for table in tables}
     lines = [
-        *_accuracies(rows.get("confusion", [])),
-        *_strongest(rows.get("strongest", [])),
-        *_events(rows.get("events", [])),
+        *accuracy_lines(rows.get("confusion", [])),
+        *strongest_lines(rows.get("strongest", [])),
+        *event_lines(rows.get("events", [])),
     ]
     return "\n".join(f"- {line}" for line in lines)
 
 
-def _accuracies(rows: list[Row]) -> Iterator[str]:
+def accuracy_lines(rows: list[Row]) -> Iterator[str]:
+    """Yield a sentence on the accuracy by each protocol."""
     for on, words in (
         ("held out", "The paper's protocol (samples split at random)"),
         ("other objects", "The same classifiers on objects that were not in training"),
@@ -45,12 +46,16 @@ def _accuracies(rows: list[Row]) -> Iterator[str]:
             for row in _select(rows, {"classifier": name, "on": on, "figure": "accuracy"})
         ]
         if accuracies:
-            paper = _paper if on == "held out" else lambda _: ""  # it tested no other objects
-            parts = [f"{name} {_value(row)} % correct{paper(row)}" for name, row in accuracies]
+            parts = []
+            for name, row in accuracies:
+                known = on == "held out" and row.paper is not None  # it tested no other objects
+                paper = f" (paper: {row.paper:.1f} %)" if known else ""
+                parts.append(f"{name} {_value(row)} % correct{paper}")
             yield f"{words}: {', '.join(parts)}{_recordings(accuracies[0][1])}."
 
 
-def _strongest(rows: list[Row]) -> Iterator[str]:
+def strongest_lines(rows: list[Row]) -> Iterator[str]:
+    """Yield a sentence on our method and the strongest baseline."""
     ours = _select(rows, {**STRONGEST, "figure": "holdfast [%]"})
     baseline = _select(rows, {**STRONGEST, "figure": "baseline [%]"})
     # Without a baseline there is nothing to compare.
@@ -61,7 +66,8 @@ def _strongest(rows: list[Row]) -> Iterator[str]:
         )
 
 
-def _events(rows: list[Row]) -> Iterator[str]:
+def event_lines(rows: list[Row]) -> Iterator[str]:
+    """Yield a sentence on the missed events of some methods."""
     parts = [
         f"{method} {_value(missed)} % (with {_value(false)} false alarms per minute)"
         for method in SUMMARY_METHODS
@@ -81,10 +87,6 @@ def _select(rows: list[Row], keys: dict[str, str]) -> list[Row]:
 
 def _value(row: Row) -> str:
     return f"{row.ours:.1f}"
-
-
-def _paper(row: Row) -> str:
-    return "" if row.paper is None else f" (paper: {row.paper:.1f} %)"
 
 
 def _recordings(row: Row) -> str:

@@ -7,7 +7,6 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import CONTACT_FORCE
-from holdfast.sensors.types import Array
 from holdfast.twin.hand import RATE
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast.twin.world import World
@@ -87,17 +86,14 @@ def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
         if held_for < trial.load.start - LEAD_TIME:
             continue
         tips = running.simulation.world.contact.tips
+        # Without contact a fingertip moves over nothing: it does not slide.
+        speeds = np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0)
         yield Instant(
             time=held_for - trial.load.start,
             force=float(tips[:, TIP_LOAD].sum()),
             least=least_force_at(trial, held_for),
-            slip_speed=float(_speeds(tips).max()),
+            slip_speed=float(speeds.max()),
             state=command.state.value,
             is_lost=running.is_lost,
             world=running.simulation.world,
         )
-
-
-def _speeds(tips: Array) -> Array:
-    """Return the slip speed of each fingertip, 0 without contact [m/s]."""
-    return np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0)

@@ -1,6 +1,6 @@
 """Contents of `trial.json` and `trials.csv`, from the results of all trials."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +39,10 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
     # A result for JSON, null for what is infinite or unknown.
     return {
         "laws": _summaries(results),
-        "unseen_objects": _summaries(results, _of("unseen", True)),
-        "seen_objects": _summaries(results, _of("unseen", False)),
-        "by_kind": {kind.value: _summaries(results, _of("kind", kind.value)) for kind in LoadKind},
-        "by_fingers": {str(n): _summaries(results, _of("n_fingers", n)) for n in (3, 4)},
+        "unseen_objects": _summaries(results, unseen=True),
+        "seen_objects": _summaries(results, unseen=False),
+        "by_kind": {kind.value: _summaries(results, kind=kind.value) for kind in LoadKind},
+        "by_fingers": {str(n): _summaries(results, n_fingers=n) for n in (3, 4)},
         "paired": {
             other: {law: compare(results[law], results[other]) for law in results if law != other}
             for other in (BASELINE_LAW, OWN_LAW)
@@ -73,7 +73,11 @@ def example_of(results: TrialResults) -> int | None:
         The number; None if there is no such trial, or one of the two laws was not run.
     """
     pairs = zip(results.get(BASELINE_LAW, ()), results.get(OWN_LAW, ()), strict=False)
-    saved = (one.number for lost, one in pairs if lost.held and lost.dropped and _is_saved(one))
+    saved = (
+        own.number
+        for lost, own in pairs
+        if lost.held and lost.dropped and own.held and own.feasible and not own.dropped
+    )
     return next(saved, None)
 
 
@@ -89,30 +93,19 @@ def infeasible_of(results: TrialResults) -> list[dict[str, Any]]:
 def trials_csv(results: TrialResults) -> str:
     """Return a line for each trial with each law; `inf` is infinite, an empty field unknown."""
     names = list(TrialResult.__struct_fields__)
-    rows = [
-        [_known(getattr(one, name)) for name in names] for each in results.values() for one in each
-    ]
+    lines = ([getattr(one, name) for name in names] for each in results.values() for one in each)
+    rows = [["" if str(value) == "nan" else value for value in line] for line in lines]
     return csv_text([names, *rows])
 
 
-def _known(value: object) -> object:
-    return "" if str(value) == "nan" else value
-
-
-def _is_saved(result: TrialResult) -> bool:
-    return result.held and result.feasible and not result.dropped
-
-
-def _summaries(
-    results: TrialResults, chosen: Callable[[TrialResult], bool] = lambda _: True
-) -> dict[str, Summary]:
-    """Return the numbers of each law over the trials that are chosen."""
-    return {law: summarize([one for one in each if chosen(one)]) for law, each in results.items()}
-
-
-def _of(field: str, value: object) -> Callable[[TrialResult], bool]:
-    """Return whether a field of a result has a value, as a function."""
-    return lambda one: bool(getattr(one, field) == value)
+def _summaries(results: TrialResults, **fields: object) -> dict[str, Summary]:
+    """Return the numbers of each law over the trials whose fields have these values."""
+    return {
+        law: summarize(
+            [one for one in each if all(getattr(one, name) == fields[name] for name in fields)]
+        )
+        for law, each in results.items()
+    }
 
 
 def _example(results: TrialResults, number: int) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """A whole comparison of laws: run the trials, then write tables, figures and the report."""
 
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ from holdfast.parallel import Engine
 from holdfast_lab.report.environment import fact_texts, machine, versions
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
 from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
-from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import (
     BASELINE_LAW,
     OWN_LAW,
@@ -59,7 +57,7 @@ def run_trials(
     check_output_folder(out, COMPARISON, force=force)
     start = time.perf_counter()
     runner = TaskRunner(Path(out), engine, progress, notify)
-    # The results of all trials, by law and in the order of the trials.
+    # All laws of a trial follow one another: a process computes the least forces of a trial once.
     tasks = {law: [plan.trial_task(number, law) for number in range(plan.n)] for law in plan.laws}
     by_number = (task for same in zip(*tasks.values(), strict=True) for task in same)
     done = runner.run(list(by_number))
@@ -74,7 +72,6 @@ def run_trials(
     document |= {"versions": versions(), "machine": machine(), "seconds": seconds}
     sections = report_sections(document, results, example)
     others = {"trials.csv": trials_csv(results).encode()}
-    # The head of the report.
     write_report(
         out,
         COMPARISON,
@@ -99,21 +96,18 @@ def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
     tasks = {law: plan.course_task(number, law) for law in laws}
     done = runner.run(list(tasks.values()))
     courses = {law: done[task.name] for law, task in tasks.items()}
-    task = plan.film_task(number, laws)
-    runner.notify("rendering the film of one trial")
-    try:
-        film = TaskRunner(runner.folder).run([task])[task.name]
-    except OutputError as cause:
-        return Example(_describe(plan, number, courses), courses, reason=str(cause))
-    return Example(_describe(plan, number, courses), courses, film)
-
-
-def _describe(plan: TrialPlan, number: int, courses: Mapping[str, TrialCourse]) -> str:
-    """Return a sentence on a trial."""
     trial = draw_trial(number, plan.seed, plan.plant)
     lost_at = courses[BASELINE_LAW].lost_at
     when = "" if lost_at is None else f"; {BASELINE_LAW} loses it {lost_at:.2f} s later"
-    return (
+    what = (
         f"Trial {number}: {trial.grasp.object}, {trial.n_fingers} fingers, load "
         f"{trial.load.kind.value}{when}."
     )
+    task = plan.film_task(number, laws)
+    runner.notify("rendering the film of one trial")
+    try:
+        # In this process: it needs a back end of MuJoCo, which a worker may lack.
+        film = TaskRunner(runner.folder).run([task])[task.name]
+    except OutputError as cause:
+        return Example(what, courses, reason=str(cause))
+    return Example(what, courses, film)

@@ -58,7 +58,17 @@ def draw_distributions(groups: Mapping[str, Distribution]) -> Figure:
     figure, grid = panels(len(groups), 2, 2.6, sharey=True)
     styles = series_styles(name for group in groups.values() for name in group.values)
     for axes, (x, group) in zip(grid, groups.items(), strict=True):
-        _prepare_axis(axes, group)
+        axes.set_xscale("log")
+        axes.set_xlim(group.floor * 0.9, group.limit)
+        axes.grid(color=FAINT, linewidth=0.5)
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(
+            FuncFormatter(
+                lambda value, _, floor=group.floor: "0" if value <= floor * 1.01 else f"{value:g}"
+            )
+        )
+        if group.goal is not None:
+            axes.axvline(group.goal, color=GREY, linewidth=0.9, linestyle=":")
         for name, values in group.values.items():
             _draw_steps(axes, values, group, styles[name])
         add_labels(axes, x)
@@ -66,7 +76,7 @@ def draw_distributions(groups: Mapping[str, Distribution]) -> Figure:
         grid[0].set_ylim(-2, 102)
         add_labels(grid[0], y="share of trials [%]")
     handles = legend_handles(styles, [group.values for group in groups.values()])
-    for handle in handles:
+    for handle in handles:  # steps have no marks
         handle.set_marker("")
     add_legend(figure, handles, per_row=6)
     return figure
@@ -91,6 +101,7 @@ def draw_trade_offs(
         goal: largest x and y of the area that is shaded.
     """
     figure, grid = panels(len(groups), 2, 2.8, sharey=True)
+    # One scale, so that the shaded area has the same size in all panels.
     for axes in grid[1:]:
         axes.sharex(grid[0])
     styles = series_styles(name for group in groups.values() for name in group)
@@ -98,7 +109,15 @@ def draw_trade_offs(
         axes.grid(color=FAINT, linewidth=0.5)
         axes.fill_between([0, goal[0]], 0, goal[1], color=COLOURS[2], alpha=0.15, linewidth=0)
         for name, values in group.items():
-            _draw_cross(axes, values, styles[name])
+            at, drops = values
+            if at.value is None or drops.value is None:
+                continue
+            color, marker, _ = styles[name]
+            if at.low is not None and at.high is not None:
+                axes.hlines(drops.value, at.low, at.high, color=color, linewidth=1.1)
+            if drops.low is not None and drops.high is not None:
+                axes.vlines(at.value, drops.low, drops.high, color=color, linewidth=1.1)
+            axes.plot(at.value, drops.value, color=color, marker=marker, markersize=5, linestyle="")
         axes.set_ylim(-3, 103)
         axes.set_xlim(left=0.9)
         add_title(axes, title)
@@ -118,26 +137,33 @@ def draw_courses(courses: Mapping[str, TrialCourse]) -> Figure:
     """
     figure, grid = panels(2 * len(courses), len(courses), 1.7)
     upper, lower = grid[: len(courses)], grid[len(courses) :]
-    for index, (title, course) in enumerate(courses.items()):
-        add_title(upper[index], title)
-        axes = upper[index]
-        axes.grid(color=FAINT, linewidth=0.5)
-        axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
-        axes.plot(
-            course.times, course.force, color=COLOURS[0], linewidth=1.1, label="force of the hand"
+    for (title, course), force, slip in zip(courses.items(), upper, lower, strict=True):
+        add_title(force, title)
+        add_labels(slip, "time since the load began [s]")
+        for axes in (force, slip):
+            axes.grid(color=FAINT, linewidth=0.5)
+            axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
+        times, speed = course.times, 1e3 * np.array(course.slip_speed)
+        force.plot(times, course.force, color=COLOURS[0], linewidth=1.1, label="force of the hand")
+        force.plot(
+            times, course.least, color=INK, linewidth=0.9, linestyle="--", label="least force"
         )
-        axes.plot(
-            course.times,
-            course.least,
-            color=INK,
-            linewidth=0.9,
-            linestyle="--",
-            label="least force",
-        )
-        _mark_loss(axes, course)
-        _draw_slip(lower[index], course)
-    for row in (upper, lower):
-        _share_limits(row)
+        slip.plot(times, speed, color=COLOURS[1], linewidth=0.9)
+        for axes in (force, slip):
+            if course.lost_at is not None:
+                axes.axvline(course.lost_at, color=COLOURS[1], linewidth=1.0)
+                axes.annotate(
+                    "lost", (course.lost_at, 0.97), xycoords=("data", "axes fraction"),
+                    xytext=(3, 0), textcoords="offset points", va="top", fontsize=FONT_SIZE,
+                    color=COLOURS[1],
+                )  # fmt: skip
+    # The panels of a row have the same limits, so that the laws can be compared.
+    for row in (upper, lower) if courses else ():
+        right = max(axes.get_xlim()[1] for axes in row)
+        left = min(axes.get_xlim()[0] for axes in row)
+        top = max(axes.get_ylim()[1] for axes in row)
+        for axes in row:
+            axes.set(xlim=(left, right), ylim=(0, top))
     if courses:
         add_labels(upper[0], y="normal force, sum [N]")
         add_labels(lower[0], y="slip speed [mm/s]")
@@ -145,21 +171,10 @@ def draw_courses(courses: Mapping[str, TrialCourse]) -> Figure:
     return figure
 
 
-def _prepare_axis(axes: Axes, group: Distribution) -> None:
-    axes.set_xscale("log")
-    axes.set_xlim(group.floor * 0.9, group.limit)
-    axes.grid(color=FAINT, linewidth=0.5)
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(
-        FuncFormatter(lambda value, _: "0" if value <= group.floor * 1.01 else f"{value:g}")
-    )
-    if group.goal is not None:
-        axes.axvline(group.goal, color=GREY, linewidth=0.9, linestyle=":")
-
-
 def _draw_steps(axes: Axes, values: Array, group: Distribution, style: SeriesStyle) -> None:
     if not len(values):
         return
+    # Shares of all values: infinite ones keep the curve below 100 %.
     finite = np.sort(np.maximum(values[np.isfinite(values)], group.floor))
     shares = 100 * np.arange(len(finite) + 1) / len(values)
     x = np.concatenate([[group.floor * 0.9], finite, [group.limit]])
@@ -167,45 +182,6 @@ def _draw_steps(axes: Axes, values: Array, group: Distribution, style: SeriesSty
         x, [*shares, shares[-1]], where="post", color=style.color, linestyle=style.linestyle,
         linewidth=1.2,
     )  # fmt: skip
-
-
-def _draw_cross(axes: Axes, values: TradeOff, style: SeriesStyle) -> None:
-    x, y = values
-    if x.value is None or y.value is None:
-        return
-    if x.low is not None and x.high is not None:
-        axes.hlines(y.value, x.low, x.high, color=style.color, linewidth=1.1)
-    if y.low is not None and y.high is not None:
-        axes.vlines(x.value, y.low, y.high, color=style.color, linewidth=1.1)
-    axes.plot(x.value, y.value, color=style.color, marker=style.marker, markersize=5, linestyle="")
-
-
-def _draw_slip(axes: Axes, course: TrialCourse) -> None:
-    axes.grid(color=FAINT, linewidth=0.5)
-    axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
-    axes.plot(course.times, 1e3 * np.array(course.slip_speed), color=COLOURS[1], linewidth=0.9)
-    _mark_loss(axes, course)
-    add_labels(axes, "time since the load began [s]")
-
-
-def _mark_loss(axes: Axes, course: TrialCourse) -> None:
-    if course.lost_at is not None:
-        axes.axvline(course.lost_at, color=COLOURS[1], linewidth=1.0)
-        axes.annotate(
-            "lost", (course.lost_at, 0.97), xycoords=("data", "axes fraction"), xytext=(3, 0),
-            textcoords="offset points", va="top", fontsize=FONT_SIZE, color=COLOURS[1],
-        )  # fmt: skip
-
-
-def _share_limits(row: Sequence[Axes]) -> None:
-    """Give all axes of a row the same limits, so that they can be compared."""
-    if not row:
-        return
-    right = max(axes.get_xlim()[1] for axes in row)
-    left = min(axes.get_xlim()[0] for axes in row)
-    top = max(axes.get_ylim()[1] for axes in row)
-    for axes in row:
-        axes.set(xlim=(left, right), ylim=(0, top))
 
 
 def distribution_figure(results: TrialResults) -> ReportFigure:

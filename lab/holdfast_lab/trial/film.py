@@ -1,7 +1,6 @@
 """Film of one trial with two laws, one above the other, with load, force and state in words."""
 
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -76,8 +75,10 @@ def film(trial: Trial, laws: tuple[str, str], model: str) -> bytes:
         OutputError: no back end of MuJoCo works here.
     """
     sides = [[_framed(law, shot, trial.load) for shot in _shots(trial, law, model)] for law in laws]
+    gap = np.full((FILM_GAP, FILM_WIDTH, 3), 255, dtype=np.uint8)
+    above, below = sides
     pictures = (
-        _stacked([side[min(k, len(side) - 1)] for side in sides])
+        np.concatenate([above[min(k, len(above) - 1)], gap, below[min(k, len(below) - 1)]])
         for k in range(max(map(len, sides)))
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -93,6 +94,7 @@ def _shots(trial: Trial, law: str, model: str) -> list[Shot]:
         for number, instant in enumerate(follow(trial, law, model)):
             if number % SAMPLES_PER_PICTURE == 0 and instant.world is not None:
                 world = instant.world
+                # Made late, because only a world has the model that it draws.
                 renderer = renderer or Renderer(world.hand.model, FILM_WIDTH, HEIGHT)
                 arrows = np.column_stack([world.bodies[:-1, :3], world.contact.contact_force])
                 load = _load_arrow(trial, instant, world.bodies[-1, :3])
@@ -119,11 +121,6 @@ def _load_arrow(trial: Trial, instant: Instant, place: Array) -> Array | None:
         return None
     length = min(LOAD_LENGTH_PER_NEWTON * size, MAX_LOAD_LENGTH) / size * force
     return np.concatenate([place + (item.radius + CLEARANCE) * TOWARDS_VIEWER, length])
-
-
-def _stacked(pictures: Sequence[Picture]) -> Picture:
-    gap = np.full((FILM_GAP, FILM_WIDTH, 3), 255, dtype=np.uint8)
-    return np.concatenate([pictures[0], gap, *pictures[1:]])
 
 
 def _framed(law: str, shot: Shot, load: Load) -> Picture:
@@ -178,12 +175,8 @@ def load_text(load: Load, time: float) -> str:
     if load.kind is LoadKind.FRICTION:
         return f"friction x {state.friction:.2f}"
     if load.kind is LoadKind.PULL:
-        return f"pull {float(np.linalg.norm(state.force)):.1f} N {_side(state.force)}"
+        axis = int(np.argmax(np.abs(state.force)))
+        side = SIDES[axis][int(state.force[axis] > 0)]
+        return f"pull {float(np.linalg.norm(state.force)):.1f} N {side}"
     size = float(np.linalg.norm(state.acceleration))
     return f"{load.kind.value} {size:.1f} m/s2"  # the font has no raised 2
-
-
-def _side(vector: Array) -> str:
-    """Return the direction of a vector in the picture, in a word."""
-    axis = int(np.argmax(np.abs(vector)))
-    return SIDES[axis][int(vector[axis] > 0)]

@@ -102,7 +102,7 @@ def calm_patches(trial: Trial) -> list[Patch]:
     while simulation.held_for < trial.load.start - 1 / RATE and not simulation.is_over:
         simulation.step(scales)
         if simulation.protocol.lost_at is not None:
-            break
+            break  # the contacts of the sample before stay
         if simulation.held_for >= trial.load.start - 2 / RATE or not patches:
             patches = patches_of(simulation.world) if simulation.held_for > 0 else []
     return patches
@@ -110,27 +110,27 @@ def calm_patches(trial: Trial) -> list[Patch]:
 
 def patches_of(world: World) -> list[Patch]:
     """Return the patches of the fingertips that touch the object."""
-    tips = np.flatnonzero(world.loads > CONTACT_FORCE)
-    return [_patch(world, int(tip)) for tip in tips]
-
-
-def _patch(world: World, tip: int) -> Patch:
-    item, finger = world.bodies[-1], world.bodies[tip]
-    turn, back = finger[3:12].reshape(3, 3), item[3:12].reshape(3, 3)
-    forces = world.contact.node_forces[tip]
-    touching = np.any(forces != 0.0, axis=1)
-    arms = finger[:3] + world.constants.nodes[touching, :3] @ turn.T - item[:3]
-    solid = world.constants.solid
-    outward = np.array([probe(solid, *place)[1:] for place in arms @ back]) @ back.T
-    pressed = np.maximum(np.sum(forces[touching] @ turn.T * outward, axis=1), 0.0)
-    middle = pressed @ arms / pressed.sum()
-    normal = pressed @ outward
-    normal /= np.linalg.norm(normal)
-    spread = arms - middle
-    spread -= np.outer(spread @ normal, normal)
-    values, axes = np.linalg.eigh((pressed[:, None] * spread).T @ spread / pressed.sum())
-    reach = PATCH_POINTS * np.sqrt(np.maximum(values[1:], 0.0)) * axes[:, 1:]  # the first: normal
-    return Patch(middle + np.vstack([reach.T, -reach.T]), -normal)
+    patches = []
+    for tip in np.flatnonzero(world.loads > CONTACT_FORCE):
+        item, finger = world.bodies[-1], world.bodies[tip]
+        turn, back = finger[3:12].reshape(3, 3), item[3:12].reshape(3, 3)
+        forces = world.contact.node_forces[tip]
+        touching = np.any(forces != 0.0, axis=1)
+        arms = finger[:3] + world.constants.nodes[touching, :3] @ turn.T - item[:3]
+        solid = world.constants.solid
+        outward = np.array([probe(solid, *place)[1:] for place in arms @ back]) @ back.T
+        # A node whose friction pulls outward presses nothing.
+        pressed = np.maximum(np.sum(forces[touching] @ turn.T * outward, axis=1), 0.0)
+        middle = pressed @ arms / pressed.sum()
+        normal = pressed @ outward
+        normal /= np.linalg.norm(normal)
+        # The points lie in the plane of the patch, along the main axes of its pressure.
+        spread = arms - middle
+        spread -= np.outer(spread @ normal, normal)
+        values, axes = np.linalg.eigh((pressed[:, None] * spread).T @ spread / pressed.sum())
+        reach = PATCH_POINTS * np.sqrt(np.maximum(values[1:], 0.0)) * axes[:, 1:]  # first: normal
+        patches.append(Patch(middle + np.vstack([reach.T, -reach.T]), -normal))
+    return patches
 
 
 def least_normal_force(patches: list[Patch], carried: Array, friction: float) -> float:

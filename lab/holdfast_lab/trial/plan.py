@@ -63,7 +63,7 @@ class TrialPlan:
             raise ValueError(f"at least 1 trial expected, {self.n} given")
         if self.seed < 0:
             raise ValueError(f"a seed of at least 0 expected, {self.seed} given")
-        # Check that a model has all fingers of the twin, and can be used live.
+        # Before hours of trials: the model has all fingers of the twin, and can be used live.
         model = Model.load(self.model)
         lacking = [finger for finger in FINGERS if not {finger, "*"} & set(model.fingers)]
         if lacking:
@@ -80,20 +80,20 @@ class TrialPlan:
 
     def trial_task(self, number: int, law: str) -> Task:
         """Return the task of one trial with one law."""
-        version = _version(law, SIMULATION)
+        version = law_version(law, SIMULATION)
         arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
         return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
 
     def course_task(self, number: int, law: str) -> Task:
         """Return the task of the course of one trial with one law."""
         arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
-        version = _version(law, COURSE)
+        version = law_version(law, COURSE)
         return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
 
     def film_task(self, number: int, laws: tuple[str, str]) -> Task:
         """Return the task of the film of one trial with two laws."""
         arguments = (self.seed, number, laws, self.model, self.model_digest, self.plant)
-        versions = (_version(law, FILM) for law in laws)
+        versions = (law_version(law, FILM) for law in laws)
         version = sha256("".join(versions).encode()).hexdigest()
         return Task(f"film/{number}", film_of, arguments, bytes, version=version)
 
@@ -138,6 +138,7 @@ def film_of(
     return film(draw_trial(number, seed, plant), laws, model)
 
 
+# Once in a process, because every trial asks for the same model.
 @cache
 def _check_digest(model: str, digest: str) -> None:
     if Model.load(model).digest != digest:
@@ -145,7 +146,7 @@ def _check_digest(model: str, digest: str) -> None:
 
 
 @cache
-def _version(law: str, modules: tuple[str, ...]) -> str:
+def law_version(law: str, modules: tuple[str, ...]) -> str:
     """Return a digest of what a trial depends on: the source, and the constants of its law.
 
     The files of other laws are left out, so that a new law leaves the results of the others.

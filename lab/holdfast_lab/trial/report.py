@@ -141,19 +141,15 @@ def summary_text(document: Mapping[str, Any]) -> str:
     """Return the main results: one sentence on all, then the goals, as a list."""
     laws = document["laws"]
     law = OWN_LAW if OWN_LAW in laws else next(iter(laws))
-    goals = _goals(laws[law], law, document["unseen_objects"][law], document["goals"])
-    lines = [_main(document, law), *goals]
+    dropped = NUMBER_COLUMNS[0]
+    parts = [f"{law} dropped {_text(laws[law], dropped)} % of the objects"]
+    if BASELINE_LAW in laws and law != BASELINE_LAW:
+        parts.append(f"a grip of fixed force {_text(laws[BASELINE_LAW], dropped)} %")
+    lines = [
+        f"On {laws[law]['n']} trials of the twin, {', '.join(parts)}.",
+        *_goals(laws[law], law, document["unseen_objects"][law], document["goals"]),
+    ]
     return "\n".join(f"- {line}" for line in lines)
-
-
-def _main(document: Mapping[str, Any], law: str) -> str:
-    row = document["laws"][law]
-    parts = [f"{law} dropped {_text(row, NUMBER_COLUMNS[0])} % of the objects"]
-    if BASELINE_LAW in document["laws"] and law != BASELINE_LAW:
-        parts.append(
-            f"a grip of fixed force {_text(document['laws'][BASELINE_LAW], NUMBER_COLUMNS[0])} %"
-        )
-    return f"On {row['n']} trials of the twin, {', '.join(parts)}."
 
 
 def _goals(row: Summary, law: str, unseen: Summary, goals: Mapping[str, float]) -> Iterator[str]:
@@ -162,15 +158,13 @@ def _goals(row: Summary, law: str, unseen: Summary, goals: Mapping[str, float]) 
     for column in (columns[field] for field in goals):
         value, goal = row[column.field]["value"], goals[column.field]
         missing = value is None and bool(column.n_field and not row.get(column.n_field))
-        verdict = "nothing slipped" if missing else "reached" if _within(value, goal) else "missed"
+        # A missing value of trials that did react is infinite: the goal is missed.
+        reached = value is not None and value <= goal
+        verdict = "nothing slipped" if missing else "reached" if reached else "missed"
         yield (
             f"{column.head}: {_text(row, column)} for {law}, on the six other objects "
             f"{_text(unseen, column)}; the goal is at most {column.factor * goal:g}: {verdict}."
         )
-
-
-def _within(value: float | None, goal: float) -> bool:
-    return value is not None and value <= goal
 
 
 def _text(row: Summary, column: LawColumn) -> str:

@@ -177,6 +177,7 @@ class RunningTrial:
         """Simulate one sample and return the command that follows from it."""
         self.simulation.step(self.scales)
         time = (self.simulation.n_samples - 1) / RATE
+        # A queue of samples is the latency: each is used when `latency` others have come.
         self._late.append((self.simulation.read(), self.simulation.joint_angles()))
         if len(self._late) <= self.trial.latency:
             return GripCommand(time, LoopState.IDLE, {})
@@ -189,18 +190,15 @@ class RunningTrial:
         if self._reports_joints:
             self._controller.observe(angles)
         command = self._controller.update(estimate, time)
-        self.scales = np.array([_scale(command, finger) for finger in FINGERS])
+        # Fingers that a command leaves out keep the force of the first grip.
+        scales = {finger: each.scale for finger, each in command.fingers.items()}
+        self.scales = np.array([scales.get(finger, 1.0) for finger in FINGERS])
         return command
 
 
 @cache
 def _model(name: str) -> Model:
     return Model.load(name)
-
-
-def _scale(command: GripCommand, finger: str) -> float:
-    finger_command = command.fingers.get(finger)
-    return 1.0 if finger_command is None else finger_command.scale
 
 
 def least_force_at(trial: Trial, held_for: float) -> float:
@@ -304,12 +302,18 @@ class _TrialLog:
         if not (loaded.any() or controlled.any()):
             return base
         slipping = loaded & (rows[:, -1] > SLIP_SPEED)
+        drop_reason = ""
+        if lost:
+            began = not math.isnan(self._began_at)
+            # The state at the last sample: a scale that was at its limit before may have fallen.
+            drop_reason = WHILE_SLIPPING if not self._at_limit else AT_LIMIT
+            drop_reason = drop_reason if began else NEVER_BEGAN
         raised_before, reaction = self._reaction(rows[:, 0], loaded, slipping)
         return msgspec.structs.replace(
             base,
             held=True,
             dropped=lost,
-            drop_reason=self._drop_reason() if lost else "",
+            drop_reason=drop_reason,
             slip=math.inf if lost else float(self._slid.max()),
             slipped=bool(slipping.any()),
             raised_before=raised_before,
@@ -319,18 +323,13 @@ class _TrialLog:
             **_force_ratios(rows[loaded | controlled]),
         )
 
-    def _drop_reason(self) -> str:
-        """Return why the object was lost: the loop never began, the limit of force, or a slip."""
-        if math.isnan(self._began_at):
-            return NEVER_BEGAN
-        return AT_LIMIT if self._at_limit else WHILE_SLIPPING
-
     def _reaction(self, times: Array, loaded: Mask, slipping: Mask) -> tuple[bool, float]:
         """Return whether the force rose before the first slip, and the reaction to it [s]."""
         if not slipping.any():
             return False, math.nan
         scales = np.array(self._scales)
         onset, start = int(np.argmax(slipping)), int(np.argmax(loaded))
+        # A force that the law raised for the load itself is no reaction to the slip.
         if (scales[onset - 1] > RISE * scales[start - 1]).any():
             return True, math.nan
         risen = (scales[onset:] > RISE * scales[onset - 1]).any(axis=1)
@@ -341,6 +340,7 @@ class _TrialLog:
 
 def _force_ratios(rows: Array) -> dict[str, float]:
     """Return the ratios of the force to the least ones, where these are finite."""
+    # Where no force holds, there is nothing to compare with.
     finite = np.isfinite(rows).all(axis=1)
     _, force, to_hold, to_stop, coulomb, _ = rows[finite].T
     if not finite.any():

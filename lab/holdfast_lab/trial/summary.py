@@ -52,10 +52,9 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
     """
     held = [result for result in results if result.held and result.feasible]
     slips = [result.slip for result in held]
-    reactions = _reaction_times(held)
-    friction_reactions = _reaction_times(
-        [result for result in held if result.kind == LoadKind.FRICTION]
-    )
+    reacting = [result for result in held if not math.isnan(reaction_time(result))]
+    reactions = [reaction_time(result) for result in reacting]
+    friction_reactions = [reaction_time(r) for r in reacting if r.kind == LoadKind.FRICTION]
     return {
         "n": len(held),
         "n_not_held": sum(result.feasible and not result.held for result in results),
@@ -72,18 +71,14 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         "slipped_over_3mm": _mean([100.0 * (slip > LONG_SLIP) for slip in slips]),
         "reaction_median": _quantile(reactions, 0.5),
         "friction_reaction_median": _quantile(friction_reactions, 0.5),
-        "force_ratio_mean": _mean_of_known([result.force_ratio for result in held]),
-        "static_ratio_mean": _mean_of_known([result.static_ratio for result in held]),
-        "coulomb_ratio_mean": _mean_of_known([result.coulomb_ratio for result in held]),
-        "peak_ratio_mean": _mean_of_known([result.peak_ratio for result in held]),
+        "force_ratio_mean": _mean([result.force_ratio for result in held]),
+        "static_ratio_mean": _mean([result.static_ratio for result in held]),
+        "coulomb_ratio_mean": _mean([result.coulomb_ratio for result in held]),
+        "peak_ratio_mean": _mean([result.peak_ratio for result in held]),
         "false_reactions_per_minute": _ratio(
             [60.0 * result.n_false for result in held], [result.quiet_time for result in held]
         ),
     }
-
-
-def _reaction_times(results: Sequence[TrialResult]) -> list[float]:
-    return [time for result in results if not math.isnan(time := reaction_time(result))]
 
 
 def reaction_time(result: TrialResult) -> float:
@@ -123,10 +118,10 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
         "dropped": _ratio(
             [100.0 * one.dropped - 100.0 * other.dropped for one, other in pairs], ones
         ),
-        "slid_less": _share([one.slip < other.slip for one, other in pairs]),
-        "slid_more": _share([one.slip > other.slip for one, other in pairs]),
-        "reacted_sooner": _share([one < other for one, other in known]),
-        "reacted_later": _share([one > other for one, other in known]),
+        "slid_less": _mean([100.0 * (one.slip < other.slip) for one, other in pairs]),
+        "slid_more": _mean([100.0 * (one.slip > other.slip) for one, other in pairs]),
+        "reacted_sooner": _mean([100.0 * (one < other) for one, other in known]),
+        "reacted_later": _mean([100.0 * (one > other) for one, other in known]),
         "force_ratio_mean": _ratio(
             [one.force_ratio - other.force_ratio for one, other in pairs], ones
         ),
@@ -144,6 +139,7 @@ def _false_reactions(pairs: Sequence[tuple[TrialResult, TrialResult]]) -> Summar
 
     def statistic(draws: Array) -> Array:
         sums = draws @ counts
+        # A resample may have no quiet time under one of the laws.
         known = (sums[:, 1] > 0) & (sums[:, 3] > 0)
         rates = sums[known]
         difference = np.full(len(sums), np.nan)
@@ -154,10 +150,6 @@ def _false_reactions(pairs: Sequence[tuple[TrialResult, TrialResult]]) -> Summar
     return _number(value, bootstrap_interval(statistic, len(counts)))
 
 
-def _share(hits: Sequence[bool]) -> Summary:
-    return _ratio([100.0 * hit for hit in hits], [1.0] * len(hits))
-
-
 def _ratio(parts: Sequence[float], wholes: Sequence[float]) -> Summary:
     whole = sum(wholes)
     value = sum(parts) / whole if whole > 0 else None
@@ -166,11 +158,9 @@ def _ratio(parts: Sequence[float], wholes: Sequence[float]) -> Summary:
 
 
 def _mean(values: Sequence[float]) -> Summary:
-    return _ratio(values, [1.0] * len(values))
-
-
-def _mean_of_known(values: Sequence[float]) -> Summary:
-    return _mean([value for value in values if not math.isnan(value)])
+    """Return the mean of the values that are known: those that are not NaN."""
+    known = [value for value in values if not math.isnan(value)]
+    return _ratio(known, [1.0] * len(known))
 
 
 def _quantile(values: Sequence[float], share: float) -> Summary:

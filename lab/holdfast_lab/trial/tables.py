@@ -191,19 +191,15 @@ def _rows(
 ) -> Iterator[Row]:
     for law, summary in by_law.items():
         for column in columns:
-            yield _row({**(keys or {}), "law": law, "figure": column.head}, summary, column)
-
-
-def _row(keys: dict[str, Key], summary: Summary, column: LawColumn) -> Row:
-    number = summary[column.field]
-    n_known = summary.get(column.n_field, summary.get("n_slipped", 0)) if column.n_field else 0
-    missing = math.inf if n_known else None
-    value, interval = number["value"], number["interval"]
-    ends = None
-    if interval is not None:
-        ends = (_scaled(interval[0], column, missing), _scaled(interval[1], column, missing))
-    return Row(keys, _scaled(value, column, missing), None, summary["n"], ends)
-
-
-def _scaled(value: float | None, column: LawColumn, missing: float | None) -> float | None:
-    return missing if value is None else column.factor * value
+            # JSON has null for what is infinite and for what is not known; the number of trials
+            # behind a value tells them apart. The document of an older run has `n_slipped` alone.
+            n = summary.get(column.n_field, summary.get("n_slipped", 0)) if column.n_field else 0
+            number = summary[column.field]
+            value, *ends = (
+                (math.inf if n else None) if each is None else column.factor * each
+                for each in (number["value"], *(number["interval"] or ()))
+            )
+            yield Row(
+                {**(keys or {}), "law": law, "figure": column.head}, value, None, summary["n"],
+                (ends[0], ends[1]) if ends else None,
+            )  # fmt: skip

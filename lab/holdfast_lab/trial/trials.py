@@ -128,7 +128,27 @@ def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     kind = LOAD_KINDS[(number + number // len(objects)) % len(LOAD_KINDS)]
     generator = np.random.default_rng([seed, number])
     grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table, plant=plant)
-    load = _draw_load(generator, kind, item.mass)
+    # Every kind takes the same draws first, so that a change of one kind changes no other.
+    start = float(generator.uniform(*QUIET_TIME))
+    direction = AXIS_DIRECTIONS[int(generator.integers(len(AXIS_DIRECTIONS)))]
+    share = float(generator.random())
+
+    def between(low: float, high: float) -> float:
+        return low + (high - low) * share
+
+    if kind is LoadKind.WEIGHT:
+        load = Load(kind, start, 0.0, item.mass * between(0.6, 1.4))
+    elif kind is LoadKind.FRICTION:
+        load = Load(kind, start, 0.0, between(0.65, 0.4))
+    elif kind is LoadKind.PULL:
+        duration = float(generator.uniform(0.6, 1.2))
+        load = Load(kind, start, duration, item.mass * GRAVITY * between(0.8, 1.6), direction)
+    elif kind is LoadKind.SHAKE:
+        rate = float(generator.uniform(2.0, 4.0))
+        load = Load(kind, start, 1.5, between(6.0, 12.0), direction, rate)
+    else:
+        load = Load(kind, start, float(generator.uniform(0.5, 0.8)), between(6.0, 12.0), direction)
+    # Every object with three fingers in every second round; spheres fall in such a grip.
     three = item.shape != "sphere" and number // len(objects) % 2 == 1
     speed = float(generator.uniform(*CLOSING_SPEED))
     shortest, longest = plant_named(plant).latency
@@ -144,24 +164,3 @@ def _objects() -> list[tuple[str, GraspObject, Path | None]]:
         for table in (None, OTHER_OBJECTS)
         for name, item in load_objects(table).items()
     ]
-
-
-def _draw_load(generator: np.random.Generator, kind: LoadKind, mass: float) -> Load:
-    start = float(generator.uniform(*QUIET_TIME))
-    direction = AXIS_DIRECTIONS[int(generator.integers(len(AXIS_DIRECTIONS)))]
-    share = float(generator.random())
-
-    def between(low: float, high: float) -> float:
-        return low + (high - low) * share
-
-    if kind is LoadKind.WEIGHT:
-        return Load(kind, start, 0.0, mass * between(0.6, 1.4))
-    if kind is LoadKind.FRICTION:
-        return Load(kind, start, 0.0, between(0.65, 0.4))
-    if kind is LoadKind.PULL:
-        duration = float(generator.uniform(0.6, 1.2))
-        return Load(kind, start, duration, mass * GRAVITY * between(0.8, 1.6), direction)
-    if kind is LoadKind.SHAKE:
-        rate = float(generator.uniform(2.0, 4.0))
-        return Load(kind, start, 1.5, between(6.0, 12.0), direction, rate)
-    return Load(kind, start, float(generator.uniform(0.5, 0.8)), between(6.0, 12.0), direction)

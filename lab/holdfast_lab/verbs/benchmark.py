@@ -22,7 +22,7 @@ def make_data(folder: Path, engine: "Engine", *, as_json: bool) -> None:
     document: dict[str, object] = {"version": protocol().version}
     for name, split in protocol().splits.items():
         print_message(f"{name}: {split.holds}")
-        _simulate(folder / name, split, engine)
+        simulate_split(folder / name, split, engine)
         recordings = load_split(folder, name)
         digests = {r.name: digest_of(r) for r in progress(recordings, "comparing")}
         differ = differing(split, digests)
@@ -72,7 +72,8 @@ def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
         print_score_table(table)
 
 
-def _simulate(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
+def simulate_split(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
+    """Simulate the missing recordings of a part of the benchmark."""
     from holdfast.cli.simulate import GraspOptions
     from holdfast.twin.objects import OTHER_OBJECTS
     from holdfast.twin_recordings import plan_grasps, simulate_grasps

@@ -46,12 +46,7 @@ class RandomizedHands:
 
     @staticmethod
     def simulate(
-        out: Path,
-        grasps: GraspOptions,
-        options: HandOptions,
-        *,
-        engine: "Engine",
-        force: bool,
+        out: Path, grasps: GraspOptions, options: HandOptions, *, engine: "Engine", force: bool
     ) -> list[str]:
         """Simulate randomized hands whose recordings do not exist; return the names of new ones.
 

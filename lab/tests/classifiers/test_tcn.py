@@ -212,10 +212,10 @@ def test_mean_scale_and_shapes_after_training():
 
 @deep
 def test_an_epoch_has_as_many_of_either_class():
-    from holdfast_lab.classifiers.tcn import _balanced_rows
+    from holdfast_lab.classifiers.tcn import balanced_rows
 
     stable = np.array([True] * 3 + [False] * 9)
-    epochs = [_balanced_rows(stable, np.random.default_rng(seed)) for seed in range(20)]
+    epochs = [balanced_rows(stable, np.random.default_rng(seed)) for seed in range(20)]
     for rows in epochs:
         assert len(set(rows.tolist())) == 6
         assert stable[rows].sum() == 3
@@ -226,10 +226,10 @@ def test_an_epoch_has_as_many_of_either_class():
 def test_dropout_leaves_out_whole_channels_and_scales_the_others():
     import torch
 
-    from holdfast_lab.classifiers.tcn import _drop_channels
+    from holdfast_lab.classifiers.tcn import drop_channels
 
     chance = torch.Generator().manual_seed(0)
-    thinned = _drop_channels(torch.ones((500, 12, 5)), 0.2, chance).numpy()
+    thinned = drop_channels(torch.ones((500, 12, 5)), 0.2, chance).numpy()
     assert (thinned == thinned[:, :, :1]).all()
     assert set(np.unique(thinned).tolist()) == {0.0, 1.25}
     assert (thinned == 0).mean() == pytest.approx(0.2, abs=0.02)
@@ -239,13 +239,13 @@ def test_dropout_leaves_out_whole_channels_and_scales_the_others():
 def test_kernels_begin_by_hes_rule():
     import torch
 
-    from holdfast_lab.classifiers.tcn import _initial_weights
+    from holdfast_lab.classifiers.tcn import initial_weights
 
     chance = torch.Generator().manual_seed(0)
-    kernel = _initial_weights(chance, "block1/0", (400, 12, 8)).detach().numpy()
+    kernel = initial_weights(chance, "block1/0", (400, 12, 8)).detach().numpy()
     assert kernel.var() == pytest.approx(2 / 96, rel=0.05)
     for name, value in (("bias", 0.0), ("gain", 1.0), ("shift", 0.0)):
-        assert (_initial_weights(chance, f"block1/0/{name}", (12,)).detach().numpy() == value).all()
+        assert (initial_weights(chance, f"block1/0/{name}", (12,)).detach().numpy() == value).all()
 
 
 @deep

@@ -165,7 +165,7 @@ def hand_with(wanted, measured, numbers=range(40)):
         kind = str(hold.generator("hand").choice(SENSOR_KINDS))
         drawn = draw_sensor(hold.generator("sensor"), kind)
         drawn = with_measured(drawn, kind, measured, hold.generator("measured"))
-        if wanted(drawn.stream, simulation._carrier(hold)):
+        if wanted(drawn.stream, simulation.carrier_of(hold)):
             return number
     raise AssertionError("no such hand")
 

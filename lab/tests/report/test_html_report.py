@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pytest
 from matplotlib.figure import Figure
 
-from holdfast_lab.report import images
+import holdfast_lab.report.html_report as report_module
 from holdfast_lab.report.html_report import ReportFigure, Section, html_report
 from holdfast_lab.report.result_tables import ResultTable, Row
 
@@ -130,7 +130,7 @@ def test_the_report_is_reproducible():
 
 
 def test_a_large_figure_is_a_png(monkeypatch):
-    monkeypatch.setattr(images, "MAX_INLINE_SVG", 1000)
+    monkeypatch.setattr(report_module, "MAX_INLINE_SVG", 1000)
     read = Page(page())
     assert [source[:22] for source in read.sources] == ["data:image/png;base64,"] * 2
 

@@ -31,9 +31,9 @@ def version(law):
 @pytest.fixture
 def fresh():
     """Versions are computed again, before and after the test."""
-    trial_plan._version.cache_clear()
+    trial_plan.law_version.cache_clear()
     yield
-    trial_plan._version.cache_clear()
+    trial_plan.law_version.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_a_result_is_stored_for_its_plant():
 class TestVersion:
     def test_it_depends_on_the_constants_of_the_law(self, fresh, monkeypatch):
         before = {law: version(law) for law in ("pr2", "holdfast")}
-        trial_plan._version.cache_clear()
+        trial_plan.law_version.cache_clear()
         monkeypatch.setitem(laws.LAWS, "holdfast", lambda: laws.Stability(fall=0.6))
         assert version("holdfast") != before["holdfast"]
         assert version("pr2") == before["pr2"]

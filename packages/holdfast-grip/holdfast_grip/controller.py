@@ -82,10 +82,29 @@ class GripController:
         self.limits = limits
         self.law = law_named(law) if isinstance(law, str) else law
         sensors = sensors or {}
-        _check_unit(self.law, sensors, newtons_per_unit)
+        # A law that needs newtons must not take counts for them, nor newtons be scaled twice.
+        measured = [name for name, sensor in sensors.items() if sensor.unit == "N"]
+        in_newtons = bool(sensors) and len(measured) == len(sensors)
+        if self.law.needs_newtons and not in_newtons and newtons_per_unit is None:
+            raise ValueError(
+                f"the law {type(self.law).__name__} needs forces in N and the readings are counts: "
+                "give newtons_per_unit, the calibration of the sensor"
+            )
+        if measured and newtons_per_unit is not None:
+            raise ValueError(
+                f"newtons_per_unit: readings in counts expected, those of {', '.join(measured)} "
+                "are in N already: leave the calibration out"
+            )
         given = 1.0 if newtons_per_unit is None else newtons_per_unit
         self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
-        self._normals = {name: _three(one.normal) for name, one in sensors.items()}
+        if not all(math.isfinite(factor) and factor > 0 for factor in self._factors):
+            raise ValueError(
+                f"newtons_per_unit: numbers above 0 expected, {newtons_per_unit} given"
+            )
+        self._normals: dict[str, Three] = {}
+        for name, sensor in sensors.items():
+            x, y, z = sensor.normal.tolist()
+            self._normals[name] = (x, y, z)
         rates = [sensor.rate for sensor in sensors.values()]
         # The slowest sensor decides: its sample is late only after its period.
         self._max_age = 1 / min(rates, default=DETECTOR_RATE) + limits.stale_after
@@ -425,30 +444,3 @@ def _broken_law(law: Law, n: int, given: str) -> str:
         f"law {type(law).__name__}: the contract of laws expects a scale and a reason for each of "
         f"{n} fingers, {given} given"
     )
-
-
-def _three(vector: Array) -> Three:
-    x, y, z = vector.tolist()
-    return x, y, z
-
-
-def _check_unit(
-    law: Law,
-    sensors: Mapping[str, Sensor],
-    newtons_per_unit: float | tuple[float, float, float] | None,
-) -> None:
-    in_newtons = bool(sensors) and all(sensor.unit == "N" for sensor in sensors.values())
-    if law.needs_newtons and not in_newtons and newtons_per_unit is None:
-        raise ValueError(
-            f"the law {type(law).__name__} needs forces in N and the readings are counts: give "
-            "newtons_per_unit, the calibration of the sensor"
-        )
-    measured = [name for name, sensor in sensors.items() if sensor.unit == "N"]
-    if measured and newtons_per_unit is not None:
-        raise ValueError(
-            f"newtons_per_unit: readings in counts expected, those of {', '.join(measured)} are in "
-            "N already: leave the calibration out"
-        )
-    given = newtons_per_unit if isinstance(newtons_per_unit, tuple) else (newtons_per_unit,)
-    if any(one is not None and not (math.isfinite(one) and one > 0) for one in given):
-        raise ValueError(f"newtons_per_unit: numbers above 0 expected, {newtons_per_unit} given")

@@ -4,10 +4,7 @@ import math
 from collections.abc import Mapping
 
 from holdfast_grip.command import FingerCommand, GripCommand, GripReason, LoopState
-from holdfast_grip.limits import Limits
-
-SLACK = 1e-9
-"""Rounding that a limit may be exceeded by."""
+from holdfast_grip.limits import SLACK, Limits
 
 
 class CommandGuard:
@@ -69,8 +66,12 @@ class CommandGuard:
             of it, is never held back.
         """
         command = self.check(command)
-        early = self._is_early(command.time - self._sent_at)
-        early = early or self._is_early(clock - self._sent_at_clock)
+        # On either clock; a clock that went back, and one of NaN, holds nothing back.
+        period = (1.0 - SLACK) / self.limits.max_rate
+        early = (
+            0.0 <= command.time - self._sent_at < period
+            or 0.0 <= clock - self._sent_at_clock < period
+        )
         kind = command.state, command.reason
         if early and (command.state is not LoopState.FAULT or kind == self._sent):
             return None
@@ -93,9 +94,6 @@ class CommandGuard:
             # Never back: the time until the next command would allow a larger rise.
             self._checked_at = max(self._checked_at, command.time)
         return command
-
-    def _is_early(self, elapsed: float) -> bool:
-        return 0.0 <= elapsed < (1.0 - SLACK) / self.limits.max_rate
 
     def _violation(self, command: GripCommand) -> str:
         limits = self.limits

@@ -55,8 +55,8 @@ class JerkMonitor:
         """Process a report.
 
         Args:
-            angles: (n_joints,) angle of each joint [rad]. Other joints than before, and an angle
-                that is not finite, begin anew.
+            angles: (n_joints,) angle of each joint [rad]. If their number changes or an angle is
+                not finite, earlier reports are forgotten.
         """
         last, before = self._last, self._speed
         self.jerked = False

@@ -6,6 +6,8 @@ from typing import Literal
 import msgspec
 
 FaultAction = Literal["hold", "open"]
+SLACK = 1e-9
+"""Rounding by which a limit may be exceeded: of scales and times, and relative of efforts."""
 
 
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -3,6 +3,7 @@
 import math
 
 from holdfast.contact import ContactEstimate, ContactState
+from holdfast_grip.limits import SLACK
 
 FROZEN_TIME = 0.08
 """Time for which a noisy finger repeats its force exactly when it counts as frozen [s]."""
@@ -15,8 +16,6 @@ MAX_FREE_REPEATS = 3
 FROZEN_RATIO, REPEATING_RATIO = 10, 3
 """A run of repeats is frozen, or suspicious, from these multiples of the longest one without
 contact."""
-SLACK = 1e-9
-"""Rounding of times [s]."""
 
 
 class RepeatMonitor:

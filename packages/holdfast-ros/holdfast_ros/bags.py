@@ -6,14 +6,15 @@ codec decodes them by the definitions in the bag, which are data: nothing from a
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from holdfast.errors import RecordingError
-from holdfast.io.definitions import Definition, parse_definition, short_name
+from holdfast.io.cdr import MessageDecoder
+from holdfast.io.definitions import Definition, field_paths, parse_definition, short_name
 from holdfast.io.importers.table import natural_order
 from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.sensors.types import Array
@@ -22,7 +23,6 @@ from holdfast_ros.bag_storage.folder import METADATA, open_folder
 from holdfast_ros.bag_storage.mcap import open_mcap
 from holdfast_ros.bag_storage.ros1 import open_ros1
 from holdfast_ros.bag_storage.sqlite import open_sqlite
-from holdfast_ros.pose_messages import PoseDecoder, has_poses
 from holdfast_ros.sensor_messages import known_definition
 
 MAGICS = {
@@ -31,6 +31,11 @@ MAGICS = {
     ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
 }
 """First bytes of the files of bags, by suffix. MCAP has the profile of ROS 2."""
+_OPENERS: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
+    ".bag": open_ros1,
+    ".db3": open_sqlite,
+    ".mcap": open_mcap,
+}
 MAX_BAG_MESSAGE_SIZE = 1 << 22
 """Maximum size of a message that is decoded [bytes]; one of 368 taxels has some 10 kB."""
 
@@ -107,19 +112,15 @@ class Bag:
         """Return the definition in the bag; if there is none, the one of a known type."""
         # Publishers of a type send the same definition, which is parsed once.
         key = (one.kind, one.definition)
-        if key not in self._definitions:
-            self._definitions[key] = self._parsed(*key)
+        if key not in self._definitions and one.definition.strip():
+            self._definitions[key] = None
+            with suppress(ValueError):  # a topic that cannot be read does not hide the others
+                self._definitions[key] = parse_definition(*key)
+        elif key not in self._definitions:
+            standard = standard_definition(one.kind) if self.ros2 else None
+            # Messages of known sensors first: ROS itself has none of these types.
+            self._definitions[key] = known_definition(one.kind, ros2=self.ros2) or standard
         return self._definitions[key]
-
-    def _parsed(self, kind: str, text: str) -> Definition | None:
-        if text.strip():
-            try:
-                return parse_definition(kind, text)
-            # A topic that cannot be read does not hide the others.
-            except ValueError:
-                return None
-        standard = standard_definition(kind) if self.ros2 else None
-        return known_definition(kind, ros2=self.ros2) or standard
 
 
 def standard_definition(kind: str) -> Definition | None:
@@ -152,7 +153,9 @@ def open_bag(path: Path) -> Iterator[Bag]:
     ros2 = path.suffix != ".bag" or path.is_dir()
     try:
         budget = ReadBudget(path)
-        with _storage(path, budget) as storage:
+        opener: Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]
+        opener = open_folder if path.is_dir() else _OPENERS[path.suffix]
+        with opener(path, budget) as storage:
             yield Bag(storage, budget, ros2=ros2)
     except RecordingError:
         raise
@@ -168,20 +171,6 @@ def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
     """Return the poses of bodies in a bag; see `importer.poses`."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     frames: dict[str, str] = {}
-    for name, frame, row in _poses(path):
-        rows.setdefault(name, []).append(row)
-        frames[name] = frame
-    if missing := [name for name in wanted.values() if name not in rows]:
-        found = ", ".join(sorted(rows)) or "none"
-        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {found}")
-    parents = sorted({frames[name] for name in wanted.values()})
-    if len(parents) > 1:
-        raise RecordingError(f"{path}: poses in one frame expected, {' and '.join(parents)} given")
-    return {body: np.array(rows[name]) for body, name in wanted.items()}
-
-
-def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
-    """Yield topic or child frame, parent frame, and time and pose, of each pose in a bag."""
     with open_bag(path) as bag:
         decoders = {
             topic.number: PoseDecoder(topic.definition, ros2=bag.ros2)
@@ -191,9 +180,17 @@ def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
         topics = [topic for topic in bag.topics if topic.number in decoders]
         for topic, _, data in bag.messages(topics):
             for pose in decoders[topic.number](data):
-                row = (pose.time, *pose.position, *pose.quaternion)
-                bag.keep(0)
-                yield pose.body or topic.name, pose.frame, row
+                name = pose.body or topic.name
+                bag.keep(0)  # a row of numbers counts as an object
+                rows.setdefault(name, []).append((pose.time, *pose.position, *pose.quaternion))
+                frames[name] = pose.frame
+    if missing := [name for name in wanted.values() if name not in rows]:
+        found = ", ".join(sorted(rows)) or "none"
+        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {found}")
+    parents = sorted({frames[name] for name in wanted.values()})
+    if len(parents) > 1:
+        raise RecordingError(f"{path}: poses in one frame expected, {' and '.join(parents)} given")
+    return {body: np.array(rows[name]) for body, name in wanted.items()}
 
 
 def _is_bag(path: Path) -> bool:
@@ -205,12 +202,96 @@ def _is_bag(path: Path) -> bool:
         return MAGICS[path.suffix].match(file.read(64)) is not None
 
 
-def _storage(path: Path, budget: ReadBudget) -> AbstractContextManager[BagStorage]:
-    if path.is_dir():
-        return open_folder(path, budget)
-    openers: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
-        ".bag": open_ros1,
-        ".db3": open_sqlite,
-        ".mcap": open_mcap,
-    }
-    return openers[path.suffix](path, budget)
+class StampedPose(NamedTuple):
+    """Pose of a body in a frame at one instant.
+
+    Attributes:
+        body: name of the body's frame, without a slash at its beginning; empty if the message
+            does not name it.
+        frame: name of the frame that the pose is expressed in, without that slash.
+        time: stamp in the header [s].
+        position: x, y, z [m].
+        quaternion: w, x, y, z.
+    """
+
+    body: str
+    frame: str
+    time: float
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
+class PoseDecoder:
+    """Decoder of messages of one type into the poses in them.
+
+    Args:
+        definition: definition of the messages.
+        ros2: whether messages are encoded as in ROS 2; otherwise as in ROS 1.
+
+    Raises:
+        ValueError: the messages have no poses; see `has_poses`.
+    """
+
+    def __init__(self, definition: Definition, *, ros2: bool) -> None:
+        if not has_poses(definition):
+            raise ValueError(
+                f"{definition.name} has no poses; messages like geometry_msgs/PoseStamped and "
+                "tf2_msgs/TFMessage have"
+            )
+        self._decode = MessageDecoder(definition, ros2=ros2)
+
+    def __call__(self, data: bytes) -> list[StampedPose]:
+        """Return the poses in a message.
+
+        Raises:
+            ValueError: the bytes are not a message of this type.
+        """
+        message = self._decode(data)
+        if "transforms" not in message:
+            pose = message["pose"]
+            return [_pose("", message["header"], pose["position"], pose["orientation"])]
+        return [
+            _pose(
+                one["child_frame_id"],
+                one["header"],
+                one["transform"]["translation"],
+                one["transform"]["rotation"],
+            )
+            for one in message["transforms"]
+        ]
+
+
+def has_poses(definition: Definition) -> bool:
+    """Return whether messages have the fields of PoseStamped or of TFMessage."""
+    paths = field_paths(definition)
+    return any(needed <= paths for needed in (_POSE_PATHS, _TF_PATHS))
+
+
+def _pose_paths(prefix: str, position: str, rotation: str) -> set[str]:
+    axes = [f"{position}.{axis}" for axis in "xyz"] + [f"{rotation}.{axis}" for axis in "wxyz"]
+    return {f"{prefix}header.frame_id string", *(f"{prefix}{axis} float64" for axis in axes)}
+
+
+_POSE_PATHS = _pose_paths("", "pose.position", "pose.orientation")
+_TF_PATHS = {
+    "transforms[].child_frame_id string",
+    *_pose_paths("transforms[].", "transform.translation", "transform.rotation"),
+}
+
+
+def _pose(
+    body: str,
+    header: Mapping[str, Any],
+    position: Mapping[str, float],
+    rotation: Mapping[str, float],
+) -> StampedPose:
+    # ROS 1 and ROS 2 give the two fields other names, in the same order.
+    seconds, nanoseconds = header["stamp"].values()
+    return StampedPose(
+        # ROS 1 allowed a slash before the name of a frame; tf2 does not.
+        body.lstrip("/"),
+        header["frame_id"].lstrip("/"),
+        seconds + nanoseconds * 1e-9,
+        (position["x"], position["y"], position["z"]),
+        (rotation["w"], rotation["x"], rotation["y"], rotation["z"]),
+    )

@@ -276,16 +276,15 @@ def _raw_type(name: str, types: tuple[tuple[str, tuple[MessageField, ...]], ...]
 
 
 def _struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type[Any]:
-    fields = {field.name: _member(field, types) for field in types[name]}
+    """Return a type of DDS with the fields of a message, and of those inside it."""
+    fields: dict[str, Any] = {}
+    for field in types[name]:
+        one: Any = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
+        if field.size is not None:  # 0 for a list of any length
+            one = idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]
+        fields[field.name] = one
     _, kind = name.split("/")
     return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
-
-
-def _member(field: MessageField, types: Mapping[str, tuple[MessageField, ...]]) -> Any:  # noqa: ANN401
-    one = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
-    if field.size is None:
-        return one
-    return idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]
 
 
 class Ros2Link(Link):

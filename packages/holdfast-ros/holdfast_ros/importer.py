@@ -6,6 +6,7 @@ ignored.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -154,7 +155,14 @@ class _DeviceTrack:
         readings = readings_of(sample, "count")
         if readings.shape != readings_of(self.first, "count").shape:
             self.n_refused += 1
-        elif self.last is None or not _is_repeated(self.last, sample):
+        # A sample with the number and the time of the last one is new if its readings are: the node
+        # of a PapillArray may read while they change.
+        elif (
+            self.last is None
+            or sample.time is None
+            or (self.last.time, self.last.sequence) != (sample.time, sample.sequence)
+            or not np.array_equal(readings_of(self.last, "count"), readings)
+        ):
             self.readings.append(readings)
             self.stamps.append((sample.time, sample.stamp, time))
         self.last = sample
@@ -196,15 +204,6 @@ class _DeviceTrack:
         return np.nan if times is None else float(np.median(bag_times - times))
 
 
-def _is_repeated(first: DeviceSample, second: DeviceSample) -> bool:
-    """Return whether the second sample is the first one, sent again."""
-    return (
-        second.time is not None
-        and (first.time, first.sequence) == (second.time, second.sequence)
-        and np.array_equal(readings_of(first, "count"), readings_of(second, "count"))
-    )
-
-
 class _BagImport:
     """Import of one bag, which is read once from its beginning to its end."""
 
@@ -221,7 +220,13 @@ class _BagImport:
         if not any(track.readings for track in self._tracks.values()):
             names = ", ".join(topic.name for topic in topics)
             raise RecordingError(f"{self._path} has no messages on {names}; at least one expected")
-        clock = self._clock()
+        # The best clock that all tracks have, that increases and that is one clock. The clock of
+        # the bag needs no check: it is used where no other one fits.
+        tracks, clock = [track for track in self._tracks.values() if track.readings], CLOCKS[-1]
+        for candidate in reversed(CLOCKS[:-1]):
+            offsets = [track.offset(candidate) for track in tracks]
+            if np.ptp(offsets) <= ONE_CLOCK_DIFFERENCE:  # False if an offset is NaN
+                clock = candidate
         name = self._path.name if self._path.is_dir() else self._path.stem
         try:
             modules, metadata = self._modules(clock), self._metadata(topics, clock)
@@ -233,7 +238,10 @@ class _BagImport:
         topics: dict[str, _TactileTopic] = {}
         others: list[str] = []
         for part in self._bag.topics:
-            decode = self._decoder(part)
+            decode = None
+            if part.definition is not None:
+                with suppress(ValueError):  # messages of another kind
+                    decode = SampleDecoder(part.definition, ros2=self._bag.ros2)
             if decode is None:
                 others.append(f"{part.name} ({part.kind})")
             else:
@@ -246,12 +254,6 @@ class _BagImport:
             )
         return list(topics.values())
 
-    def _decoder(self, part: BagTopic) -> SampleDecoder | None:
-        try:
-            return part.definition and SampleDecoder(part.definition, ros2=self._bag.ros2)
-        except ValueError:  # messages of another kind
-            return None
-
     def _read(self, topics: list[_TactileTopic]) -> None:
         """Read the samples of all topics, in the order of time."""
         decoders = {topic.name: topic.decode for topic in topics}
@@ -259,7 +261,12 @@ class _BagImport:
         for part, time, data in self._bag.messages(part for one in topics for part in one.parts):
             n_read[part.name] += 1
             for sample in decoders[part.name](data):
-                self._add(part.name, sample, time)
+                readings = readings_of(sample, "count")
+                if not len(readings):  # XELA's server sends this for a sensor off
+                    continue
+                self._bag.keep(readings.nbytes)
+                key = part.name, 0 if sample.number is None else sample.number
+                self._tracks.setdefault(key, _DeviceTrack(sample)).add(sample, time)
         for topic in topics:
             n_expected = sum(part.n_messages for part in topic.parts)
             if self._bag.complete and n_read[topic.name] < n_expected:
@@ -267,24 +274,6 @@ class _BagImport:
                     f"{self._path} is cut or damaged: {n_read[topic.name]} messages on "
                     f"{topic.name}, {n_expected} expected"
                 )
-
-    def _add(self, topic: str, sample: DeviceSample, time: float) -> None:
-        readings = readings_of(sample, "count")
-        if not len(readings):  # XELA's server sends this for a sensor off
-            return
-        self._bag.keep(readings.nbytes)
-        number = 0 if sample.number is None else sample.number
-        self._tracks.setdefault((topic, number), _DeviceTrack(sample)).add(sample, time)
-
-    def _clock(self) -> str:
-        """Return the best clock that all tracks have, that increases and that is one clock."""
-        tracks = [track for track in self._tracks.values() if track.readings]
-        # The clock of the bag needs no check: it is used where no other one fits.
-        for clock in CLOCKS[:-1]:
-            offsets = [track.offset(clock) for track in tracks]
-            if np.ptp(offsets) <= ONE_CLOCK_DIFFERENCE:  # False if an offset is NaN
-                return clock
-        return CLOCKS[-1]
 
     def _modules(self, clock: str) -> dict[str, Tactile]:
         modules: dict[str, Tactile] = {}
@@ -301,22 +290,28 @@ class _BagImport:
                 module_name(finger, part, named=False): Tactile(sensor, times, parts[part])
                 for part, sensor in sensors.items()
             }
-            prefix = _unused_prefix(modules, new, finger, topic.strip("/"))
+            # Two topics may have devices of one number: the shortest prefix that makes the names
+            # of the modules different from all before.
+            base = topic.strip("/")
+            prefixes = ["", f"{finger}/", f"{base}/", f"{base}/{finger}/"]
+            if finger in new:
+                prefixes = ["", f"{base}/"]
+            free = (x for x in prefixes if not any(f"{x}{name}" in modules for name in new))
+            prefix = next(free, prefixes[-1])
             modules.update({f"{prefix}{name}": module for name, module in new.items()})
         return modules
-
-    def _drift(self, clock: str) -> float:
-        """Return how much faster the bag's clock runs than that of the longest track."""
-        track = max(self._tracks.values(), key=lambda track: len(track.stamps))
-        place = CLOCKS.index(clock)
-        times = np.array([(stamps[place], stamps[-1]) for stamps in track.stamps], dtype=np.float64)
-        device, bag = (times - times[0]).T
-        return round(float(np.polyfit(device, bag - device, 1)[0]), 6) if len(times) > 2 else 0.0
 
     def _metadata(self, topics: list[_TactileTopic], clock: str) -> dict[str, Any]:
         hands = [xela_models.whole_hand(track.first.model) for track in self._tracks.values()]
         names = sorted({hand.name for hand in hands if hand is not None})
         n_refused = sum(track.n_refused for track in self._tracks.values())
+        # How much faster the clock of the bag runs than that of the longest track.
+        drift, track = 0.0, max(self._tracks.values(), key=lambda track: len(track.stamps))
+        if len(track.stamps) > 2:
+            pairs = [(row[CLOCKS.index(clock)], row[-1]) for row in track.stamps]
+            stamps = np.array(pairs, dtype=np.float64)
+            device, bag = (stamps - stamps[0]).T
+            drift = round(float(np.polyfit(device, bag - device, 1)[0]), 6)
         return {
             "source": self._path.name,
             "topics": {topic.name: topic.kind for topic in topics},
@@ -324,16 +319,5 @@ class _BagImport:
             **({"hand": names[0]} if len(names) == 1 else {}),
             **({"n_refused": n_refused} if n_refused else {}),
             **({"n_undated": self._n_undated} if self._n_undated else {}),
-            **({"clock_drift": drift} if abs(drift := self._drift(clock)) >= MIN_DRIFT else {}),
+            **({"clock_drift": drift} if abs(drift) >= MIN_DRIFT else {}),
         }
-
-
-def _unused_prefix(
-    taken: Mapping[str, Tactile], new: Mapping[str, Tactile], finger: str, topic: str
-) -> str:
-    """Return a prefix for the names of new modules that makes them different from others."""
-    longer = [f"{topic}/"] if finger in new else [f"{finger}/", f"{topic}/", f"{topic}/{finger}/"]
-    return next(
-        (prefix for prefix in ("", *longer) if not any(f"{prefix}{name}" in taken for name in new)),
-        longer[-1],
-    )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 from msgspec.structs import asdict
 
-from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
+from holdfast.contact import ContactState, HandEstimate, Reason
 from holdfast.live.documents import numbered
 from holdfast.openable import Openable
 from holdfast.sensors.types import Unit
@@ -306,17 +306,16 @@ def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
     base = namespace.rstrip("/")
     if not re.fullmatch(r"(/[A-Za-z][A-Za-z0-9_]*)*", base):
         raise ValueError(f"a namespace as /holdfast expected, {namespace!r} given")
-    names = {finger: f"{base}/{_ros_name(finger)}" for finger in fingers}
+    names = {}
+    for finger in fingers:
+        name = re.sub(r"[^A-Za-z0-9_/]", "_", finger).strip("/")
+        name = re.sub(r"/+(?=[0-9_])", "_", re.sub(r"_{2,}", "_", name))
+        part = name if name[:1].isalpha() else f"finger_{name.lstrip('_')}"
+        names[finger] = f"{base}/{part}"
     # `hand` and `grip` have topics too, which no finger may take.
     if len({*names.values(), f"{base}/hand", f"{base}/grip"}) <= len(names) + 1:
         raise ValueError(f"fingers {', '.join(names)} would share topics: rename one")
     return names
-
-
-def _ros_name(finger: str) -> str:
-    name = re.sub(r"[^A-Za-z0-9_/]", "_", finger).strip("/")
-    name = re.sub(r"/+(?=[0-9_])", "_", re.sub(r"_{2,}", "_", name))
-    return name if name[:1].isalpha() else f"finger_{name.lstrip('_')}"
 
 
 def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> list[DiagnosticStatus]:
@@ -332,7 +331,22 @@ def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> lis
     if now - published > MAX_ESTIMATE_AGE:
         silent = (("seconds_since_estimate", f"{now - published:.0f}"),)
         return [DiagnosticStatus("hand", ERROR, "no estimates any more", silent)]
-    fingers = [_diagnostic(name, finger) for name, finger in estimate.fingers.items()]
+    fingers = []
+    for name, finger in estimate.fingers.items():
+        faults = ", ".join(finger.faults)
+        # Without its samples a finger is out of work; a fault that it works with is a warning.
+        is_lost = finger.state is ContactState.UNKNOWN and finger.reason in (
+            Reason.FAULT,
+            Reason.GAP,
+        )
+        level = ERROR if is_lost else WARN if faults else OK
+        values = tuple(
+            (field, ", ".join(map(str, value)) if isinstance(value, tuple) else str(value))
+            for field, value in asdict(numbered(finger)).items()
+            if field not in NOT_IN_DIAGNOSTICS
+        )
+        text = faults or (str(finger.reason) if is_lost else "well")
+        fingers.append(DiagnosticStatus(name, level, text, values))
     worst = max((status.level for status in fingers), default=OK)
     faulty = [status.name for status in fingers if status.level == worst] if worst else []
     text = f"problem of {', '.join(faulty)}" if faulty else "no problems"
@@ -357,22 +371,3 @@ def diagnostic_of_grip(grip: "GripDocument") -> DiagnosticStatus:
     level = ERROR if grip.state == "FAULT" else OK
     message = f"{grip.state} ({reason})" if reason else grip.state
     return DiagnosticStatus("grip", level, message, values)
-
-
-def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:
-    faults = ", ".join(finger.faults)
-    is_lost = finger.state is ContactState.UNKNOWN and finger.reason in (Reason.FAULT, Reason.GAP)
-    level = ERROR if is_lost else WARN if faults else OK
-    values = tuple(
-        (field, _text(value))
-        for field, value in asdict(numbered(finger)).items()
-        if field not in NOT_IN_DIAGNOSTICS
-    )
-    return DiagnosticStatus(
-        name, level, faults or (str(finger.reason) if is_lost else "well"), values
-    )
-
-
-def _text(value: object) -> str:
-    """Return the value of a field of an estimate as a text."""
-    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)

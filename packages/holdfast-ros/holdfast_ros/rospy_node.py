@@ -158,21 +158,18 @@ def published_topics(master: str) -> dict[str, str]:
 def publishers_of(master: str, topic: str) -> list[str]:
     """Return the names of the running nodes that publish a topic.
 
-    A node that was killed stays registered, so each is asked for an answer.
+    A node that was killed stays registered: only those that answer are returned.
 
     Raises:
         SourceError: the ROS master does not answer.
     """
     topics = dict(call_master(master, "getSystemState")[0])
-    return [node for node in topics.get(topic, ()) if _answers(master, node)]
-
-
-def _answers(master: str, node: str) -> bool:
-    """Return whether a registered node runs."""
-    with suppress(SourceError):
-        call_master(call_master(master, "lookupNode", node), "getPid")
-        return True
-    return False
+    running = []
+    for node in topics.get(topic, ()):
+        with suppress(SourceError):
+            call_master(call_master(master, "lookupNode", node), "getPid")
+            running.append(node)
+    return running
 
 
 def subscribed_topics(master: str) -> list[str]:

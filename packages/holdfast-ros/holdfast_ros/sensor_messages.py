@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,17 +106,6 @@ def known_definition(name: str, *, ros2: bool) -> Definition | None:
     return None
 
 
-def _other_layout(name: str) -> list[Definition]:
-    """Return at most one other definition of a type of ROS 2, whose bags and topics may have none.
-
-    Packages of one name differ: the maker's messages have no headers.
-    """
-    if short_name(name) not in _PILLARS:
-        return []
-    text = _SENSOR_STATE_OF_ROS2.replace("PACKAGE", short_name(name).partition("/")[0])
-    return [parse_definition(short_name(name), text)]
-
-
 class SampleDecoder:
     """Decoder of messages of one type into the samples in them.
 
@@ -128,8 +118,22 @@ class SampleDecoder:
     """
 
     def __init__(self, definition: Definition, *, ros2: bool) -> None:
-        layouts = [definition, *(_other_layout(definition.name) if ros2 else ())]
-        self._layouts = [(_converter(text), MessageDecoder(text, ros2=ros2)) for text in layouts]
+        layouts, short = [definition], short_name(definition.name)
+        # Packages of one name differ: the maker's messages have no headers, and bags and topics of
+        # ROS 2 may have no definition that says so.
+        if ros2 and short in _PILLARS:
+            text = _SENSOR_STATE_OF_ROS2.replace("PACKAGE", short.partition("/")[0])
+            layouts.append(parse_definition(short, text))
+        self._layouts = []
+        for layout in layouts:
+            # By the fields of the messages: packages differ in the names of types.
+            paths = field_paths(layout)
+            convert = next((convert for needed, convert in _CONVERTERS if needed <= paths), None)
+            if convert is None:
+                raise ValueError(
+                    f"{layout.name} is not supported; supported are {SUPPORTED_MESSAGES}"
+                )
+            self._layouts.append((convert, MessageDecoder(layout, ros2=ros2)))
 
     def __call__(self, data: bytes) -> list[DeviceSample]:
         """Return the sample of each device in a message.
@@ -160,15 +164,6 @@ SUPPORTED_MESSAGES = (
     "XelaServerMsg, SensorState"
 )
 """Supported message types, for error messages."""
-
-
-def _converter(definition: Definition) -> Callable[[Mapping[str, Any]], list[DeviceSample]]:
-    """Choose by the fields of the messages: packages differ in the names of types."""
-    paths = field_paths(definition)
-    for needed, convert in _CONVERTERS:
-        if needed <= paths:
-            return convert
-    raise ValueError(f"{definition.name} is not supported; supported are {SUPPORTED_MESSAGES}")
 
 
 def _axis_paths(prefix: str, kind: str, axes: str = "xyz") -> set[str]:
@@ -204,16 +199,8 @@ def _from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
     return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
 
 
-def _from_sensor_state(message: Mapping[str, Any]) -> list[DeviceSample]:
-    return _pillar_sample(message, ("fX", "fY", "fZ"))
-
-
-def _from_sensor_state_of_ros2(message: Mapping[str, Any]) -> list[DeviceSample]:
-    """Return the sample of a PapillArray in ROS 2, which allows small letters only."""
-    return _pillar_sample(message, ("fx", "fy", "fz"))
-
-
-def _pillar_sample(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
+def _from_sensor_state(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
+    """Return the sample of a PapillArray; ROS 2 allows small letters only in names of fields."""
     forces = _points(message["pillars"], names)
     time = message["tus"] * 1e-6 if message["tus"] > 0 else None
     header = message.get("header")  # the maker's messages of ROS 2 have none
@@ -239,8 +226,14 @@ _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSamp
         | _axis_paths("points[].point.", "float64"),
         _from_x_server,
     ),
-    ({"tus int64"} | _axis_paths("pillars[].f", "float32", "XYZ"), _from_sensor_state),
-    ({"tus int64"} | _axis_paths("pillars[].f", "float32"), _from_sensor_state_of_ros2),
+    (
+        {"tus int64"} | _axis_paths("pillars[].f", "float32", "XYZ"),
+        partial(_from_sensor_state, names=("fX", "fY", "fZ")),
+    ),
+    (
+        {"tus int64"} | _axis_paths("pillars[].f", "float32"),
+        partial(_from_sensor_state, names=("fx", "fy", "fz")),
+    ),
 )
 
 

@@ -16,7 +16,7 @@ from holdfast.io.importers.array_tables import (
     joined_axes,
 )
 from holdfast.io.importers.table import first_texts
-from holdfast_ros.bags import Bag, BagTopic
+from holdfast_ros.bags import Bag
 
 IMAGE_KINDS = re.compile(r"sensor_msgs/(Compressed)?Image|.*Video.*|.*/Marker(Array)?")
 """Types of messages that are left out unless their topic is named."""
@@ -40,7 +40,13 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
     Raises:
         RecordingError: no topic has one of these names.
     """
-    topics = {topic.number: topic for topic in bag.topics if _is_wanted(topic, names)}
+    prefixes = [f"{name.strip('/')}/" for name in names]
+    topics = {
+        topic.number: topic
+        for topic in bag.topics
+        if any(prefix.startswith(f"{topic.name.strip('/')}/") for prefix in prefixes)
+        or (not names and IMAGE_KINDS.fullmatch(topic.kind) is None)
+    }
     if not topics:
         shown = first_texts(list(dict.fromkeys(topic.name for topic in bag.topics)))
         raise RecordingError(f"{path} has no topic {', '.join(names)}; it has {shown}")
@@ -72,13 +78,6 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
         arrays = {place: one for place, one in arrays.items() if not place.endswith("stamp")}
         found |= {f"{name}/{place}": one for place, one in arrays.items()}
     return found
-
-
-def _is_wanted(topic: BagTopic, names: Collection[str]) -> bool:
-    if not names:
-        return IMAGE_KINDS.fullmatch(topic.kind) is None
-    name = topic.name.strip("/")
-    return any(f"{one.strip('/')}/".startswith(f"{name}/") for one in names)
 
 
 def _fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

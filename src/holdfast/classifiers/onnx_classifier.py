@@ -76,18 +76,18 @@ class Onnx(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_default
         rows = feature_rows(features, self.n_features)
         probabilities = np.full(len(rows), np.nan)
         known = ~np.isnan(rows).any(axis=1)
-        if known.any():
-            probabilities[known] = self._run(rows[known])
-        return probabilities
-
-    def _run(self, rows: Array) -> Array:
+        if not known.any():
+            return probabilities
+        # An ONNX file comes from anyone: what it returns is checked, not clipped.
         session, name, dtype = _session(self.content, self.n_features)
-        output = run_rows(session, name, rows.astype(dtype)).astype(np.float64)
-        if output.shape not in ((len(rows),), (len(rows), 1)):
-            raise ModelError(f"{self.file}: {len(rows)} probabilities expected, {output.shape}")
+        output = run_rows(session, name, rows[known].astype(dtype)).astype(np.float64)
+        n = int(known.sum())
+        if output.shape not in ((n,), (n, 1)):
+            raise ModelError(f"{self.file}: {n} probabilities expected, {output.shape}")
         if not ((output >= 0) & (output <= 1)).all():
             raise ModelError(f"{self.file}: probabilities from 0 to 1 expected")
-        return output.reshape(len(rows))
+        probabilities[known] = output.reshape(n)
+        return probabilities
 
 
 @lru_cache(maxsize=8)

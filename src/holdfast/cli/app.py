@@ -35,6 +35,7 @@ VERB_GROUPS = {
         "import": "Import recordings from other formats.",
         "info": "Show the content of a recording, a folder of them, or a model.",
         "label": "Label recordings on a page or by a rule, and check labels.",
+        "teach": "Teach a model the slips of your own hand.",
         "train": "Train a model from labelled recordings.",
         "evaluate": "Evaluate a model on labelled recordings.",
         "tune": "Choose the threshold for a wanted rate of false alarms.",

@@ -58,6 +58,7 @@ class CsvOptions:
         suffix = Path(source).suffix.lower()
         if not self.sensor and self.columns is None:
             return suffix == f".{CSV_FORMAT}" and not is_uri(source)
+        # These files and sources name their sensors.
         if is_uri(source) or suffix in SUFFIXES:
             raise ValueError(f"--sensor and --columns are for CSV files; {source} given")
         return True
@@ -110,6 +111,7 @@ def report_findings(recordings: "Iterable[tuple[str, Iterable[Finding]]]") -> No
     for name, findings in recordings:
         for kind, finding in {finding.kind: finding for finding in findings}.items():
             by_kind.setdefault(kind, []).append((name, finding))
+    # A hundred files of one logger have the same finding: one line names the first.
     for pairs in by_kind.values():
         name, finding = pairs[0]
         module = f"{finding.module}: " if finding.module else ""

@@ -56,6 +56,7 @@ class FormatOptions:
             out, self.data_format, parse_sensors(self.sensor or ()), self.columns,
             labels=not self.no_labels, force=force,
         )  # fmt: skip
+        # Without the option, the task chooses the format by what is installed.
         return task if self.suffix is None else replace(task, suffix=self.suffix)
 
 

@@ -246,7 +246,8 @@ class DetectorOptions:
         from holdfast.devices.uri import is_uri
         from holdfast.model import Debounce, Model
 
-        # builtin:any has the form of a URI; a forgotten MODEL is the usual mistake.
+        # Before the model is read, whose message would name a missing file. builtin:any has the
+        # form of a URI; a forgotten MODEL is the usual mistake.
         is_source = is_uri(name) and not name.startswith("builtin:")
         if is_source or name.endswith((".parquet", ".mcap", ".csv")):
             raise ValueError(
@@ -273,6 +274,7 @@ class DetectorOptions:
         """Create the detector of an open source, and report what the source lacks."""
         taxels = parse_taxels(self.ignore, source.sensors)
         strict = self.rate is RatePolicy.STRICT
+        # It refuses a sensor or a rate that does not fit; what follows are only warnings.
         stream = start.create_stream(model, source, strict=strict, ignore=taxels)
         report_missing_fingers(model, source.name, source.sensors)
         report_other_handling(model, stream.fingers)
@@ -309,6 +311,7 @@ class ServerOptions:
         if token is not None and file is not None:
             raise ValueError("--token and --token-file given; only one of them expected")
         if file is None:
+            # What is typed wins over what the shell has set some time ago.
             return os.environ.get(TOKEN_VARIABLE) if token is None else token
         try:
             if not file.is_file():
@@ -400,6 +403,7 @@ def report_missing_slip_rules(model: "Model") -> None:
     without = [name for name, part in model.fingers.items() if part.slip is None]
     if not without:
         return
+    # A model of one hand may have a rule for some of its fingers only.
     only = "" if len(without) == len(model.fingers) else f" for {', '.join(without)}"
     print_message(
         f"{model.name} has no slip rule{only}: slip_probability is null (holdfast train on "
@@ -429,6 +433,7 @@ def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[
         finger, _, number = part.strip().rpartition(":")
         if not (finger and number.isdecimal()):
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
+        # A configuration file names taxels of all fingers; a source may have only some of them.
         if finger in sensors:
             first, last = taxel_number(0), taxel_number(sensors[finger].n_taxels - 1)
             if not first <= int(number) <= last:
@@ -468,5 +473,6 @@ def check_speed(source: str, speed: float) -> None:
 
     if not (math.isfinite(speed) and speed >= 0):
         raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
+    # A device sends at its own pace.
     if speed != 1 and is_uri(source) and not source.startswith("twin:"):
         raise ValueError(f"--speed is for recordings and the twin; {source} is a device")

@@ -43,6 +43,7 @@ def warn_about_recordings(evaluation: "Evaluation", n_recordings: int) -> None:
     """Print the names of recordings on which the model was trained, and of copies."""
     pairs = [f"{name} of {original}" for name, original in evaluation.copies]
     trained_on = evaluation.trained_on
+    # Five names say which recordings are meant; a folder may have hundreds.
     copies, names = (", ".join(x[:5]) + (" ..." if len(x) > 5 else "") for x in (pairs, trained_on))
     if copies:
         print_message(f"copies, with the same readings: {copies}; the verdict counts them once")
@@ -66,6 +67,7 @@ def print_metrics(metrics: "Metrics") -> None:
     """
     pooled, hand = metrics.pooled, metrics.events.hand
     (tn, fp), (fn, tp) = pooled.confusion
+    # A model that says nothing but STABLE is right wherever the label is: the least to beat.
     shares = [format_number(100 * k / max(pooled.n, 1), 1) for k in (fn + tp, tn + fp)]
     print_line("by sample")
     print_table(
@@ -159,7 +161,7 @@ def print_slips(
     print_paragraph(f"Of one finger: {support}.{NEVER_NOTE}")
     if summary.intervals is not None:
         print_line()
-        print_paragraph(_intervals(summary.intervals, chosen=summary.threshold_chosen))
+        print_paragraph(format_intervals(summary.intervals, chosen=summary.threshold_chosen))
 
 
 def slips_origin(metrics: "SlipMetrics") -> str:
@@ -185,7 +187,7 @@ def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
+def format_intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
     """Return the intervals of the row of all fingers, and whether they include the choice."""
     from holdfast.metrics.summary import LEVEL
 
@@ -216,6 +218,7 @@ def print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> Non
         points: lowest threshold first.
         notes: word beside a threshold.
     """
+    # The points are of one question: all have the scores of slips, or none has.
     slips = {point.threshold: point.slips for point in points if point.slips is not None}
     if slips:
         print_line(

@@ -72,7 +72,7 @@ def sensors(
         print_all(as_json=as_json)
         return
     layout = find_layout(name, base)
-    figure.check()
+    figure.check()  # only now: an unknown name is the worse mistake
     figure.save(draw)
     if as_json:
         facts = layout.to_dict()

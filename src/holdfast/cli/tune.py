@@ -100,6 +100,7 @@ def tune(
         return
     print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), n))
     chosen, before = tuned.chosen, tuned.before
+    # By threshold: the one of before may be among those that were tried.
     points = {point.threshold: point for point in (*tuned.points, before)}
     notes = {before.threshold: "before", chosen.threshold: "chosen"}
     print_points([points[t] for t in sorted(points)], notes)

@@ -1,7 +1,7 @@
 """Export of recordings as the generic CSV of docs/importing.md, which `holdfast import` reads."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -37,6 +37,20 @@ class CsvExport(NamedTuple):
     files: list[str]
     sensors: list[str]
     left_out: list[str]
+
+    def note_left_out(self, recording: Recording) -> None:
+        """Add what a recording has and its tables have not."""
+        empty = [name for name, module in recording.modules.items() if not module.n_samples]
+        parts = {
+            "metadata": recording.metadata,
+            "truth": recording.truth,
+            "markers": recording.markers,
+            "media": recording.media,
+            "modules without samples": empty,
+        }
+        for name, part in parts.items():
+            if part and name not in self.left_out:
+                self.left_out.append(name)
 
 
 def export(
@@ -76,21 +90,34 @@ def export(
         with whole_file(out, force=force) as part:
             _write_table(part, modules)
         result.files.append(out.name)
-        _note_left_out(recordings[0], result)
+        result.note_left_out(recordings[0])
         return result
     with whole_files(out, force=force) as folder:
         for recording in progress(recordings):
             for name, modules in _tables(recording).items():
-                _write_sensors(folder, out, modules, sensors, result)
+                for finger, module in modules.items():
+                    # The option `--sensor NAME=FILE` of the import is for all tables.
+                    before = sensors.setdefault(finger, module.sensor)
+                    if before != module.sensor:
+                        raise RecordingError(
+                            f"{finger} has the sensors {before.name} and {module.sensor.name} in "
+                            "different recordings; export them apart"
+                        )
+                    file = f"{file_stem(finger)}{SENSOR_SUFFIX}"
+                    if not _is_built_in(module.sensor) and not (folder / file).exists():
+                        text = msgspec.json.encode(module.sensor.to_dict())
+                        (folder / file).write_bytes(msgspec.json.format(text))
+                        result.sensors.append(f"{finger}={out / file}")
                 _write_table(folder / f"{name}{CSV_SUFFIX}", modules)
                 result.files.append(f"{name}{CSV_SUFFIX}")
-            _note_left_out(recording, result)
+            result.note_left_out(recording)
     return result
 
 
 def _tables(recording: Recording) -> dict[str, dict[str, Tactile]]:
     """Return the modules of each table, by the stem of its file."""
     groups: list[dict[str, Tactile]] = []
+    # Modules of one clock share rows. Most hands have one, and the file then its recording's name.
     for name, module in recording.modules.items():
         if not _PLAIN_NAME.fullmatch(name):
             raise RecordingError(
@@ -120,50 +147,8 @@ def _is_built_in(item: Sensor) -> bool:
     return item in (known, calibrated)
 
 
-def _write_sensors(
-    folder: Path,
-    out: Path,
-    modules: Mapping[str, Tactile],
-    known: dict[str, Sensor],
-    result: CsvExport,
-) -> None:
-    """Write the sensors that are not built in.
-
-    Raises:
-        RecordingError: a module has another sensor than in a recording before.
-    """
-    for name, module in modules.items():
-        before = known.setdefault(name, module.sensor)
-        if before != module.sensor:
-            raise RecordingError(
-                f"{name} has the sensors {before.name} and {module.sensor.name} in different "
-                "recordings; export them apart"
-            )
-        file = f"{file_stem(name)}{SENSOR_SUFFIX}"
-        if not _is_built_in(module.sensor) and not (folder / file).exists():
-            text = msgspec.json.encode(module.sensor.to_dict())
-            (folder / file).write_bytes(msgspec.json.format(text))
-            result.sensors.append(f"{name}={out / file}")
-
-
 def _write_table(path: Path, modules: Mapping[str, Tactile]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        for name, module in modules.items():
-            file.write(f"# sensor: {name}={module.sensor.name}\n# unit: {name}={module.unit}\n")
-        columns = ["time"]
-        for name, module in modules.items():
-            width = max(2, len(str(module.sensor.n_taxels)))
-            for number in taxel_numbers(range(module.sensor.n_taxels)):
-                columns += [f"{name}.t{number:0{width}d}.{axis}" for axis in "xyz"]
-        for name, module in modules.items():
-            columns += [f"{name}.label", f"{name}.cause"] if module.labels else []
-        file.write(csv_text([columns]))
-        for block in _rows(modules):
-            file.write(block)
-
-
-def _rows(modules: Mapping[str, Tactile]) -> Iterator[str]:
-    """Yield the rows as text, in blocks."""
+    """Write modules with the same times: their comments, the header, and a row for each sample."""
     times: Array = next(iter(modules.values())).times
     labels = []  # of each labelled module, the cells `label,cause` of each sample
     for module in modules.values():
@@ -173,25 +158,24 @@ def _rows(modules: Mapping[str, Tactile]) -> Iterator[str]:
             text = f"{label.state.value.lower()},{label.cause or ''}"
             cells[first:last] = [text] * (last - first)
         labels += [cells] if module.labels else []
-    for start in range(0, len(times), ROWS_AT_ONCE):
-        cut = slice(start, start + ROWS_AT_ONCE)
-        columns = [module.readings[cut].reshape(len(times[cut]), -1) for module in modules.values()]
-        parts: list[Iterable[str]] = [map(repr, times[cut].tolist())]
-        # `repr` is the shortest text that is read back as the same number.
-        parts += [(",".join(map(repr, row)) for row in column.tolist()) for column in columns]
-        parts += [cells[cut] for cells in labels]
-        yield "".join(",".join(row) + "\n" for row in zip(*parts, strict=True))
-
-
-def _note_left_out(recording: Recording, result: CsvExport) -> None:
-    empty = [name for name, module in recording.modules.items() if not module.n_samples]
-    parts = {
-        "metadata": recording.metadata,
-        "truth": recording.truth,
-        "markers": recording.markers,
-        "media": recording.media,
-        "modules without samples": empty,
-    }
-    for name, part in parts.items():
-        if part and name not in result.left_out:
-            result.left_out.append(name)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for name, module in modules.items():
+            file.write(f"# sensor: {name}={module.sensor.name}\n# unit: {name}={module.unit}\n")
+        columns = ["time"]
+        for name, module in modules.items():
+            # Names of one length: sorted as text, columns keep the order of the taxels.
+            width = max(2, len(str(module.sensor.n_taxels)))
+            for number in taxel_numbers(range(module.sensor.n_taxels)):
+                columns += [f"{name}.t{number:0{width}d}.{axis}" for axis in "xyz"]
+        for name, module in modules.items():
+            columns += [f"{name}.label", f"{name}.cause"] if module.labels else []
+        file.write(csv_text([columns]))
+        for start in range(0, len(times), ROWS_AT_ONCE):
+            cut = slice(start, start + ROWS_AT_ONCE)
+            parts: list[Iterable[str]] = [map(repr, times[cut].tolist())]
+            for module in modules.values():
+                readings = module.readings[cut].reshape(len(times[cut]), -1).tolist()
+                # `repr` is the shortest text that is read back as the same number.
+                parts.append(",".join(map(repr, row)) for row in readings)
+            parts += [cells[cut] for cells in labels]
+            file.write("".join(",".join(row) + "\n" for row in zip(*parts, strict=True)))

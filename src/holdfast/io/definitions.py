@@ -175,21 +175,16 @@ def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[Messag
         size = int(match["size"] or 0) if match["many"] else None
         # `[<=N]` is encoded as a sequence of any length, `[N]` has no length.
         bounded = match["many"] and "<=" in match["many"]
-        yield MessageField(
-            match["name"], _kind(match["kind"], block, blocks), 0 if bounded else size
-        )
-
-
-def _kind(kind: str, block: str, blocks: Mapping[str, str]) -> str:
-    if kind in NUMBER_CODES or kind in ("string", *_STAMPS):
-        return kind
-    kind = short_name(kind)
-    package = block.split("/", maxsplit=1)[0]
-    # The package of the message comes first; `Header` alone is that of std_msgs, as in ROS 1.
-    for full in (kind, f"{package}/{kind}", f"std_msgs/{kind}"):
-        if full in blocks:
-            return full
-    raise ValueError(f"{block}: a field is of {kind}, which is not defined")
+        kind = match["kind"]
+        if kind not in NUMBER_CODES and kind not in ("string", *_STAMPS):
+            short, package = short_name(kind), block.split("/", maxsplit=1)[0]
+            # The package of the message comes first; `Header` alone is that of std_msgs, as in
+            # ROS 1.
+            names = (short, f"{package}/{short}", f"std_msgs/{short}")
+            kind = next((name for name in names if name in blocks), "")
+            if not kind:
+                raise ValueError(f"{block}: a field is of {short}, which is not defined")
+        yield MessageField(match["name"], kind, 0 if bounded else size)
 
 
 def _measure(

@@ -279,8 +279,13 @@ class _Child:
 
     def _answer(self, timeout: float) -> _Answer | None:
         """Return the next answer; None if there is none in time, and the process has ended."""
+
+        def give_up() -> None:
+            self._is_late = True
+            self._process.kill()
+
         # Not every system reads a pipe with a timeout; the end of the process ends the reading.
-        timer = Timer(timeout, self._give_up)
+        timer = Timer(timeout, give_up)
         # The timer must not keep this process alive after its end.
         timer.daemon = True
         timer.start()
@@ -290,10 +295,6 @@ class _Child:
             return None
         finally:
             timer.cancel()
-
-    def _give_up(self) -> None:
-        self._is_late = True
-        self._process.kill()
 
 
 _idle: list[_Child] = []

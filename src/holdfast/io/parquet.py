@@ -162,7 +162,22 @@ def read_columns(path: Path) -> tuple[Header, Iterator[TimedArrays]]:
         RecordingError: as in `load`.
     """
     header, file = _open(path)
-    return header, _modules_ahead(header, file, path)
+    specs = _specs(header, file, path)
+    read = _GroupReader(file, path, "C")
+
+    def modules_ahead() -> Iterator[TimedArrays]:
+        # A thread reads the next module while the caller uses one. Where memory is short, a new
+        # thread can end the process; so `load` has none.
+        modules = [([spec], _schema([spec]).names) for spec in specs if spec.track != "truth"]
+        parts = product(range(file.num_row_groups), modules)
+        with ThreadPoolExecutor(1) as reader:
+            ahead = (reader.submit(read, group, *module) for group, module in parts)
+            waiting = deque(islice(ahead, MODULES_AHEAD))
+            while waiting:
+                waiting.extend(islice(ahead, 1))
+                yield waiting.popleft().result()
+
+    return header, modules_ahead()
 
 
 def is_foreign(path: Path) -> bool:
@@ -184,7 +199,21 @@ def write_checksum(path: Path) -> None:
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     budget = ReadBudget(path)
-    _check_ends(path)
+    size = path.stat().st_size
+    if size == 0:
+        raise RecordingError(f"{path} is empty (0 bytes); a Parquet recording expected")
+    with path.open("rb") as file:
+        head = file.read(len(PARQUET_MAGIC))
+        file.seek(max(0, size - len(PARQUET_MAGIC)))
+        tail = file.read()
+    if head != PARQUET_MAGIC:
+        raise RecordingError(f"{path} is no Parquet file, or its first bytes are damaged")
+    # The smallest file is the magic, a length of 4 bytes, and the magic.
+    if tail != PARQUET_MAGIC or size < 3 * len(PARQUET_MAGIC):
+        raise RecordingError(
+            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
+            "from which nothing can be recovered"
+        )
     # The checksum comes first: Arrow may end the process for a file that is damaged.
     try:
         place = _checksum_place(path)
@@ -206,24 +235,6 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     header = (table.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
     budget.keep(JSON_EXPANSION * len(header))
     return decode_header(header, path), table
-
-
-def _check_ends(path: Path) -> None:
-    size = path.stat().st_size
-    if size == 0:
-        raise RecordingError(f"{path} is empty (0 bytes); a Parquet recording expected")
-    with path.open("rb") as file:
-        head = file.read(len(PARQUET_MAGIC))
-        file.seek(max(0, size - len(PARQUET_MAGIC)))
-        tail = file.read()
-    if head != PARQUET_MAGIC:
-        raise RecordingError(f"{path} is no Parquet file, or its first bytes are damaged")
-    # The smallest file is the magic, a length of 4 bytes, and the magic.
-    if tail != PARQUET_MAGIC or size < 3 * len(PARQUET_MAGIC):
-        raise RecordingError(
-            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
-            "from which nothing can be recovered"
-        )
 
 
 def _checksum_place(path: Path) -> int:
@@ -268,23 +279,21 @@ def _schema(specs: list[ArraySpec]) -> pa.Schema:
     for spec in specs:
         if spec.track != "truth":
             fields.append((f"{spec.column}.time", pa.float64()))
-        fields += [(name, arrow_type(spec.number)) for name in _column_names(spec)]
+            n_taxels = spec.shape[0]
+            # Numbers of one width, so that the names of columns sort like the taxels.
+            width = max(2, len(str(n_taxels)))
+            taxels = [f"t{number:0{width}d}" for number in taxel_numbers(range(n_taxels))]
+            components = [f"{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
+        else:
+            places = product(*(range(size) for size in spec.shape))
+            components = [".".join(map(str, place)) for place in places]
+        # A value of one number has no component, and its column no end.
+        names = [f"{spec.column}.{end}" if end else spec.column for end in components]
+        fields += [(name, arrow_type(spec.number)) for name in names]
     counts = Counter(name for name, _ in fields)
     if repeated := sorted(name for name, n in counts.items() if n > 1):
         raise RecordingError(f"two arrays of the recording would share the column {repeated[0]!r}")
     return pa.schema(fields)
-
-
-def _column_names(spec: ArraySpec) -> list[str]:
-    """Return the name of the column of each component of a value."""
-    if spec.track != "truth":
-        n_taxels = spec.shape[0]
-        # Numbers of one width, so that the names of columns sort like the taxels.
-        width = max(2, len(str(n_taxels)))
-        taxels = [f"t{number:0{width}d}" for number in taxel_numbers(range(n_taxels))]
-        return [f"{spec.column}.{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
-    places = product(*(range(size) for size in spec.shape))
-    return [".".join([spec.column, *map(str, place)]) for place in places]
 
 
 def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
@@ -294,26 +303,21 @@ def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
 
 
 def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
+    """Yield the arrays of each row group as they are in a recording, (n, ...)."""
     specs = _specs(header, file, path)
     read = _GroupReader(file, path, "F")
-    return (_by_sample(specs, read(group, specs)) for group in range(file.num_row_groups))
+    shapes = {spec.topic: spec.shape for spec in specs}
 
+    def by_sample(arrays: TimedArrays) -> TimedArrays:
+        return {
+            topic: (times, values.T.reshape(len(times), *shapes[topic]))
+            if topic != TRUTH_TIME
+            else (times, times)
+            for topic, (times, values) in arrays.items()
+        }
 
-def _modules_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
-    """Yield each module of each row group; a thread reads the next while the caller uses it.
-
-    Where memory is short, a new thread can end the process; so `load` has none.
-    """
-    specs = _specs(header, file, path)
-    read = _GroupReader(file, path, "C")
-    modules = [([spec], _schema([spec]).names) for spec in specs if spec.track != "truth"]
-    parts = product(range(file.num_row_groups), modules)
-    with ThreadPoolExecutor(1) as reader:
-        ahead = (reader.submit(read, group, *module) for group, module in parts)
-        waiting = deque(islice(ahead, MODULES_AHEAD))
-        while waiting:
-            waiting.extend(islice(ahead, 1))
-            yield waiting.popleft().result()
+    # Not a generator: a file of other columns is refused by the call.
+    return (by_sample(read(group, specs)) for group in range(file.num_row_groups))
 
 
 def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
@@ -377,17 +381,6 @@ def _value_size(spec: ArraySpec) -> int:
     """Return the size of a value and its time in memory [bytes]."""
     n_bytes: int = 8 + spec.n_components * np.dtype(_memory_type(spec)).itemsize
     return n_bytes
-
-
-def _by_sample(specs: list[ArraySpec], arrays: TimedArrays) -> TimedArrays:
-    """Return arrays with values (n_components, n) as they are in a recording, (n, ...)."""
-    shapes = {spec.topic: spec.shape for spec in specs}
-    return {
-        topic: (times, values.T.reshape(len(times), *shapes[topic]))
-        if topic != TRUTH_TIME
-        else (times, times)
-        for topic, (times, values) in arrays.items()
-    }
 
 
 def _columns(specs: list[ArraySpec], table: pa.Table, order: Literal["C", "F"]) -> TimedArrays:

@@ -12,6 +12,13 @@
 /* A taxel stands still by a fault if it does so this many times as long as ever before. Healthy
  * taxels reached 5 times in 24 randomized hands, and once in real recordings. */
 #define HF_STILL_RATIO ((hf_real)10)
+/* Time between comparisons of single axes [s], and the time for which an axis that moves is the
+ * same at most. On real magnetic skins, no axis was the same for longer than 0.45 s. */
+#define HF_COMPARED_SECONDS ((hf_real)0.05)
+#define HF_MOVING_SECONDS ((hf_real)0.25)
+/* Factor of the time for which an axis is the same that differed fewer than HF_MIN_CHANGES times.
+ */
+#define HF_SELDOM_RATIO ((hf_real)5)
 /* Changes from which the past of a taxel shows how long it stands still. One that changed less
  * often is compared with the others. */
 #define HF_MIN_CHANGES 10
@@ -398,6 +405,57 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
     }
 }
 
+/* Note the magnetometers of a finger of which one axis is stuck, while that of the others moves.
+ *
+ * Whole counts with little noise repeat, so an axis is compared with its own past. */
+static void hf_find_stuck_axes(const hf_finger *f)
+{
+    holdfast_finger_memory *const s = f->state;
+    const hf_real moving = HF_MOVING_SECONDS / HF_COMPARED_SECONDS;
+    s->stuck_axes = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const hf_real *const readings = f->readings + axis * f->n;
+        size_t n_moving = 0;
+        int32_t longest = 0; /* of those that move */
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            const holdfast_taxel *const taxel = &f->taxels[i];
+            const bool is_live = taxel->n_differed[axis] >= HF_MIN_CHANGES;
+            if (is_live && (hf_real)taxel->n_same[axis] < moving) {
+                n_moving += 1;
+                longest = taxel->longest_same[axis] > longest ? taxel->longest_same[axis] : longest;
+            }
+        }
+        for (size_t i = 0; i < f->n_taxels; ++i) {
+            holdfast_taxel *const taxel = &f->taxels[i];
+            /* Stuck: same for max(2 s, 10 times as long as ever before); one that differed too
+             * seldom, for max(10 s, 10 times as long as the others, too). */
+            const bool is_live = taxel->n_differed[axis] >= HF_MIN_CHANGES;
+            int32_t before = taxel->longest_same[axis];
+            before = !is_live && longest > before ? longest : before;
+            const hf_real least = (is_live ? 1 : HF_SELDOM_RATIO) * HF_DEAD_SECONDS;
+            const hf_real limit =
+                hf_max(least / HF_COMPARED_SECONDS, HF_STILL_RATIO * (hf_real)(before + 1));
+            const bool is_stuck = (hf_real)taxel->n_same[axis] >= limit;
+            if (readings[i] != taxel->compared[axis]) {
+                if (!is_stuck && taxel->n_same[axis] > taxel->longest_same[axis]) {
+                    taxel->longest_same[axis] = taxel->n_same[axis];
+                }
+                taxel->compared[axis] = readings[i];
+                taxel->n_same[axis] = 0;
+                taxel->n_differed[axis] += 1;
+            } else {
+                taxel->n_same[axis] += 1;
+                const bool at_limit =
+                    readings[i] <= f->finger->low || readings[i] >= f->finger->high;
+                if (is_stuck && !at_limit && f->used[i] > 0 &&
+                    (hf_real)n_moving >= HF_MOVING_SHARE * f->finger->n_used) {
+                    s->stuck_axes |= hf_bit(i);
+                }
+            }
+        }
+    }
+}
+
 /* Find the faulty taxels of a finger at a sample that changed a reading. */
 static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
 {
@@ -407,8 +465,13 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
         hf_forget_change(f, i);
         f->powers[i] = f->powers[f->n + i] = 0;
     }
-    s->taxel_faults = 0;
-    s->faulty_taxels = s->noisy_taxels = 0;
+    const int64_t interval = (int64_t)lrint((double)(HF_COMPARED_SECONDS / f->hand->period));
+    if (f->finger->is_magnetic && s->n_changes % (interval > 1 ? interval : 1) == 0) {
+        hf_find_stuck_axes(f);
+    }
+    s->taxel_faults = s->stuck_axes ? HOLDFAST_STUCK : 0;
+    s->faulty_taxels = s->stuck_axes;
+    s->noisy_taxels = 0;
     if (changes.any_still) {
         hf_find_still_taxels(f);
     }

@@ -4,7 +4,12 @@
  * taxel frames, for drivers that turn the readings of all chips alike. A load differs from taxel to
  * taxel. So the part that is common to all taxels is a field where nothing else differs; it is
  * taken out of the readings, and stays out while a load hides it. docs/sensors.md says what is
- * lost. */
+ * lost.
+ *
+ * The modules of a hand are in one field. How they lie to each other is not known, as fingers move;
+ * but while the hand turns, the field changes equally fast for all of them. So where a change may
+ * be a field or a load, or a load hides the field, an open module decides: it is the field that
+ * changes if both change equally fast. */
 #include "finger.h"
 
 /* Share by which the gains of magnetometers differ, and what they read of a field. */
@@ -20,6 +25,10 @@
 #define HF_MOVES ((hf_real)1.5)
 /* Factor of the squared noise of taxels: twice what is expected, as the tare has noise, too. */
 #define HF_FIELD_MARGIN ((hf_real)4)
+/* Factor by which the speeds of the field differ between modules: gains, and their noise. */
+#define HF_SPEED_TOLERANCE ((hf_real)1.25)
+/* The speed of a field counts from this many times its noise on, as a root mean square. */
+#define HF_SPEED_TO_NOISE ((hf_real)6)
 /* Share of a change that is normal in a press; a field has any direction. */
 #define HF_PRESSED_SHARE ((hf_real)0.7)
 /* Under a load that differs from a field by this factor of its square, only each fourth sample is
@@ -28,8 +37,9 @@
 #define HF_SKIPPED_SAMPLES 3
 /* Time for which it must be unclear whether a change is a field or a load [s]. */
 #define HF_UNCLEAR_SECONDS ((hf_real)0.1)
-/* Time constant over which the common part is smoothed [s]. */
+/* Time constants over which the common part, and then its speed, are smoothed [s]. */
 #define HF_COMMON_SECONDS ((hf_real)0.05)
+#define HF_SPEED_SECONDS ((hf_real)0.1)
 /* A field changes within a second by at most this many times its largest value: a third of a second
  * for half a turn of the hand. */
 #define HF_FIELD_SPEED ((hf_real)3)
@@ -37,8 +47,8 @@
 /* What the taxels of a finger have in common, beyond the tare. */
 typedef struct {
     hf_real n;           /* taxels */
-    hf_real mean[3];     /* in the fingertip frame if it is turned, else in the taxel frames */
-    bool is_turned;      /* the frame in which more is common */
+    hf_real means[6];    /* in the taxel frames, and in the fingertip frame */
+    bool is_turned;      /* more is common in the fingertip frame */
     hf_real differences; /* sum of the squared distances of the taxels from the mean */
 } hf_common;
 
@@ -74,7 +84,7 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
     for (size_t k = 0; k < 7; ++k) {
         sums[k] = hf_total(parts[k]);
     }
-    hf_common common = {f->finger->n_used, {0, 0, 0}, false, 0};
+    hf_common common = {f->finger->n_used, {0, 0, 0, 0, 0, 0}, false, 0};
     for (size_t i = 0; left_out && i < f->n_taxels; ++i) {
         if ((left_out & hf_bit(i)) && f->used[i] > 0) {
             hf_real h[3];
@@ -92,12 +102,12 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
     }
     /* sum |h_i - mean|^2 = sum |h_i|^2 - |sum h_i|^2 / n. Rounding decides nothing: 1 %. */
     common.is_turned = hf_square(sums + 3) > (hf_real)1.01 * hf_square(sums);
-    const hf_real *const sum = common.is_turned ? sums + 3 : sums;
     const hf_real share = 1 / hf_max(common.n, 1);
-    for (size_t axis = 0; axis < 3; ++axis) {
-        common.mean[axis] = share * sum[axis];
+    for (size_t k = 0; k < 6; ++k) {
+        common.means[k] = share * sums[k];
     }
-    common.differences = hf_max(sums[6] - share * hf_square(sum), 0);
+    const hf_real square = hf_square(common.is_turned ? sums + 3 : sums);
+    common.differences = hf_max(sums[6] - share * square, 0);
     return common;
 }
 
@@ -110,27 +120,53 @@ static bool hf_is_press(const hf_finger *f, const hf_common *common, const hf_re
            along * along >= HF_PRESSED_SHARE * HF_PRESSED_SHARE * hf_square(change);
 }
 
+/* Return whether the field of another module changes at a speed between two. */
+static bool hf_another_turns(const hf_finger *f, hf_real low, hf_real high)
+{
+    for (size_t i = 0; i < HF_N_FINGERS(f->hand); ++i) {
+        const holdfast_finger_memory *const other = &f->fingers[i];
+        const bool is_present = f->state->last_time - other->last_time <= HF_MAX_BRIDGED_SECONDS;
+        const bool is_between = low <= other->field_speed && other->field_speed <= high;
+        if (other != f->state && other->field_speed > 0 && is_present && is_between) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Update the field of a finger by what its taxels have in common. Return whether it may be either
  * a field or a load. */
 static bool hf_update_field(const hf_finger *f, const hf_common *common)
 {
     holdfast_finger_memory *const s = f->state;
-    const hf_real most = f->finger->max_field, *const mean = common->mean;
+    if (common->n < HF_MIN_TAXELS) { /* all may be loaded alike */
+        s->is_deep = false;
+        return false;
+    }
+    const hf_real most = f->finger->max_field;
+    const bool is_known = !isinf(most), is_first = !(hf_square(s->field) > 0);
     const bool same_frame = common->is_turned == s->field_is_turned;
-    const hf_real gain = hf_min(1, f->hand->period / HF_COMMON_SECONDS);
-    /* c(k) = c(k-1) + (T / tau) (mean(k) - c(k-1)); change = mean - field. */
-    hf_real motion[3], change[3];
+    const size_t frame = common->is_turned ? 3 : 0;
+    const hf_real *const mean = common->means + frame;
+    /* c(k) = c(k-1) + (T / tau) (mean(k) - c(k-1)), and its speed likewise. */
+    const hf_real elapsed = f->hand->period * (hf_real)(s->n_skipped + 1);
+    const hf_real gain = hf_min(1, elapsed / HF_COMMON_SECONDS);
+    const hf_real speed_gain = hf_min(1, elapsed / HF_SPEED_SECONDS);
+    hf_real motions[6], steps[6], change[3];
+    for (size_t k = 0; k < 6; ++k) {
+        motions[k] = common->means[k] - s->common[k];
+        steps[k] = gain * motions[k];
+        s->common[k] += steps[k];
+        s->speed[k] += speed_gain * (steps[k] / elapsed - s->speed[k]);
+    }
     for (size_t axis = 0; axis < 3; ++axis) {
-        motion[axis] = same_frame ? mean[axis] - s->common[axis] : 0;
-        s->common[axis] = mean[axis] - (1 - gain) * motion[axis];
         change[axis] = mean[axis] - (same_frame ? s->field[axis] : 0);
     }
     /* n |v| > 4 noise: F of that vector is above the noise of F. The first field of a sensor whose
      * unit is not known has four times that: what is less may be a skin that warms. */
-    const bool is_known = !isinf(most), is_first = !(hf_square(s->field) > 0);
     const hf_real to_noise = HF_FIELD_TO_NOISE * (!is_known && is_first ? HF_FIRST_FIELD : 1);
     const hf_real noise = to_noise * s->noise / common->n, least = noise * noise;
-    const hf_real moved = hf_square(motion), square = hf_square(change);
+    const hf_real moved = hf_square(motions + frame), square = hf_square(change);
     if (moved <= least) {
         memcpy(s->still_field, s->field, sizeof s->field);
     }
@@ -138,14 +174,22 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
      * of all taxels adds up in the force: what they have in common has the limit of the force. */
     const hf_real of_noise = HF_FIELD_MARGIN * 3 * (s->noise * s->noise);
     s->is_untouched = square <= least && common->differences <= of_noise;
+    /* Alike: sum |h_i - mean|^2 <= n (0.1 max(|mean|, |change|))^2 + 4 times that of noise. */
+    const hf_real squares = common->n * hf_max(hf_square(mean), square);
+    const hf_real limit = HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE * squares + of_noise;
+    const bool is_clear = common->differences <= limit;
+    s->is_deep = common->differences > HF_DEEP_LOAD * limit;
+    /* Variance of a component of the speed: (noise / n)^2 T / (2 tau_1 tau_2 (tau_1 + tau_2)). */
+    const hf_real speed = hf_sqrt(hf_square(s->speed + frame));
+    const hf_real seconds = 2 * HF_COMMON_SECONDS * HF_SPEED_SECONDS;
+    const hf_real variance =
+        3 * f->hand->period / (seconds * (HF_COMMON_SECONDS + HF_SPEED_SECONDS));
+    const bool is_turning = speed * common->n > HF_SPEED_TO_NOISE * s->noise * hf_sqrt(variance);
     if (square <= least) {
         s->field_is_load = false;
+        s->field_speed = is_turning && is_clear ? speed : 0;
         return false;
     }
-    /* Alike: sum |h_i - mean|^2 <= n (0.1 max(|mean|, |change|))^2 + 4 times that of noise. */
-    const hf_real limit =
-        common->n * (HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE) * hf_max(hf_square(mean), square);
-    const bool is_alike = common->differences <= limit + of_noise;
     /* A load: a press that is too fast for a field, or too strong. Where the unit is not known, any
      * press is one, unless it is small beside a field that was found, or in the fingertip frame:
      * on a curved patch, no press is alike there. */
@@ -153,19 +197,34 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     const bool is_strong = hf_square(mean) > most * most;
     const bool is_fast = moved > fastest * fastest;
     const bool is_small = square < hf_square(s->field) / 4;
-    const bool is_load =
+    bool is_load =
         hf_is_press(f, common, change) &&
         (is_known ? is_fast || is_strong || s->field_is_load : !is_small && !common->is_turned);
+    bool is_alike = is_clear, is_followed = false;
+    s->is_shared = s->is_shared && is_small;
+    if (!is_clear || is_load) {
+        /* In the frame of the field; of the first one, in that which moves more. */
+        const hf_real plain = hf_square(s->speed), turned = hf_square(s->speed + 3);
+        if (is_first) {
+            s->field_is_turned = turned > (hf_real)1.01 * plain;
+        }
+        const hf_real own = hf_sqrt(s->field_is_turned ? turned : plain);
+        is_followed = hf_another_turns(f, own / HF_SPEED_TOLERANCE, own * HF_SPEED_TOLERANCE);
+        s->is_shared |= is_followed;
+    }
+    const hf_real nearly = HF_LOAD_SHARE * HF_LOAD_SHARE;
+    if (s->is_shared) { /* gains may differ more, and no press is a load */
+        is_alike = common->differences <= nearly * squares + of_noise;
+        is_load = false;
+    }
+    s->field_is_load = is_load && is_alike;
     if (!is_alike) {
-        s->field_is_load = false;
-        if (common->differences > HF_DEEP_LOAD * (limit + of_noise)) {
-            s->n_skipped = HF_SKIPPED_SAMPLES;
+        for (size_t axis = 0; axis < 3 && is_followed; ++axis) {
+            s->field[axis] += steps[axis + (s->field_is_turned ? 3 : 0)];
         }
         /* Without the noise: what is under it is no field, and a light touch is not unclear. */
-        const hf_real nearly = common->n * (HF_LOAD_SHARE * HF_LOAD_SHARE) * square;
-        return !is_load && common->differences <= nearly;
+        return !is_load && !s->is_shared && common->differences <= nearly * common->n * square;
     }
-    s->field_is_load = is_load;
     if (is_load) {
         if (is_known && is_fast) { /* what was taken for a field before */
             memcpy(s->field, s->still_field, sizeof s->field);
@@ -177,9 +236,12 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     }
     /* What moves is taken as it is; else the smoothed part, as one noisy sample of the mean would
      * stay in the force. Moves: |motion| > 1.5 times the least. */
-    memcpy(s->field, moved > HF_MOVES * HF_MOVES * least ? mean : s->common, sizeof s->field);
+    const bool moves = moved > HF_MOVES * HF_MOVES * least;
+    memcpy(s->field, moves ? mean : s->common + frame, sizeof s->field);
     s->has_new_field = true;
+    s->is_untouched = common->differences <= of_noise;
     s->field_is_turned = common->is_turned;
+    s->field_speed = is_turning && !s->is_shared ? speed : 0;
     return false;
 }
 
@@ -193,13 +255,12 @@ static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
         return 0;
     }
     s->has_new_field = false;
-    if (s->n_skipped > 0) {
-        s->n_skipped -= 1;
+    if (s->is_deep && s->n_skipped < HF_SKIPPED_SAMPLES && !hf_another_turns(f, 0, HF_INFINITY)) {
+        s->n_skipped += 1;
     } else {
         const hf_common common = hf_find_common(f, left_out);
-        /* Of fewer taxels, all may be loaded alike. A touch may be unclear while it begins. */
-        const bool is_unclear = common.n >= HF_MIN_TAXELS && hf_update_field(f, &common);
-        s->n_unclear = is_unclear ? s->n_unclear + 1 : 0;
+        s->n_unclear = hf_update_field(f, &common) ? s->n_unclear + 1 : 0; /* a touch may begin */
+        s->n_skipped = 0;
     }
     if (hf_square(s->field) > 0) {
         /* f_i -= field, or R_i^T field. */

@@ -16,6 +16,7 @@ typedef struct {
     const holdfast_hand *hand;
     const holdfast_finger *finger;
     holdfast_finger_memory *state;
+    const holdfast_finger_memory *fingers; /* of all */
     holdfast_values *values;
     size_t n_taxels;
     size_t n;                 /* lanes: n_taxels rounded up */

@@ -266,6 +266,11 @@ typedef struct {
     int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
     int64_t longest_still; /* most successive samples without a change, of those that changed the
                               finger */
+    /* Of each axis of a magnetometer, which is compared every 0.05 s: */
+    hf_real compared[3];     /* reading */
+    int32_t n_same[3];       /* comparisons since it last differed */
+    int32_t longest_same[3]; /* most of these that were no fault */
+    int32_t n_differed[3];   /* comparisons at which it differed */
 } holdfast_taxel;
 
 /* What replaces a taxel that is left out (masks.c). */
@@ -343,6 +348,7 @@ typedef struct {
     uint32_t taxel_faults;  /* faults of single taxels at the last sample that changed a reading */
     uint64_t faulty_taxels; /* bits of those taxels */
     uint64_t noisy_taxels;  /* bits of the noisy ones among them */
+    uint64_t stuck_axes;    /* bits of the magnetometers of which an axis does not change */
     /* Taxels that are left out (masks.c). */
     int64_t n_refused;    /* successive samples of the tare with a reading that is not valid */
     uint64_t lost;        /* bits of the taxels that have no tare */
@@ -357,10 +363,14 @@ typedef struct {
     /* Magnetic field that all taxels read (field.c). */
     hf_real field[3];       /* that is taken out of all readings */
     hf_real still_field[3]; /* the same, when the readings did not move together last */
-    hf_real common[3];      /* the readings' mean beyond the tare, smoothed over 0.05 s */
     bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
+    hf_real common[6];      /* the readings' mean beyond the tare in both frames, smoothed */
+    hf_real speed[6];       /* of these, smoothed, too [unit of the readings / s] */
+    hf_real field_speed;    /* of the field, if the finger is open and it moves; else 0 */
     bool field_is_load;     /* the taxels moved alike, as no field does */
-    int32_t n_skipped;      /* next samples whose field is not looked for, under a load */
+    bool is_shared;         /* the field was found by the help of another module */
+    bool is_deep;           /* a load hides the field */
+    int32_t n_skipped;      /* samples whose field was not looked for since, under such a load */
     bool has_new_field;     /* the field changed at this sample */
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */

@@ -225,6 +225,9 @@ static void hf_update_contact_load(const hf_finger *f, size_t now, hf_real keep)
     const hf_real *const force = f->track[now].force;
     /* zero: F at the least F . n so far of a release. */
     const hf_real normal = hf_dot(force, f->finger->normal);
+    if (f->state->has_new_field) { /* all taxels are at their tare: what fell was the field */
+        hf_fill(m->contact_zero, 3, 0);
+    }
     if (normal < hf_dot(m->contact_zero, f->finger->normal) && hf_is_release(f, now, normal)) {
         for (size_t axis = 0; axis < 3; ++axis) {
             m->contact_zero[axis] = force[axis];

@@ -11,6 +11,7 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
     f.hand = hand;
     f.finger = finger;
     f.state = &memory->fingers[index];
+    f.fingers = memory->fingers;
     f.values = &memory->values[index];
     f.n_taxels = finger->n_taxels;
     f.n = hf_n_lanes(finger->n_taxels);
@@ -158,6 +159,7 @@ static int32_t hf_process(const hf_finger *f, double time)
     const bool after_gap = (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
     hf_clear_values(v);
     s->last_time = time;
+    s->field_speed = 0; /* a sample that is refused shows none */
     if (after_gap) {
         s->n_stretch = 0;
     }

@@ -143,21 +143,20 @@ class FaultWatch:
         ]
         self._since = {key: min(now, self._since.get(key, now)) for key in faults}
         lasting = [key for key in faults if now - self._since[key] >= MIN_FAULT_DURATION]
-        often = [(Fault.INVALID, name) for name in self._often_invalid(estimate)]
+        # Readings of a single sample that cannot be true never last: many of them are reported.
+        for name, finger in estimate.fingers.items():
+            times = self._invalid.setdefault(name, deque([-math.inf], MANY_INVALID))
+            if Fault.INVALID in finger.faults and finger.time != times[-1]:
+                times.append(finger.time)
+        since = now - INVALID_SECONDS
+        often = [
+            (Fault.INVALID, name) for name, times in self._invalid.items() if times[0] >= since
+        ]
         lasting += [key for key in often if key not in lasting]
         new = [k for k in lasting if now - self._reported.get(k, -math.inf) >= REPEAT_INTERVAL]
         self._reported.update(dict.fromkeys(lasting, now))
         self.current = _problems(lasting)
         return _problems(new)
-
-    def _often_invalid(self, estimate: HandEstimate) -> list[str]:
-        """Return the fingers with many readings of a single sample that cannot be true."""
-        for name, finger in estimate.fingers.items():
-            times = self._invalid.setdefault(name, deque([-math.inf], MANY_INVALID))
-            if Fault.INVALID in finger.faults and finger.time != times[-1]:
-                times.append(finger.time)
-        since = estimate.time - INVALID_SECONDS
-        return [name for name, times in self._invalid.items() if times[0] >= since]
 
 
 def _problems(faults: list[tuple[Fault, str]]) -> list[Problem]:

@@ -343,6 +343,6 @@ def described(summary: HandlingSummary) -> str:
     before, after = summary.before, summary.after
     return (
         f"{summary.sensor}: held {summary.seconds:.0f} s; {moved}. {summary.n_changed} of "
-        f"{summary.n_features} features are scaled anew, and {after.stable:.0f} % of this handling "
-        f"is STABLE, {before.stable:.0f} % before."
+        f"{summary.n_features} features have a new scale, and {after.stable:.0f} % of this "
+        f"handling is STABLE, {before.stable:.0f} % before."
     )

@@ -174,7 +174,9 @@ def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> M
     period = float(np.median(steps))
     is_gap = steps > GAP_PERIODS * period
     still = ~(np.nan_to_num(changes) != 0).any(axis=0)
-    field = _common_field(name, sensor, times, valid, noise)
+    # Of white noise, but not of a single step: a touch makes no noise.
+    usual = 1.05 * np.nanmedian(np.abs(changes), axis=0)
+    field = _common_field(name, sensor, times, valid, usual)
     axes = [(i, a) for i, a in np.argwhere(still & ~still.all(axis=1)[:, None]).tolist()]
     return ModuleHealth(
         sensor=sensor.name,
@@ -228,7 +230,7 @@ def changes_since(check: HealthCheck, last: HealthCheck | None) -> list[str]:
             share = 100 * now.n_zeros / now.n_samples
             found.append(f"{name} reads zeros in one taxel in {share:.2g} % of its samples")
         if len(now.noise) == 1:
-            found.append(f"{name} has one taxel: no field or touch can be told apart")
+            found.append(f"{name} has one taxel: a field and a touch look the same in it")
         then = last.modules.get(name) if last else None
         if last is None or then is None or then.sensor != now.sensor:
             continue

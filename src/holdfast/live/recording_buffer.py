@@ -63,9 +63,17 @@ class ModuleBuffer:
             return False
         if self._dtype is None and readings.dtype.name in NUMBER_TYPES:
             self._dtype = readings.dtype
-        kept = readings if readings.dtype == self._dtype else _cast(readings, self._dtype)
-        if kept is None:
-            return False
+        kept = readings
+        if readings.dtype != self._dtype:
+            if self._dtype is None or readings.dtype.kind not in "biuf":
+                return False
+            with np.errstate(invalid="ignore", over="ignore"):
+                kept = readings.astype(self._dtype)
+                back = kept.astype(readings.dtype)  # comparing int64 with float64 rounds
+            # A file has one number type: what does not keep its value in it is not stored.
+            nan = self._dtype.kind == "f"
+            if not all(np.array_equal(one, readings, equal_nan=nan) for one in (kept, back)):
+                return False
         self._times.append(time)
         self._readings.append(kept)
         self._last_time = time
@@ -220,14 +228,3 @@ def marker_text(text: str) -> str:
     """Return a text as one line of printable characters, at most `MAX_MARKER_LENGTH` long."""
     line = " ".join(text.split())[:MAX_MARKER_LENGTH]
     return "".join(character if character.isprintable() else "?" for character in line)
-
-
-def _cast(readings: npt.NDArray[Any], dtype: np.dtype[Any] | None) -> npt.NDArray[Any] | None:
-    """Return the readings in a dtype that holds all of them exactly; else None."""
-    if dtype is None or readings.dtype.kind not in "biuf":
-        return None
-    with np.errstate(invalid="ignore", over="ignore"):
-        cast = readings.astype(dtype)
-        back = cast.astype(readings.dtype)  # comparing int64 with float64 rounds
-    same = all(np.array_equal(one, readings, equal_nan=dtype.kind == "f") for one in (cast, back))
-    return cast if same else None

@@ -18,7 +18,6 @@ from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
-from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.training.calibration import check_normalised
 
@@ -55,7 +54,7 @@ class StatusPublisher:
         self._session = session
         self._panels, self._document_type = panels, document_type
         self._calibration = calibration
-        self._told = ""  # the newest text of the calibration that became a notice
+        self._noticed = ""  # the newest text of the calibration that became a notice
         self._report = report
         self._faults = FaultWatch()
         self._slips = SlipWatch()
@@ -79,9 +78,9 @@ class StatusPublisher:
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
         text = "" if self._calibration is None else self._calibration.text
-        if text and text != self._told:
+        if text and text != self._noticed:
             self.add_notice(text)
-        self._told = text
+        self._noticed = text
         # The session's thread goes on appending: only what is there now belongs to this document.
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
         estimates = [estimate for _, update in updates for estimate in update.estimates]
@@ -174,10 +173,24 @@ def hello_document(session: Session, started: float, can_record: bool) -> schema
     """Return the first document of a connection."""
     source, stream = session.source, session.stream
     model = stream.model
+    fingers = {}
+    for name, sensor in stream.fingers.items():
+        part = model.finger(name, sensor)
+        fingers[name] = schema.FingerInfo(
+            sensor=sensor.name,
+            unit=sensor.unit,
+            n_taxels=sensor.n_taxels,
+            positions=sensor.positions.tolist(),
+            rotations=sensor.rotations.tolist(),
+            normal=tuple(sensor.normal.tolist()),
+            contact_threshold=part.contact_threshold,
+            probability_threshold=part.stable.threshold,
+            slip_threshold=None if part.slip is None else part.slip.threshold,
+        )
     return schema.HelloDocument(
         model=model.name or "a model without a name",
         source=source.name,
-        fingers={name: _finger_info(model, name, one) for name, one in stream.fingers.items()},
+        fingers=fingers,
         modules={name: sensor.n_taxels for name, sensor in source.sensors.items()},
         rate=None if np.isnan(stream.rate) else stream.rate,
         started=started,
@@ -230,21 +243,6 @@ def recording_info(recorder: Recorder) -> schema.RecordingInfo:
         n_bytes=status.n_bytes,
         n_markers=status.n_markers,
         n_dropped=status.n_dropped,
-    )
-
-
-def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
-    part = model.finger(name, sensor)
-    return schema.FingerInfo(
-        sensor=sensor.name,
-        unit=sensor.unit,
-        n_taxels=sensor.n_taxels,
-        positions=sensor.positions.tolist(),
-        rotations=sensor.rotations.tolist(),
-        normal=tuple(sensor.normal.tolist()),
-        contact_threshold=part.contact_threshold,
-        probability_threshold=part.stable.threshold,
-        slip_threshold=None if part.slip is None else part.slip.threshold,
     )
 
 

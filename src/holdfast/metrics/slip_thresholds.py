@@ -141,12 +141,15 @@ def bounded_threshold(
         for name in ("false_quiet", "false_held", "raised_seconds")
     )
 
-    def rates(false: Array, minutes: Array) -> Array:
-        whole = (draws @ minutes)[:, None]
-        return np.divide(draws @ false, whole, out=np.zeros((n, false.shape[1])), where=whole > 0)
-
-    rate = (1 - DISTURBED_SHARE) * rates(false_quiet, quiet)
-    rate += DISTURBED_SHARE * rates(false_held - false_quiet, held - quiet)
+    rate, weight = np.zeros((n, false_held.shape[1])), np.zeros((n, 1))
+    for false, minutes, share in (
+        (false_quiet, quiet, 1 - DISTURBED_SHARE),
+        (false_held - false_quiet, held - quiet, DISTURBED_SHARE),
+    ):
+        drawn = (draws @ minutes)[:, None]
+        rate += share * np.divide(draws @ false, drawn, out=np.zeros_like(rate), where=drawn > 0)
+        weight += share * (drawn > 0)  # a resample without one of the two has only the other
+    rate /= np.maximum(weight, DISTURBED_SHARE)
     fits = np.quantile(rate, RATE_BOUND, axis=0) <= false_alarms
     fits &= 100 * raised.sum(axis=0) <= MAX_RAISED_QUIET * 60 * quiet.sum()
     # As in `_places`: what is left of the unbroken run of thresholds at the end that fit.

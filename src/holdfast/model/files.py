@@ -13,7 +13,6 @@ from holdfast.classifiers import Onnx
 from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
 from holdfast.errors import ModelError, OutputError
 from holdfast.files import check_keys, read_input, whole_file, write_whole
-from holdfast.model.first_schema import upgraded
 from holdfast.model.heads import Head
 from holdfast.model.parts import FingerModel
 from holdfast.sensors import Sensor
@@ -28,7 +27,6 @@ Fingers = Mapping[str, FingerModel]
 MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
-FIRST_SCHEMA = re.compile(rb'"schema"\s*:\s*"holdfast\.model/1"')
 ONNX_NAME = re.compile(r'"([0-9a-f]{16}\.onnx)"')
 """Name of an ONNX file in a model file, by the digest of its content."""
 
@@ -45,7 +43,15 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
     try:
         check_keys(data)
-        model = decode(_with_ranges(data), kind)
+        found = msgspec.json.decode(data)
+        sensors = found.get("sensors") if isinstance(found, dict) else None
+        if isinstance(sensors, dict):
+            for name, fields in sensors.items():
+                # A sensor is a dataclass, in which msgspec would ignore unknown fields.
+                sensors[name] = with_range(fields if isinstance(fields, dict) else {})
+                Sensor.from_dict(sensors[name])
+            data = msgspec.json.encode(found)
+        model = decode(data, kind)
         if any(rule.content for rule in _onnx_rules(model.fingers)):
             raise ModelError("a model file names its ONNX file; it does not hold the content")
         folder = Path(path).parent
@@ -132,7 +138,14 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
         for file in written:
             file.unlink(missing_ok=True)
         raise
-    _delete_unused(replaced, Path(path))
+    # Those that no model file beside it names.
+    if replaced:
+        folder, end = Path(path).parent, Path(path).suffix
+        for other in {Path(path), *folder.glob("*.json"), *folder.glob(f"*{end}")}:
+            replaced -= _onnx_names(other)
+    for name in replaced:
+        with suppress(OSError):  # a file too many does no harm
+            Path(path).with_name(name).unlink(missing_ok=True)
 
 
 def encode(model: "Model") -> bytes:
@@ -145,14 +158,10 @@ def encode(model: "Model") -> bytes:
 def decode(data: bytes, kind: type[ModelT]) -> ModelT:
     """Return the model of a JSON text, without the contents of ONNX files.
 
-    A text of the version before is read as well.
-
     Raises:
         ModelError: the fields contradict each other.
         ValueError: the text is no JSON, or of another form.
     """
-    if FIRST_SCHEMA.search(data):
-        data = msgspec.json.encode(upgraded(msgspec.json.decode(data)))
     return msgspec.json.decode(data, type=kind, dec_hook=_decode_array)
 
 
@@ -192,31 +201,6 @@ def _onnx_names(path: Path) -> set[str]:
         return set(ONNX_NAME.findall(read_input(path, MAX_MODEL_SIZE).decode(errors="replace")))
     except OSError:
         return set()
-
-
-def _delete_unused(names: set[str], path: Path) -> None:
-    """Delete those of some ONNX files beside a model file that no model file there names."""
-    if names:
-        for other in {path, *path.parent.glob("*.json"), *path.parent.glob(f"*{path.suffix}")}:
-            names -= _onnx_names(other)
-    for name in names:
-        with suppress(OSError):  # a file too many does no harm
-            path.with_name(name).unlink(missing_ok=True)
-
-
-def _with_ranges(data: bytes) -> bytes:
-    """Return the JSON of a model, the ranges of its sensors under their present name.
-
-    Fields that no sensor has are refused, which msgspec ignores in a dataclass.
-    """
-    found = msgspec.json.decode(data)
-    sensors = found.get("sensors") if isinstance(found, dict) else None
-    if not isinstance(sensors, dict):
-        return data
-    for name, fields in sensors.items():
-        sensors[name] = with_range(fields if isinstance(fields, dict) else {})
-        Sensor.from_dict(sensors[name])
-    return msgspec.json.encode(found)
 
 
 def _decode_array(kind: type, data: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)

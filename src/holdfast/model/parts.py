@@ -230,6 +230,7 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     min_duration: float = 0.0
     hysteresis: float = 0.0
     hold: float = 0.0
+    # Unset, not 0: models without a filter keep the digest that they had before there was one.
     switching: float | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:

@@ -1,7 +1,8 @@
 """Built-in sensors and hands, made from the tables in the folder `tables`; those of plug-ins."""
 
 import csv
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 from importlib import resources
 from typing import Any
 
@@ -93,13 +94,31 @@ def flat_sensor(
         >>> flat_sensor("mine", 3, 3, 0.0047).positions[0].tolist()
         [-0.0047, 0.0047, 0.0]
     """
-    positions = np.round(_grid(n_rows, n_columns, pitch, pitch), 9)
+    grid = _grid(name, (n_rows, n_columns), (pitch, pitch), rate, unit=unit)
+    # Multiples of a decimal pitch differ from decimal numbers in their last digits.
+    return replace(grid, positions=np.round(grid.positions, 9))
+
+
+def _grid(
+    name: str,
+    shape: tuple[int, int],
+    pitches: tuple[float, float],
+    rate: float,
+    ends: tuple[float, float] | None = None,
+    unit: Unit = "count",
+) -> Sensor:
+    """Return a flat grid around its centre, row by row from the top left; pitches in x and y."""
+    (n_rows, n_columns), (pitch_x, pitch_y) = shape, pitches
+    x = (np.arange(n_columns) - (n_columns - 1) / 2) * pitch_x
+    y = ((n_rows - 1) / 2 - np.arange(n_rows)) * pitch_y
+    positions = np.array([[column, row, 0.0] for row in y for column in x])
     rotations = np.tile(np.eye(3), (len(positions), 1, 1))
-    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, unit)
+    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, unit, ends)
 
 
 @cache
-def _uskin_curved() -> Sensor:
+def uskin_curved() -> Sensor:
+    """Return the uSCuAH fingertip: 30 taxels on a shell, in the frame of the Allegro fingertip."""
     positions, rotations = _poses(_table("uskin_curved.csv"))
     return Sensor(
         "uskin-curved",
@@ -112,26 +131,11 @@ def _uskin_curved() -> Sensor:
 
 
 @cache
-def _uskin_4x4() -> Sensor:
-    return _flat("uskin-4x4", _grid(4, 4, 4.667e-3, 4.667e-3), 100.0, UINT16)
-
-
-@cache
-def _uskin_4x6() -> Sensor:
-    return _flat("uskin-4x6", _grid(4, 6, 7.24e-3, 7.17e-3), 100.0, UINT16)
-
-
-@cache
-def _gtac() -> Sensor:
-    """Return 15 finger sections with one 3-axis reading each; nominal places, 3 a finger."""
-    return _flat("gtac", _grid(3, 5, 25e-3, 25e-3), 150.0)
-
-
-@cache
-def _anyskin() -> Sensor:
+def anyskin() -> Sensor:
     """Return 5 magnetometers: centre, left, right, up, down; rotated in plane, nominal pitch."""
     pitch = 7e-3
     positions = pitch * np.array([[0, 0, 0], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    # Each chip is rotated in the plane by an angle of its own.
     angles = np.array([-np.pi / 2, -np.pi / 2, np.pi, np.pi / 2, 0.0])
     rotations = np.zeros((5, 3, 3))
     rotations[:, 0, 0] = rotations[:, 1, 1] = np.cos(angles)
@@ -142,16 +146,9 @@ def _anyskin() -> Sensor:
 
 
 @cache
-def _papillarray() -> Sensor:
-    """Return 3 x 3 pillars, in newtons; nominal pitch."""
-    positions = _grid(3, 3, 7e-3, 7e-3)
-    rotations = np.tile(np.eye(3), (9, 1, 1))
-    normal = np.array([0.0, 0.0, 1.0])
-    return Sensor("papillarray", positions, rotations, normal, rate=1000.0, unit="N")
-
-
-@cache
-def _allegro_uskin() -> Hand:
+def allegro_uskin() -> Hand:
+    """Return the Allegro hand with 18 uSkin modules, which report in one packet of 368 taxels."""
+    # In the packet, modules interleave as the hand reads them out: only the table says which.
     by_module: dict[str, list[dict[str, str]]] = {}
     for row in _table("allegro_uskin.csv"):
         by_module.setdefault(row["module"], []).append(row)
@@ -177,15 +174,18 @@ def _allegro_uskin() -> Hand:
 
 
 SENSORS = {
-    "uskin-curved": _uskin_curved,
-    "uskin-4x4": _uskin_4x4,
-    "uskin-4x6": _uskin_4x6,
-    "gtac": _gtac,
-    "anyskin": _anyskin,
-    "papillarray": _papillarray,
+    "uskin-curved": uskin_curved,
+    # Pitches of XELA's URDF files of the uSPa44 and the uSPa46.
+    "uskin-4x4": cache(partial(_grid, "uskin-4x4", (4, 4), (4.667e-3, 4.667e-3), 100.0, UINT16)),
+    "uskin-4x6": cache(partial(_grid, "uskin-4x6", (4, 6), (7.24e-3, 7.17e-3), 100.0, UINT16)),
+    # 15 sections of fingers with a reading each; nominal places, 3 a finger.
+    "gtac": cache(partial(_grid, "gtac", (3, 5), (25e-3, 25e-3), 150.0)),
+    "anyskin": anyskin,
+    # 3 x 3 pillars, which send newtons; nominal pitch.
+    "papillarray": cache(partial(_grid, "papillarray", (3, 3), (7e-3, 7e-3), 1000.0, unit="N")),
 }
 """Functions that make the built-in sensors, by name."""
-HANDS = {"allegro-uskin": _allegro_uskin}
+HANDS = {"allegro-uskin": allegro_uskin}
 """Functions that make the built-in hands, by name."""
 
 
@@ -213,17 +213,3 @@ def _poses(rows: list[dict[str, str]]) -> tuple[Array, Array]:
     positions = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
     rotations = np.array([[[float(row[f"r{i}{j}"]) for j in axes] for i in axes] for row in rows])
     return positions, rotations
-
-
-def _grid(n_rows: int, n_columns: int, pitch_x: float, pitch_y: float) -> Array:
-    """Return positions on a flat grid around its centre [m], from the top left, row by row."""
-    x = (np.arange(n_columns) - (n_columns - 1) / 2) * pitch_x
-    y = ((n_rows - 1) / 2 - np.arange(n_rows)) * pitch_y
-    return np.array([[column, row, 0.0] for row in y for column in x])
-
-
-def _flat(
-    name: str, positions: Array, rate: float, ends: tuple[float, float] | None = None
-) -> Sensor:
-    rotations = np.tile(np.eye(3), (len(positions), 1, 1))
-    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, range=ends)

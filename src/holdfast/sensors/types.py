@@ -95,10 +95,25 @@ class Sensor:
         if not isinstance(magnetic, bool):
             raise ValueError(f"{self.name}: magnetic true or false expected, {magnetic!r} given")
         object.__setattr__(self, "magnetic", magnetic)
-        object.__setattr__(self, "range", _checked_range(self.range, self.name))
-        object.__setattr__(self, "positions", _locked(positions))
-        object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
-        object.__setattr__(self, "normal", _locked(_unit_vector(normal)))
+        if self.range is not None:
+            ends = _array(self.range, f"range of {self.name}", (2,))
+            low, high = ends.tolist()
+            if low >= high:
+                raise ValueError(
+                    f"range of {self.name}: smallest, largest expected, {low}, {high} given"
+                )
+            object.__setattr__(self, "range", (low, high))
+        rotations = _exact_rotations(rotations, self.name)
+        length = float(np.linalg.norm(normal)) if longest < 1e100 else np.inf
+        if not 1e-100 < length < np.inf:  # the squares in the norm overflow, or all become zero
+            normal = normal / longest
+            length = float(np.linalg.norm(normal))
+        # Values hold read-only arrays: a sensor is shared by models, recordings and streams.
+        for name, values in (
+            ("positions", positions), ("rotations", rotations), ("normal", normal / length)
+        ):  # fmt: skip
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
@@ -250,9 +265,9 @@ class HandModule:
         flat = _array(self.flat_indices, f"flat indices {what}", (n,)).astype(np.int64)
         grid = _array(self.grid, f"grid {what}", (n, 2)).astype(np.int64)
         positions = _array(self.positions, f"positions {what}", (n, 3))
-        object.__setattr__(self, "positions", _locked(positions))
-        object.__setattr__(self, "rotations", _locked(exact))
-        for name, values in (("flat_indices", flat), ("grid", grid)):
+        for name, values in (
+            ("positions", positions), ("rotations", exact), ("flat_indices", flat), ("grid", grid)
+        ):  # fmt: skip
             values.flags.writeable = False
             object.__setattr__(self, name, values)
 
@@ -358,6 +373,7 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
     """Return the nearest rotation matrices, by polar decomposition."""
     if np.abs(rotations).max(initial=0.0) > 2:
         raise ValueError(f"{name}: components of rotations from -1 to 1 expected")
+    # Tables have six digits, and what is no exact rotation changes the length of a force.
     left, _, right = np.linalg.svd(rotations)
     exact: Array = left @ right
     error = np.abs(exact - rotations).max(axis=(1, 2))
@@ -376,32 +392,8 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
     return rotations if error[worst] < EXACT_TOLERANCE else exact
 
 
-def _unit_vector(vector: Array) -> Array:
-    """Return the vector with length 1; one that has it already is unchanged."""
-    length = float(np.linalg.norm(vector)) if np.abs(vector).max() < 1e100 else np.inf
-    if not 1e-100 < length < np.inf:  # the squares would overflow
-        vector = vector / np.abs(vector).max()
-        length = float(np.linalg.norm(vector))
-    unit: Array = vector / length
-    return unit
-
-
 def with_range(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a sensor with the range under its present name."""
     if "limits" not in fields or "range" in fields:
         return dict(fields)
     return {"range" if key == "limits" else key: value for key, value in fields.items()}
-
-
-def _checked_range(given: object, name: str) -> tuple[float, float] | None:
-    if given is None:
-        return None
-    low, high = _array(given, f"range of {name}", (2,)).tolist()  # type: ignore[arg-type]
-    if low >= high:
-        raise ValueError(f"range of {name}: smallest, largest expected, {low}, {high} given")
-    return low, high
-
-
-def _locked(array: Array) -> Array:
-    array.flags.writeable = False
-    return array

@@ -60,32 +60,38 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
         link = left.pop()
         for child in below.get(link, ()):
             if child not in frames:  # links in a circle are visited once
-                frames[child] = _pose(parents[child], frames[link])
+                frames[child] = parents[child].frame(frames[link])
                 left.append(child)
-    poses = [_pose(j, frames[j.parent]) for j in joints if match in j.name and j.parent in frames]
+    poses = [j.frame(frames[j.parent]) for j in joints if match in j.name and j.parent in frames]
     if not poses:
         raise ValueError(f"{path} has no joint below {base!r} whose name contains {match!r}")
     return np.array([p for p, _ in poses]), np.array([r for _, r in poses])
 
 
 class _Joint:
+    """Joint of a URDF file: the pose of its child link in the frame of its parent link."""
+
     def __init__(self, element: ET.Element) -> None:
         origin = element.find("origin")
         # A joint without an origin has the frame of its parent link, as the format says.
         attributes = {} if origin is None else origin.attrib
         self.name = element.get("name", "")
-        self.parent = _link(element, "parent")
-        self.child = _link(element, "child")
-        self.position = _three_numbers(attributes.get("xyz", "0 0 0"))
-        angles = _three_numbers(attributes.get("rpy", "0 0 0"))
+        ends = (element.find(end) for end in ("parent", "child"))
+        self.parent, self.child = ("" if end is None else end.get("link", "") for end in ends)
+        triplets = []
+        for key in ("xyz", "rpy"):
+            text = attributes.get(key, "0 0 0")
+            numbers = np.array([float(word) for word in text.split()])
+            if numbers.shape != (3,) or not np.isfinite(numbers).all():
+                raise ValueError(f"three finite numbers expected, {text!r} given")
+            triplets.append(numbers)
+        self.position, angles = triplets
         self.rotation: Array = _rotation(*angles)
 
-
-def _three_numbers(text: str) -> Array:
-    numbers = np.array([float(word) for word in text.split()])
-    if numbers.shape != (3,) or not np.isfinite(numbers).all():
-        raise ValueError(f"three finite numbers expected, {text!r} given")
-    return numbers
+    def frame(self, parent: LinkPose) -> LinkPose:
+        """Return the pose of the link below, in the frame that the parent's pose is in."""
+        position, rotation = parent
+        return position + rotation @ self.position, rotation @ self.rotation
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> Array:
@@ -117,14 +123,3 @@ def _product(a: Quaternion, b: Quaternion) -> Quaternion:
         a[3] * b[2] + b[3] * a[2] + (a[0] * b[1] - a[1] * b[0]),
         a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
     )
-
-
-def _link(joint: ET.Element, end: str) -> str:
-    element = joint.find(end)
-    return "" if element is None else element.get("link", "")
-
-
-def _pose(joint: _Joint, parent: LinkPose) -> LinkPose:
-    """Return the pose of the link below a joint, in the frame that the parent's pose is in."""
-    position, rotation = parent
-    return position + rotation @ joint.position, rotation @ joint.rotation

@@ -55,17 +55,21 @@ def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
     """
     if n_taxels < 1:
         raise ValueError(f"{model or 'a sensor'} with {n_taxels} taxels given; at least 1 expected")
-    known = whole_hand(model)
-    if known is not None:
-        _check(model, n_taxels, known.n_taxels, known.name)
-        return {name: module.sensor for name, module in known.modules.items()}
-    if (name := XELA_SENSORS.get(model.lower())) is not None:
-        built_in = sensor(name)
-        _check(model, n_taxels, built_in.n_taxels, name)
-        return {"": built_in}
-    if not model and n_taxels in SENSOR_BY_N_TAXELS:
-        return {"": sensor(SENSOR_BY_N_TAXELS[n_taxels])}
-    return {"": flat_grid(model.lower() or "unknown", n_taxels)}
+    # A whole hand first: its model has no sensor of its own.
+    known: Hand | Sensor | None = whole_hand(model)
+    if known is None and model.lower() in XELA_SENSORS:
+        known = sensor(XELA_SENSORS[model.lower()])
+    if known is None:
+        if not model and n_taxels in SENSOR_BY_N_TAXELS:
+            return {"": sensor(SENSOR_BY_N_TAXELS[n_taxels])}
+        return {"": flat_grid(model.lower() or "unknown", n_taxels)}
+    if n_taxels != known.n_taxels:
+        raise ValueError(
+            f"{n_taxels} taxels given, {known.n_taxels} expected ({model}: {known.name})"
+        )
+    if isinstance(known, Sensor):
+        return {"": known}
+    return {name: module.sensor for name, module in known.modules.items()}
 
 
 def is_known(model: str) -> bool:
@@ -92,6 +96,7 @@ def flat_grid(name: str, n_taxels: int) -> Sensor:
         >>> float(flat_grid("uspa35", 15).positions[:, 1].max())
         0.0047
     """
+    # Complete rows: the layout is unknown, and a row with gaps would invent more of it.
     n_rows = max(k for k in range(1, int(n_taxels**0.5) + 1) if n_taxels % k == 0)
     n_columns = n_taxels // n_rows
     row, column = np.divmod(np.arange(n_taxels), n_columns)
@@ -100,8 +105,3 @@ def flat_grid(name: str, n_taxels: int) -> Sensor:
     rotations = np.tile(np.eye(3), (n_taxels, 1, 1))
     normal = np.array([0.0, 0.0, 1.0])
     return Sensor(name, positions, rotations, normal, DEFAULT_RATE, range=UINT16)
-
-
-def _check(model: str, n_given: int, n_expected: int, name: str) -> None:
-    if n_given != n_expected:
-        raise ValueError(f"{n_given} taxels given, {n_expected} expected ({model}: {name})")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from holdfast.training.calibration import CalibratedModel, calibrate, calibrate_with_report
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import Setting
+from holdfast.training.teaching import Taught, teach, teach_with_report
 from holdfast.training.trainer import Trained, train
 from holdfast.training.tune import CurvePoint, Tuned, tune
 
@@ -16,12 +17,15 @@ __all__ = [
     "CurvePoint",
     "Setting",
     "StabilityClassifier",
+    "Taught",
     "Trained",
     "Tuned",
     "calibrate",
     "calibrate_with_report",
     "compute_decisions",
     "evaluate",
+    "teach",
+    "teach_with_report",
     "train",
     "tune",
 ]

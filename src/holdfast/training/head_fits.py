@@ -4,14 +4,16 @@ from collections.abc import Collection, Iterator, Mapping
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
-from holdfast.classifiers.causes import fit_causes
 from holdfast.classifiers.fitting import Samples, standardise
 from holdfast.classifiers.linear import MAX_DEVIATION, Linear
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.contact import CAUSES
+from holdfast.classifiers.newton import fit_multinomial
+from holdfast.contact import CAUSES, Cause
 from holdfast.features import FeatureSpec
 from holdfast.model import ANY_FINGER, Head, Model
+from holdfast.sensors.types import Array
 from holdfast.training.targets import TargetSamples
 
 SLIP_SMOOTHING, SLIP_HOLD_TIME = 0.02, 0.05
@@ -172,3 +174,24 @@ def missing_heads(
                 f"still given, at least {MIN_SLIDING_SAMPLES} and 1 expected; the model gets no "
                 "slip rule there"
             )
+
+
+def fit_causes(
+    features: Array, causes: npt.NDArray[np.str_], c: float
+) -> tuple[Linear, tuple[Cause, ...]]:
+    """Fit the scores of causes to unstable samples; all causes weigh alike.
+
+    Args:
+        features: (n, n_features) finite.
+        causes: (n,) name of the cause of each sample.
+        c: inverse strength of the L2 penalty on the weights of standardised features.
+
+    Returns:
+        The rule, and the causes of its outputs.
+    """
+    names, classes, counts = np.unique(causes, return_inverse=True, return_counts=True)
+    mean, scale, standardised = standardise(features)
+    balanced = len(causes) / (len(names) * counts)
+    solution = fit_multinomial(standardised, classes, balanced, c)
+    rule = Linear.of(mean, scale, solution.weights, solution.intercepts)
+    return rule, tuple(map(Cause, names.tolist()))

@@ -9,7 +9,8 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -33,6 +34,7 @@ from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metr
 from holdfast.model import ANY_FINGER, Head, Model, Training
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
+from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.training.dataset_scan import OneRecording, Progress, show_nothing
 from holdfast.training.evaluation import compute_decisions
@@ -40,20 +42,20 @@ from holdfast.training.head_fits import fit_slip
 from holdfast.training.targets import TargetInput, TargetSamples, slip_target
 from holdfast.training.tune import N_SHOWN, CurvePoint
 
-FALSE_ALARMS = 1.5
+WANTED_FALSE_ALARMS = 1.5
 """False alarms per minute of held time of a finger for which the threshold is set by default."""
 MIN_SLIPS, FEW_SLIPS = 3, 10
 """Slips of fingers below which nothing is fitted, and below which the user is warned."""
 MIN_SLIDING = 20
 """Sliding samples below which nothing is fitted: with fewer, the samples of one slip decide."""
-MIN_RECORDINGS, FEW_RECORDINGS = 2, 5
+MIN_TAUGHT_RECORDINGS, FEW_RECORDINGS = 2, 5
 """Recordings with slips below which nothing is scored, and recordings below which the user is
 warned: a fold then leaves out a large part of the slips."""
 TAUGHT_SUFFIX = ", taught"
 """End of the name of a taught model."""
 TRUTH_AUTHOR = "twin"
 """Author of the labels of simulated recordings."""
-MAX_FOLDS = 10
+MAX_TAUGHT_FOLDS = 10
 """Maximum number of heads that are fitted out of fold; of more recordings, every tenth is left out
 together."""
 
@@ -64,20 +66,54 @@ class Taught:
 
     Attributes:
         model: with the taught head.
-        slips: metrics out of fold, at the threshold of the model; None if no slip is known.
+        slips: metrics out of fold, at the threshold of the model.
         base: metrics of the model that was given, on the same grasps; None without a slip rule.
-        hand_alarms: false alarms of all fingers per minute in which the hand holds; None if it
-            never does.
+        hand_alarms: false alarms of all fingers per minute in which the hand holds.
         n_recordings: number of recordings with known slips.
         warnings: for the user.
     """
 
     model: Model
-    slips: SlipSummary | None
+    slips: SlipSummary
     base: SlipSummary | None
-    hand_alarms: float | None
+    hand_alarms: float
     n_recordings: int
     warnings: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """What the taught head is good for on the next grasps of this hand, in one sentence."""
+        pooled, intervals = self.slips.pooled, self.slips.intervals
+        interval = None if intervals is None else intervals.incipient["0.1"]
+        known = "" if interval is None else " ({:.0f} to {:.0f})".format(*interval)
+        return (
+            f"{pooled.n} slips in {self.n_recordings} grasps: of those that it was not taught, "
+            f"{pooled.incipient['0.1'] or 0:.0f} %{known} are found within 0.1 s, at "
+            f"{pooled.false_alarms_per_minute['held'] or 0:.2g} false alarms a minute of held time "
+            f"of a finger, {self.hand_alarms:.2g} of the hand."
+        )
+
+    def document(self, path: Path) -> dict[str, Any]:
+        """Return the figures for JSON.
+
+        Args:
+            path: of the model.
+        """
+        slip = {
+            "n": self.slips.pooled.n,
+            "grasps": self.n_recordings,
+            "out_of_fold": self.slips.pooled,
+            "intervals": self.slips.intervals,
+        }
+        return {
+            "model": path,
+            "steps": [],
+            "heads": {"slip": slip},
+            "base": None if self.base is None else self.base.pooled,
+            "hand_false_alarms_per_minute": self.hand_alarms,
+            "warnings": self.warnings,
+            "verdict": self.verdict,
+        }
 
 
 class TaughtPart(NamedTuple):
@@ -103,7 +139,7 @@ FoldScores = list[tuple[Mapping[str, SlipCurve], Mapping[str, SlipCounts]]]
 
 
 def teach(
-    model: Model, recordings: Sequence[Recording], *, false_alarms: float = FALSE_ALARMS
+    model: Model, recordings: Sequence[Recording], *, false_alarms: float = WANTED_FALSE_ALARMS
 ) -> Model:
     """Return a model with a head `slip` of the user's own hand.
 
@@ -129,7 +165,7 @@ def teach_with_report(
     model: Model,
     recordings: Sequence[Recording],
     *,
-    false_alarms: float = FALSE_ALARMS,
+    false_alarms: float = WANTED_FALSE_ALARMS,
     seed: int = 0,
     engine: Engine | None = None,
     progress: Progress = show_nothing,
@@ -159,7 +195,7 @@ def teach_with_report(
     base = _base_of(model, list(parts.values()))
 
     # A head that is scored on a recording was fitted without it, and without those of its fold.
-    n_folds = min(len(parts), MAX_FOLDS)
+    n_folds = min(len(parts), MAX_TAUGHT_FOLDS)
     folds = [list(parts)[fold::n_folds] for fold in range(n_folds)]
     tasks = ((fold, [OneRecording(recordings, k) for k in fold]) for fold in folds)
     scored = engine.map_ordered(_score_fold, tasks, shared=(base, model, samples))
@@ -168,16 +204,18 @@ def teach_with_report(
     pooled = [SlipCurve.total(list(fingers.values())) for fingers in curves]
     total = SlipCurve.total(pooled)
     index = bounded_threshold(pooled, false_alarms, seed=seed)
-    if index is None:
+    slips = None
+    if index is not None:
+        slips = slip_summary(
+            [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
+            slip_intervals([SlipCurve.of_one(curve[index]) for curve in pooled], seed=seed),
+        )
+    if index is None or slips is None:
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute in "
             f"{total.silent.held_seconds / 60:.2g} min of held time; more grasps expected in which "
             "nothing slides, with pushes and taps"
         )
-    slips = slip_summary(
-        [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
-        slip_intervals([SlipCurve.of_one(curve[index]) for curve in pooled], seed=seed),
-    )
     head = _fitted(samples, ())
     shown = range(max(index - N_SHOWN, 0), min(index + N_SHOWN + 1, len(total)))
     points = [CurvePoint.of_slips(float(SLIP_THRESHOLDS[k]), slip_metrics(total[k])) for k in shown]
@@ -216,7 +254,7 @@ def taught_recording(recording: Recording) -> Recording:
 
 def _read_part(model: Model, index: int, part: Sequence[Recording]) -> TaughtPart:
     """Return the samples of one recording, of all fingers whose slips are known."""
-    recording = taught_recording(part[0])
+    recording = at_rate(taught_recording(part[0]), model.rate)
     modules = recording.modules
     sensors = model.fingers_of({name: module.sensor for name, module in modules.items()})
     truths = {
@@ -228,7 +266,7 @@ def _read_part(model: Model, index: int, part: Sequence[Recording]) -> TaughtPar
     known = {name: sensors[name] for name in truths}
     plan = StreamPlan(
         known, dict.fromkeys(known, TAUGHT_FEATURES), model.window, Tare.parse(model.tare),
-        model.rate or recording.rate,
+        recording.rate,
     )  # fmt: skip
     samples = []
     for name, rows in extract(plan, recording).items() if known else ():
@@ -252,11 +290,11 @@ def _joined(parts: Sequence[TaughtPart], n_recordings: int) -> TargetSamples:
     """
     n_slips = sum(part.n_slips for part in parts)
     n_with = sum(part.n_slips > 0 for part in parts)
-    if n_slips < MIN_SLIPS or n_with < MIN_RECORDINGS:
+    if n_slips < MIN_SLIPS or n_with < MIN_TAUGHT_RECORDINGS:
         raise TrainingError(
             f"{n_slips} slips in {n_with} of {n_recordings} recordings given; at least "
-            f"{MIN_SLIPS} in {MIN_RECORDINGS} expected (holdfast label, or holdfast label auto "
-            "tracking with a video)"
+            f"{MIN_SLIPS} in {MIN_TAUGHT_RECORDINGS} expected (holdfast label, or holdfast label "
+            "auto tracking with a video)"
         )
     samples = TargetSamples.joined([part.samples for part in parts if part.samples is not None])
     n_still = samples.n_usable - samples.n_positive
@@ -327,12 +365,11 @@ def _score_fold(
     return scores
 
 
-def _hand_alarms(curves: Sequence[Mapping[str, SlipCurve]], index: int) -> float | None:
+def _hand_alarms(curves: Sequence[Mapping[str, SlipCurve]], index: int) -> float:
     """Return the false alarms of all fingers per minute in which a finger of the hand holds."""
     counts = [[curve[index] for curve in fingers.values()] for fingers in curves]
     seconds = sum(max((c.held_seconds for c in own), default=0.0) for own in counts)
-    n = sum(c.false_held for own in counts for c in own)
-    return 60 * n / seconds if seconds else None
+    return 60 * sum(c.false_held for own in counts for c in own) / seconds
 
 
 def _warnings(n_recordings: int, n_slips: int) -> Iterator[str]:

@@ -115,7 +115,7 @@ def aims_of(item: GraspObject, finger: str) -> tuple[Array, Array]:
     height = {"index": item.finger_height, "ring": -item.finger_height}.get(finger, 0.0)
     angle = np.arctan2(push[2], -push[0]) - item.yaw  # palm x, z to world x, y
     outward = np.array([np.cos(angle), np.sin(angle), 0.0])
-    reach = reach_of(item, outward, height + _middle(item))
+    reach = reach_of(item, outward, height + item.middle)
     reach = 0.0 if np.isnan(reach) else reach  # over or under the object: its axis
     meet = np.add(MIDDLE_PLACE, (0.0, height, 0.0)) - push * reach
     return push, meet - push * PATH_GAPS[:, None]
@@ -127,15 +127,10 @@ def object_pose(item: GraspObject) -> tuple[Array, float]:
     The position is that of its centre of mass; its middle is at `MIDDLE_PLACE`.
     """
     x, y, z = MIDDLE_PLACE
-    return np.array([x, -z, y - _middle(item)]), item.yaw
+    return np.array([x, -z, y - item.middle]), item.yaw
 
 
 _FIRST = np.array([JOINTS[finger] for finger in FINGERS], np.intc)
-
-
-def _middle(item: GraspObject) -> float:
-    """Return the height of the object's middle above its centre of mass [m]."""
-    return float(item.foot[2]) + item.half_height
 
 
 def _solve(hand: HandModel, place: int, point: Array, push: Array, guess: Array) -> Array:
@@ -143,6 +138,8 @@ def _solve(hand: HandModel, place: int, point: Array, push: Array, guess: Array)
     limits = hand.limits()[first : first + 4]
     low, high = limits[:, 0] + JOINT_MARGIN, limits[:, 1] - JOINT_MARGIN
 
+    # Three unknown angles more than a point has coordinates: the normal, and a joint that stays
+    # where it is, decide among the solutions that reach the point.
     def residuals(joints: Array) -> Array:
         pad, normal = _pad(hand, place, joints)
         turned = NORMAL_WEIGHT * (normal - push)

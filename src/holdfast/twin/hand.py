@@ -209,8 +209,7 @@ def object_xml(item: GraspObject) -> str:
 
 def _drawn_object_xml(item: GraspObject) -> str:
     colour = f'rgba="{OBJECT_COLOUR}"'
-    half, size = item.half_height, item.size
-    middle = float(item.foot[2]) + half
+    half, size, middle = item.half_height, item.size, item.middle
     if item.shape == "sphere":
         return f'<geom type="sphere" size="{size[0]}" {colour} mass="0"/>'
     if item.shape == "box":
@@ -224,6 +223,7 @@ def _drawn_object_xml(item: GraspObject) -> str:
             f'euler="0 0 {k * np.pi / 3!r}" {colour} mass="0"/>'
             for k in range(3)
         )
+    # MuJoCo has no frustum: it is drawn as slices.
     n_slices = 24 if item.shape == "frustum" else 1
     foot, top = (size[0], size[1]) if item.shape == "frustum" else (size[0], size[0])
     thick = half / n_slices

@@ -58,6 +58,32 @@ class MagneticFaults:
         if self.turn_time == 0 or max(self.zero_share, self.cross_talk) > 1:
             raise ValueError("a turn time above 0, and shares of at most 1 expected")
 
+    @classmethod
+    def parse(cls, text: str) -> "MagneticFaults":
+        """Return the troubles of a text like `field=300,zero-share=0.02`; none of an empty one.
+
+        Raises:
+            ValueError: a name is unknown or given twice, or a value is no number or out of range.
+
+        Example:
+            >>> MagneticFaults.parse("field=300,turn-time=3").turn_time
+            3.0
+        """
+        known = [part.name.replace("_", "-") for part in fields(cls)]
+        values: dict[str, float] = {}
+        for pair in filter(None, (each.strip() for each in text.split(","))):
+            name, _, value = pair.partition("=")
+            if name not in known or name.replace("-", "_") in values:
+                raise ValueError(
+                    f"--faults with each of {', '.join(known)} at most once expected, "
+                    f"{pair!r} given"
+                )
+            try:
+                values[name.replace("-", "_")] = float(value)
+            except ValueError:
+                raise ValueError(f"--faults {name}: a number expected, {value!r} given") from None
+        return cls(**values)
+
     @property
     def changes_nothing(self) -> bool:
         """Whether there are no troubles."""
@@ -112,3 +138,7 @@ class MagneticFaults:
                         values[k, drawn.integers(sensor.n_taxels)] = 0
             found[name] = np.clip(np.rint(values), 0, COUNTS_END).astype(np.uint16)
         return found
+
+
+WITHOUT_FAULTS = MagneticFaults()
+"""No troubles."""

@@ -113,6 +113,11 @@ class GraspObject:
         """Half of the height along z [m]."""
         return self.size[_height(self.shape)]
 
+    @property
+    def middle(self) -> float:
+        """Height of its middle above its centre of mass [m]."""
+        return float(self.foot[2]) + self.half_height
+
 
 @cache
 def _built_in() -> dict[str, GraspObject]:
@@ -172,7 +177,27 @@ def make_object(name: str, row: object) -> GraspObject:
     """
     shape, numbers = _read(row)
     size, friction, texture = (numbers[key] for key in ("size", "friction", "texture"))
-    _check(shape, size, friction, texture)
+    # Each number is in its range; here those are compared that limit one another.
+    if friction[1] > friction[0]:
+        raise ValueError(f"friction: kinetic {friction[1]:g} is more than static {friction[0]:g}")
+    if texture[1] < 0.0005 or texture[0] > texture[1] / 10:
+        raise ValueError(
+            "texture: a wavelength of at least 0.0005 and 10 amplitudes expected, "
+            f"{texture[1]:g} given for an amplitude of {texture[0]:g}"
+        )
+    height = _height(shape)
+    rounding = size[-1] if shape in ("box", "cylinder", "hexagon", "frustum") else 0.0
+    if rounding >= min(size[: height + 1]):
+        raise ValueError(f"size: a rounding below the other sizes expected, {rounding:g} given")
+    if shape == "capsule" and size[1] < size[0]:
+        raise ValueError(f"size: half height {size[1]:g} is less than the radius {size[0]:g}")
+    low, high = GRASPABLE_HALF_WIDTH
+    for width in size[: max(height, 1)]:
+        if not low <= width <= high:
+            raise ValueError(
+                f"size: it cannot be grasped: half widths from {low:g} to {high:g} m fit the hand, "
+                f"{width:g} given"
+            )
     volume, centre, moments = _mass_of(_core(shape, size))
     (mass,) = numbers["mass"]
     return GraspObject(
@@ -187,7 +212,7 @@ def make_object(name: str, row: object) -> GraspObject:
         texture_wavelength=texture[1],
         finger_height=numbers["finger_height"][0],
         yaw=numbers["yaw"][0],
-        foot=np.array([0.0, 0.0, -size[_height(shape)] - centre]),
+        foot=np.array([0.0, 0.0, -size[height] - centre]),
     )
 
 
@@ -225,31 +250,6 @@ def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
     return shape, numbers
 
 
-def _check(
-    shape: str, size: tuple[float, ...], friction: tuple[float, ...], texture: tuple[float, ...]
-) -> None:
-    if friction[1] > friction[0]:
-        raise ValueError(f"friction: kinetic {friction[1]:g} is more than static {friction[0]:g}")
-    if texture[1] < 0.0005 or texture[0] > texture[1] / 10:
-        raise ValueError(
-            "texture: a wavelength of at least 0.0005 and 10 amplitudes expected, "
-            f"{texture[1]:g} given for an amplitude of {texture[0]:g}"
-        )
-    height = _height(shape)
-    rounding = size[-1] if shape in ("box", "cylinder", "hexagon", "frustum") else 0.0
-    if rounding >= min(size[: height + 1]):
-        raise ValueError(f"size: a rounding below the other sizes expected, {rounding:g} given")
-    if shape == "capsule" and size[1] < size[0]:
-        raise ValueError(f"size: half height {size[1]:g} is less than the radius {size[0]:g}")
-    low, high = GRASPABLE_HALF_WIDTH
-    for width in size[: max(height, 1)]:
-        if not low <= width <= high:
-            raise ValueError(
-                f"size: it cannot be grasped: half widths from {low:g} to {high:g} m fit the hand, "
-                f"{width:g} given"
-            )
-
-
 def _height(shape: str) -> int:
     """Return the place of the half height in the sizes of a shape."""
     return {"sphere": 0, "capsule": 1, "cylinder": 1, "hexagon": 1}.get(shape, 2)
@@ -265,18 +265,12 @@ def _core(shape: str, size: tuple[float, ...]) -> Array:
         core[1], core[EXTENSION] = size[_height(shape)] - size[0], size[0]
         return core
     core[EXTENSION] = size[-1]
-    inner = [value - size[-1] for value in size[:-1]]
-    if shape == "cylinder":
-        _revolve(core, size[0], size[0], *size[1:])
-    elif shape == "frustum":
-        _revolve(core, *size)
-    else:
-        core[1 : 1 + len(inner)] = inner
-    return core
-
-
-def _revolve(core: Array, foot: float, top: float, half_height: float, rounding: float) -> None:
-    """Write a core whose side is parallel to the frustum's, one rounding inside."""
+    if shape not in ("cylinder", "frustum"):
+        core[1 : len(size)] = [value - size[-1] for value in size[:-1]]
+        return core
+    # A side that is parallel to that of the shape, one rounding inside. A cylinder is a frustum
+    # with one radius.
+    foot, top, half_height, rounding = size if shape == "frustum" else (size[0], *size)
     slope = (top - foot) / (2 * half_height)
     steep = math.hypot(1.0, slope)
     height = half_height - rounding
@@ -284,6 +278,7 @@ def _revolve(core: Array, foot: float, top: float, half_height: float, rounding:
     core[1:4] = middle - slope * height, middle + slope * height, height
     core[SIDE_OUT], core[SIDE_UP] = 1 / steep, -slope / steep
     core[SIDE_LENGTH] = 2 * height * steep
+    return core
 
 
 def solid(item: GraspObject) -> Array:
@@ -293,7 +288,7 @@ def solid(item: GraspObject) -> Array:
         (N_OBJECT_NUMBERS,) array: code, core, texture, static and kinetic friction.
     """
     packed = _core(item.shape, item.size)
-    packed[CENTRE] = -item.half_height - item.foot[2]
+    packed[CENTRE] = -item.middle
     # Two waves, the second 0.37 times as long; about the axis a whole number of each, so that the
     # surface has no seam.
     wave = 2 * math.pi / item.texture_wavelength

@@ -145,6 +145,7 @@ class Protocol:
         """
         if time == 0.0:
             self.anchor[:] = body[:12]
+        # Release first: it also ends a closing that timed out, and a hold that lost the object.
         if time >= self._released_at:
             self._depths = np.minimum(self._depths + OPENING_SPEED * self._period, OPEN_GAP)
             phase = Phase.RELEASED if (loads > MIN_TOUCH_LOAD).any() else Phase.FREE
@@ -174,6 +175,8 @@ class Protocol:
 
     def _hold(self, time: float, loads: Array, slip: float, body: Array) -> Command:
         held_for = time - float(self.locked_at or 0.0)
+        # The object is lost if it is far from its place, or if it was touched too little for a
+        # while: with one finger it would fall.
         n_touching = sum(load > MIN_TOUCH_LOAD for load in loads.tolist())
         self._untouched_for = self._untouched_for + self._period if n_touching < 2 else 0.0
         away = body[:3] - self._locked_place
@@ -181,6 +184,7 @@ class Protocol:
         if self.lost_at is None and (is_far or self._untouched_for >= LOST_CONTACT_TIME):
             self.lost_at = time
         if held_for >= self.plan.profile.hold and self._released_at == np.inf:
+            # The operator first takes the object where it is now.
             self._released_at = time + HAND_OVER_TIME
             self.anchor[:] = body[:12]
         if self.lost_at is not None:

@@ -18,7 +18,7 @@ from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.loads import Load, LoadState, load_state
-from holdfast.twin.magnetic_faults import MagneticFaults
+from holdfast.twin.magnetic_faults import WITHOUT_FAULTS, MagneticFaults
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.plant import MILD, plant_named
@@ -70,6 +70,7 @@ class Grasp:
         noise: rms of a reading at rest [count]; rounding to whole counts remains. None for that
             of the sensor.
         plant: name of the plant, see `holdfast.twin.plant`.
+        faults: troubles of the skins.
     """
 
     object: str
@@ -83,6 +84,7 @@ class Grasp:
     glitch_rate: float | None = None
     noise: float | None = None
     plant: str = MILD
+    faults: MagneticFaults = WITHOUT_FAULTS
 
     @property
     def item(self) -> GraspObject:
@@ -119,7 +121,6 @@ class Simulation:
     Args:
         grasp: the grasp.
         parameters: parameters of the skin; by default `UskinParameters()`.
-        faults: troubles of the skins; by default none.
         plan: plan of the grasp; by default the one that is drawn for it.
         loads: loads on the held object, in addition to the disturbances of the plan.
 
@@ -139,7 +140,6 @@ class Simulation:
         self,
         grasp: Grasp,
         parameters: UskinParameters | None = None,
-        faults: MagneticFaults | None = None,
         *,
         plan: Plan | None = None,
         loads: Sequence[Load] = (),
@@ -154,7 +154,6 @@ class Simulation:
         self.plan = plan or _draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
-        self._faults = faults or MagneticFaults()
         if grasp.noise is not None:
             skin = replace(skin, noise_counts=grasp.noise)
         self.uskins = {finger: _skin(grasp.seed, finger, skin) for finger in FINGERS}
@@ -274,11 +273,11 @@ class Simulation:
 
     def _with_faults(self, counts: dict[str, Counts], times: Array) -> dict[str, Counts]:
         """Return the counts (n, n_taxels, 3) of each finger with the troubles of the skins."""
-        if self._faults.changes_nothing:
+        if self.grasp.faults.changes_nothing:
             return counts
         sensors = {finger: uskin.sensor for finger, uskin in self.uskins.items()}
         rest = {finger: uskin.taxels.baseline for finger, uskin in self.uskins.items()}
-        return self._faults.apply(sensors, counts, times, rest, self.grasp.seed)
+        return self.grasp.faults.apply(sensors, counts, times, rest, self.grasp.seed)
 
     def recording(self) -> Recording:
         """Return the recording so far, with truth and labels."""
@@ -308,8 +307,8 @@ class Simulation:
                 {**record, **{key: lock + record[key] for key in ("start", "end")}}
                 for record in self._slip_events.records
             ]
-        if not self._faults.changes_nothing:
-            metadata["magnetic_faults"] = asdict(self._faults)
+        if not grasp.faults.changes_nothing:
+            metadata["magnetic_faults"] = asdict(grasp.faults)
         return Recording(name, modules, metadata, truth)
 
     def _truth(self, times: Array) -> Truth:
@@ -334,7 +333,6 @@ def simulate(
     grasp: Grasp,
     parameters: UskinParameters | None = None,
     on_sample: SampleCallback | None = None,
-    faults: MagneticFaults | None = None,
 ) -> Recording:
     """Simulate one grasp and return its recording with truth and labels.
 
@@ -342,7 +340,6 @@ def simulate(
         grasp: the grasp.
         parameters: parameters of the skin; by default `UskinParameters()`.
         on_sample: function that is called after each sample, for instance to draw a picture.
-        faults: troubles of the skins; by default none.
 
     Returns:
         Recording of four fingertips in counts at 150 Hz. The metadata of a grasp that was never
@@ -351,7 +348,7 @@ def simulate(
     Raises:
         ValueError: object, profile or case is unknown, or the object cannot be grasped.
     """
-    simulation = Simulation(grasp, parameters, faults)
+    simulation = Simulation(grasp, parameters)
     while not simulation.is_over:
         simulation.step()
         if on_sample is not None and simulation.command is not None:

@@ -316,7 +316,18 @@ class SlipEvents:
         guide[3:12] = (turn @ guide[3:12].reshape(3, 3)).ravel()
         guide[12:18] = 0.0
         motion = slice(12, 15) if event.kind is SlipKind.CREEP else slice(15, 18)
-        guide[motion] = self._speed(event, elapsed) * self._axis
+        # Speed [m/s] or spin [rad/s]: it pulls until the object slides.
+        since_closed = elapsed - RECLOSING_TIME
+        speed = event.rate
+        if since_closed < 0 or self._ended_at < math.inf:
+            speed = 0.0
+        elif event.kind is SlipKind.ROLL:
+            speed = event.rate if since_closed < event.size / event.rate else -event.rate
+        elif self._slid < MIN_SLIDE:
+            # Before the object slides, the force rises by the stiffness of the hand times its way.
+            lever = GUIDE_LEVER if event.kind is SlipKind.TURN else 1.0
+            speed = max(event.rate, event.pull_rate / (event.stiffness * lever))
+        guide[motion] = speed * self._axis
         # Stiffness and damping of the hand, and both in rotation, by the inertia that is least.
         turning = event.stiffness * GUIDE_LEVER**2
         moments = [event.stiffness * self._item.mass, turning * float(self._item.inertia.min())]
@@ -326,18 +337,6 @@ class SlipEvents:
         )
         guide[-1] = event.tremor
         return guide
-
-    def _speed(self, event: SlipEvent, elapsed: float) -> float:
-        """Return speed [m/s] or spin [rad/s] of the hand: it pulls until the object slides."""
-        if elapsed < RECLOSING_TIME or self._ended_at < math.inf:
-            return 0.0
-        if event.kind is SlipKind.ROLL:
-            return event.rate if elapsed - RECLOSING_TIME < event.size / event.rate else -event.rate
-        if self._slid >= MIN_SLIDE:
-            return event.rate
-        # Before the object slides, the force rises by the stiffness of the hand times its way.
-        lever = GUIDE_LEVER if event.kind is SlipKind.TURN else 1.0
-        return max(event.rate, event.pull_rate / (event.stiffness * lever))
 
 
 def _axis(event: SlipEvent, body: Array, locked_pose: Array) -> Array:

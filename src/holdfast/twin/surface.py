@@ -94,23 +94,20 @@ def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Arra
     n = max(round(2 * angle * _RADIUS * np.cos(elevation) / NODE_PITCH), 2)
     lengths = np.linspace(begin, end, N_ELEMENT_PARTS + 1)
     angles = np.linspace(-angle, angle, n * N_ELEMENT_PARTS + 1)
-    corners = _points(radius, *np.meshgrid(lengths, angles, indexing="ij"))
+    # Corners of the parts, by length along the skin [m] and angle about its axis [rad].
+    length, around = np.meshgrid(lengths, angles, indexing="ij")
+    rise = np.maximum(length - SHOULDER, 0.0) / _RADIUS
+    level = np.cos(rise)
+    direction = np.stack([level * np.cos(around), level * np.sin(around), np.sin(rise)], -1)
+    foot = np.zeros_like(direction)
+    foot[..., 2] = np.minimum(length, SHOULDER)
+    unit = direction + foot / _RADIUS
+    distances = radius(unit.reshape(-1, 3)).reshape(length.shape)
+    foot[..., 0] = AXIS
+    corners: Array = direction * distances[..., None] + foot
+    # The area vector of a part is half the cross product of its diagonals.
     across, along = np.diff(corners, axis=1), np.diff(corners, axis=0)
     vectors = np.cross(across[:-1] + across[1:], along[:, :-1] + along[:, 1:]) / 4
     vectors = vectors.reshape(N_ELEMENT_PARTS, n, N_ELEMENT_PARTS, 3).sum(axis=(0, 2))
     middle = np.arange(n) * N_ELEMENT_PARTS + N_ELEMENT_PARTS // 2
     return corners[N_ELEMENT_PARTS // 2, middle], vectors
-
-
-def _points(radius: RBFInterpolator, lengths: Array, angles: Array) -> Array:
-    """Return points of the skin by length along it [m] and angle about its axis [rad]."""
-    elevation = np.maximum(lengths - SHOULDER, 0.0) / _RADIUS
-    level = np.cos(elevation)
-    direction = np.stack([level * np.cos(angles), level * np.sin(angles), np.sin(elevation)], -1)
-    foot = np.zeros_like(direction)
-    foot[..., 2] = np.minimum(lengths, SHOULDER)
-    unit = direction + foot / _RADIUS
-    distances = radius(unit.reshape(-1, 3)).reshape(lengths.shape)
-    foot[..., 0] = AXIS
-    points: Array = direction * distances[..., None] + foot
-    return points

@@ -221,7 +221,8 @@ class _State(NamedTuple):
     colour: Array
 
 
-_TIME, _RATE, _WARMTH = range(3)
+_TIME, _RATE = range(2)
+"""Positions in `_State.numbers`; the third, the temperature, is that of uskin_readout.c alone."""
 
 
 class Readout:
@@ -231,8 +232,26 @@ class Readout:
         self, parameters: UskinParameters, taxels: Taxels, generator: np.random.Generator
     ) -> None:
         self._parameters = parameters
-        self._constants = _constants(parameters, taxels)
+        # Of a single reading before rounding: averaging lowers the noise that the sensor shows.
+        noises = [parameters.noise_counts * factor for factor in parameters.noise_by_axis]
+        before_rounding = [math.sqrt(max(noise**2 - ROUNDING_VARIANCE, 0.0)) for noise in noises]
+        shares = np.array(parameters.lag_shares)
+        self._constants = _Constants(
+            taxels,
+            np.array(parameters.limits),
+            np.array(parameters.counts_per_newton),
+            shares,
+            np.array(parameters.lag_times),
+            1.0 - float(shares.sum()),
+            np.array(before_rounding) * math.sqrt(parameters.n_averaged),
+            parameters.scan_time,
+            int(parameters.scan_line),
+            float(parameters.step),
+            parameters.warming_rate,
+            parameters.thermal_time,
+        )
         self._generator = generator
+        # Its own, so that a slow part of the noise leaves all other draws as they are.
         self._colour_generator = generator.spawn(1)[0]
         shape = taxels.baseline.shape
         self._state = _State(
@@ -247,11 +266,6 @@ class Readout:
             colour=np.zeros((2, len(taxels.baseline) * 3)),
         )
 
-    @property
-    def warmth(self) -> float:
-        """Temperature above that at the start [K]."""
-        return float(self._state.numbers[_WARMTH])
-
     def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
         """Compute the next samples; arguments, result and errors are those of `Uskin.counts`."""
         forces, clock = self._checked(taxel_forces, times)
@@ -260,16 +274,13 @@ class Readout:
             drawn = self._generator.standard_normal((len(clock), 1 + self._state.force.size))
             if self._parameters.slow_share or self._parameters.walk:
                 self._colour(clock, drawn)
-            if math.isnan(self._state.numbers[_TIME]):
-                self._rest(forces[0], clock[0], drawn[0, 0])
+            if math.isnan(self._state.numbers[_TIME]):  # the silicone is at rest under the forces
+                state = self._state
+                state.force[:] = state.delayed[:] = forces[0]
+                state.numbers[_TIME] = clock[0]
+                state.numbers[_RATE] = self._constants.spread * drawn[0, 0]
             read_out(forces, clock, drawn, self._constants, self._state, counts)
         return counts
-
-    def _rest(self, forces: Array, time: float, drawn: float) -> None:
-        """Set the state of a silicone at rest under forces."""
-        state = self._state
-        state.force[:] = state.delayed[:] = forces
-        state.numbers[_TIME], state.numbers[_RATE] = time, self._constants.spread * drawn
 
     def _colour(self, clock: Array, drawn: Array) -> None:
         """Colour the noise, with random numbers of its own: white, slow and a random walk.
@@ -303,28 +314,3 @@ class Readout:
         if (np.diff(clock, prepend=self._state.numbers[_TIME]) <= 0).any():  # before it, NaN
             raise ValueError("increasing times expected")
         return forces, clock
-
-
-def _constants(parameters: UskinParameters, taxels: Taxels) -> _Constants:
-    shares = np.array(parameters.lag_shares)
-    return _Constants(
-        taxels,
-        np.array(parameters.limits),
-        np.array(parameters.counts_per_newton),
-        shares,
-        np.array(parameters.lag_times),
-        1.0 - float(shares.sum()),
-        _noise_of_reading(parameters),
-        parameters.scan_time,
-        int(parameters.scan_line),
-        float(parameters.step),
-        parameters.warming_rate,
-        parameters.thermal_time,
-    )
-
-
-def _noise_of_reading(parameters: UskinParameters) -> Array:
-    """Return (3,) the noise of a single reading before rounding; averaging lowers it [count]."""
-    noises = [parameters.noise_counts * factor for factor in parameters.noise_by_axis]
-    before_rounding = [math.sqrt(max(noise**2 - ROUNDING_VARIANCE, 0.0)) for noise in noises]
-    return np.array(before_rounding) * math.sqrt(parameters.n_averaged)

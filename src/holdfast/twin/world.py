@@ -199,7 +199,7 @@ class World(ContactWorld):
         )  # fmt: skip
         self.set_point_error = self._advance(self._physics, self._tick, target, action)
         self._tick += SUBSTEPS
-        if self.bodies[-1, 2] < MIN_HEIGHT:
+        if self.bodies[-1, 2] < MIN_HEIGHT:  # a fall without end would make the numbers useless
             self.hand.data.qvel[N_JOINTS:] = 0.0
             self.hand.data.qpos[N_JOINTS + 2] = MIN_HEIGHT - 0.1
 

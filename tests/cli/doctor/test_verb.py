@@ -12,7 +12,7 @@ from holdfast.devices.sources.xela import places
 from holdfast.devices.uri import source_states
 from holdfast.errors import EXTRA_PURPOSES, install_command
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import sensor
+from holdfast.sensors import Sensor, sensor
 
 
 @pytest.fixture(autouse=True)
@@ -144,6 +144,39 @@ def test_the_modules_of_a_source(capsys, tmp_path):
     found = json.loads(capsys.readouterr().out)
     assert (list(found["modules"]), found["findings"]) == (["index"], [])
     assert found["last"] == found["date"] and found["history"] == str(history)
+
+
+def test_a_touched_hand_is_one_line(capsys, tmp_path):
+    path, history = tmp_path / "touched.parquet", tmp_path / "history.json"
+    readings = 33_000 + np.rint(np.random.default_rng(0).normal(0, 3, (300, 16, 3)))
+    readings[200:, 5, 2] += 500  # one step, louder than any noise
+    module = Tactile(sensor("uskin-4x4"), np.arange(300) / 100, readings)
+    save_recording(Recording("touched", {"index": module}), path)
+    assert main(["doctor", str(path), "--history", str(history)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("holdfast: index was touched at 2.1 s: ") and err.count("\n") == 1
+    assert not history.exists()
+
+
+def test_a_module_of_one_taxel_is_one_line(capsys, tmp_path):
+    flat = sensor("anyskin")
+    one = Sensor("one", flat.positions[:1], flat.rotations[:1], flat.normal, 100.0, magnetic=True)
+    readings = np.random.default_rng(0).normal(0, 3, (300, 1, 3))
+    path = tmp_path / "one.parquet"
+    save_recording(Recording("one", {"index": Tactile(one, np.arange(300) / 100, readings)}), path)
+    assert main(["doctor", str(path), "--history", str(tmp_path / "history.json")]) == 0
+    out = capsys.readouterr().out
+    assert out.endswith("- index has one taxel: no field or touch can be told apart\n")
+
+
+def test_a_sensor_without_positions_is_one_line(capsys, tmp_path):
+    path = tmp_path / "sensor.json"
+    path.write_text('{"name": "x", "rotations": [], "normal": [0, 0, 1], "rate": 100}')
+    assert main(["doctor", f"serial:///dev/null?sensor={path}"]) == 2
+    assert capsys.readouterr().err == (
+        f"holdfast: serial:///dev/null?sensor={path}: {path}: fields ['positions'] are missing in "
+        "a sensor; it needs ['name', 'normal', 'positions', 'rate', 'rotations']\n"
+    )
 
 
 def test_options_of_a_check_need_a_source(capsys):

@@ -104,4 +104,4 @@ def test_the_moving_mean_equals_that_of_scipy(n):
     for seed in range(20):
         values = np.random.default_rng(seed).normal(size=(1 + 9 * seed, 3)) * 1e3
         expected = uniform_filter1d(values, n, axis=0, mode="nearest")
-        np.testing.assert_array_equal(forces._moving_mean(values, n), expected)
+        np.testing.assert_array_equal(forces.moving_mean(values, n), expected)

@@ -170,9 +170,9 @@ def score_submission(
         differ += [f"{name}/{d}" for d in differing(protocol.splits[name], digests)]
     # The recordings that thresholds are chosen on are not scored themselves.
     tuning = scored.pop(TUNING)
-    tables = [_stability_table(scored), _events_table(scored, tuning)]
+    tables = [stability_table(scored), events_table(scored, tuning)]
     if submission.has_slips:
-        tables.append(_slips_table(scored, tuning))
+        tables.append(slips_table(scored, tuning))
     left_out = [
         name for name, split in protocol.splits.items() if split.scored and name not in scored
     ]
@@ -192,7 +192,8 @@ def log_odds(scores: Array) -> Array:
     return np.asarray(np.clip(odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS))
 
 
-def _stability_table(scored: Mapping[str, Scored]) -> ResultTable:
+def stability_table(scored: Mapping[str, Scored]) -> ResultTable:
+    """Return the table of stability by sample."""
     rows: list[Row] = []
     for split, recordings in scored.items():
         decisions = (
@@ -206,7 +207,8 @@ def _stability_table(scored: Mapping[str, Scored]) -> ResultTable:
     )  # fmt: skip
 
 
-def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
+def events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
+    """Return the table of events, at thresholds chosen on tuning."""
     ranges = [
         FalseAlarmRanges.of(own.scores.hold(HOLD_TIME), AlarmLabels.of(own.labels))
         for fingers in tuning.values()
@@ -237,7 +239,8 @@ def _events_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
     )  # fmt: skip
 
 
-def _slips_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
+def slips_table(scored: Mapping[str, Scored], tuning: Scored) -> ResultTable:
+    """Return the table of slips, at thresholds chosen on tuning."""
     ranks = still_ranks(_slip_scores(tuning))
     if not len(ranks):
         raise ValueError(f"{TUNING}: no scored sample that is held and does not slide")

@@ -103,7 +103,7 @@ def read_submission(path: Path) -> Submission:
     Raises:
         ValueError: it is no table of scores, or a score is not from 0 to 1.
     """
-    table = _read_table(path)
+    table = read_score_table(path)
     values: dict[str, Array] = {}
     for name in ("stable", SLIP):
         if name not in table.column_names:
@@ -141,7 +141,13 @@ def read_submission(path: Path) -> Submission:
     return Submission(path.name, recordings, SLIP in values)
 
 
-def _read_table(path: Path) -> pa.Table:
+def read_score_table(path: Path) -> pa.Table:
+    """Read the columns of a submission.
+
+    Raises:
+        ValueError: the file cannot be read, a column is missing, or a cell that needs a value is
+            empty.
+    """
     if path.suffix not in SUBMISSION_SUFFIXES:
         raise ValueError(f"{path}: a .csv or .parquet file expected")
     try:

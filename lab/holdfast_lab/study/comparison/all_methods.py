@@ -11,7 +11,6 @@ from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.study.comparison import (
     costs,
-    error_tables,
     event_tables,
     sample_tables,
     strongest,
@@ -26,6 +25,8 @@ from holdfast_lab.study.comparison.jobs import (
     method_results,
     method_task,
     method_titles,
+    short_title,
+    short_titles,
 )
 from holdfast_lab.study.evaluation.evaluate_method import (
     BY_RATE,
@@ -47,9 +48,9 @@ TABLES = (
     event_tables.glitches,
     event_tables.glitch_rates,
     sample_tables.splits,
-    error_tables.phases,
-    error_tables.force,
-    error_tables.directions,
+    sample_tables.phases,
+    sample_tables.force,
+    sample_tables.directions,
     sample_tables.reliability,
     costs.table,
 )
@@ -84,17 +85,16 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
 
 def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """Return all figures of the comparison."""
-    drawn = [
-        _accuracy_figure(plan, results),
-        _alarm_figure(plan, results),
-        _reliability_figure(plan, results),
-        _grip_figure(plan, results),
-        _direction_figure(plan, results),
+    return [
+        accuracy_figure(plan, results),
+        alarm_figure(plan, results),
+        reliability_figure(plan, results),
+        *error_figures(plan, results),
     ]
-    return [figure for figure in drawn if figure is not None]
 
 
-def _accuracy_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+def accuracy_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+    """Return the accuracy of all methods as hands, on three splits."""
     rows = [
         row
         for row in sample_tables.hands(plan, results).rows
@@ -115,12 +115,21 @@ def _accuracy_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     return ReportFigure("methods", caption, draw_dots(groups, emphasised))
 
 
-def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+def alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+    """Return missed events over false alarms under a stable label, by threshold."""
     post = f"{1000 * POST_DURATIONS[0]:.0f} ms"
-    curves = {
-        title: _alarm_curve(evaluation)
-        for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items()
-    }
+    chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
+    curves = {}
+    for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items():
+        rates, missed = [], []
+        for alarms in (evaluation.alarms[name] for name in BY_RATE):
+            seconds = sum(alarm.stable_seconds for alarm in alarms)
+            n_false = sum(alarm.n_under_stable for alarm in alarms)
+            rates.append(60 * n_false / seconds if seconds else np.nan)
+            n_events = sum(len(alarm.delays) for alarm in alarms)
+            n_missed = sum(alarm.n_missed(POST_DURATIONS[0]) for alarm in alarms)
+            missed.append(100 * n_missed / n_events if n_events else np.nan)
+        curves[title] = PlottedCurve(np.array(rates), np.array(missed), chosen=chosen)
     caption = (
         "Missed events against false alarms, by recording. Thresholds are chosen on "
         "training recordings for false alarms under a stable label of "
@@ -133,21 +142,8 @@ def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     )
 
 
-def _alarm_curve(evaluation: MethodEvaluation) -> PlottedCurve:
-    """Return missed events over false alarms under a stable label."""
-    rates, missed = [], []
-    for alarms in (evaluation.alarms[name] for name in BY_RATE):
-        seconds = sum(alarm.stable_seconds for alarm in alarms)
-        n_false = sum(alarm.n_under_stable for alarm in alarms)
-        rates.append(60 * n_false / seconds if seconds else np.nan)
-        n_events = sum(len(alarm.delays) for alarm in alarms)
-        n_missed = sum(alarm.n_missed(POST_DURATIONS[0]) for alarm in alarms)
-        missed.append(100 * n_missed / n_events if n_events else np.nan)
-    chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
-    return PlottedCurve(np.array(rates), np.array(missed), chosen=chosen)
-
-
-def _reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+def reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+    """Return the share of stable samples over the probability, and the Brier scores."""
     # Of each method, (m, 3): mean probability, share of stable samples, samples of each used bin.
     curves, notes = {}, {}
     for title, evaluation in _by_recording(plan, results, DETAIL_METHODS).items():
@@ -160,22 +156,35 @@ def _reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     return ReportFigure("reliability", caption, draw_reliability(curves, notes))
 
 
-def _grip_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:
-    rows = error_tables.force(plan, results).rows
+def error_figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
+    """Return the errors by grip force and by direction; none without a truth."""
+    made = []
+    rows = sample_tables.force(plan, results).rows
     groups = {
         kind: _groups(plan, [row for row in rows if row.keys["error"] == kind], "grip")
-        for kind in error_tables.ERROR_KINDS
+        for kind in sample_tables.ERROR_KINDS
     }
-    if not any(groups.values()):
-        return None
-    caption = (
-        "Errors by grip force, by recording. The paper states that grip force has no influence."
-    )
-    return ReportFigure("grip", caption, draw_groups(groups, "samples [%]"))
+    if any(groups.values()):
+        caption = (
+            "Errors by grip force, by recording. The paper states that grip force has no influence."
+        )
+        made.append(ReportFigure("grip", caption, draw_groups(groups, "samples [%]")))
+    rows = sample_tables.directions(plan, results).rows
+    by_direction = _groups(plan, rows, "direction")
+    if by_direction:
+        caption = (
+            "Disturbances called stable, by direction, by recording. The paper states that "
+            "disturbances in all directions are found."
+        )
+        drawn = draw_groups(
+            {"direction of the push": by_direction}, "disturbed, called stable [%]", per_row=1
+        )
+        made.append(ReportFigure("directions", caption, drawn))
+    return made
 
 
 def _direction_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:
-    rows = error_tables.directions(plan, results).rows
+    rows = sample_tables.directions(plan, results).rows
     groups = {"direction of the push": _groups(plan, rows, "direction")}
     if not any(groups.values()):
         return None
@@ -193,8 +202,9 @@ def _groups(
     """Return the values of the rows by recording, by method and by the values of `key`."""
     shown = [row for row in rows if row.keys["on"] == SPLIT_TITLES["recording"]]
     drawn = {
-        title: _estimates([r for r in shown if _short_title(str(r.keys["method"])) == title], key)
-        for title in _short_titles(plan, DETAIL_METHODS).values()
+        title: _estimates([r for r in shown if short_title(str(r.keys["method"])) == title], key)
+        for name, title in short_titles(plan).items()
+        if name in DETAIL_METHODS
     }
     return {title: values for title, values in drawn.items() if values}
 
@@ -212,15 +222,7 @@ def _by_recording(
     """Return the evaluations by recording of some methods, by short title."""
     evaluations = {
         title: dict(method_results(plan, results, name)).get("recording")
-        for name, title in _short_titles(plan, names).items()
+        for name, title in short_titles(plan).items()
+        if name in names
     }
     return {title: each for title, each in evaluations.items() if each is not None}
-
-
-def _short_titles(plan: StudyPlan, names: Sequence[str]) -> dict[str, str]:
-    """Return the titles of methods without the text in brackets, for legends."""
-    return {n: _short_title(title) for n, title in method_titles(plan).items() if n in names}
-
-
-def _short_title(title: str) -> str:
-    return title.split(" (", maxsplit=1)[0]

@@ -104,8 +104,9 @@ def glitches(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for key, evaluation in method_results(plan, results, REFERENCE_METHOD):
         counts = evaluation.glitches
+        # By object the recordings are those of the split by recording, with the same truth.
         if key != "object" and any(count.grasped_seconds for count in counts):
-            rows += _glitch_rows({"on": SPLIT_TITLES[key]}, counts, plan.seed)
+            rows += glitch_rows({"on": SPLIT_TITLES[key]}, counts, plan.seed)
     note = (
         "By the truth of the recordings, while the hand holds the object; no method is involved. "
         "The object slides if it moves on a finger at over 1 mm/s within 0.1 s after a jump of "
@@ -166,7 +167,8 @@ def _lines(
                     yield keys, evaluation.readings[reading][threshold]
 
 
-def _glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:
+def glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:
+    """Yield the rows of one line of the table of glitches."""
     n = [len(count.distances) for count in counts]
     minutes = [count.grasped_seconds / 60 for count in counts]
     yield ratio_row(keys | {"figure": "glitches per minute held"}, n, minutes, seed, scale=1.0)

@@ -74,6 +74,16 @@ def method_titles(plan: StudyPlan) -> dict[str, str]:
     }
 
 
+def short_titles(plan: StudyPlan) -> dict[str, str]:
+    """Return the titles of the compared methods for legends, by name."""
+    return {name: short_title(title) for name, title in method_titles(plan).items()}
+
+
+def short_title(title: str) -> str:
+    """Return the title of a method without the text in brackets."""
+    return title.split(" (", maxsplit=1)[0]
+
+
 def is_torch_installed() -> bool:
     """Return whether torch, which the network needs, is installed."""
     return find_spec("torch") is not None

@@ -13,7 +13,7 @@ from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE, enough_c
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.model import Model
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast.training import Setting, compute_decisions, train
 from holdfast.training.setting import Split
@@ -56,38 +56,32 @@ def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEs
     for left_out in held_out_folds(objects, "recording", n_folds(real), seed):
         others = [recording for index, recording in enumerate(recordings) if index not in left_out]
         # Another draw in each fold, the same in every run.
-        model = _model(making, others, seed + min(left_out))
+        model = model_made(making, others, seed + min(left_out))
         estimates |= {index: _estimates(model, recordings[index]) for index in left_out}
     return [estimates[index] for index in sorted(estimates)]
 
 
-def _model(making: Making, others: Sequence[Recording], seed: int) -> Model | None:
+def model_made(making: Making, others: Sequence[Recording], seed: int) -> Model | None:
     """Return the model for a fold; None if it cannot be fitted from nothing."""
     shipped = Model.load(SHIPPED)
+    if making == "untouched":
+        return shipped
     adapting = Setting.adapting(shipped)
-    match making:
-        case "untouched":
-            return shipped
-        case "adapted to one":
-            return _trained(_one_with_both_classes(others, seed), adapting) or shipped
-        case "adapted to all":
-            return _trained(others, adapting) or shipped
-        case "from nothing":
-            return _trained(others, replace(adapting, init=None, trials=0))
+    if making == "from nothing":
+        return trained_model(others, replace(adapting, init=None, trials=0))
+    if making == "adapted to one":
+        # Drawn from those that have both classes on every finger: no other can adapt the model.
+        able = []
+        for other in others:
+            codes = [module.label_states for module in other.modules.values()]
+            if all(len(np.unique(of_finger[of_finger != UNKNOWN] == STABLE)) == 2
+                   for of_finger in codes):  # fmt: skip
+                able.append(other)
+        others = [able[np.random.default_rng(seed).integers(len(able))]] if able else []
+    return trained_model(others, adapting) or shipped
 
 
-def _one_with_both_classes(others: Sequence[Recording], seed: int) -> list[Recording]:
-    """Return one recording, drawn from those with both classes on every finger; none without."""
-    able = [other for other in others if all(map(_has_both_classes, other.modules.values()))]
-    return [able[np.random.default_rng(seed).integers(len(able))]] if able else []
-
-
-def _has_both_classes(module: Tactile) -> bool:
-    codes = module.label_states
-    return len(np.unique(codes[codes != UNKNOWN] == STABLE)) == 2
-
-
-def _trained(recordings: Sequence[Recording], setting: Setting) -> Model | None:
+def trained_model(recordings: Sequence[Recording], setting: Setting) -> Model | None:
     """Return the model that `holdfast train` makes; None if it cannot with these recordings.
 
     Its cross-validation is by recording where that is possible and fast. It is not used here.
@@ -105,19 +99,19 @@ def _estimates(model: Model | None, recording: Recording) -> RecordingEstimates:
         decided = {} if model is None else compute_decisions(model, recording).fingers
     except ModelError:
         decided = {}
-    fingers = {n: _latest(decided.get(n), m.times) for n, m in recording.modules.items()}
+    fingers = {n: latest_decisions(decided.get(n), m.times) for n, m in recording.modules.items()}
     hand = hand_decisions(fingers, len(fingers))
-    at_hand = [_latest(finger, hand.times) for finger in fingers.values()]
+    at_hand = [latest_decisions(finger, hand.times) for finger in fingers.values()]
     return RecordingEstimates(
         recording.name,
         {name: unit_estimates(f.stable_probability, f.states) for name, f in fingers.items()},
-        unit_estimates(_hand_probability(at_hand), hand.states),
+        unit_estimates(smallest_probability(at_hand), hand.states),
         Column.of(hand.states),
         Column.of(np.all([each.states != UNKNOWN for each in at_hand], axis=0)),
     )
 
 
-def _latest(decided: FingerDecisions | None, times: Array) -> FingerDecisions:
+def latest_decisions(decided: FingerDecisions | None, times: Array) -> FingerDecisions:
     """Return the latest decision at each time, without labels; UNKNOWN before the first."""
     unlabelled = np.full(len(times), UNKNOWN, dtype=np.int8)
     if decided is None:
@@ -129,7 +123,7 @@ def _latest(decided: FingerDecisions | None, times: Array) -> FingerDecisions:
     return FingerDecisions(times, unlabelled, states, probability)
 
 
-def _hand_probability(fingers: Sequence[FingerDecisions]) -> Array:
+def smallest_probability(fingers: Sequence[FingerDecisions]) -> Array:
     """Return the smallest probability of the fingers in contact.
 
     If too few are in contact to hold an object, it is the smallest of all fingers: a finger that

@@ -133,11 +133,19 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     estimates = {name: results[_task_name(name)] for name in lines}
     counts = count_recordings(results[LABELS], estimates)
     by_line = {lines[name]: each for name, each in counts.items()}
+    source = plan.real.load()[0].metadata.get("source")
+    note = f"{MEANING} {BOX_CAVEAT}" if source == uskin_pick_move.SOURCE else MEANING
+    rows: list[Row] = []
+    for line, of_line in by_line.items():
+        rows.append(mean_auc_row(_keys(line), of_line, plan.seed))
+        rows += recording_rows(_keys(line), of_line, plan.seed)
+    heads = ("method", "trained on")
+    title = "Real recordings, pooled"
     return [
-        _pooled(by_line, f"{MEANING} {BOX_CAVEAT}" if _is_box(plan.real) else MEANING, plan.seed),
-        _by_recording(by_line, plan.seed),
-        _by_finger(by_line, plan.seed),
-        _pairs(lines, results[LABELS], estimates, plan.seed),
+        ResultTable("real", title, note, rows, heads, digits_of=COUNT_DIGITS),
+        recording_table(by_line, plan.seed),
+        finger_auc_table(by_line, plan.seed),
+        pair_table(lines, results[LABELS], estimates, plan.seed),
     ]
 
 
@@ -158,16 +166,8 @@ def real_methods(plan: StudyPlan, real: Corpus) -> dict[str, str]:
     }
 
 
-def _pooled(by_line: Mapping[Line, Sequence[RecordingCounts]], note: str, seed: int) -> ResultTable:
-    rows: list[Row] = []
-    for line, counts in by_line.items():
-        rows.append(mean_auc_row(_keys(line), counts, seed))
-        rows += recording_rows(_keys(line), counts, seed)
-    title = "Real recordings, pooled"
-    return ResultTable("real", title, note, rows, ("method", "trained on"), digits_of=COUNT_DIGITS)
-
-
-def _by_recording(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> ResultTable:
+def recording_table(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> ResultTable:
+    """Return the table of the figures of each recording."""
     rows = [
         row
         for line, counts in _each_recording(by_line)
@@ -178,7 +178,8 @@ def _by_recording(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) 
     return ResultTable("real_recordings", title, BY_RECORDING, rows, lines, digits_of=COUNT_DIGITS)
 
 
-def _by_finger(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> ResultTable:
+def finger_auc_table(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> ResultTable:
+    """Return the table of the AUC of each finger in each recording."""
     rows: list[Row] = []
     for line, counts in _each_recording(by_line):
         for finger, unit in counts.fingers.items():
@@ -194,12 +195,13 @@ def _by_finger(by_line: Mapping[Line, Sequence[RecordingCounts]], seed: int) -> 
     return ResultTable("real_fingers", title, BY_FINGER, rows, lines, digits_of=digits)
 
 
-def _pairs(
+def pair_table(
     lines: Mapping[str, Line],
     labels: Sequence[RecordingLabels],
     estimates: Mapping[str, Sequence[RecordingEstimates]],
     seed: int,
 ) -> ResultTable:
+    """Return the table of the model that ships beside each other line."""
     rows: list[Row] = []
     for name, line in lines.items():
         if name != UNTOUCHED:
@@ -228,7 +230,3 @@ def _keys(line: Line) -> dict[str, Key]:
 
 def _task_name(line: str) -> str:
     return f"real/{line}"
-
-
-def _is_box(real: Corpus) -> bool:
-    return real.load()[0].metadata.get("source") == uskin_pick_move.SOURCE

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from holdfast.metrics import Interval, Metrics, bootstrap_interval, ratio_of_sums
 from holdfast.metrics.statistics import quantile, quantile_of
 from holdfast.sensors.types import Array
+from holdfast_lab.figures.curves import PlottedCurve
 from holdfast_lab.report.result_tables import Key, Row
 from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
 
@@ -170,6 +171,17 @@ def difference_row(keys: RowKeys, first: Metrics, second: Metrics, seed: int) ->
     ours = float(statistic(np.ones((1, len(names))))[0]) if names else None
     interval = bootstrap_interval(statistic, len(names), seed=seed)
     return Row(dict(keys), ours, None, len(names), interval)
+
+
+def curve_of(rows: Sequence[Row], key: str) -> PlottedCurve:
+    """Return the values of rows over one of their keys, with their intervals."""
+    ordered = sorted(rows, key=lambda row: float(row.keys[key]))
+    ends = [row.interval or (None, None) for row in ordered]
+    y, low, high = (
+        np.array([np.nan if value is None else float(value) for value in values])
+        for values in ([row.ours for row in ordered], [a for a, _ in ends], [b for _, b in ends])
+    )
+    return PlottedCurve(np.array([float(row.keys[key]) for row in ordered]), y, low, high)
 
 
 def calibration_row(keys: RowKeys, evaluation: MethodEvaluation, seed: int) -> Row:

@@ -7,8 +7,6 @@ of the twin. One more table compares how noise affects the paper's sigma and an 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from holdfast.contact import UNSTABLE_MARGIN
 from holdfast.twin.profile import profile, profiles
 from holdfast_lab.figures.curves import PlottedCurve, draw_lines
@@ -22,7 +20,13 @@ from holdfast_lab.study.comparison.jobs import (
     method_effort,
     method_job,
 )
-from holdfast_lab.study.comparison.rows import DIGITS, difference_row, ratio_row, sample_rows
+from holdfast_lab.study.comparison.rows import (
+    DIGITS,
+    curve_of,
+    difference_row,
+    ratio_row,
+    sample_rows,
+)
 from holdfast_lab.study.evaluation.evaluate_method import (
     COMPARED,
     COMPARED_RATE,
@@ -101,15 +105,15 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """Return a table for each condition, for the profiles, and for sigma against energy."""
-    swept = [_sweep_table(plan, results, sweep) for sweep in sweeps(plan)]
-    return [*swept, _profile_table(plan, results), _sigma_energy_table(plan, results)]
+    swept = [sweep_table(plan, results, sweep) for sweep in sweeps(plan)]
+    return [*swept, profile_table(plan, results), sigma_energy_table(plan, results)]
 
 
 def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """Return the tables of the conditions as curves."""
-    swept = [_draw(_sweep_table(plan, results, each), each, CURVES) for each in sweeps(plan)]
+    swept = [_draw(sweep_table(plan, results, each), each, CURVES) for each in sweeps(plan)]
     sweep = Sweep("sigma_energy", "Sigma beside energy", NOISE_NAME, _noise(plan), "")
-    sigma_energy = _draw(_sigma_energy_table(plan, results), sweep, CURVES[:2])
+    sigma_energy = _draw(sigma_energy_table(plan, results), sweep, CURVES[:2])
     return [*swept, sigma_energy]
 
 
@@ -121,7 +125,8 @@ def varied_methods(plan: StudyPlan) -> list[str]:
 
 def sweeps(plan: StudyPlan) -> list[Sweep]:
     """Return the conditions that are varied. The margin is one only if the truth is known."""
-    unit = plan.main.load()[0].modules[plan.main.fingers[0]].unit
+    first = plan.main.load()[0]
+    unit = first.modules[plan.main.fingers[0]].unit
     noise = Sweep(
         "noise",
         "Sensitivity to noise",
@@ -130,11 +135,18 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
         f"Standard deviation of white noise added to every reading [{unit}], in training and "
         "in test; the readings already contain the noise of the twin.",
     )
+    by_margin: dict[float, Variation] = {}
+    if first.truth is not None and "phase" in first.truth.hand:
+        # The margin that the labels of the recordings have already is no variation.
+        known = str(first.metadata.get("profile"))
+        default = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
+        for margin in (0.0, UNSTABLE_MARGIN) if plan.quick else MARGINS:
+            by_margin[margin] = Variation(margin=None if margin == default else margin)
     margins = Sweep(
         "margins",
         "Sensitivity to the margin of labels",
         MARGIN,
-        _margins(plan),
+        by_margin,
         "Time by which labels extend every disturbance at both ends, in training and in the "
         "figures by sample; alarms are counted by labels without margin.",
     )
@@ -157,22 +169,6 @@ def _noise(plan: StudyPlan) -> dict[float, Variation]:
     return {level: Variation(noise=level) for level in levels}
 
 
-def _margins(plan: StudyPlan) -> dict[float, Variation]:
-    """Return the variations by margin; none without a truth.
-
-    The margin that the labels of the recordings have already is no variation.
-    """
-    first = plan.main.load()[0]
-    if first.truth is None or "phase" not in first.truth.hand:
-        return {}
-    known = str(first.metadata.get("profile"))
-    usual = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
-    margins = (0.0, UNSTABLE_MARGIN) if plan.quick else MARGINS
-    return {
-        margin: Variation() if margin == usual else Variation(margin=margin) for margin in margins
-    }
-
-
 def _task(plan: StudyPlan, method: str, variation: Variation) -> Task:
     if method in METHODS and variation == Variation():
         job = method_job(plan, method)  # as in the comparison: equal jobs are done once
@@ -190,7 +186,8 @@ def _task_name(method: str, variation: Variation) -> str:
     return f"sensitivity/{method}/noise-{variation.noise:g}/every-{variation.every}{margin}"
 
 
-def _sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
+def sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
+    """Return the table of one condition, with a line for each method and value."""
     rows: list[Row] = []
     for method in varied_methods(plan):
         for value, variation in sorted(sweep.variations.items()):
@@ -203,7 +200,8 @@ def _sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable
     )
 
 
-def _profile_table(plan: StudyPlan, results: Results) -> ResultTable:
+def profile_table(plan: StudyPlan, results: Results) -> ResultTable:
+    """Return the table of other profiles of the twin, without a new fit."""
     rows: list[Row] = []
     for method in varied_methods(plan):
         evaluations = results[_task_name(method, Variation())]
@@ -221,7 +219,8 @@ def _profile_table(plan: StudyPlan, results: Results) -> ResultTable:
     return ResultTable("profiles", title, note, rows, ("method", "on"), digits_of=DIGITS)
 
 
-def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
+def sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
+    """Return the table of sigma and energies as noise grows."""
     rows: list[Row] = []
     for value, variation in _noise(plan).items():
         first = results[_task_name("sigma_cut", variation)]["recording"].metrics
@@ -261,23 +260,11 @@ def _draw(table: ResultTable, sweep: Sweep, columns: Sequence[str]) -> ReportFig
     for column in columns:
         rows = [row for row in table.rows if row.keys["figure"] == column]
         names = dict.fromkeys(str(row.keys[head]) for row in rows)
-        curves = {n: _curve([r for r in rows if r.keys[head] == n], sweep.key) for n in names}
+        curves = {}
+        for name in names:
+            own = [row for row in rows if row.keys[head] == name]
+            curves[name] = curve_of(own, sweep.key)
         if curves:
             groups[column] = curves
     caption = f"{table.title}. Bands: 95 % intervals, by bootstrap over recordings."
     return ReportFigure(f"{sweep.name}_curves", caption, draw_lines(groups, sweep.key))
-
-
-def _curve(rows: Sequence[Row], key: str) -> PlottedCurve:
-    rows = sorted(rows, key=lambda row: float(row.keys[key]))
-    ends = [row.interval or (None, None) for row in rows]
-    x, y, low, high = (
-        np.array([np.nan if value is None else float(value) for value in values])
-        for values in (
-            [float(row.keys[key]) for row in rows],
-            [row.ours for row in rows],
-            [low for low, _ in ends],
-            [high for _, high in ends],
-        )
-    )
-    return PlottedCurve(x, y, low, high)

@@ -1,10 +1,7 @@
 """Part of the study: the slip of single fingers, decided by each method and scored by the truth."""
 
-from collections.abc import Iterator
-
 import msgspec
 
-from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
 from holdfast.metrics.slip_truth import DISTANCES
 from holdfast.metrics.slips import (
     EARLIEST_ALARM,
@@ -12,7 +9,6 @@ from holdfast.metrics.slips import (
     FOUND_WITHIN,
     LATEST_ALARM,
 )
-from holdfast.metrics.statistics import Interval
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
@@ -135,11 +131,25 @@ def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:
         evaluation: of a method.
     """
     n = evaluation.n_recordings
-    pooled = evaluation.summary.pooled
-    rows = [
-        Row({**keys, "figure": figure}, value, None, n, interval)
-        for figure, value, interval in _shares(evaluation.summary)
+    pooled, intervals = evaluation.summary.pooled, evaluation.summary.intervals
+    # Head of the column, and where its value and its interval are: a field, and a key of it.
+    shares: list[tuple[str, str, str | None]] = [
+        (f"{begin}{words} [%]", kind, limit)
+        for kind, begin in SLIP_KINDS.items()
+        for limit, words in FOUND_TITLES.items()
     ]
+    for distance, name in zip(DISTANCES, ("before_1mm", "before_3mm"), strict=True):
+        shares.append((f"before {1000 * distance:g} mm [%]", name, None))
+    shares.append((QUIET_RAISED, "raised_quiet", None))
+    shares.append((FALSE_HELD, "false_alarms_per_minute", "held"))
+    shares.append((FALSE_QUIET, "false_alarms_per_minute", "quiet"))
+    rows = []
+    for head, field, key in shares:
+        value = getattr(pooled, field)
+        interval = None if intervals is None else getattr(intervals, field)
+        if key is not None:
+            value, interval = value[key], None if interval is None else interval[key]
+        rows.append(Row({**keys, "figure": head}, value, None, n, interval))
     counts = {
         "AUC": pooled.auc,
         N_SLIPS: pooled.n,
@@ -148,23 +158,3 @@ def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:
         HELD_MINUTES: pooled.held_minutes,
     }
     return rows + [Row({**keys, "figure": name}, value, None, n) for name, value in counts.items()]
-
-
-def _shares(summary: SlipSummary) -> Iterator[tuple[str, float | None, Interval | None]]:
-    """Yield head, value and interval of each figure that has an interval."""
-    pooled, intervals = summary.pooled, summary.intervals
-    for kind, begin in SLIP_KINDS.items():
-        for limit, words in FOUND_TITLES.items():
-            yield f"{begin}{words} [%]", getattr(pooled, kind)[limit], _of(intervals, kind, limit)
-    for distance, name in zip(DISTANCES, ("before_1mm", "before_3mm"), strict=True):
-        head = f"before {1000 * distance:g} mm [%]"
-        yield head, getattr(pooled, name), _of(intervals, name)
-    yield QUIET_RAISED, pooled.raised_quiet, _of(intervals, "raised_quiet")
-    rates = "false_alarms_per_minute"
-    for where, head in (("held", FALSE_HELD), ("quiet", FALSE_QUIET)):
-        yield head, getattr(pooled, rates)[where], _of(intervals, rates, where)
-
-
-def _of(intervals: SlipIntervals | None, name: str, key: str | None = None) -> Interval | None:
-    interval = None if intervals is None else getattr(intervals, name)
-    return interval if key is None or interval is None else interval[key]

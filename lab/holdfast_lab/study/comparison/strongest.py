@@ -60,9 +60,7 @@ class Measure(NamedTuple):
 
 def table(plan: StudyPlan, results: Results) -> ResultTable:
     """Return the table of our method against the strongest baselines, on unseen objects."""
-    rows: list[Row] = []
-    for measure in MEASURES:
-        rows += _measure_rows(plan, results, measure)
+    rows = [row for measure in MEASURES for row in measure_rows(plan, results, measure)]
     posts = f"{1000 * POST_DURATIONS[0]:.0f} ms"
     note = (
         "Errors of holdfast and of the baseline that has the fewest errors on the same "
@@ -94,12 +92,13 @@ def strongest_of_family(
         as_hand: compare hands, not what the methods decide for.
     """
     found = {n: e for n, e in _evaluations(plan, results, key).items() if n in PAPER_FAMILY}
-    counts = {n: _sample_errors(e.hand if as_hand else e.metrics) for n, e in found.items()}
+    counts = {n: sample_errors(e.hand if as_hand else e.metrics) or [] for n, e in found.items()}
     name = _fewest_errors(counts)
     return None if name is None else (name, found[name])
 
 
-def _measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterator[Row]:
+def measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterator[Row]:
+    """Yield the rows of one kind of error: ours, the baseline's and their ratio."""
     key = "others" if "others" in plan.corpora else "object"
     evaluations = _evaluations(plan, results, key)
     counts = {name: measure.counts(evaluation) for name, evaluation in evaluations.items()}
@@ -142,19 +141,14 @@ def _fewest_errors(counts: dict[str, CountPairs]) -> str | None:
     return min(shares, key=lambda name: shares[name], default=None)
 
 
-def _sample_errors(metrics: Metrics) -> CountPairs:
+def sample_errors(metrics: Metrics | None) -> CountPairs | None:
+    """Return the wrong samples, and all, of each recording; None without metrics."""
+    if metrics is None:
+        return None
     return [(n - n_correct, n) for n_correct, n in correct_and_all(metrics).values()]
 
 
-def _finger_errors(evaluation: MethodEvaluation) -> CountPairs | None:
-    return None if evaluation.fingers is None else _sample_errors(evaluation.fingers)
-
-
-def _hand_errors(evaluation: MethodEvaluation) -> CountPairs:
-    return _sample_errors(evaluation.hand)
-
-
-def _held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
+def held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
     """Return the errors of fingers while the hand holds the object."""
     if evaluation.fingers is None or not any(each.phases for each in evaluation.breakdown):
         return None
@@ -165,7 +159,8 @@ def _held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
     return counts
 
 
-def _missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
+def missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
+    """Return a function from an evaluation to its missed events and all events."""
     return lambda evaluation: [
         (alarms.n_missed(POST_DURATIONS[0]), len(alarms.delays))
         for alarms in evaluation.readings[reading][COMPARED]
@@ -174,12 +169,12 @@ def _missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:
 
 NOTHING = "nothing"
 MEASURES = (
-    Measure("samples of fingers [%]", NOTHING, _finger_errors),
-    Measure("samples of hands [%]", NOTHING, _hand_errors),
-    Measure("samples of fingers [%]", "samples at which nothing is held", _held_errors),
-    Measure("events, a glitch is an event [%]", NOTHING, _missed_events(EVENT), EVENT),
-    Measure("events, a glitch is a false alarm [%]", NOTHING, _missed_events(FALSE_ALARM),
+    Measure("samples of fingers [%]", NOTHING, lambda one: sample_errors(one.fingers)),
+    Measure("samples of hands [%]", NOTHING, lambda one: sample_errors(one.hand)),
+    Measure("samples of fingers [%]", "samples at which nothing is held", held_errors),
+    Measure("events, a glitch is an event [%]", NOTHING, missed_events(EVENT), EVENT),
+    Measure("events, a glitch is a false alarm [%]", NOTHING, missed_events(FALSE_ALARM),
             FALSE_ALARM),
-    Measure("events [%]", "glitches", _missed_events(LEFT_OUT), LEFT_OUT),
+    Measure("events [%]", "glitches", missed_events(LEFT_OUT), LEFT_OUT),
 )  # fmt: skip
 """The kinds of errors in the table: without any exclusion, then with exclusions."""

@@ -1,6 +1,12 @@
 """The methods that the study compares, in one file for each family."""
 
-from holdfast_lab.study.methods.force_rules import DIFFERENCE, FRICTION_METHOD, TANGENTIAL
+from holdfast_lab.study.methods.force_rules import (
+    DIFFERENCE,
+    FRICTION_METHOD,
+    SLIP_SERVO,
+    SPECTRUM,
+    TANGENTIAL,
+)
 from holdfast_lab.study.methods.holdfast import HOLDFAST
 from holdfast_lab.study.methods.learning import ANYSKIN, JAMES_LEPORA, TCN
 from holdfast_lab.study.methods.method import (
@@ -11,7 +17,6 @@ from holdfast_lab.study.methods.method import (
     hand_signal,
     stretchwise,
 )
-from holdfast_lab.study.methods.vibration import SLIP_SERVO, SPECTRUM
 from holdfast_lab.study.methods.wavelets import (
     ENERGY,
     LOG_HAND,

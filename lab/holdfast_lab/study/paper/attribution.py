@@ -200,7 +200,11 @@ def difference_row(
         seed: of the bootstrap.
         paired: a resample draws the same recordings for both.
     """
-    first, second = _correct_and_all(counts), _correct_and_all(base)
+    tables = (np.array(table, dtype=np.float64).reshape(-1, 4) for table in (counts, base))
+    # Correct samples, TN + TP, and all samples of each recording.
+    first, second = (
+        np.column_stack([table[:, 0] + table[:, 3], table.sum(axis=1)]) for table in tables
+    )
     if paired:
         both = np.hstack([first, second])
     else:
@@ -218,8 +222,3 @@ def difference_row(
     interval = bootstrap_interval(statistic, len(both), seed=seed)
     n = sum(any(row) for row in counts)
     return Row({**keys, "figure": LINE_DIFFERENCE}, ours, None, n, interval)
-
-
-def _correct_and_all(counts: ConfusionCounts) -> Array:
-    table = np.array(counts, dtype=np.float64).reshape(-1, 4)
-    return np.column_stack([table[:, 0] + table[:, 3], table.sum(axis=1)])

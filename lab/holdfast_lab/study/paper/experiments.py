@@ -79,9 +79,9 @@ def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
         series = finger_series(recording, example.finger, Tare.parse(corpus.tare))
         series = series._replace(name=f"{example.recording}, {example.finger}")
         if example.experiment == "protocol":
-            every += _protocol_figures(series)
+            every += protocol_figures(series)
         else:
-            every.append(_experiment_figure(example, series))
+            every.append(experiment_figure(example, series))
     return every
 
 
@@ -99,7 +99,7 @@ def predict_examples(
         TrainingError: the finger has labels of one class only.
     """
     main = corpora["main"]
-    examples = list(_choose(corpora, finger))
+    examples = list(choose_examples(corpora, finger))
     for name in TITLES:
         features = corpus_features(METHODS[name], _select(main, finger))
         training = MethodTraining.of(METHODS[name], features, seed=seed)
@@ -121,7 +121,7 @@ def predict_examples(
     return [ExampleRecording("protocol", "main", first, finger), *examples]
 
 
-def _choose(corpora: Mapping[str, Corpus], finger: str) -> Iterator[ExampleRecording]:
+def choose_examples(corpora: Mapping[str, Corpus], finger: str) -> Iterator[ExampleRecording]:
     """Yield a recording of each experiment; the first recording if none has a case."""
     any_found = False
     for experiment, case in EXPERIMENT_CASES.items():
@@ -150,7 +150,8 @@ def _select(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus
     return msgspec.structs.replace(corpus, fingers=(finger,), recordings=names)
 
 
-def _protocol_figures(series: FingerSeries) -> Iterator[ReportFigure]:
+def protocol_figures(series: FingerSeries) -> Iterator[ReportFigure]:
+    """Yield the figures of forces and of features."""
     chosen = "Chosen: the first recording with disturbances, by name."
     yield ReportFigure(
         "forces",
@@ -167,7 +168,8 @@ def _protocol_figures(series: FingerSeries) -> Iterator[ReportFigure]:
     )
 
 
-def _experiment_figure(example: ExampleRecording, series: FingerSeries) -> ReportFigure:
+def experiment_figure(example: ExampleRecording, series: FingerSeries) -> ReportFigure:
+    """Return the figure of an experiment with predicted states."""
     name, title = CAPTIONS[example.experiment]
     predicted = {TITLES[method]: np.array(states) for method, states in example.states.items()}
     fits = (

@@ -87,7 +87,7 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """Return the table of four and the table of the ceiling; none without a truth."""
     if f"labels/{_methods(plan)[0]}" not in results:
         return []
-    every = [_label_table(plan, results), _ceiling_table(plan, results)]
+    every = [label_table(plan, results), ceiling_table(plan, results)]
     return [table for table in every if table.rows]
 
 
@@ -134,20 +134,19 @@ def evaluate_labels(
         for tested, of_recording in decided.items():
             ordered = [of_recording[index] for index in sorted(of_recording)]
             metrics[f"{trained}/{tested}"] = summarise(ordered, seed=seed)
-    # The sources are in order: exact, then drawn.
-    rule = [_confusion(exact, drawn) for exact, drawn in zip(*by_source.values(), strict=True)]
+    # TN, FP, FN, TP of each recording, with the drawn labels as decisions.
+    rule = []
+    for exact, drawn in zip(by_source["exact"], by_source["drawn"], strict=True):
+        counts = np.zeros(4, dtype=np.int64)
+        for finger, truth in exact.labels.items():
+            as_decisions = score_samples(truth, drawn.labels[finger], np.zeros(len(truth)))
+            counts += as_decisions.confusion.ravel()
+        rule.append([int(n) for n in counts])
     return LabelEvaluation(metrics, rule)
 
 
-def _confusion(exact: RecordingFeatures, drawn: RecordingFeatures) -> list[int]:
-    """Return TN, FP, FN, TP of one recording, with the drawn labels as decisions."""
-    counts = np.zeros(4, dtype=np.int64)
-    for finger, truth in exact.labels.items():
-        counts += score_samples(truth, drawn.labels[finger], np.zeros(len(truth))).confusion.ravel()
-    return [int(n) for n in counts]
-
-
-def _label_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
+def label_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
+    """Return the table of four: both labels in training and in test."""
     rows: list[Row] = []
     rule: ConfusionCounts = []
     for name in _methods(plan):
@@ -162,8 +161,15 @@ def _label_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
                 }
                 metrics = evaluation.metrics[f"{trained}/{tested}"]
                 rows += sample_rows(keys, metrics, SHOWN)
-                if tested == "exact":
-                    rows += _event_rows(keys, metrics)
+                if tested == "exact":  # events by drawn labels would be other events
+                    hand, n = metrics.events.hand, len(metrics.recordings)
+                    ends = None if metrics.intervals is None else metrics.intervals.hand
+                    missed = None if ends is None else ends.missed["0.05"]
+                    alarms = None if ends is None else ends.false_alarms_per_minute
+                    figure = keys | {"figure": MISSED_EVENTS}
+                    rows.append(Row(figure, hand.missed["0.05"], None, n, missed))
+                    figure = keys | {"figure": FALSE_ALARMS}
+                    rows.append(Row(figure, hand.false_alarms_per_minute, None, n, alarms))
     keys = {"method": "the drawn labels themselves", "trained on": "–", "tested on": "exact truth"}
     # The heads of the other lines, so that the rule stands in the same columns.
     names = {"accuracy": "accuracy [%]", "FDR": "FDR [%]", "FNR": "FNR [%]"}
@@ -185,16 +191,8 @@ def _label_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
     )  # fmt: skip
 
 
-def _event_rows(keys: Keys, metrics: Metrics) -> Iterator[Row]:
-    hand, intervals, n = metrics.events.hand, metrics.intervals, len(metrics.recordings)
-    ends = None if intervals is None else intervals.hand
-    missed = None if ends is None else ends.missed["0.05"]
-    alarms = None if ends is None else ends.false_alarms_per_minute
-    yield Row(keys | {"figure": MISSED_EVENTS}, hand.missed["0.05"], None, n, missed)
-    yield Row(keys | {"figure": FALSE_ALARMS}, hand.false_alarms_per_minute, None, n, alarms)
-
-
-def _ceiling_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
+def ceiling_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
+    """Return the table of what the sensor shows."""
     rows: list[Row] = []
     for role, title in CEILING_ROLES.items():
         for window in CEILING_WINDOWS:

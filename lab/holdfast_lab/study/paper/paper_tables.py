@@ -1,6 +1,6 @@
 """Part of the study: the tables of the paper by its own protocol, and on new data."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from holdfast.plots.style import PAPER
 from holdfast_lab.figures.curves import PlottedCurve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.study.comparison.rows import curve_of
 from holdfast_lab.study.paper import published
 from holdfast_lab.study.paper.pooled_samples import ENERGY_NAME
 from holdfast_lab.study.paper.random_split import (
@@ -90,15 +91,14 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """
     fits = PaperResults(plan, results)
     makers = (
-        _confusion_table, _window_table, _ablation_table, _unseen_table, _finger_table,
-        _zhang_table,
+        confusion_table, window_table, ablation_table, unseen_table, finger_table, zhang_table,
     )  # fmt: skip
     return [*(make(fits) for make in makers), published.discrepancies()]
 
 
 def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
     """Return Table II as a figure."""
-    return [_window_figure(_window_table(PaperResults(plan, results)))]
+    return [window_figure(window_table(PaperResults(plan, results)))]
 
 
 def first_finger(plan: StudyPlan) -> str:
@@ -177,7 +177,8 @@ class PaperResults:
         )
 
 
-def _confusion_table(fits: PaperResults) -> ResultTable:
+def confusion_table(fits: PaperResults) -> ResultTable:
+    """Return Table I: the rates of each class."""
     rows: list[Row] = []
     for name, title in METHOD_TITLES.items():
         keys: Keys = {"classifier": title}
@@ -201,7 +202,8 @@ def _confusion_table(fits: PaperResults) -> ResultTable:
     return ResultTable("confusion", title, note, rows, ("classifier", "on"))
 
 
-def _window_table(fits: PaperResults) -> ResultTable:
+def window_table(fits: PaperResults) -> ResultTable:
+    """Return Table II: the rates by window."""
     rows: list[Row] = []
     for window in _windows(fits.plan):
         for title, names in FEATURE_SETS.items():
@@ -216,7 +218,8 @@ def _window_table(fits: PaperResults) -> ResultTable:
     return ResultTable("window", title, note, rows, ("features", "N_w", "on"))
 
 
-def _ablation_table(fits: PaperResults) -> ResultTable:
+def ablation_table(fits: PaperResults) -> ResultTable:
+    """Return Table III: the rates by features."""
     rows: list[Row] = []
     for window in ABLATION_WINDOWS:
         for subset, paper in published.ABLATION.items():
@@ -228,7 +231,8 @@ def _ablation_table(fits: PaperResults) -> ResultTable:
     return ResultTable("ablation", title, note, rows, ("N_w", "features", "on"))
 
 
-def _unseen_table(fits: PaperResults) -> ResultTable:
+def unseen_table(fits: PaperResults) -> ResultTable:
+    """Return the accuracy on new recordings and objects."""
     rows: list[Row] = []
     for name, title in METHOD_TITLES.items():
         keys: Keys = {"classifier": title}
@@ -240,7 +244,8 @@ def _unseen_table(fits: PaperResults) -> ResultTable:
     return ResultTable("unseen", title, note, rows, ("classifier", "on"))
 
 
-def _finger_table(fits: PaperResults) -> ResultTable:
+def finger_table(fits: PaperResults) -> ResultTable:
+    """Return accuracy and FDR of every finger."""
     rows: list[Row] = []
     for finger in _fingers(fits.plan):
         for name, title in FINGER_TITLES.items():
@@ -259,7 +264,8 @@ def _finger_table(fits: PaperResults) -> ResultTable:
     return ResultTable("fingers", "Every finger [%]", note, rows, lines)
 
 
-def _zhang_table(fits: PaperResults) -> ResultTable:
+def zhang_table(fits: PaperResults) -> ResultTable:
+    """Return Zhang's threshold beside the paper's method."""
     methods = {
         "energy of F_x (Zhang), SVM": (_ZHANG, published.PUBLISHED_ZHANG),
         "energy of F_x, best cut": (_BEST_THRESHOLD, {}),
@@ -292,7 +298,7 @@ def _task(
 ) -> Task:
     roles = ("main", "fresh", "others")
     corpora = {role: plan.corpora[role] for role in roles if role in plan.corpora}
-    budget = _budget(plan)
+    budget = fit_budget(plan)
     arguments = (corpora, finger, window, variants, budget, plan.seed, thorough)
     cost = sum(
         1 + budget.trials * SECONDS_PER_TRIAL[base_name(classifier)] for classifier, _ in variants
@@ -300,7 +306,8 @@ def _task(
     return Task(f"paper/{name}", evaluate_variants, arguments, list[VariantResult], cost=cost)
 
 
-def _budget(plan: StudyPlan) -> FitBudget:
+def fit_budget(plan: StudyPlan) -> FitBudget:
+    """Return the limits of the work for one classifier."""
     return FitBudget(trials=5, n_fit=40_000) if plan.quick else FitBudget(30, N_FIT)
 
 
@@ -316,7 +323,7 @@ def _fingers(plan: StudyPlan) -> list[str]:
 
 def _protocol(plan: StudyPlan, result: VariantResult) -> Iterator[str]:
     """Yield sentences on how the values were computed."""
-    budget = _budget(plan)
+    budget = fit_budget(plan)
     yield (
         f"Protocol of the paper: samples of all recordings are pooled ({first_finger(plan)}, "
         f"N_w = {DEFAULT_WINDOW}), and 80 % of them are drawn at random for training. "
@@ -345,41 +352,26 @@ def _protocol(plan: StudyPlan, result: VariantResult) -> Iterator[str]:
         yield "Other objects: each is tested with a fit to the others, in the same way."
 
 
-def _window_figure(window: ResultTable) -> ReportFigure:
+def window_figure(window: ResultTable) -> ReportFigure:
     """Draw the rates of the deployed features by window, one panel for each rate."""
     rows = [row for row in window.rows if row.keys["features"] == "deployed"]
     names = list(dict.fromkeys(str(row.keys["figure"]) for row in rows))
-    groups = {
-        f"{name} [%]": _curves([r for r in rows if r.keys["figure"] == name]) for name in names
-    }
+    groups: dict[str, dict[str, PlottedCurve]] = {}
+    for name in names:
+        of_rate = [row for row in rows if row.keys["figure"] == name]
+        test_data = dict.fromkeys(str(row.keys["on"]) for row in of_rate)
+        curves = {
+            on: curve_of([row for row in of_rate if row.keys["on"] == on], "N_w")
+            for on in test_data
+        }
+        # The paper's value stands beside every kind of test data: one curve for all of them.
+        paper = {float(r.keys["N_w"]): r.paper for r in of_rate if r.paper is not None}
+        if paper:
+            curves[PAPER] = PlottedCurve(np.array(list(paper)), np.array(list(paper.values())))
+        groups[f"{name} [%]"] = curves
     caption = (
         "The paper's Table II as curves: LogReg on the deployed features by window. Bands are "
         "95 % intervals, by bootstrap over recordings. The line 'held out' is the protocol of the "
         "paper; the other lines are recordings and objects that were not used for training."
     )
     return ReportFigure("window", caption, draw_lines(groups, "$N_w$ [samples]", per_row=2))
-
-
-def _curves(rows: Sequence[Row]) -> dict[str, PlottedCurve]:
-    """Return the curves of one rate: ours by test data, and the paper's."""
-    test_data = dict.fromkeys(str(row.keys["on"]) for row in rows)
-    curves = {on: _curve([row for row in rows if row.keys["on"] == on]) for on in test_data}
-    paper = {_window_of(row): row.paper for row in rows if row.paper is not None}
-    if paper:
-        curves[PAPER] = PlottedCurve(np.array(list(paper)), np.array(list(paper.values())))
-    return curves
-
-
-def _curve(rows: Sequence[Row]) -> PlottedCurve:
-    ends = [row.interval or (None, None) for row in rows]
-    low, high = (np.array([_number(end[k]) for end in ends]) for k in (0, 1))
-    x = np.array([_window_of(row) for row in rows])
-    return PlottedCurve(x, np.array([_number(row.ours) for row in rows]), low, high)
-
-
-def _window_of(row: Row) -> float:
-    return float(row.keys["N_w"])
-
-
-def _number(value: float | None) -> float:
-    return np.nan if value is None else value

@@ -244,7 +244,19 @@ def _evaluate(
     in_training = main.parts >= N_HELD_OUT_PARTS
     train = samples.take(in_training)
     folds = main.parts[in_training] % N_FOLDS
-    parameters = _search(train, folds, recipe, budget.trials, seed)
+    # Hyper-parameters by Bayesian optimisation of the error over random folds, as in the paper.
+    parameters: Parameters = {}
+    if recipe.reference:
+        # The masks are thinned by the step by which `thin` takes the samples.
+        few = _ungrouped(thin(train, SEARCH_SAMPLES))
+        step = thinning_step(len(folds), SEARCH_SAMPLES)
+        masks = [folds[::step] == fold for fold in range(N_FOLDS)]
+        parameters = search(
+            few, masks, recipe, n_trials=budget.trials, seed=seed, objective="error"
+        )
+        # The search draws weights too, which the fits ignore: report those that were used.
+        if isinstance(recipe, FixedWeights):
+            parameters = recipe.fixed(parameters)
     fit = _Fit(recipe, parameters, budget.n_fit, seed)
     classifier = fit(train)
     counts = {HELD_OUT: confusion_counts(classifier, samples.take(~in_training), n)}
@@ -278,19 +290,3 @@ def _substitute_folds(
         # As many folds as objects, so each object is left out by itself.
         folds[UNSEEN_OBJECTS] = inner_folds(by_object, len(names), seed)
     return folds
-
-
-def _search(train: Samples, folds: Integers, recipe: Recipe, trials: int, seed: int) -> Parameters:
-    """Return hyper-parameters by Bayesian optimisation of the error over random folds.
-
-    The paper minimises the classification error in this way.
-    """
-    if not recipe.reference:
-        return {}
-    # The masks are thinned by the step by which `thin` takes the samples.
-    few = _ungrouped(thin(train, SEARCH_SAMPLES))
-    step = thinning_step(len(folds), SEARCH_SAMPLES)
-    masks = [folds[::step] == fold for fold in range(N_FOLDS)]
-    parameters = search(few, masks, recipe, n_trials=trials, seed=seed, objective="error")
-    # The search draws weights too, which the fits ignore: report those that were used.
-    return recipe.fixed(parameters) if isinstance(recipe, FixedWeights) else parameters

@@ -1,7 +1,7 @@
 """Part of the study: experiments 1 and 2 of the paper in numbers, over all recordings."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -17,7 +17,7 @@ from holdfast.contact import (
     UNSTABLE,
     Phase,
 )
-from holdfast.metrics import Decisions, FingerDecisions
+from holdfast.metrics import FingerDecisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import MIN_STABLE_DURATION
 from holdfast.metrics.masks import join_runs, runs
@@ -25,6 +25,7 @@ from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.study.comparison.jobs import short_title
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.error_breakdown import latest_rows
 from holdfast_lab.study.evaluation.evaluate_method import (
@@ -122,7 +123,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """Return the tables of experiment 1, experiment 2 and single disturbances."""
     by_method = {n: results[f"verdicts/{n}"] for n in _methods(plan) if f"verdicts/{n}" in results}
-    makers = (_failed_table, _disturbed_table, _single_table)
+    makers = (failed_table, disturbed_table, single_table)
     made = [make(by_method, plan.seed) for make in makers] if by_method else []
     return [table for table in made if table.rows]
 
@@ -165,18 +166,35 @@ def grasp_verdicts(
     tests = tuple(others.values())
     job = EvaluationJob(name, corpora["main"], ("recording",), tests, effort=effort, seed=seed)
     return [
-        _verdict(role, cases[role][scored.recording.name], scored)
+        verdict_of(role, cases[role][scored.recording.name], scored)
         for role, (_, recordings) in zip(("main", *others), score_splits(job), strict=True)
         for scored in recordings
     ]
 
 
-def _verdict(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
-    recording = scored.recording
+def verdict_of(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
+    """Return the verdict of a method on one scored grasp."""
+    recording, truth = scored.recording, scored.recording.truth
     decisions = scored.decide(recording.exact_labels)
-    contact, unstable = _contact_counts(decisions, recording.truth)
+    # Samples of a grasp, from the start of the closing until the release begins: all of them and
+    # those not called stable, in contact and labelled unstable.
+    contact, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
+    for finger in decisions.fingers.values():
+        if truth is None:
+            break
+        phase = truth.hand["phase"][latest_rows(truth, finger.times)]
+        closing = np.flatnonzero(phase == Phase.CLOSING)
+        grasp = np.zeros(len(phase), dtype=bool)
+        # Without a closing there is no grasp, and nothing counts.
+        grasp[closing[0] if len(closing) else len(phase) :] = True
+        grasp &= (phase != Phase.RELEASED) & (finger.states != UNKNOWN)
+        grasp &= (finger.labels != UNKNOWN) & (finger.labels != NO_CONTACT)
+        not_stable = finger.states != STABLE
+        is_unstable = grasp & (finger.labels == UNSTABLE)
+        contact += (grasp.sum(), (grasp & not_stable).sum())
+        unstable += (is_unstable.sum(), (is_unstable & not_stable).sum())
     stable_after = [
-        stable_after_lock(finger.times, finger.states, recording.truth)
+        stable_after_lock(finger.times, finger.states, truth)
         for finger in decisions.fingers.values()
     ]
     known = [time for time in stable_after if time is not None]
@@ -185,36 +203,12 @@ def _verdict(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
         recording=recording.name,
         object=recording.object or "",
         case=case,
-        contact=contact,
-        unstable=unstable,
+        contact=(int(contact[0]), int(contact[1])),
+        unstable=(int(unstable[0]), int(unstable[1])),
         first_stable=[first for first, _ in known],
         lasting_stable=[lasting for _, lasting in known],
-        disturbances=find_disturbances(decisions.hand, recording.truth),
+        disturbances=find_disturbances(decisions.hand, truth),
     )
-
-
-def _contact_counts(
-    decisions: Decisions, truth: Truth | None
-) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return samples, and those not called stable: in contact, and labelled unstable.
-
-    They are the samples of a grasp: from the start of the closing until the release begins.
-    """
-    contact, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
-    if truth is not None:
-        for finger in decisions.fingers.values():
-            phase = truth.hand["phase"][latest_rows(truth, finger.times)]
-            closing = np.flatnonzero(phase == Phase.CLOSING)
-            grasp = np.zeros(len(phase), dtype=bool)
-            # Without a closing there is no grasp, and nothing counts.
-            grasp[closing[0] if len(closing) else len(phase) :] = True
-            grasp &= (phase != Phase.RELEASED) & (finger.states != UNKNOWN)
-            grasp &= (finger.labels != UNKNOWN) & (finger.labels != NO_CONTACT)
-            not_stable = finger.states != STABLE
-            is_unstable = grasp & (finger.labels == UNSTABLE)
-            contact += (grasp.sum(), (grasp & not_stable).sum())
-            unstable += (is_unstable.sum(), (is_unstable & not_stable).sum())
-    return (int(contact[0]), int(contact[1])), (int(unstable[0]), int(unstable[1]))
 
 
 def stable_after_lock(
@@ -286,7 +280,8 @@ def find_disturbances(
     return disturbances
 
 
-def _failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    """Return the table of experiment 1."""
     rows: list[Row] = []
     for name, verdicts in by_method.items():
         failed = [verdict for verdict in verdicts if verdict.case == "failed"]
@@ -312,12 +307,13 @@ def _failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) ->
     )
 
 
-def _disturbed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def disturbed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    """Return the table of experiment 2."""
     rows: list[Row] = []
     for name, verdicts in by_method.items():
         whole = [verdict for verdict in verdicts if verdict.role not in ONLY_FAILED]
         for title, chosen in _groups([grasp for grasp in whole if grasp.case != "failed"]):
-            rows += _disturbed_rows({"on": title, "method": METHODS[name].title}, chosen, seed)
+            rows += disturbed_rows({"on": title, "method": METHODS[name].title}, chosen, seed)
     note = (
         "Grasps that held the object. Time from the lock to the first stable estimate of a "
         "finger, and to the first that stays stable for half a second; infinite if there is none. "
@@ -340,7 +336,8 @@ _LOCK_FIGURES = (
 )
 
 
-def _disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Iterator[Row]:
+def disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Iterator[Row]:
+    """Yield the rows of one line of the table of experiment 2."""
     first = [grasp.first_stable for grasp in chosen]
     lasting = [grasp.lasting_stable for grasp in chosen]
     for figure, values, q in zip(
@@ -358,15 +355,23 @@ def _disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> It
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
 
 
-def _single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    """Return the table of single disturbances."""
     del seed
     rows: list[Row] = []
     digits: dict[str, int] = {}
     for name, verdicts in by_method.items():
-        short = METHODS[name].title.split(" (", maxsplit=1)[0]
+        short = short_title(METHODS[name].title)
         detected, delay = f"{short}: detected", f"{short}: delay [s]"
         digits |= {detected: 0, delay: 3}
-        for grasp in _first_of_each_object(verdicts):
+        # The first recording with disturbances of each object; fresh ones, if there are.
+        disturbed = [one for one in verdicts if one.disturbances and one.case != "failed"]
+        role = "fresh" if any(one.role == "fresh" for one in disturbed) else "main"
+        first: dict[str, GraspVerdict] = {}
+        for grasp in sorted(disturbed, key=lambda grasp: grasp.recording):
+            if grasp.role == role:
+                first.setdefault(grasp.object, grasp)
+        for grasp in first.values():
             for number, disturbance in enumerate(grasp.disturbances, 1):
                 keys: Keys = {"recording": grasp.recording, "disturbance": number}
                 if name == next(iter(by_method)):
@@ -384,20 +389,6 @@ def _single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) ->
     lines = ("recording", "disturbance")
     digits |= {"slides": 0, "from [s]": 2, "to [s]": 2}
     return ResultTable("disturbances", title, note, rows, lines, digits_of=digits)
-
-
-def _first_of_each_object(verdicts: Iterable[GraspVerdict]) -> list[GraspVerdict]:
-    """Return the first recording with disturbances of each object; fresh ones, if there are."""
-    disturbed = [
-        verdict for verdict in verdicts if verdict.disturbances and verdict.case != "failed"
-    ]
-    roles = {grasp.role for grasp in disturbed}
-    role = "fresh" if "fresh" in roles else "main"
-    first: dict[str, GraspVerdict] = {}
-    for grasp in sorted(disturbed, key=lambda grasp: grasp.recording):
-        if grasp.role == role:
-            first.setdefault(grasp.object, grasp)
-    return list(first.values())
 
 
 def _groups(verdicts: Sequence[GraspVerdict]) -> Iterator[tuple[str, list[GraspVerdict]]]:

@@ -3,7 +3,8 @@
 A detector that sees a window of readings cannot distinguish such a sample from a stable one.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import msgspec
@@ -12,7 +13,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from holdfast.contact import NO_CONTACT, UNKNOWN, Cause, ContactState
 from holdfast.metrics.masks import Mask
-from holdfast.recordings import Recording, Tactile, label_states
+from holdfast.recordings import Tactile, label_states
 from holdfast.sensors.types import Array
 from holdfast_lab.study.paper.label_sources import relabelled
 from holdfast_lab.study.plan import Corpus
@@ -65,9 +66,23 @@ def count_hidden(corpus: Corpus, window: int) -> list[HiddenCounts]:
         corpus: of recordings that begin without contact; else the list is empty.
         window: N_w, samples in the window.
     """
-    found = [list(_recording_changes(corpus, recording, window)) for recording in corpus.load()]
+    found = []
+    for recording in corpus.load():
+        exact = relabelled(recording, "exact", corpus.tare).modules
+        changes = []
+        for name in corpus.fingers:
+            if name in exact and exact[name].n_samples:
+                module = exact[name]
+                states = label_states(module.labels, module.times)
+                first_contact = np.flatnonzero(states != NO_CONTACT)
+                at_rest = np.zeros(len(states), dtype=bool)
+                at_rest[: first_contact[0] if len(first_contact) else len(states)] = True
+                values = window_changes(module, window)
+                kinds = label_kinds(module)
+                changes.append(_Changes(name, values, at_rest, kinds, states != UNKNOWN))
+        found.append(changes)
     rest: dict[str, list[Array]] = {}
-    for change in (changes for recording in found for changes in recording):
+    for change in chain.from_iterable(found):
         rest.setdefault(change.finger, []).append(change.values[change.at_rest])
     limits = {}
     for finger, parts in rest.items():
@@ -112,19 +127,6 @@ def noise_limits(at_rest: Sequence[Array]) -> Array | None:
     every = np.concatenate([*at_rest, np.empty((0, 3))])
     every = every[~np.isnan(every).any(axis=1)]
     return np.quantile(every, NOISE_QUANTILE, axis=0) if len(every) else None
-
-
-def _recording_changes(corpus: Corpus, recording: Recording, window: int) -> Iterator[_Changes]:
-    for name in corpus.fingers:
-        if name not in recording.modules or not recording.modules[name].n_samples:
-            continue
-        module = relabelled(recording, "exact", corpus.tare).modules[name]
-        states = label_states(module.labels, module.times)
-        first_contact = np.flatnonzero(states != NO_CONTACT)
-        at_rest = np.zeros(len(states), dtype=bool)
-        at_rest[: first_contact[0] if len(first_contact) else len(states)] = True
-        values = window_changes(module, window)
-        yield _Changes(name, values, at_rest, label_kinds(module), states != UNKNOWN)
 
 
 def label_kinds(module: Tactile) -> list[str]:

@@ -15,8 +15,8 @@ from holdfast_lab.study.comparison import (
     sensitivity,
     strongest,
 )
-from holdfast_lab.study.comparison.error_tables import force_quartiles
 from holdfast_lab.study.comparison.rows import correct_and_all
+from holdfast_lab.study.comparison.sample_tables import force_quartiles
 from holdfast_lab.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.methods import METHODS

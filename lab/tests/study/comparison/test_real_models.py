@@ -141,17 +141,17 @@ class TestHand:
             self.finger([STABLE, UNSTABLE, STABLE, STABLE], [0.7, 0.1, 0.6, 0.5]),
             self.finger([STABLE, STABLE, STABLE, STABLE], [0.8, 0.8, 0.8, 0.8]),
         ]
-        assert real_models._hand_probability(fingers).tolist() == [0.7, 0.1, 0.6, 0.5]
+        assert real_models.smallest_probability(fingers).tolist() == [0.7, 0.1, 0.6, 0.5]
 
     def test_without_enough_contacts_every_finger_keeps_its_score(self):
         fingers = [
             self.finger([NO_CONTACT, STABLE, NO_CONTACT, UNKNOWN], [0.3, 0.8, 0.2, np.nan]),
             self.finger([NO_CONTACT, NO_CONTACT, STABLE, STABLE], [0.7, 0.1, 0.6, 0.5]),
         ]
-        assert real_models._hand_probability(fingers).tolist() == [0.3, 0.1, 0.2, 0.5]
+        assert real_models.smallest_probability(fingers).tolist() == [0.3, 0.1, 0.2, 0.5]
 
     def test_a_decision_lasts_until_the_next(self):
         decided = FingerDecisions([0.01, 0.03], [0, 0], [STABLE, UNSTABLE], [0.9, 0.1])
-        latest = real_models._latest(decided, np.array([0.0, 0.01, 0.02, 0.03, 0.04]))
+        latest = real_models.latest_decisions(decided, np.array([0.0, 0.01, 0.02, 0.03, 0.04]))
         assert latest.states.tolist() == [UNKNOWN, STABLE, STABLE, UNSTABLE, UNSTABLE]
         assert latest.stable_probability.tolist()[1:] == [0.9, 0.9, 0.1, 0.1]

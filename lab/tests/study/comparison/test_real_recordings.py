@@ -142,7 +142,8 @@ def test_one_finger_has_no_whole_hand_methods(corpus):
 
 def test_the_caveat_of_the_box_is_given_for_the_box_only(corpus, made, monkeypatch):
     assert "one box" not in made["real"].note
-    monkeypatch.setattr(real_recordings, "_is_box", lambda _: True)
+    own = corpus.load()[0].metadata.get("source")
+    monkeypatch.setattr(real_recordings.uskin_pick_move, "SOURCE", own)
     plan = StudyPlan({"main": corpus}, real=corpus)
     monkeypatch.setattr(jobs, "METHODS", {"logreg": METHODS["logreg"]})
     untouched = {"untouched": real_recordings.MODELS["untouched"]}

@@ -1,13 +1,21 @@
-"""Methods on the fingertip force itself."""
+"""Methods on the fingertip force itself, and on its vibration."""
 
 import numpy as np
 import pytest
 
 from holdfast.classifiers import Samples
+from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
+from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.study.methods import METHODS
-from holdfast_lab.study.methods.force_rules import MIN_TANGENTIAL_FORCE
+from holdfast_lab.study.methods.force_rules import (
+    BANDS,
+    MIN_TANGENTIAL_FORCE,
+    band_energy,
+    band_pass,
+    high_pass,
+)
 
-from .patch_signals import pressed
+from .patch_signals import along_normal, pressed
 
 FRICTION = METHODS["friction"]
 
@@ -55,3 +63,109 @@ def test_force_difference_by_hand():
     hand = pressed([[0, 0, 0], [3, 4, 0], [3, 4, 12], [3, 4, 12]], rate=100.0)
     found = METHODS["difference"].features(hand)["index"]
     np.testing.assert_allclose(found[:, 0], [np.nan, 500, 1200, 0])
+
+
+SERVO = METHODS["slip_servo"]
+RATE = 10 * np.pi
+"""At which a = 1 / (1 + 2 pi 5 / rate) = 1 / 2."""
+
+
+def test_high_pass_by_hand():
+    # y_0 = 0, then y_k = (y_(k-1) + x_k - x_(k-1)) / 2.
+    found = high_pass(np.array([10.0, 14.0, 14.0, 6.0, 7.0]), RATE)
+    np.testing.assert_allclose(found, [0, 2, 1, -3.5, -1.25])
+
+
+def test_high_pass_of_a_sum_is_the_sum_of_high_passes():
+    pads = np.random.default_rng(0).normal(size=(15, 80))
+    np.testing.assert_allclose(
+        high_pass(pads.sum(axis=0), 150.0), sum(high_pass(pad, 150.0) for pad in pads), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(("frequency", "gain"), [(0.8, 0.5), (2.0, 1.0), (5.0, 0.5), (40.0, 0.0)])
+def test_band_pass_lets_its_band_through(frequency, gain):
+    """Half the power at the ends of the band, all of it at their geometric mean."""
+    times = np.arange(6000) / 150.0
+    found = band_pass(np.sin(2 * np.pi * frequency * times), 150.0)[3000:]
+    assert 2 * (found**2).mean() == pytest.approx(gain, abs=0.02)
+
+
+def test_the_slip_ratio_by_hand():
+    # Newtons, the rate at which a = 1 / 2. |F_hp| after the step of 0.02 N is 0.01 N, and
+    # 0.007 |F| is under 0.048 N; the grip does not change yet: |F_bp| < 0.18 N.
+    hand = pressed(along_normal([1.0, 1.02, 1.02]), RATE, "N")
+    found = SERVO.features(hand)["index"][:, 0]
+    np.testing.assert_allclose(found, [0, 0.01 / 0.048, 0.005 / 0.048])
+
+
+@pytest.mark.parametrize(("held", "least"), [(2.0, 0.048), (10.0, 0.07), (50.0, 0.2)])
+def test_the_threshold_grows_with_the_force_between_its_limits(held, least):
+    hand = pressed(along_normal([held, held + 0.1]), RATE, "N")
+    threshold = np.clip(0.007 * (held + 0.1), 0.048, 0.2)
+    assert threshold == pytest.approx(least, rel=0.02)
+    assert SERVO.features(hand)["index"][1, 0] == pytest.approx(0.05 / threshold)
+
+
+def test_nothing_is_slip_while_the_grip_changes():
+    closing = np.concatenate([np.zeros(50), np.linspace(0, 20, 100)])
+    found = SERVO.features(pressed(along_normal(closing), 150.0, "N"))["index"][:, 0]
+    slow = np.abs(band_pass(closing, 150.0))
+    fast = np.abs(high_pass(closing, 150.0))
+    assert (slow[80:] > 0.18).all()
+    assert (fast[80:] > 0.2).all()
+    assert (found[80:] == 0).all()
+
+
+def test_vibration_in_counts_is_that_in_nominal_newtons():
+    newtons = along_normal(np.random.default_rng(0).normal(size=100) * 0.05 + 3)
+    counts = newtons / 0.000729
+    one, two = (pressed(newtons, 150.0, "N"), pressed(counts, 150.0, "count"))
+    np.testing.assert_allclose(SERVO.features(one)["index"], SERVO.features(two)["index"])
+
+
+def test_a_nominal_newton_is_that_of_the_twin():
+    assert UskinParameters().counts_per_newton[2] == pytest.approx(1 / NEWTONS_PER_NORMAL_COUNT)
+
+
+def sine(frequency, amplitude, n=100, rate=150.0):
+    return amplitude * np.sin(2 * np.pi * frequency * np.arange(n) / rate + 0.3)[:, None]
+
+
+def test_band_energy_by_hand():
+    """Four samples: w = 0, 1/2, 1, 1/2, so that N sum w^2 / 2 = 3; bins at 0, 1 and 2 Hz."""
+    # Less their mean of 2, times w: 0, 1, 0, -1. |X| at 1 Hz: |-1j - 1j| = 2; at 2 Hz: 0.
+    found = band_energy(np.array([[2.0], [4.0], [2.0], [0.0]]), 4.0, ((1, 2), (2, 3)), 1.0)
+    np.testing.assert_allclose(found, [[np.nan] * 2] * 3 + [[4 / 3, 0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("amplitude", [1.0, 30.0])
+def test_a_sine_inside_a_band_shows_its_power_there_and_nowhere_else(amplitude):
+    found = band_energy(sine(40.0, amplitude), 150.0, BANDS)[29:]
+    power = amplitude**2 / 2
+    np.testing.assert_allclose(found / power, [[0, 0, 1, 0, 1]] * 71, atol=1e-12)
+
+
+def test_the_window_of_the_spectrum_slides():
+    values = np.random.default_rng(0).normal(size=(90, 3)) * [1, 20, 3] + [0, 50, 4000]
+    found = METHODS["spectrum"].features(pressed(values, 150.0))["index"]
+    weights = np.hanning(31)[:30]
+    for k in (29, 50, 89):
+        window = values[k - 29 : k + 1]
+        power = np.abs(np.fft.fft((window - window.mean(axis=0)) * weights[:, None], axis=0)) ** 2
+        bins = [[1, 2], [3, 4, 5], [6, 7, 8, 9], [10, 11, 12, 13, 14], list(range(1, 15))]
+        wanted = [power[b].sum() * 2 / (30 * (weights**2).sum()) for b in bins]
+        np.testing.assert_allclose(10 ** found[k], wanted)
+    assert np.isnan(found[:29]).all()
+
+
+def test_the_energy_of_a_constant_force_is_finite():
+    found = METHODS["spectrum"].features(pressed(np.full((60, 3), 7.0), 150.0))["index"]
+    np.testing.assert_allclose(found[29:], -12, atol=0.01)
+
+
+def test_bands_above_half_the_rate_are_empty():
+    noise = np.random.default_rng(0).normal(size=(60, 3))
+    found = METHODS["spectrum"].features(pressed(noise, 60.0))["index"][20:]
+    assert (found[:, 3] == -12).all()
+    assert (found[:, :2] > -6).all()

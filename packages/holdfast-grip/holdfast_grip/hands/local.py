@@ -46,7 +46,13 @@ class ScalarGripper(HandDevice):
         self, function: Callable[[float], object], name: str = "call:", resource: str | None = None
     ) -> None:
         self.name = name
-        self.heartbeat = _heartbeat(function, name)
+        beat = getattr(function, "heartbeat", None)
+        if beat is not None and not (isinstance(beat, int | float) and 0.0 < beat < math.inf):
+            raise ValueError(
+                f"{name}: the attribute heartbeat of the function: a time above 0 s expected, "
+                f"{beat!r} given"
+            )
+        self.heartbeat = None if beat is None else float(beat)
         self.needs_idle = bool(getattr(function, "needs_idle", False))
         self._function = function
         self._resource = name if resource is None else resource
@@ -130,19 +136,6 @@ def _resource(module: ModuleType, name: str) -> str:
 def largest_scale(command: GripCommand) -> float:
     """Return the force scale of a gripper: the largest of all fingers, 1 without any."""
     return max((finger.scale for finger in command.fingers.values()), default=1.0)
-
-
-def _heartbeat(function: Callable[[float], object], name: str) -> float | None:
-    """Return the attribute `heartbeat` of a function [s]; None without one."""
-    found = getattr(function, "heartbeat", None)
-    if found is None:
-        return None
-    if not isinstance(found, int | float) or not 0.0 < found < math.inf:
-        raise ValueError(
-            f"{name}: the attribute heartbeat of the function: a time above 0 s expected, "
-            f"{found!r} given"
-        )
-    return float(found)
 
 
 class LogFile(HandDevice):

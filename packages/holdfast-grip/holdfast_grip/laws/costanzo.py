@@ -85,11 +85,26 @@ class Costanzo(Law):
         load = sum(touch.tangential for touch in touches)
         # At most the whole step: after a pause the filter would overshoot.
         self._load += min(dt / LOAD_SMOOTHING, 1.0) * (load - self._load)
-        slip = self._slip(touches)
+        # The friction of the fingers that slide; their slip, 0 to 1, by their share of the force.
+        sliding = [touch for touch in touches if touch.slip_probability > self.slip_level]
+        press, slip = sum(touch.normal for touch in sliding), 0.0
+        if press > 0:
+            ratio = sum(touch.tangential for touch in sliding) / press
+            self._friction = min(self._friction, max(ratio, self.least_friction))
+            total = sum(touch.normal for touch in touches)
+            above = sum(one.normal * (one.slip_probability - self.slip_level) for one in sliding)
+            slip = above / (total * (1.0 - self.slip_level))
         static = max(STATIC_MARGIN * self._load / self._friction, LEAST_STATIC_FORCE)
         scale = max(touch.scale for touch in touches)
-        if slip > 0:
-            return [self._pressed(static, slip, scale, time, dt)] * len(touches)
+        if slip > 0:  # the PI controller, which only raises the force
+            self.relaxation.slipped(scale, time)
+            self._integral += self.gain * INTEGRAL_GAIN * slip * dt
+            self._integral = min(self._integral, LARGEST_DYNAMIC_FORCE)
+            proportional = self.gain * PROPORTIONAL_GAIN * slip
+            dynamic = min(proportional + self._integral, LARGEST_DYNAMIC_FORCE)
+            wanted = (static + dynamic) / self._start_force
+            reason = GripReason.SLIP if wanted > scale else GripReason.NONE
+            return [(max(wanted, scale), reason)] * len(touches)
         least = static / self._start_force
         if least > STATIC_RISE * scale:
             return [(least, GripReason.MARGIN)] * len(touches)
@@ -97,24 +112,3 @@ class Costanzo(Law):
         # The integral falls with the force, or the next slip would begin with the old one.
         self._integral = min(self._integral, max(wish[0] - least, 0.0) * self._start_force)
         return [wish] * len(touches)
-
-    def _slip(self, touches: Sequence[Touch]) -> float:
-        """Return the slip of the hand, 0 to 1; learn the friction of the fingers that slide."""
-        sliding = [touch for touch in touches if touch.slip_probability > self.slip_level]
-        press = sum(touch.normal for touch in sliding)
-        if press <= 0:
-            return 0.0
-        ratio = sum(touch.tangential for touch in sliding) / press
-        self._friction = min(self._friction, max(ratio, self.least_friction))
-        total = sum(touch.normal for touch in touches)
-        above = sum(touch.normal * (touch.slip_probability - self.slip_level) for touch in sliding)
-        return above / (total * (1.0 - self.slip_level))
-
-    def _pressed(self, static: float, slip: float, scale: float, time: float, dt: float) -> Wish:
-        """Return the scale of the PI controller, which only raises the force."""
-        self.relaxation.slipped(scale, time)
-        self._integral += self.gain * INTEGRAL_GAIN * slip * dt
-        self._integral = min(self._integral, LARGEST_DYNAMIC_FORCE)
-        dynamic = min(self.gain * PROPORTIONAL_GAIN * slip + self._integral, LARGEST_DYNAMIC_FORCE)
-        wanted = (static + dynamic) / self._start_force
-        return (max(wanted, scale), GripReason.SLIP if wanted > scale else GripReason.NONE)

@@ -12,7 +12,7 @@ and fall were tuned by the rule for all rivals (docs/study/grip.md).
 from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Law, Touch, Wish
+from holdfast_grip.laws.base import Law, Touch, Wish, stay
 
 FORCE_MARGIN = 1.3
 """Factor of the least normal force."""
@@ -60,22 +60,23 @@ class FrictionMargin(Law):
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
         """Return the scale that the tangential force of each finger needs."""
-        return [self._wish(k, touch, dt) for k, touch in enumerate(touches)]
-
-    def _wish(self, k: int, touch: Touch, dt: float) -> Wish:
-        if not (touch.known and touch.normal > LOWEST_FORCE and touch.start_normal > 0):
-            return (touch.scale, GripReason.NONE)
-        ratio = touch.tangential / touch.normal
-        if touch.probability >= STABLE_PROBABILITY:
-            self._friction[k] = max(self._friction[k], ratio)
-        # A finger that slips below the known coefficient shows a lower one.
-        elif ratio < self._friction[k]:
-            self._friction[k] = max(self.first_friction, SLIP_SHARE * ratio)
-        target = max(self.margin * touch.tangential / self._friction[k], LOWEST_FORCE)
-        scale = target / touch.start_normal
-        if scale > touch.scale:
+        wishes = stay(touches)
+        for k, touch in enumerate(touches):
+            # Without a force nothing is known of the friction: the scale stays.
+            if not (touch.known and touch.normal > LOWEST_FORCE and touch.start_normal > 0):
+                continue
+            ratio = touch.tangential / touch.normal
+            if touch.probability >= STABLE_PROBABILITY:
+                self._friction[k] = max(self._friction[k], ratio)
+            # A finger that slips below the known coefficient shows a lower one.
+            elif ratio < self._friction[k]:
+                self._friction[k] = max(self.first_friction, SLIP_SHARE * ratio)
+            target = max(self.margin * touch.tangential / self._friction[k], LOWEST_FORCE)
+            scale = target / touch.start_normal
+            if scale <= touch.scale:
+                share = max(1.0 - self.fall * dt, FALL_SHARE)
+                wishes[k] = (max(scale, share * touch.scale), GripReason.RELAX)
             # Two margins: a rise begins below the lower one, and ends at the upper one.
-            acts = self.acts_at * scale > self.margin * touch.scale
-            return (scale, GripReason.MARGIN) if acts else (touch.scale, GripReason.NONE)
-        share = max(1.0 - self.fall * dt, FALL_SHARE)
-        return (max(scale, share * touch.scale), GripReason.RELAX)
+            elif self.acts_at * scale > self.margin * touch.scale:
+                wishes[k] = (scale, GripReason.MARGIN)
+        return wishes

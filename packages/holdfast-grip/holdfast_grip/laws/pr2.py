@@ -75,14 +75,10 @@ class _Filters:
         a, b, c = self._high
         self._high = keep * (a + x - u), keep * (b + y - v), keep * (c + z - w)
         self._last = touch.force
-        self._slow += (touch.normal - self._slow) * _share(dt, BAND[0])
-        self._fast += (touch.normal - self._fast) * _share(dt, BAND[1])
+        # A low-pass filter of first order follows this share of a step.
+        slow, fast = (dt * 2 * math.pi * corner for corner in BAND)
+        self._slow += (touch.normal - self._slow) * (slow / (1.0 + slow))
+        self._fast += (touch.normal - self._fast) * (fast / (1.0 + fast))
         threshold = factor * min(max(SHARE * math.hypot(x, y, z), LOWEST), HIGHEST)
         band_pass = abs(self._fast - self._slow)
         return math.hypot(*self._high) > threshold and band_pass < SLOW_LIMIT
-
-
-def _share(dt: float, corner: float) -> float:
-    """Return the share of a step that a first-order low-pass filter follows."""
-    step = dt * 2 * math.pi * corner
-    return step / (1.0 + step)

@@ -12,7 +12,7 @@ RELAXATION_MARGIN = 1.25
 class Relaxation:
     """Slow fall of a force scale to a margin above the force of the last slip, 1 at least.
 
-    The published laws end a grip with the highest force that a slip asked for. This rule is an
+    The published laws end a grip with the highest force that a slip required. This rule is an
     addition, the same for each law that has it. A slip within the settle time after another one
     belongs to that one. A false slip at a lower force lowers the floor again.
 

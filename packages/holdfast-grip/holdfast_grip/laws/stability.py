@@ -204,38 +204,31 @@ class Stability(Law):
     def _react(self, doubt: float, scale: float, time: float, dt: float) -> None:
         """Begin a step if the doubt lasts; else follow a load that grows."""
         since = time - self._stepped_at
-        if since < self.refractory or self._is_explained(time):
+        # A jerk of the hand explains a doubt, unless load is missing.
+        is_held = self._load >= (1.0 - JERK_MISSING_LOAD) * self._calm_load
+        if since < self.refractory or (is_held and time - self._jerked_at < JERK_TIME):
             self._sum = 0.0
             return
-        missing = self._missing(time) if doubt > self.hold_level else 0.0
+        is_falling = time - self._fell_at < self.episode
+        missing, load = 0.0, self._calm_load
+        if doubt > self.hold_level:
+            # Load that a falling force takes along is not missing: 50 false rises in 34 long holds
+            # became 14 (docs/decisions/0025).
+            if is_falling and self._calm_press > 0:
+                load *= min(self._press / self._calm_press, 1.0)
+            missing = max(1.0 - self._load / load, 0.0) if load > 0 else 0.0
         evidence = doubt + self.missing_gain * missing
-        self._sum = max(0.0, self._sum + (evidence - self._level(since, time)) * dt)
+        # A step counts until the doubt has come below its level once, a fall for an episode.
+        level = self.hold_level
+        if since < self.episode:
+            level = self.again_level
+        elif self._rested_at < self._stepped_at or is_falling:
+            level = self.fall_level
+        self._sum = max(0.0, self._sum + (evidence - level) * dt)
         if self._sum >= self.reaction:
             self._step(min(evidence, LARGEST_DOUBT), scale, time, missing)
         elif doubt > self.hold_level:
             self._follow_load(scale, time)
-
-    def _missing(self, time: float) -> float:
-        """Return the share of the load of the calm grip that is missing, beyond a fall of N."""
-        load = self._calm_load
-        # Load that a falling force takes along is not missing: 50 false rises in 34 long holds
-        # became 14 (docs/decisions/0025).
-        if time - self._fell_at < self.episode and self._calm_press > 0:
-            load *= min(self._press / self._calm_press, 1.0)
-        return max(1.0 - self._load / load, 0.0) if load > 0 else 0.0
-
-    def _is_explained(self, time: float) -> bool:
-        """Return whether a jerk of the hand explains a doubt at this time."""
-        is_held = self._load >= (1.0 - JERK_MISSING_LOAD) * self._calm_load
-        return is_held and time - self._jerked_at < JERK_TIME
-
-    def _level(self, since: float, time: float) -> float:
-        """Return the level of the doubt, at a time since the last step."""
-        if since < self.episode:
-            return self.again_level
-        # A step counts until the doubt has come below its level once, a fall for an episode.
-        is_stirred = self._rested_at < self._stepped_at or time - self._fell_at < self.episode
-        return self.fall_level if is_stirred else self.hold_level
 
     def _step(self, evidence: float, scale: float, time: float, missing: float) -> None:
         """Begin a step; the first one of an episode shows the friction."""

@@ -57,11 +57,11 @@ class WongZhu(Law):
                 self._last[k] = touch.tangential
         if self.together and any(slips):
             slips = [True] * len(slips)
-        return [self._wish(k, touch, slips[k], time, dt) for k, touch in enumerate(touches)]
-
-    def _wish(self, k: int, touch: Touch, slips: bool, time: float, dt: float) -> Wish:
-        relaxation = self._relaxations[k]
-        if not slips:
-            return relaxation.wish(touch.scale, time, dt)
-        relaxation.slipped(touch.scale, time)
-        return (touch.scale * self.gain, GripReason.SLIP)
+        wishes: list[Wish] = []
+        for touch, relaxation, slipping in zip(touches, self._relaxations, slips, strict=True):
+            if slipping:
+                relaxation.slipped(touch.scale, time)
+                wishes.append((touch.scale * self.gain, GripReason.SLIP))
+            else:
+                wishes.append(relaxation.wish(touch.scale, time, dt))
+        return wishes

@@ -102,41 +102,31 @@ def explain_fault(
     """
     key = ENDED if failure else reason
     meaning = GRIP_FAULTS.get(key, UNKNOWN_FAULT)
-    return GripFault(
-        reason=key,
-        happened=f"{meaning.happened} {meaning.advice}",
-        commanded=_commanded(limits, armed=armed, released=released, ended=bool(failure)),
-        continues=_continues(meaning, limits, ended=bool(failure)),
-        reset=_reset(limits, ended=bool(failure)),
+    opens = limits.on_fault == "open"
+    commanded = "Held: the last command stays, no force rises or falls."
+    continues = (
+        "Estimates go on. Control continues by itself "
+        f"after {limits.recovery:g} s of valid samples."
     )
-
-
-def _commanded(limits: Limits, *, armed: bool, released: bool, ended: bool) -> str:
-    if not armed:
-        return "Dry run: nothing is sent to the hand."
-    if ended:
-        action = "opens the hand" if limits.on_fault == "open" else "keeps the last command"
-        return f"Nothing is sent any more; the watchdog {action}."
-    if released:
-        return "Released: the hand is commanded to open."
-    return "Held: the last command stays, no force rises or falls."
-
-
-def _continues(meaning: FaultMeaning, limits: Limits, *, ended: bool) -> str:
-    if ended:
-        return "Control has ended; only the estimates go on."
-    if meaning.lasts or limits.on_fault == "open" or math.isinf(limits.recovery):
-        return "Estimates go on. Control stays off, in later grasps too, until Reset."
-    wait = f"after {limits.recovery:g} s of valid samples"
-    return f"Estimates go on. Control continues by itself {wait}."
-
-
-def _reset(limits: Limits, *, ended: bool) -> str:
-    if ended:
-        return "Reset has no effect: end this program, and start it again."
-    if limits.on_fault == "open":
-        return "Reset waits for the next grip; it never closes the hand."
-    return (
+    reset = (
         "Reset continues with these forces if the grip still touches the object; else it waits "
         "for the next grip."
+    )
+    if released:
+        commanded = "Released: the hand is commanded to open."
+    if opens:
+        reset = "Reset waits for the next grip; it never closes the hand."
+    if meaning.lasts or opens or math.isinf(limits.recovery):
+        continues = "Estimates go on. Control stays off, in later grasps too, until Reset."
+    # The end of the loop outranks what the fault would be in a loop that runs.
+    if failure:
+        action = "opens the hand" if opens else "keeps the last command"
+        commanded = f"Nothing is sent any more; the watchdog {action}."
+        continues = "Control has ended; only the estimates go on."
+        reset = "Reset has no effect: end this program, and start it again."
+    if not armed:
+        commanded = "Dry run: nothing is sent to the hand."
+    happened = f"{meaning.happened} {meaning.advice}"
+    return GripFault(
+        reason=key, happened=happened, commanded=commanded, continues=continues, reset=reset
     )

@@ -130,7 +130,14 @@ class GripLoop:
         # The first IDLE command after a reset has released the hand; no other one is sent.
         repeats = self._stays_open and before is not None and before.state is LoopState.IDLE
         if self.armed:
-            self._send(self.last, is_new=admitted is not None and not repeats)
+            self._beat(self.last)
+            if admitted is not None and not repeats:
+                self.n_sent += self.hand.send(self.last)
+                self._sent = self.last
+                if self._watchdog is not None:
+                    # If this process was stopped between heartbeat and command, the watchdog has
+                    # taken over before the command left: the loop ends with the safe command.
+                    self._watchdog.check()
         return self.last
 
     def follow(self, estimate: HandEstimate, time: float) -> None:
@@ -190,20 +197,6 @@ class GripLoop:
         if math.isfinite(time):
             return time
         return self._now if math.isfinite(self._now) else 0.0
-
-    def _send(self, command: GripCommand, *, is_new: bool) -> None:
-        """Send a heartbeat, and the command if it is new.
-
-        If the process was stopped between heartbeat and command, the watchdog has taken over
-        before the command left. The check after it finds this, and the loop ends with the safe
-        command.
-        """
-        self._beat(command)
-        if is_new:
-            self.n_sent += self.hand.send(command)
-            self._sent = command
-            if self._watchdog is not None:
-                self._watchdog.check()
 
     def _beat(self, command: GripCommand) -> None:
         if self._watchdog is not None:

@@ -10,10 +10,9 @@ from typing import Self
 from msgspec.structs import asdict
 
 from holdfast.live.session import Session
-from holdfast_grip.command import GripCommand, GripReason, LoopState
-from holdfast_grip.documents import GripDocument, GripEntry, GripFault, GripFinger
+from holdfast_grip.command import GripReason, LoopState
+from holdfast_grip.documents import GripDocument, GripEntry, GripFinger
 from holdfast_grip.errors import HandError
-from holdfast_grip.limits import Limits
 from holdfast_grip.loop.grip_faults import explain_fault
 from holdfast_grip.loop.grip_loop import GripLoop
 from holdfast_grip.loop.runner import LoopRunner
@@ -97,6 +96,15 @@ class LiveGrip:
         loop, last = self._loop, self._loop.last
         limits, highest = loop.controller.limits, loop.controller.highest_scales
         state = LoopState.FAULT if self.failure else last.state if last else LoopState.IDLE
+        fault = None
+        if state is LoopState.FAULT:
+            fault = explain_fault(
+                last.reason if last else "",
+                limits,
+                armed=loop.armed,
+                released=last is not None and last.release,
+                failure=str(self.failure or ""),
+            )
         return GripDocument(
             hand=loop.hand.name,
             law=self._law,
@@ -114,18 +122,8 @@ class LiveGrip:
             n_sent=loop.n_sent,
             failure=str(self.failure or ""),
             events=list(self._log.entries),
-            fault=self._fault(limits, last) if state is LoopState.FAULT else None,
+            fault=fault,
             waiting=loop.controller.waits_for if state is LoopState.IDLE else "",
-        )
-
-    def _fault(self, limits: Limits, last: GripCommand | None) -> GripFault:
-        """Return the explanation of the fault."""
-        return explain_fault(
-            last.reason if last else "",
-            limits,
-            armed=self._loop.armed,
-            released=last is not None and last.release,
-            failure=str(self.failure or ""),
         )
 
     def _ended(self) -> "Future[None] | None":

@@ -25,7 +25,7 @@ from holdfast.errors import HoldfastError
 from holdfast_grip.command import GripCommand, GripReason, LoopState
 from holdfast_grip.errors import HandError
 from holdfast_grip.guard import safe_command
-from holdfast_grip.hands import HandDevice, open_hand
+from holdfast_grip.hands import open_hand
 from holdfast_grip.limits import FaultAction
 
 TIMEOUT = 0.1
@@ -235,8 +235,14 @@ def main(uri: str, on_fault: str, timeout: str) -> int:
     pipe = sys.stdin.fileno()
     last = _watch(pipe, float(timeout))
     os.close(pipe)  # the next heartbeat of the loop fails, before it can send an old command
-    if last is not None:
-        _take_over(hand, last, release=on_fault == "open")
+    release = on_fault == "open"
+    # Nothing to hold in a hand that has no grip yet.
+    if last is not None and (release or last.state is not LoopState.IDLE):
+        command = safe_command(last, GripReason.WATCHDOG, release=release)
+        for _ in range(N_SAFE_COMMANDS):
+            with suppress(HandError):  # the next attempt may pass
+                hand.send(command, repeat=True)
+            time.sleep(SAFE_COMMAND_PERIOD)
     hand.close()
     return int(last is not None)
 
@@ -262,14 +268,3 @@ def _watch(pipe: int, timeout: float) -> GripCommand | None:
         if not data:
             break
     return last
-
-
-def _take_over(hand: HandDevice, last: GripCommand, *, release: bool) -> None:
-    """Send the safe command several times; none to hold a hand that has no grip yet."""
-    if last.state is LoopState.IDLE and not release:
-        return
-    command = safe_command(last, GripReason.WATCHDOG, release=release)
-    for _ in range(N_SAFE_COMMANDS):
-        with suppress(HandError):  # the next attempt may pass
-            hand.send(command, repeat=True)
-        time.sleep(SAFE_COMMAND_PERIOD)

@@ -99,6 +99,7 @@ def check_space(files: Sequence[PublicFile], folder: Path) -> None:
     Raises:
         OutputError: it has not.
     """
+    # The folder may not exist yet: its disk is that of the first one around it that does.
     existing = next(place for place in (folder, *folder.parents) if place.exists())
     needed = sum(file.size or 0 for file in files if not (folder / file.path).exists())
     free = shutil.disk_usage(existing).free
@@ -141,8 +142,16 @@ def _fetch(
             target.unlink()
         return Path(storage.fetch(file.path, downloader=_Download(part, file, report)))
     except requests.RequestException as cause:
-        if cause.response is not None:
-            raise _refusal(public, file, url, cause.response) from cause
+        answer = cause.response
+        if answer is not None and answer.status_code in (404, 410):
+            raise SourceError(
+                f"{public.name}: {file.path} is gone ({answer.status_code} at {url}); there are "
+                f"also {other_sets(public.name)}"
+            ) from cause
+        if answer is not None:
+            raise SourceError(
+                f"{public.name}: {url} answers {answer.status_code} {answer.reason}"
+            ) from cause
         raise SourceError(
             f"{public.name}: {url} cannot be reached ({type(cause).__name__}); what was loaded is "
             "kept, and the same command continues"
@@ -156,16 +165,6 @@ def _fetch(
             f"{public.name}: {url} has another sha256 than {file.sha256}, which is expected; the "
             "file was thrown away"
         ) from cause
-
-
-def _refusal(public: PublicSet, file: PublicFile, url: str, answer: "Response") -> SourceError:
-    """Return the error of a server that answers without the file."""
-    if answer.status_code in (404, 410):
-        return SourceError(
-            f"{public.name}: {file.path} is gone ({answer.status_code} at {url}); there are also "
-            f"{other_sets(public.name)}"
-        )
-    return SourceError(f"{public.name}: {url} answers {answer.status_code} {answer.reason}")
 
 
 class _Download:
@@ -189,6 +188,7 @@ class _Download:
         from requests import Timeout
         from requests.exceptions import ChunkedEncodingError
 
+        # Each try continues where the last one ended.
         for tries_left in reversed(range(MAX_DOWNLOAD_TRIES)):
             try:
                 self._load(url)
@@ -196,10 +196,12 @@ class _Download:
             except (Disconnected, ChunkedEncodingError, Timeout):
                 if not tries_left:
                     raise
+        # A server may send the pointer of Git LFS in place of the content.
         if is_lfs_pointer(self._part):
             text = refusal_of_lfs_pointer(self._part).partition(" is ")[2]
             self._part.unlink()
             raise SourceError(f"{url} is {text}")
+        # pooch checks a sum that is known; without one, the length is all that can be checked.
         if self._file.sha256 is None and (n_bytes := self._part.stat().st_size) != self._size:
             self._part.unlink()
             expected = "no length is known" if self._size is None else f"{self._size} expected"
@@ -218,11 +220,13 @@ class _Download:
         n_done = _incomplete_size(self._part)
         if n_done and n_done == self._file.size:
             return
+        # A packed body has no place from which to continue, and may unpack to any size.
         headers = {"Accept-Encoding": "identity"}
         if n_done:
             headers["Range"] = f"bytes={n_done}-"
         answer = _answer(url, headers)
         try:
+            # The part is longer than the file is now, so the file has changed.
             if n_done and answer.status_code == requests.codes.requested_range_not_satisfiable:
                 self._part.unlink()
                 raise requests.ConnectionError("the incomplete file does not fit; begin again")
@@ -240,6 +244,7 @@ class _Download:
         stated = answer.headers.get("Content-Length", "")
         if self._file.size is None:
             self._size = n_bytes + int(stated) if stated.isdecimal() else None
+        # The length that a server states is not believed: bytes are counted, and so is the time.
         chunks = answer.iter_content(DOWNLOAD_CHUNK)
         with _open_part(self._part, continues=continues) as file:
             while chunk := _in_time(partial(next, chunks, b"")):
@@ -311,18 +316,17 @@ def _in_time(call: Callable[[], _T]) -> _T:
     """
     import requests
 
+    def close_late(result: "Future[Any]") -> None:
+        # Its answer came after the time limit: an open connection would stay.
+        if result.exception() is None and hasattr(answer := result.result(), "close"):
+            answer.close()
+
     result = in_thread(call)
     try:
         return result.result(ANSWER_LIMIT)
     except TimeoutError as cause:
-        result.add_done_callback(_close_late)
+        result.add_done_callback(close_late)
         raise requests.Timeout(f"less than {DOWNLOAD_CHUNK} bytes in time") from cause
-
-
-def _close_late(result: "Future[Any]") -> None:
-    """Close an answer that came when nobody waited for it."""
-    if result.exception() is None and hasattr(answer := result.result(), "close"):
-        answer.close()
 
 
 @contextmanager

@@ -1,8 +1,8 @@
 """Tables of public recordings: all sets, one of them, and what was imported of it."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from holdfast.cli.import_ import print_imported
 from holdfast.cli.terminal.console import (
     print_json,
     print_line,
@@ -10,9 +10,11 @@ from holdfast.cli.terminal.console import (
     print_paragraph,
     print_table,
 )
-from holdfast.recording_import import ImportResult
 from holdfast_interop.datasets.download import download_folder, format_size
 from holdfast_interop.datasets.registry import PublicFile, PublicSet, find_set, public_sets
+
+if TYPE_CHECKING:
+    from holdfast.recording_import import ImportResult
 
 
 def print_sets(*, as_json: bool) -> None:
@@ -55,9 +57,11 @@ def print_set(name: str, *, as_json: bool) -> None:
 
 
 def print_result(
-    public: PublicSet, files: Sequence[PublicFile], result: ImportResult, *, as_json: bool
+    public: PublicSet, files: Sequence[PublicFile], result: "ImportResult", *, as_json: bool
 ) -> None:
     """Print what was imported of a set, its licence, and what to do next."""
+    from holdfast.cli.import_ import print_imported
+
     n_unchecked = sum(file.sha256 is None for file in files)
     folder = download_folder(public.name)
     facts = {"dataset": public.name, "licence": public.licence, "folder": folder}

@@ -1,6 +1,6 @@
 """Export of recordings for Foxglove: MCAP files with JSON messages, and a layout of its panels."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,12 +13,27 @@ from holdfast.exporters.output import whole_files
 from holdfast.files import file_stem
 from holdfast.recordings import Recording
 from holdfast_interop.foxglove.hand_frames import frames_of
-from holdfast_interop.foxglove.layout import layout
 from holdfast_interop.foxglove.messages import Message, messages
-from holdfast_interop.foxglove.schemas import SCHEMAS, schema_of
+from holdfast_interop.foxglove.schemas import (
+    ARROWS_TOPIC,
+    FORCE_TOPIC,
+    INSTABILITY_TOPIC,
+    LABEL_TOPIC,
+    LOG_TOPIC,
+    PHASE_TOPIC,
+    SCHEMAS,
+    SLIP_TOPIC,
+    STABLE_TOPIC,
+    STATE_TOPIC,
+    TAXELS_TOPIC,
+    finger_topic,
+    schema_of,
+    series_label,
+)
 
 if TYPE_CHECKING:
     from holdfast.model import Model
+
 
 LAYOUT_FILE = "holdfast-layout.json"
 EXPORT_CHUNK_SIZE = 1 << 20
@@ -106,6 +121,7 @@ class _MessageFile:
         times = [recording.start, *(time for time, _ in recording.markers)]
         if recording.truth is not None and len(recording.truth.times):
             times.append(float(recording.truth.times[0]))
+        # Times of MCAP are unsigned.
         self._offset = max(0.0, -min(times))
         self._encoder = msgspec.json.Encoder()
         self._schemas: dict[str, int] = {}
@@ -137,10 +153,15 @@ class _MessageFile:
         """Write a message; the schema and the channel of its topic come before the first."""
         topic = message.topic
         if topic not in self._channels:
+            name = schema_of(topic)
+            if name not in self._schemas:
+                text = msgspec.json.encode({"title": name, **SCHEMAS[name]})
+                self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
             self._channels[topic] = self._writer.register_channel(
-                topic, "json", self._schema(schema_of(topic))
+                topic, "json", self._schemas[name]
             )
         document = message.document
+        # Scenes and transforms have the stamp inside each entity, where Foxglove reads it.
         if "entities" not in document and "transforms" not in document:
             document = {"timestamp": self.stamp(message.time), **document}
         time = self._nanoseconds(message.time)
@@ -151,11 +172,92 @@ class _MessageFile:
         """Write the end of the file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
 
-    def _schema(self, name: str) -> int:
-        if name not in self._schemas:
-            text = msgspec.json.encode({"title": name, **SCHEMAS[name]})
-            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
-        return self._schemas[name]
-
     def _nanoseconds(self, time: float) -> int:
         return max(0, round((time + self._offset) * 1e9))
+
+
+LAYOUT_VERSION = 1
+"""Version of the form, and of each panel in it."""
+ROOT_FRAME = "world"
+CAMERA = {
+    "distance": 0.35,
+    "perspective": True,
+    "phi": 65.0,
+    "thetaOffset": 60.0,
+    "fovy": 45.0,
+    "near": 0.01,
+    "far": 100.0,
+}
+"""View of the hand from 0.35 m."""
+INFO_LEVEL = 2
+"""Level of Foxglove from which messages are shown."""
+
+
+def layout(fingers: Collection[str], topics: Collection[str]) -> dict[str, object]:
+    """Return a layout: the hand with its arrows, plots, states and the log.
+
+    Args:
+        fingers: names of the fingers of all recordings.
+        topics: topics of all recordings; panels without one are left out.
+
+    Example:
+        >>> layout(["thumb"], ["/holdfast/force"])["content"]["direction"]
+        'row'
+    """
+    plots = [
+        _plot(title, topic, fingers)
+        for title, topic in (
+            ("Force", FORCE_TOPIC),
+            ("Instability", INSTABILITY_TOPIC),
+            ("P(stable)", STABLE_TOPIC),
+            ("P(slip)", SLIP_TOPIC),
+        )
+        if topic in topics
+    ]
+    # An estimate and its label beside each other, the phase of the experiment below all.
+    named = []
+    for finger in fingers:
+        named.append((finger, finger_topic(STATE_TOPIC, finger)))
+        named.append((f"{finger} (label)", finger_topic(LABEL_TOPIC, finger)))
+    named.append(("phase", PHASE_TOPIC))
+    states = [
+        {"value": f"{topic}.state", "label": name} for name, topic in named if topic in topics
+    ]
+    if states:
+        series = [{**path, "timestampMethod": "receiveTime"} for path in states]
+        plots.append(_panel("StateTransitions", "States", {"paths": series, "isSynced": True}))
+    shown = {topic: {"visible": True} for topic in (ARROWS_TOPIC, TAXELS_TOPIC)}
+    scene = {"topics": shown, "cameraState": CAMERA, "followTf": ROOT_FRAME}
+    hand = _panel("ThreeDee", "Hand", scene)
+    log = _panel("Log", "Log", {"topicToRender": LOG_TOPIC, "minLogLevel": INFO_LEVEL})
+    left = _split("column", [(hand, 3), (log, 1)])
+    right = _split("column", [(panel, 1) for panel in plots])
+    return {"version": LAYOUT_VERSION, "content": _split("row", [(left, 1), (right, 1)])}
+
+
+def _plot(title: str, topic: str, fingers: Iterable[str]) -> dict[str, object]:
+    paths = [
+        {
+            "value": f'{topic}.scalars[:]{{label=="{series_label(finger)}"}}.value',
+            "label": finger,
+            "enabled": True,
+            "timestampMethod": "receiveTime",
+        }
+        for finger in fingers
+    ]
+    return _panel("Plot", title, {"paths": paths, "isSynced": True})
+
+
+def _panel(kind: str, title: str, config: dict[str, object]) -> dict[str, object]:
+    return {
+        "type": "panel",
+        "panelType": kind,
+        "config": config,
+        "title": title,
+        "version": LAYOUT_VERSION,
+    }
+
+
+def _split(direction: str, items: Iterable[tuple[object, float]]) -> dict[str, object]:
+    parts = [{"proportion": share, "content": content} for content, share in items]
+    return {"type": "split", "direction": direction, "items": parts}

@@ -1,13 +1,12 @@
 """Where the sensors of a recording are: the frame of each module over time."""
 
 import csv
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 
 import numpy as np
 
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Recording
 from holdfast.sensors import Hand, hand
 from holdfast.sensors.types import Array
 
@@ -75,7 +74,31 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
             frames = [Frame(module_frame(f), WORLD, truth.times, tips[f]) for f in tips]
             rest = [name for name in recording.modules if name not in tips]
             return [*frames, *_object(recording), *_side_by_side(recording, rest)], "measured poses"
-    return _of_built_in_hand(recording)
+    known = hand(ALLEGRO)
+    # By name and sensor: a pad of another hand may have the name of one of this.
+    on_hand = [
+        name
+        for name, module in recording.modules.items()
+        if name in known.modules and known.modules[name].sensor.name == module.sensor.name
+    ]
+    rest = [name for name in recording.modules if name not in on_hand]
+    if not on_hand:
+        return [*_side_by_side(recording, rest), *_object(recording)], "side by side"
+    times, joints, origin = _joints(recording)
+    tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
+    mounts = {name: _mount(known, name) for name in on_hand}
+    for angles in joints:
+        links = allegro_links(angles)
+        for name in on_hand:
+            (place, turned), mount = links[_table_link(known, name)], mounts[name]
+            tracks[name].append(_pose((place + turned @ mount[0], turned @ mount[1])))
+    frames = [
+        Frame(module_frame(name), PALM_LINK, times, np.array(track))
+        for name, track in tracks.items()
+    ]
+    # Where the palm is in the world is not known: it stands at the origin.
+    palm = Frame(PALM_LINK, WORLD, times[:1], np.array([_pose((np.zeros(3), np.eye(3)))]))
+    return [palm, *frames, *_side_by_side(recording, rest)], origin
 
 
 def quaternions(rotations: Array) -> Array:
@@ -107,42 +130,22 @@ def allegro_links(joints: Array) -> dict[str, RigidPose]:
     Args:
         joints: (16,) angles in the order of the driver [rad].
     """
+    path = resources.files("holdfast.twin").joinpath("tables", "allegro_right.csv")
+    lines = path.read_text("utf-8").splitlines()
     poses: dict[str, RigidPose] = {PALM_LINK: (np.zeros(3), np.eye(3))}
-    for row in _allegro_table():
+    # The table has parents before their links.
+    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
         place, rotation = poses[row["parent"]]
         joint = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
         axis = np.array([float(row[f"axis_{a}"]) for a in "xyz"])
         offset = np.array([float(row[a]) for a in "xyz"])
-        fixed = _fixed_axes(*(float(row[a]) for a in ("roll", "pitch", "yaw")))
+        # As in URDF: about the fixed axes x, then y, then z.
+        roll, pitch, yaw = (float(row[a]) for a in ("roll", "pitch", "yaw"))
+        x, y, z = np.eye(3)
+        fixed = _about(z, yaw) @ _about(y, pitch) @ _about(x, roll)
         turned = rotation @ fixed @ _about(axis, float(joints[joint]))
         poses[row["link"]] = place + rotation @ offset, turned
     return poses
-
-
-def _of_built_in_hand(recording: Recording) -> tuple[list[Frame], str]:
-    """Return the modules on the Allegro hand, and the others side by side."""
-    known = hand(ALLEGRO)
-    on_hand = [name for name, m in recording.modules.items() if _is_on(known, name, m)]
-    rest = [name for name in recording.modules if name not in on_hand]
-    if not on_hand:
-        return [*_side_by_side(recording, rest), *_object(recording)], "side by side"
-    times, joints, origin = _joints(recording)
-    tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
-    mounts = {name: _mount(known, name) for name in on_hand}
-    for angles in joints:
-        links = allegro_links(angles)
-        for name in on_hand:
-            tracks[name].append(_pose(_chained(links[_table_link(known, name)], mounts[name])))
-    frames = [
-        Frame(module_frame(name), PALM_LINK, times, np.array(track))
-        for name, track in tracks.items()
-    ]
-    palm = Frame(PALM_LINK, WORLD, times[:1], np.array([_pose((np.zeros(3), np.eye(3)))]))
-    return [palm, *frames, *_side_by_side(recording, rest)], origin
-
-
-def _is_on(known: Hand, name: str, module: Tactile) -> bool:
-    return name in known.modules and known.modules[name].sensor.name == module.sensor.name
 
 
 def _joints(recording: Recording) -> tuple[Array, Array, str]:
@@ -157,6 +160,7 @@ def _joints(recording: Recording) -> tuple[Array, Array, str]:
 
 def _table_link(known: Hand, name: str) -> str:
     """Return the name of a module's link in the table of links."""
+    # The hand names links by finger (`index_link3`), the table by joint, as the URDF of the maker.
     link = known.modules[name].link
     if link == PALM_LINK:
         return link
@@ -167,12 +171,10 @@ def _table_link(known: Hand, name: str) -> str:
 def _mount(known: Hand, name: str) -> RigidPose:
     """Return the pose of the frame of a sensor on its link."""
     module = known.modules[name]
+    # The table has the pose of each taxel on the link, the sensor has it in its own frame: one
+    # taxel is enough, as the sensor is rigid.
     rotation = module.rotations[0] @ module.sensor.rotations[0].T
     return module.positions[0] - rotation @ module.sensor.positions[0], rotation
-
-
-def _chained(outer: RigidPose, inner: RigidPose) -> RigidPose:
-    return outer[0] + outer[1] @ inner[0], outer[1] @ inner[1]
 
 
 def _pose(pose: RigidPose) -> Array:
@@ -182,6 +184,7 @@ def _pose(pose: RigidPose) -> Array:
 def _side_by_side(recording: Recording, names: list[str]) -> list[Frame]:
     """Return modules in a row along x, with their normals along z."""
     widths = [np.ptp(recording.modules[n].sensor.positions, axis=0).max() for n in names]
+    # At least 1 cm: a sensor of one taxel has no width.
     step = SIDE_GAP * max([*widths, 0.01])
     frames = []
     for k, name in enumerate(names):
@@ -205,6 +208,7 @@ def _are_poses(array: Array | None) -> bool:
 
 def _from_normal(normal: Array) -> Array:
     """Return a rotation that turns a unit vector to the z axis."""
+    # Along the z axis there is no axis of rotation to compute.
     if normal[2] > 1 - 1e-9:
         return np.eye(3)
     if normal[2] < 1e-9 - 1:
@@ -219,16 +223,3 @@ def _about(axis: Array, angle: float) -> Array:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
-
-
-def _fixed_axes(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation about the fixed axes x, then y, then z, as in URDF [rad]."""
-    x, y, z = np.eye(3)
-    return _about(z, yaw) @ _about(y, pitch) @ _about(x, roll)
-
-
-def _allegro_table() -> list[Mapping[str, str]]:
-    """Return the links of the hand, parents first."""
-    path = resources.files("holdfast.twin").joinpath("tables", "allegro_right.csv")
-    lines = path.read_text("utf-8").splitlines()
-    return list(csv.DictReader(line for line in lines if not line.startswith("#")))

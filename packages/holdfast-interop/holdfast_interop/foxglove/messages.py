@@ -101,11 +101,12 @@ def messages(
     parts = [
         _transforms(frames, recording, stamp),  # before what is drawn in these frames
         _taxels(recording, stamp),
-        _arrows(recording, _coloured_by(recording, traces), stamp),
+        _arrows(recording, traces, stamp),
         *_scalars(recording, traces),
         *_states(recording, traces),
         _log(recording, traces),
     ]
+    # Merged, not sorted: all messages of a recording would not fit into memory.
     return heapq.merge(*parts, key=attrgetter("time"))
 
 
@@ -116,7 +117,8 @@ def _scalars(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[It
         if name in traces:
             forces[name] = traces[name].times, np.linalg.norm(traces[name].force, axis=1)
         elif module.n_samples:
-            forces[name] = module.times, _amplitude(recording, name)
+            force = np.einsum("tij,ntj->ni", module.sensor.rotations, zeroed(recording, name))
+            forces[name] = module.times, np.linalg.norm(force, axis=1)
     topics: dict[str, dict[str, Track]] = {FORCE_TOPIC: forces}
     for topic, column in (
         (INSTABILITY_TOPIC, "instability"),
@@ -126,31 +128,19 @@ def _scalars(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[It
     ):
         columns = {name: (trace.times, getattr(trace, column)) for name, trace in traces.items()}
         topics[topic] = {name: track for name, track in columns.items() if track[1] is not None}
-    topics[TRUE_SPEED_TOPIC] = _true_speeds(recording)
-    return [_series(topic, tracks) for topic, tracks in topics.items() if tracks]
-
-
-def _amplitude(recording: Recording, name: str) -> Array:
-    """Return F_a of a module, (n,)."""
-    module = recording.modules[name]
-    force = np.einsum("tij,ntj->ni", module.sensor.rotations, zeroed(recording, name))
-    return np.asarray(np.linalg.norm(force, axis=1))
-
-
-def _true_speeds(recording: Recording) -> dict[str, Track]:
-    """Return the true speed of the slip of each finger [mm/s], where it is known."""
     truth = recording.truth
-    if truth is None:
-        return {}
-    return {
-        finger: (truth.times, 1000.0 * arrays["slip_speed"])
-        for finger, arrays in truth.fingers.items()
-        if "slip_speed" in arrays and arrays["slip_speed"].ndim == 1
-    }
+    if truth is not None:
+        topics[TRUE_SPEED_TOPIC] = {
+            finger: (truth.times, 1000.0 * arrays["slip_speed"])  # [mm/s], as the estimate has it
+            for finger, arrays in truth.fingers.items()
+            if "slip_speed" in arrays and arrays["slip_speed"].ndim == 1
+        }
+    return [_series(topic, tracks) for topic, tracks in topics.items() if tracks]
 
 
 def _series(topic: str, tracks: Mapping[str, Track]) -> Iterator[Message]:
     """Yield messages at the samples of the fastest finger; null where a finger has a gap."""
+    # One message has the values of all fingers, so that a plot has one path for each of them.
     grid = max((times for times, _ in tracks.values()), key=len)
     columns = [_held(times, values, grid) for times, values in tracks.values()]
     labels = [series_label(finger) for finger in tracks]
@@ -166,6 +156,7 @@ def _held(times: Array, values: npt.NDArray[Any], grid: Array) -> Array:
         return np.full(len(grid), np.nan)
     rows = np.searchsorted(times, grid, side="right") - 1
     period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+    # Before the first sample `rows` is -1, which would read the last one.
     is_old = (rows < 0) | (grid - times[rows] > GAP_PERIODS * period)
     return np.where(is_old, np.nan, values[rows])
 
@@ -186,9 +177,18 @@ def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Ite
     ]
     for name, module in recording.modules.items():
         if module.labels:
-            codes = module.label_states[None]
-            topic = finger_topic(LABEL_TOPIC, name)
-            parts.append(_state_messages(topic, module.times, codes, _state_of_label))
+            topic, codes = finger_topic(LABEL_TOPIC, name), module.label_states[None]
+            # Samples without a label have the code of UNKNOWN, which a label never is.
+            parts.append(
+                _state_messages(
+                    topic,
+                    module.times,
+                    codes,
+                    lambda code: {
+                        "state": "no label" if code == UNKNOWN else STATE_BY_CODE[code].value
+                    },
+                )
+            )
     truth = recording.truth
     if truth is not None and "phase" in truth.hand and truth.hand["phase"].dtype.kind == "U":
         phases, numbers = np.unique(truth.hand["phase"], return_inverse=True)
@@ -200,14 +200,11 @@ def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Ite
     return parts
 
 
-def _state_of_label(code: int) -> dict[str, str]:
-    return {"state": STATE_BY_CODE[code].value if code != UNKNOWN else "no label"}
-
-
 def _state_messages(
     topic: str, times: Array, codes: npt.NDArray[Any], document: Callable[..., dict[str, Any]]
 ) -> Iterator[Message]:
     """Yield a message at every change of the codes (n_codes, n), and at least once a second."""
+    # Repeated, so that a viewer that jumps into the file has a state within a second.
     latest, sent_at = None, -np.inf
     for time, row in zip(times.tolist(), codes.T.tolist(), strict=True):
         if row != latest or time - sent_at >= REPEAT_SECONDS:
@@ -219,63 +216,51 @@ def _log(recording: Recording, traces: Mapping[str, FingerTrace]) -> Iterator[Me
     """Yield markers, alarms, slips and faults."""
     events = [(time, INFO, "marker", text) for time, text in recording.markers]
     for finger, trace in traces.items():
-        events += [(time, WARNING, finger, text) for time, text in _alarms(trace)]
-        events += [(time, WARNING, finger, text) for time, text in _new_faults(trace)]
-        events += _slips(finger, trace)
+        times, causes = trace.times.tolist(), trace.cause.tolist()
+        # An alarm is a change from STABLE to anything else but UNKNOWN.
+        pairs = pairwise(STATE_BY_CODE[code] for code in trace.state.tolist())
+        for time, (before, state), cause in zip(times[1:], pairs, causes[1:], strict=True):
+            if before is ContactState.STABLE and state not in (before, ContactState.UNKNOWN):
+                why = f" ({CAUSE_BY_CODE[cause]})" if CAUSE_BY_CODE[cause] else ""
+                text = f"alarm: {state.value}{why}, was {before.value}"
+                events.append((time, WARNING, finger, text))
+        masks = trace.faults.astype(np.int64)
+        new = masks & ~np.concatenate([[0], masks[:-1]])
+        for k in np.flatnonzero(new).tolist():
+            text = f"fault: {', '.join(faults_of(int(new[k])))}"
+            events.append((times[k], WARNING, finger, text))
+        for slip in SlipWatch().update(finger, trace.estimates()):
+            if slip.end is None:
+                text = f"slip begins, probability {slip.max_probability:.2f}"
+                events.append((slip.begin, WARNING, finger, text))
+            else:
+                far = "" if slip.distance is None else f", {slip.distance:.2f} mm"
+                text = f"slip ends after {slip.end - slip.begin:.3f} s{far}"
+                events.append((slip.end, INFO, finger, text))
     for time, level, name, text in sorted(events):
         document = {"level": level, "message": text, "name": name, "file": "", "line": 0}
         yield Message(time, LOG_TOPIC, document)
 
 
-def _alarms(trace: FingerTrace) -> Iterator[tuple[float, str]]:
-    """Yield changes from STABLE to anything else but UNKNOWN."""
-    states = [STATE_BY_CODE[code] for code in trace.state.tolist()]
-    rows = zip(trace.times[1:].tolist(), pairwise(states), trace.cause[1:].tolist(), strict=True)
-    for time, (before, state), cause in rows:
-        if before is ContactState.STABLE and state not in (before, ContactState.UNKNOWN):
-            why = f" ({CAUSE_BY_CODE[cause]})" if CAUSE_BY_CODE[cause] else ""
-            yield time, f"alarm: {state.value}{why}, was {before.value}"
+def _instants(recording: Recording) -> Array:
+    # From the start, so that the arrows of all modules are of the same instants.
+    n = int(recording.duration * SCENE_RATE) + 1
+    return recording.start + np.arange(n) / SCENE_RATE
 
 
-def _new_faults(trace: FingerTrace) -> Iterator[tuple[float, str]]:
-    masks = trace.faults.astype(np.int64)
-    new = masks & ~np.concatenate([[0], masks[:-1]])
-    for k in np.flatnonzero(new):
-        yield float(trace.times[k]), f"fault: {', '.join(faults_of(int(new[k])))}"
-
-
-def _slips(finger: str, trace: FingerTrace) -> Iterator[tuple[float, int, str, str]]:
-    for slip in SlipWatch().update(finger, trace.estimates()):
-        if slip.end is None:
-            text = f"slip begins, probability {slip.max_probability:.2f}"
-            yield slip.begin, WARNING, finger, text
-        else:
-            far = "" if slip.distance is None else f", {slip.distance:.2f} mm"
-            yield slip.end, INFO, finger, f"slip ends after {slip.end - slip.begin:.3f} s{far}"
-
-
-def _coloured_by(
-    recording: Recording, traces: Mapping[str, FingerTrace]
-) -> dict[str, tuple[Array, npt.NDArray[np.int8]]]:
-    """Return the codes of the states that colour the arrows of each module."""
-    return {
+def _arrows(
+    recording: Recording, traces: Mapping[str, FingerTrace], stamp: Stamp
+) -> Iterator[Message]:
+    """Yield the arrows of all modules at each instant; none of a module in a gap."""
+    # The codes of the states that colour the arrows: estimates, or else labels.
+    states = {
         name: (traces[name].times, traces[name].state)
         if name in traces
         else (module.times, module.label_states)
         for name, module in recording.modules.items()
         if module.n_samples
     }
-
-
-def _instants(recording: Recording) -> Array:
-    n = int(recording.duration * SCENE_RATE) + 1
-    return recording.start + np.arange(n) / SCENE_RATE
-
-
-def _arrows(
-    recording: Recording, states: Mapping[str, tuple[Array, npt.NDArray[np.int8]]], stamp: Stamp
-) -> Iterator[Message]:
-    """Yield the arrows of all modules at each instant; none of a module in a gap."""
+    # At a rate for eyes: arrows at every sample would make files of gigabytes.
     instants = _instants(recording)
     arrows = module_forces(recording, instants)
     scale = arrow_scale(arrows)
@@ -285,6 +270,7 @@ def _arrows(
         for name, module in arrows.items():
             k = module.sample_at(time, 1 / SCENE_RATE)
             times, codes = states[name]
+            # Estimates begin later than readings: before the first, its colour.
             row = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
             colour = ARROW_COLOURS[STATE_BY_CODE[codes[row]]]
             drawn = [] if k is None else _module_arrows(module, k, scale, places[name], colour)
@@ -301,6 +287,7 @@ def _module_arrows(
         return []
     lengths = lengths[kept]
     turned = orientations(module.forces[k][kept] * (scale / lengths[:, None]))
+    # JSON has every digit; micrometres are enough.
     rows = np.round(np.column_stack([places[kept], turned, lengths]), 6).tolist()
     shaft, head = ARROW_WIDTHS
     return [
@@ -370,16 +357,16 @@ def _transforms(frames: Sequence[Frame], recording: Recording, stamp: Stamp) -> 
     for k, time in enumerate(_instants(recording).tolist()):
         sent = frames if k == 0 else moving
         if sent:
-            transforms = [_transform(frame, time, stamp) for frame in sent]
+            transforms = []
+            for frame in sent:
+                x, y, z, qw, qx, qy, qz = np.round(frame.at(time), 7).tolist()
+                transforms.append(
+                    {
+                        "timestamp": stamp(time),
+                        "parent_frame_id": frame.parent,
+                        "child_frame_id": frame.name,
+                        "translation": {"x": x, "y": y, "z": z},
+                        "rotation": {"x": qx, "y": qy, "z": qz, "w": qw},
+                    }
+                )
             yield Message(time, TRANSFORMS_TOPIC, {"transforms": transforms})
-
-
-def _transform(frame: Frame, time: float, stamp: Stamp) -> dict[str, Any]:
-    x, y, z, qw, qx, qy, qz = np.round(frame.at(time), 7).tolist()
-    return {
-        "timestamp": stamp(time),
-        "parent_frame_id": frame.parent,
-        "child_frame_id": frame.name,
-        "translation": {"x": x, "y": y, "z": z},
-        "rotation": {"x": qx, "y": qy, "z": qz, "w": qw},
-    }

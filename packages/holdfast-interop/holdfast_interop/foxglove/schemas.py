@@ -34,6 +34,7 @@ def finger_topic(prefix: str, finger: str) -> str:
         '/holdfast/state/left_hand_17e0c719'
     """
     plain = _NOT_IN_TOPICS.sub("_", finger)
+    # Two names that differ in such characters only need two topics.
     if plain != finger or not finger.strip("/"):
         plain += "_" + blake2b(finger.encode(errors="surrogatepass"), digest_size=4).hexdigest()
     return f"{prefix}{plain}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from holdfast.features.start import declared_baselines
 from holdfast.features.tare import Tare, baseline_of, offline_tare
-from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.recordings import GAP_PERIODS, Recording
 from holdfast.sensors.types import Array, Integers
 
 BASELINE_SECONDS = 0.5
@@ -50,6 +50,7 @@ def module_forces(recording: Recording, instants: Array) -> dict[str, ModuleArro
     for name, module in recording.modules.items():
         if not module.n_samples:
             continue
+        # Only the samples that are drawn are turned into the fingertip frame.
         rows = np.unique(np.searchsorted(module.times, instants, side="right") - 1)
         kept: Integers = rows[rows >= 0]
         forces = np.einsum("tij,ntj->nti", module.sensor.rotations, zeroed(recording, name, kept))
@@ -68,13 +69,25 @@ def zeroed(recording: Recording, name: str, rows: Integers | slice = slice(None)
     """
     module = recording.modules[name]
     readings = module.readings[rows].astype(np.float64)
-    return np.asarray(readings - _baseline(recording, name, module))
+    declared = declared_baselines(recording.metadata, {name: module.sensor})
+    if name in declared:
+        return np.asarray(readings - declared[name])
+    # Newtons of a loaded start are forces already; a tare would take the load out of them.
+    is_known = module.unit == "N" and recording.starts_loaded
+    how = Tare("none") if is_known else offline_tare(BASELINE_SECONDS, module)
+    try:
+        return np.asarray(
+            readings - baseline_of(module.readings, module.times, how, module.period)[0]
+        )
+    except ValueError:  # the module has no finite readings
+        return readings
 
 
 def arrow_scale(arrows: dict[str, ModuleArrows]) -> float:
     """Return the length of an arrow for a reading of 1, the same for all modules [m/unit]."""
     largest = [np.linalg.norm(x.forces, axis=2).max(axis=1) for x in arrows.values()]
     joined = np.concatenate(largest) if largest else np.empty(0)
+    # A quantile: a single wrong reading would make all other arrows invisible.
     strong = float(np.quantile(joined, STRONG_SHARE)) if len(joined) else 0.0
     return LONGEST_ARROW / strong if strong > 0 else 0.0
 
@@ -87,19 +100,8 @@ def orientations(directions: Array) -> Array:
         [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]]
     """
     x, y, z = directions.T
+    # Half way between the x axis and the direction: no angle is computed. Against the x axis
+    # every axis of rotation is right, and half a turn about z is taken.
     turned = np.column_stack([np.zeros_like(x), -z, y, 1 + x])
     turned[x < 1e-9 - 1] = (0.0, 0.0, 1.0, 0.0)
     return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True)) + 0.0
-
-
-def _baseline(recording: Recording, name: str, module: Tactile) -> Array:
-    """Return the readings without contact, (n_taxels, 3); 0 for a module without finite ones."""
-    declared = declared_baselines(recording.metadata, {name: module.sensor})
-    if name in declared:
-        return declared[name]
-    is_known = module.unit == "N" and recording.starts_loaded
-    how = Tare("none") if is_known else offline_tare(BASELINE_SECONDS, module)
-    try:
-        return baseline_of(module.readings, module.times, how, module.period)[0]
-    except ValueError:
-        return np.zeros((module.sensor.n_taxels, 3))

@@ -89,40 +89,36 @@ def _nanoseconds(cell: str) -> int | None:
     try:
         number = float(cell)
     except ValueError:
-        return _nanoseconds_of_date(cell)
+        try:
+            date = np.datetime64(cell.removesuffix("Z").removesuffix("+00:00"), "ns")
+        except ValueError:
+            return None
+        return None if np.isnat(date) else int(date.astype(np.int64))
     if not abs(number) < MAX_NANOSECONDS:
         return None
+    # Numbers since 1970 of different units are a factor of 1000 apart.
     unit = next((unit for smallest, unit in _UNITS if number >= smallest), NANOSECONDS_PER_SECOND)
+    # A float has 53 bits: nanoseconds since 1970 need 61.
     found = int(cell) if cell.isdigit() else number
     return round(found * unit) if abs(found * unit) < MAX_NANOSECONDS else None
-
-
-def _nanoseconds_of_date(cell: str) -> int | None:
-    text = cell.removesuffix("Z").removesuffix("+00:00")
-    try:
-        date = np.datetime64(text, "ns")
-    except ValueError:
-        return None
-    return None if np.isnat(date) else int(date.astype(np.int64))
 
 
 def _labels(table: Table, cells: Sequence[str] | None, module: Tactile) -> tuple[Label, ...]:
     if cells is None:
         return ()
-    states = [
-        _state(f"{table.path}, row {row}", cell.strip().lower())
-        for row, cell in enumerate(cells, table.first_line)
-    ]
+    states: list[tuple[ContactState, Cause | None] | None] = []
+    for row, text in enumerate(cells, table.first_line):
+        cell = text.strip().lower()
+        if cell and cell not in _FLAGS:
+            raise RecordingError(
+                f"{table.path}, row {row}, column {SLIP_COLUMN!r}: {cell[:40]!r} given, 0 or 1 "
+                "expected"
+            )
+        # The data do not say where nothing touches: what is no slip counts as held.
+        held = (
+            (ContactState.UNSTABLE, Cause.SLIP) if _FLAGS.get(cell) else (ContactState.STABLE, None)
+        )
+        states.append(held if cell else None)
     return labels_from_samples(
         module.times, states, period=module.period, evidence=EVIDENCE, author=SOURCE
     )
-
-
-def _state(place: str, cell: str) -> tuple[ContactState, Cause | None] | None:
-    if not cell:
-        return None
-    if cell not in _FLAGS:
-        raise RecordingError(
-            f"{place}, column {SLIP_COLUMN!r}: {cell[:40]!r} given, 0 or 1 expected"
-        )
-    return (ContactState.UNSTABLE, Cause.SLIP) if _FLAGS[cell] else (ContactState.STABLE, None)

@@ -18,9 +18,8 @@ from holdfast.io.importers.array_tables import StoredArrays, listed
 from holdfast.io.importers.arrays import HDF5_MAGIC, arrays_of_hdf5
 from holdfast.io.importers.table import errors_named, natural_order, with_integer_type
 from holdfast.io.safe_reading import one_line
-from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
+from holdfast.recordings import Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.types import Array
 
 EXTRA = "hdf5"
 HINT = IF_IN_CONTACT
@@ -119,18 +118,27 @@ def _recording(place: str, parts: list[str], group: StoredArrays) -> Recording:
         raise RecordingError(
             f"{place}: {RAW_DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
         )
+    # Stored as taxels x axes x samples.
     readings = with_integer_type(raw.transpose(2, 0, 1))
     with errors_named(place):
         module = Tactile(_sensor(readings.shape[1]), times, readings)
         if LABELS_NAME in arrays:
-            labels = _labels(arrays[LABELS_NAME].ravel(), module)
+            codes = arrays[LABELS_NAME].ravel()
+            if len(codes) != module.n_samples:
+                raise RecordingError(f"{len(codes)} labels given for {module.n_samples} samples")
+            if not np.isin(codes, range(_OTHER + 1)).all():
+                raise RecordingError(f"labels 0 to {_OTHER} expected, {codes.max():g} given")
+            labels = labels_from_samples(
+                module.times,
+                _states([int(code) for code in codes]),
+                period=module.period,
+                evidence="annotated by hand",
+                author=SOURCE,
+            )
             module = replace(module, labels=labels)
-        return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
-
-
-def _metadata(parts: list[str]) -> dict[str, str]:
-    names = ("planner", "object", "pose", "repeat")
-    return {"source": SOURCE, **dict(zip(reversed(names), reversed(parts), strict=False))}
+        # From the end: a file of one planner has no group for it.
+        facts = zip(("repeat", "pose", "object", "planner"), reversed(parts), strict=False)
+        return Recording("_".join(parts), {"finger1": module}, {"source": SOURCE, **dict(facts)})
 
 
 def _sensor(n_taxels: int) -> Sensor:
@@ -148,20 +156,6 @@ def _sensor(n_taxels: int) -> Sensor:
     return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, range=(0.0, 65535.0))
 
 
-def _labels(codes: Array, module: Tactile) -> tuple[Label, ...]:
-    if len(codes) != module.n_samples:
-        raise RecordingError(f"{len(codes)} labels given for {module.n_samples} samples")
-    if not np.isin(codes, range(_OTHER + 1)).all():
-        raise RecordingError(f"labels 0 to {_OTHER} expected, {codes.max():g} given")
-    return labels_from_samples(
-        module.times,
-        _states([int(code) for code in codes]),
-        period=module.period,
-        evidence="annotated by hand",
-        author=SOURCE,
-    )
-
-
 def _states(codes: list[int]) -> list[_State | None]:
     """Return the state of each sample; that of label 0 depends on the labels around it.
 
@@ -170,10 +164,19 @@ def _states(codes: list[int]) -> list[_State | None]:
     """
     previous_events = _previous_events(codes)
     next_events = _previous_events(codes[::-1])[::-1]
-    return [
-        _state_at_rest(before, after) if code == _NOTHING else _STATES.get(code)
-        for code, before, after in zip(codes, previous_events, next_events, strict=True)
-    ]
+    states: list[_State | None] = []
+    for code, before, after in zip(codes, previous_events, next_events, strict=True):
+        held = before in _HELD_AFTER and after in _HELD_BEFORE
+        # Without an event on either side, nothing says which of the two a 0 is.
+        known = (before, after) != (None, None)
+        free = known and before in (None, _RELEASE) and after in (None, _GRASP)
+        if code != _NOTHING:
+            states.append(_STATES.get(code))
+        elif held:
+            states.append((ContactState.STABLE, None))
+        else:
+            states.append((ContactState.NO_CONTACT, None) if free else None)
+    return states
 
 
 def _previous_events(codes: list[int]) -> list[int | None]:
@@ -185,11 +188,3 @@ def _previous_events(codes: list[int]) -> list[int | None]:
         if code not in (_NOTHING, _OTHER):
             last = code
     return events
-
-
-def _state_at_rest(before: int | None, after: int | None) -> _State | None:
-    if before in _HELD_AFTER and after in _HELD_BEFORE:
-        return ContactState.STABLE, None
-    if before in (None, _RELEASE) and after in (None, _GRASP) and (before, after) != (None, None):
-        return ContactState.NO_CONTACT, None
-    return None

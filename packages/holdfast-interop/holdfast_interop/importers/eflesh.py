@@ -53,7 +53,10 @@ def can_read(path: Path) -> bool:
     """Return whether `path` is a file of torch, or a folder with sequences."""
     if path.is_dir():
         return bool(_sequences(path))
-    return path.suffix == TENSOR_SUFFIX and _is_zip(path)
+    if path.suffix != TENSOR_SUFFIX:
+        return False
+    with path.open("rb") as file:
+        return file.read(len(_ZIP_MAGIC)) == _ZIP_MAGIC
 
 
 def parts(path: Path) -> list[Path]:
@@ -72,11 +75,6 @@ def _sequences(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"seq_*{TENSOR_SUFFIX}"), key=natural_order)
 
 
-def _is_zip(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(_ZIP_MAGIC)) == _ZIP_MAGIC
-
-
 def read(path: Path) -> Iterator[Recording]:
     """Yield the recording in a file.
 
@@ -92,7 +90,15 @@ def read(path: Path) -> Iterator[Recording]:
     modules = {
         f"finger{k + 1}": Tactile(skin, times, values[:, k].copy()) for k in range(N_FINGERTIPS)
     }
-    yield Recording(path.stem, modules, _metadata(path))
+    metadata: dict[str, Any] = {
+        "source": SOURCE,
+        "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
+        STARTS_LOADED: True,
+    }
+    slipped = _labels(path.parent).get(path.stem)
+    yield Recording(
+        path.stem, modules, metadata if slipped is None else metadata | {SLIPPED: slipped}
+    )
 
 
 def _values(path: Path) -> npt.NDArray[np.float32]:
@@ -105,36 +111,42 @@ def _values(path: Path) -> npt.NDArray[np.float32]:
     try:
         with zipfile.ZipFile(path) as archive:
             budget.keep(0, len(archive.infolist()))
-            _check_types(path, archive, budget)
-            data = _content(path, archive, _storage(path, archive), budget)
+            members = archive.infolist()
+            # Byte order and number type, where the archive names them; nothing is unpickled.
+            for info in members:
+                name = info.filename.rpartition("/")[2]
+                if name not in ("byteorder", "data.pkl") or info.file_size > MAX_PICKLE_SIZE:
+                    continue
+                content = _content(path, archive, info, budget)
+                if name == "byteorder" and content.strip() != b"little":
+                    raise RecordingError(
+                        f"{path}: byte order {content[:20]!r} given, b'little' expected"
+                    )
+                kinds = {match.decode() for match in _STORAGE.findall(content)} - {"FloatStorage"}
+                if name == "data.pkl" and kinds:
+                    raise RecordingError(f"{path}: a {min(kinds)} given; {_FORM} expected")
+            storages = [info for info in members if re.search(r"(^|/)data/\d+$", info.filename)]
+            if len(storages) != 1 or not storages[0].filename.endswith("data/0"):
+                raise RecordingError(
+                    f"{path}: one tensor, a member data/0, expected; {len(storages)} tensors given "
+                    f"among {len(members)} members"
+                )
+            data = _content(path, archive, storages[0], budget)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as cause:
         raise RecordingError(f"{path} is cut or damaged: {cause}") from cause
-    return _shaped(path, data)
-
-
-def _storage(path: Path, archive: zipfile.ZipFile) -> zipfile.ZipInfo:
-    """Return the member with the values of the only tensor."""
-    storages = [info for info in archive.infolist() if re.search(r"(^|/)data/\d+$", info.filename)]
-    if len(storages) != 1 or not storages[0].filename.endswith("data/0"):
+    if not data or len(data) % ROW_SIZE:
         raise RecordingError(
-            f"{path}: one tensor, a member data/0, expected; {len(storages)} tensors given among "
-            f"{len(archive.infolist())} members"
+            f"{path}: {len(data)} bytes of values given; rows of {ROW_SIZE} bytes expected "
+            f"({_FORM})"
         )
-    return storages[0]
-
-
-def _check_types(path: Path, archive: zipfile.ZipFile, budget: ReadBudget) -> None:
-    """Check byte order and number type where the archive names them; nothing is unpickled."""
-    for info in archive.infolist():
-        name = info.filename.rpartition("/")[2]
-        if name not in ("byteorder", "data.pkl") or info.file_size > MAX_PICKLE_SIZE:
-            continue
-        content = _content(path, archive, info, budget)
-        if name == "byteorder" and content.strip() != b"little":
-            raise RecordingError(f"{path}: byte order {content[:20]!r} given, b'little' expected")
-        storages = {match.decode() for match in _STORAGE.findall(content)} - {"FloatStorage"}
-        if name == "data.pkl" and storages:
-            raise RecordingError(f"{path}: a {min(storages)} given; {_FORM} expected")
+    values = np.frombuffer(data, NUMBER_TYPE)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        row, column = divmod(int(wrong[0]), ROW_SIZE // NUMBER_TYPE.itemsize)
+        raise RecordingError(
+            f"{path}, row {row}, value {column}: {values[wrong[0]]} given, a finite number expected"
+        )
+    return values.reshape(-1, N_FINGERTIPS, N_MAGNETOMETERS, 3)
 
 
 def _content(
@@ -154,43 +166,27 @@ def _content(
     return archive.read(info)
 
 
-def _shaped(path: Path, data: bytes) -> npt.NDArray[np.float32]:
-    if not data or len(data) % ROW_SIZE:
-        raise RecordingError(
-            f"{path}: {len(data)} bytes of values given; rows of {ROW_SIZE} bytes expected "
-            f"({_FORM})"
-        )
-    values = np.frombuffer(data, NUMBER_TYPE)
-    wrong = np.flatnonzero(~np.isfinite(values))
-    if len(wrong):
-        row, column = divmod(int(wrong[0]), ROW_SIZE // NUMBER_TYPE.itemsize)
-        raise RecordingError(
-            f"{path}, row {row}, value {column}: {values[wrong[0]]} given, a finite number expected"
-        )
-    return values.reshape(-1, N_FINGERTIPS, N_MAGNETOMETERS, 3)
-
-
-def _metadata(path: Path) -> dict[str, Any]:
-    metadata = {
-        "source": SOURCE,
-        "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
-        STARTS_LOADED: True,
-    }
-    labels = _labels(path.parent / LABELS_FILE) or _label_lines(path.parent / LABEL_LINES_FILE)
-    slipped = labels.get(path.stem)
-    return metadata if slipped is None else metadata | {SLIPPED: slipped}
-
-
-def _labels(path: Path) -> dict[str, bool]:
+def _labels(folder: Path) -> dict[str, bool]:
     """Return whether the object slipped, by name of the sequence; empty without such a file.
 
     Raises:
-        RecordingError: the file has another form, or a sequence has two labels.
+        RecordingError: a file has another form, or a sequence has two labels.
     """
-    if not path.is_file():
-        return {}
-    table, _ = read_table(path)
     labels: dict[str, bool] = {}
+    path = folder / LABELS_FILE
+    if not path.is_file():
+        path = folder / LABEL_LINES_FILE
+        if not path.is_file():
+            return {}
+        lines = read_input(path, MAX_LABEL_LINES_SIZE).decode("utf-8", "replace").split("\n")
+        for number, line in enumerate(lines[:-1] if lines[-1] == "" else lines):
+            if line.strip() not in ("0", "1"):
+                raise RecordingError(
+                    f"{path}, line {number + 1}: 0 or 1 expected, {line.strip()[:20]!r} given"
+                )
+            labels[f"seq_{number}"] = line.strip() == "1"
+        return labels
+    table, _ = read_table(path)
     for row, (number, slip) in enumerate(table.columns(["sequence", "slip"]), table.first_line):
         name = f"seq_{number:.0f}"
         if slip not in (0, 1) or number % 1 or name in labels:
@@ -199,23 +195,4 @@ def _labels(path: Path) -> dict[str, bool]:
                 "each once, with 0 or 1 expected"
             )
         labels[name] = bool(slip)
-    return labels
-
-
-def _label_lines(path: Path) -> dict[str, bool]:
-    """Return whether the object slipped, from lines of 0 or 1; empty without such a file.
-
-    Raises:
-        RecordingError: a line has something else.
-    """
-    if not path.is_file():
-        return {}
-    lines = read_input(path, MAX_LABEL_LINES_SIZE).decode("utf-8", "replace").split("\n")
-    labels: dict[str, bool] = {}
-    for number, line in enumerate(lines[:-1] if lines[-1] == "" else lines):
-        if line.strip() not in ("0", "1"):
-            raise RecordingError(
-                f"{path}, line {number + 1}: 0 or 1 expected, {line.strip()[:20]!r} given"
-            )
-        labels[f"seq_{number}"] = line.strip() == "1"
     return labels

@@ -40,6 +40,7 @@ increases."""
 def _is_header(names: tuple[str, ...]) -> bool:
     if set(NODE_COLUMNS) <= set(names):
         return True
+    # Files without names of columns: these are 0, 1, 2, ... after an index without a name.
     numbered = tuple(str(k) for k in range(len(names) - 1))
     return len(names) > len(NODE_COLUMNS) + 2 and names == ("", *numbered)
 
@@ -69,7 +70,12 @@ def read(path: Path) -> Iterator[Recording]:
         metadata["clock"] = clock.note
     with errors_named(path):
         modules = {"finger1": Tactile(sensor("gtac"), clock.times, with_integer_type(rotated))}
-        truth = _servos(table, clock)
+        # Without a header no column is known to be a servo.
+        servos = [name for name in table.names if name.startswith(SERVO_PREFIX)]
+        truth = None
+        if servos:
+            positions: npt.NDArray[np.generic] = with_integer_type(table.columns(servos))
+            truth = Truth(clock.times, {SERVO_POSITIONS: positions[clock.n_without_time :]})
         recording = Recording(path.stem, modules, metadata, truth)
     yield recording
 
@@ -87,45 +93,24 @@ def _clock(table: Table) -> _Clock:
     named = "milliseconds" in table.names
     milliseconds = table.columns(["milliseconds"])[:, 0] if named else table.values[:, -1]
     if named and "Hz" in table.names and len(milliseconds) > 1 and not np.ptp(milliseconds):
-        rate = _rate(table)
+        rates = table.columns(["Hz"])[:, 0]
+        wrong = np.flatnonzero(~(np.isfinite(rates) & (rates > 0)))
+        if len(wrong):
+            raise RecordingError(
+                f"{table.path}, row {table.first_line + wrong[0]}, column 'Hz': "
+                f"{rates[wrong[0]]:g} given; a rate above 0 expected, because all milliseconds "
+                "are the same"
+            )
+        rate = float(np.median(rates))
         times = np.arange(len(milliseconds)) / rate
         return _Clock(times, 0, "roobooot/GTac_Gripper_V2", f"none; {rate:g} Hz by its column Hz")
-    times, n_without_time = _times(table, milliseconds)
-    return _Clock(times, n_without_time, "roobooot/GTac_")
-
-
-def _rate(table: Table) -> float:
-    """Return the median of the column `Hz` [Hz].
-
-    Raises:
-        RecordingError: it is no rate.
-    """
-    rates = table.columns(["Hz"])[:, 0]
-    wrong = np.flatnonzero(~(np.isfinite(rates) & (rates > 0)))
-    if len(wrong):
-        raise RecordingError(
-            f"{table.path}, row {table.first_line + wrong[0]}, column 'Hz': {rates[wrong[0]]:g} "
-            "given; a rate above 0 expected, because all milliseconds are the same"
-        )
-    return float(np.median(rates))
-
-
-def _servos(table: Table, clock: _Clock) -> Truth | None:
-    """Return the positions of the servos; None if the columns have no names."""
-    names = [name for name in table.names if name.startswith(SERVO_PREFIX)]
-    if not names:
-        return None
-    positions: npt.NDArray[np.generic] = with_integer_type(table.columns(names))
-    return Truth(clock.times, {SERVO_POSITIONS: positions[clock.n_without_time :]})
-
-
-def _times(table: Table, milliseconds: Array) -> tuple[Array, int]:
-    """Return the times [s], and 1 if the first row has none (as the logger writes it), else 0."""
     missing = np.isnan(milliseconds)
+    # The logger writes its first row before it has a time.
     n_without_time = int(missing[0])
     if missing[1:].any():
         row = int(np.flatnonzero(missing[1:])[0]) + 1
         raise RecordingError(
             f"{table.path}, row {table.first_line + row}: no time; only the first row may have none"
         )
-    return milliseconds[n_without_time:] * MILLISECOND, n_without_time
+    times = milliseconds[n_without_time:] * MILLISECOND
+    return _Clock(times, n_without_time, "roobooot/GTac_")

@@ -5,14 +5,13 @@ Mandil, Ghalamzan, CoRL 2022): each folder `data_sample_*` is a recording of fiv
 """
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
@@ -72,13 +71,31 @@ def read(folder: Path) -> Iterator[Recording]:
     Raises:
         RecordingError: a file is missing, or files contradict each other.
     """
+    # All files have a row for each sample; only that of the robot has the times.
     robot, _ = read_table(folder / "robot_state.csv")
     times = robot.columns(["time"])[:, 0]
     with errors_named(folder):
         modules = {name: _module(folder / file, times) for name, file in FILES.items()}
         labels = _labels(folder / "slip_label.csv", modules["finger1"])
         labelled = {name: replace(module, labels=labels) for name, module in modules.items()}
-        truth = Truth(times, {**_marker(folder / "marker.csv", len(times)), **_robot(robot)})
+        marker, _ = read_table(folder / "marker.csv")
+        names = [f"marker_position_{axis}" for axis in "xyz"]
+        names += [f"marker_quaternion_{axis}" for axis in "wxyz"]
+        pose = marker.columns(names).copy()
+        _check_rows(marker, len(times))
+        pose[(pose == LOST_MARKER_VALUE).all(axis=1)] = np.nan
+        end_effector = robot.columns(
+            [f"ee_T_{row}{column}" for row in range(4) for column in range(4)]
+        )
+        joints = range(1, N_ARM_JOINTS + 1)
+        arrays = {
+            "marker_pose": pose,  # in the frame of the camera on the wrist
+            "robot_joints": robot.columns([f"position_joint{k}" for k in joints]),
+            "robot_joint_velocities": robot.columns([f"velocity_joint{k}" for k in joints]),
+            "robot_ee_pose": end_effector.reshape(-1, 4, 4),
+            "robot_velocity": robot.columns(["v_x", "v_y"]),
+        }
+        truth = Truth(times, arrays)
         metadata = _metadata(folder / "meta_data.csv")
         recording = Recording(folder.name, labelled, metadata, truth)
     yield recording
@@ -111,7 +128,15 @@ def _labels(path: Path, module: Tactile) -> tuple[Label, ...]:
     _check_rows(table, module.n_samples)
     if not np.isin(flags, (0, 1)).all():
         raise RecordingError(f"{path}: 0 or 1 expected in columns 'slip' and 'fail'")
-    states = [_state(slip, fail) for slip, fail in flags.astype(bool).tolist()]
+    states: list[tuple[ContactState, Cause | None]] = []
+    for slip, fail in flags.astype(bool).tolist():
+        # A failed sample has no object any more, whatever its flag of slip says.
+        if fail:
+            states.append((ContactState.NO_CONTACT, Cause.LOST))
+        else:
+            states.append(
+                (ContactState.UNSTABLE, Cause.SLIP) if slip else (ContactState.STABLE, None)
+            )
     return labels_from_samples(
         module.times,
         states,
@@ -121,48 +146,16 @@ def _labels(path: Path, module: Tactile) -> tuple[Label, ...]:
     )
 
 
-def _state(slip: bool, fail: bool) -> tuple[ContactState, Cause | None]:
-    if fail:
-        return ContactState.NO_CONTACT, Cause.LOST
-    return (ContactState.UNSTABLE, Cause.SLIP) if slip else (ContactState.STABLE, None)
-
-
-def _marker(path: Path, n_rows: int) -> Mapping[str, npt.NDArray[Any]]:
-    """Return the pose of the marker in the frame of the wrist camera; NaN where it was lost."""
-    table, _ = read_table(path)
-    names = [f"marker_position_{axis}" for axis in "xyz"]
-    names += [f"marker_quaternion_{axis}" for axis in "wxyz"]
-    pose = table.columns(names).copy()
-    _check_rows(table, n_rows)
-    pose[(pose == LOST_MARKER_VALUE).all(axis=1)] = np.nan
-    return {"marker_pose": pose}
-
-
-def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
-    """Return joints and end effector pose (4 x 4) of the arm, and `v_x`, `v_y` unchanged."""
-    places = [(row, column) for row in range(4) for column in range(4)]
-    pose = table.columns([f"ee_T_{row}{column}" for row, column in places])
-    return {
-        "robot_joints": table.columns([f"position_joint{k + 1}" for k in range(N_ARM_JOINTS)]),
-        "robot_joint_velocities": table.columns(
-            [f"velocity_joint{k + 1}" for k in range(N_ARM_JOINTS)]
-        ),
-        "robot_ee_pose": pose.reshape(-1, 4, 4),
-        "robot_velocity": table.columns(["v_x", "v_y"]),
-    }
-
-
 def _metadata(path: Path) -> dict[str, Any]:
     metadata: dict[str, Any] = {"object": "box", "source": SOURCE, STARTS_LOADED: True}
     if path.is_file():
         text = read_input(path, MAX_METADATA_SIZE).decode("utf-8-sig")
         row = next(csv.DictReader(text.splitlines()), {})
-        metadata.update({key: _value(text) for key, text in row.items() if key})
+        for key, word in row.items():
+            value: str | float | None = word
+            for number in (float, int):  # the last that fits: a whole number stays one
+                with suppress(ValueError):
+                    value = number(word or "")
+            if key:
+                metadata[key] = value
     return metadata
-
-
-def _value(text: str | None) -> str | float | None:
-    for number in (int, float):
-        with suppress(ValueError):
-            return number(text or "")
-    return text

@@ -6,7 +6,7 @@ labels. Regions of other types, such as choices and texts, are ignored.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,9 @@ from holdfast.io.label_files import MAX_LABEL_FILE_SIZE
 from holdfast.recordings import Label, Recording
 
 Labels = dict[str, tuple[Label, ...]]
+
+_IS_TABLE = re.compile(r".*\.[ct]sv", re.IGNORECASE | re.DOTALL).fullmatch
+_SUFFIX = re.compile(r"(\.signals)?\.[ct]sv$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -129,11 +132,22 @@ def annotations_of(path: str | Path, recording: Recording) -> list[Annotation]:
             unknown, reversed, outside the recording or overlaps another, or a label group is
             no finger.
     """
-    task = _task_of(_tasks(Path(path)), recording, Path(path))
+    try:
+        document = msgspec.json.decode(read_input(path, MAX_LABEL_FILE_SIZE))
+        tasks = document if isinstance(document, list) else [document]
+        task = _task_of(msgspec.convert(tasks, list[_Task]), recording, Path(path))
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    except (ValueError, RecursionError) as cause:  # msgspec's errors are ValueErrors
+        raise RecordingError(f"{path} is no JSON export of Label Studio: {cause}") from cause
     found = []
     for annotation in task.annotations:
         if not annotation.was_cancelled:
-            annotator = _annotator(annotation.completed_by)
+            # A number in older versions and exports, an object with names in others.
+            person = annotation.completed_by
+            if isinstance(person, dict):
+                person = person.get("email") or person.get("username") or person.get("id")
+            annotator = "" if person is None else str(person)
             number = "an annotation" if annotation.id is None else f"annotation {annotation.id}"
             where = f"{path}, {recording.name!r}, {number}"
             found.append(
@@ -167,6 +181,7 @@ def labels_from_label_studio(
     """
     every = annotations_of(path, recording)
     if annotator is None:
+        # What a person has labelled is final; predictions wait for one.
         found = [each for each in every if not each.prediction] or every
     else:
         found = [each for each in every if each.annotator == annotator]
@@ -182,20 +197,10 @@ def labels_from_label_studio(
     )
 
 
-def _tasks(path: Path) -> list[_Task]:
-    try:
-        document = msgspec.json.decode(read_input(path, MAX_LABEL_FILE_SIZE))
-        tasks = document if isinstance(document, list) else [document]
-        return msgspec.convert(tasks, list[_Task])
-    except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
-    except (ValueError, RecursionError) as cause:
-        raise RecordingError(f"{path} is no JSON export of Label Studio: {cause}") from cause
-
-
 def _task_of(tasks: Sequence[_Task], recording: Recording, path: Path) -> _Task:
     """Return the task of a recording, by its hash or else by name."""
     named = [task for task in tasks if recording.name in _names(task)]
+    # The hash first: files are renamed, and names are given twice.
     known = [task for task in tasks if task.data.get("digest") == recording.digest]
     if not known and any("digest" in task.data for task in named):
         raise RecordingError(
@@ -217,39 +222,15 @@ def _names(task: _Task) -> list[str]:
     given = task.data.get("recording")
     texts = [each for each in task.data.values() if isinstance(each, str)]
     files = [*texts, task.file_upload or ""]
-    stems = [_stem(file) for file in files if file.lower().endswith((".csv", ".tsv"))]
+    # Of a path or a URL, whose last part may be a query.
+    last = [re.split(r"[/\\=]", unquote(file))[-1] for file in files if _IS_TABLE(file)]
+    stems = [_SUFFIX.sub("", name) for name in last]
     bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]  # without the prefix of an upload
     return [*([given] if isinstance(given, str) else []), *bare, *stems]
 
 
-def _stem(url: str) -> str:
-    name = re.split(r"[/\\=]", unquote(url))[-1]
-    return re.sub(r"(\.signals)?\.[ct]sv$", "", name, flags=re.IGNORECASE)
-
-
-def _annotator(completed_by: object) -> str:
-    if isinstance(completed_by, dict):
-        named = completed_by.get("email") or completed_by.get("username") or completed_by.get("id")
-        return "" if named is None else str(named)
-    return "" if completed_by is None else str(completed_by)
-
-
 def _labels(results: Sequence[_Result], recording: Recording, where: str, annotator: str) -> Labels:
     labels: dict[str, list[Label]] = {}
-    for finger, label in _each_label(results, recording, where, annotator):
-        labels.setdefault(finger, []).append(label)
-    try:
-        validated = recording.with_labels(labels)
-    except RecordingError as cause:
-        raise RecordingError(f"{where}: {cause}") from cause
-    return {
-        finger: validated.modules[finger].labels for finger in recording.modules if finger in labels
-    }
-
-
-def _each_label(
-    results: Sequence[_Result], recording: Recording, where: str, annotator: str
-) -> Iterator[tuple[str, Label]]:
     for result in results:
         if result.type != "timeserieslabels":
             continue
@@ -260,9 +241,16 @@ def _each_label(
                 f"{', '.join(recording.modules)} expected"
             )
         try:
-            yield finger, _label(result, annotator)
+            labels.setdefault(finger, []).append(_label(result, annotator))
         except ValueError as cause:
             raise RecordingError(f"{where}, {finger}: {cause}") from cause
+    try:
+        validated = recording.with_labels(labels)
+    except RecordingError as cause:
+        raise RecordingError(f"{where}: {cause}") from cause
+    return {
+        finger: validated.modules[finger].labels for finger in recording.modules if finger in labels
+    }
 
 
 def _label(result: _Result, annotator: str) -> Label:
@@ -285,6 +273,7 @@ def _label(result: _Result, annotator: str) -> Label:
         raise ValueError(f"one label for an interval expected, given: {given}")
     state, cause_of = state_of(value.timeserieslabels[0])
     meta = result.meta if isinstance(result.meta, dict) else {}
+    # A region that a person has changed is no longer by its first author.
     changed = result.origin == "prediction-changed"
     return Label(
         value.start,

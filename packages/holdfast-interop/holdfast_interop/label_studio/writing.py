@@ -8,8 +8,9 @@ does, at `url`.
 """
 
 import csv
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from io import StringIO
+from math import isfinite
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -24,8 +25,7 @@ from holdfast.errors import OutputError, RecordingError
 from holdfast.features import DEFAULT_WINDOW
 from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.labelling.server.signals import SERIES, signal_values
-from holdfast.recordings import Label, Recording, Tactile
-from holdfast.sensors.types import Array
+from holdfast.recordings import Recording
 from holdfast_interop.label_studio.reading import label_name, state_of
 
 TASKS, CONFIG, SIGNALS = "label-studio.json", "label-studio.xml", ".signals.csv"
@@ -66,15 +66,23 @@ def save_label_studio(
         RecordingError: there is no recording, or two have the same name.
     """
     target = Path(folder)
-    _create(target)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        raise OutputError(f"cannot write {target}: {cause.strerror}") from cause
     for name in (TASKS, CONFIG):
         refuse_overwrite(target / name, force=force)
     base = f"/data/local-files/?d={quote(target.resolve().name)}" if url is None else url
     tasks: dict[str, dict[str, Any]] = {}
     units: dict[str, str] = {}
     extra: set[str] = set()
+    # One recording at a time, as a data set may be larger than the memory.
     for recording in recordings:
-        _check_name(recording.name, tasks)
+        # Names become files and tasks: one would replace the other.
+        if recording.name in tasks:
+            raise RecordingError(
+                f"two recordings have the name {recording.name!r}; different names expected"
+            )
         signals = file_stem(recording.name) + SIGNALS
         write_whole(target / signals, signals_csv(recording, window).encode(), force=force)
         link = f"{base.rstrip('/')}/{quote(signals)}"
@@ -99,11 +107,27 @@ def task_of(recording: Recording, link: str, *, predictions: bool = False) -> di
         link: URL of the signals, for Label Studio.
         predictions: write labels as predictions, not as annotations.
     """
-    results = [
-        _result(finger, number, label)
-        for finger, module in recording.modules.items()
-        for number, label in enumerate(module.labels)
-    ]
+    results = []
+    for finger, module in recording.modules.items():
+        for number, label in enumerate(module.labels):
+            meta = {"evidence": label.evidence, "author": label.author}
+            value = {
+                "start": float(label.start),
+                "end": float(label.end),
+                "instant": False,
+                "timeserieslabels": [label_name(label.state, label.cause)],
+            }
+            results.append(
+                {
+                    "id": f"{finger}-{number}",
+                    "type": "timeserieslabels",
+                    "from_name": finger,
+                    "to_name": _series_name(finger),
+                    "value": value,
+                    "score": float(label.confidence),
+                    "meta": {name: text for name, text in meta.items() if text},
+                }
+            )
     version: dict[str, Any] = {"model_version": "holdfast"} if predictions else {}
     labelled = [version | {"result": results}] if results else []
     return {
@@ -124,15 +148,20 @@ def signals_csv(recording: Recording, window: int = DEFAULT_WINDOW) -> str:
         window: N_w of sigma.
     """
     longest = max(recording.modules.values(), key=lambda module: module.n_samples)
-    columns = [
-        column
-        for module in recording.modules.values()
-        for column in _latest_values(module, longest.times, window).T
-    ]
+    cells = [list(map(repr, longest.times.tolist()))]
+    for module in recording.modules.values():
+        # Row 0 is before the first sample of the finger.
+        values = np.full((module.n_samples + 1, len(SERIES)), np.nan)
+        if module.n_samples:
+            values[1:] = signal_values(module, TARE_DURATION, window)
+        latest = values[np.searchsorted(module.times, longest.times, side="right")]
+        cells += [
+            [f"{value:.7g}" if isfinite(value) else "" for value in column]
+            for column in latest.T.tolist()
+        ]
     text = StringIO()
     text.write(csv_text([["time", *_column_names(recording.modules)]]))
     writer = csv.writer(text, lineterminator="\n")
-    cells = [list(map(repr, longest.times.tolist())), *(list(_cells(each)) for each in columns)]
     writer.writerows(zip(*cells, strict=True))
     return text.getvalue()
 
@@ -147,38 +176,29 @@ def labelling_config(units: Mapping[str, str], extra: Iterable[str] = ()) -> str
     usual = [label_name(state) for state in LABEL_STATES]
     usual += [label_name(ContactState.UNSTABLE, cause) for cause in Cause]
     names = list(dict.fromkeys([*usual, *sorted(extra)]))
-    body = "\n".join(_finger_config(finger, unit, names) for finger, unit in units.items())
+    # A label has the colour of its state, whatever its cause.
+    labels = "\n".join(
+        f"    <Label value={quoteattr(name)} "
+        f"background={quoteattr(LABEL_COLOURS[state_of(name)[0]])}/>"
+        for name in names
+    )
+    parts = []
+    for finger, unit in units.items():
+        channels = "\n".join(
+            f"    <Channel column={quoteattr(column)} legend={quoteattr(name)} "
+            f"units={quoteattr(unit)}/>"
+            for column, name in zip(map(text_cell, _column_names([finger])), SERIES, strict=True)
+        )
+        series = quoteattr(_series_name(finger))
+        parts.append(
+            f"  <Header value={quoteattr(finger)}/>\n"
+            f'  <TimeSeriesLabels name={quoteattr(finger)} toName={series} choice="single">\n'
+            f"{labels}\n  </TimeSeriesLabels>\n"
+            f'  <TimeSeries name={series} valueType="url" value="$csv" sep="," timeColumn="time">\n'
+            f"{channels}\n  </TimeSeries>"
+        )
+    body = "\n".join(parts)
     return f"<View>\n{body}\n</View>\n"
-
-
-def _create(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as cause:
-        raise OutputError(f"cannot write {folder}: {cause.strerror}") from cause
-
-
-def _check_name(name: str, known: Collection[str]) -> None:
-    if name in known:
-        raise RecordingError(f"two recordings have the name {name!r}; different names expected")
-
-
-def _result(finger: str, number: int, label: Label) -> dict[str, Any]:
-    meta = {"evidence": label.evidence, "author": label.author}
-    return {
-        "id": f"{finger}-{number}",
-        "type": "timeserieslabels",
-        "from_name": finger,
-        "to_name": _series_name(finger),
-        "value": {
-            "start": float(label.start),
-            "end": float(label.end),
-            "instant": False,
-            "timeserieslabels": [label_name(label.state, label.cause)],
-        },
-        "score": float(label.confidence),
-        "meta": {name: text for name, text in meta.items() if text},
-    }
 
 
 def _series_name(finger: str) -> str:
@@ -187,40 +207,3 @@ def _series_name(finger: str) -> str:
 
 def _column_names(fingers: Iterable[str]) -> list[str]:
     return [f"{finger}_{name}" for finger in fingers for name in SERIES]
-
-
-def _latest_values(module: Tactile, times: Array, window: int) -> Array:
-    """Return (n, 5) signals of the latest sample of a finger at each time; NaN before the first."""
-    values = np.full((module.n_samples + 1, len(SERIES)), np.nan)
-    if module.n_samples:
-        values[1:] = signal_values(module, TARE_DURATION, window)
-    latest: Array = values[np.searchsorted(module.times, times, side="right")]
-    return latest
-
-
-def _cells(values: Array) -> Iterator[str]:
-    return (f"{value:.7g}" if np.isfinite(value) else "" for value in values.tolist())
-
-
-def _finger_config(finger: str, unit: str, names: Sequence[str]) -> str:
-    labels = "\n".join(
-        f"    <Label value={quoteattr(name)} background={quoteattr(_colour(name))}/>"
-        for name in names
-    )
-    channels = "\n".join(
-        f"    <Channel column={quoteattr(column)} legend={quoteattr(name)} "
-        f"units={quoteattr(unit)}/>"
-        for column, name in zip(map(text_cell, _column_names([finger])), SERIES, strict=True)
-    )
-    series = quoteattr(_series_name(finger))
-    return (
-        f"  <Header value={quoteattr(finger)}/>\n"
-        f'  <TimeSeriesLabels name={quoteattr(finger)} toName={series} choice="single">\n'
-        f"{labels}\n  </TimeSeriesLabels>\n"
-        f'  <TimeSeries name={series} valueType="url" value="$csv" sep="," timeColumn="time">\n'
-        f"{channels}\n  </TimeSeries>"
-    )
-
-
-def _colour(name: str) -> str:
-    return LABEL_COLOURS[state_of(name)[0]]

@@ -74,11 +74,28 @@ class SharedColumns:
         for spec in specs:
             times = arrays[spec.topic][0]
             track = track_name(spec)
+            # A window holds all new samples of a frame, or the joined windows would lack some.
             self.widths[track] = max(self.widths.get(track, 1), span.width(times))
         for spec in value_specs(specs):
-            self._add_values(recording.name, spec)
+            name, number = feature_name(spec), stored_type(spec)
+            known = self.values.get(name, ColumnSpec(number, spec.shape))
+            pair = {known.number, number}
+            # The type that holds the values of both exactly; only floats have one besides equals.
+            common = number if len(pair) == 1 else "float64"
+            if known.shape != spec.shape or (len(pair) > 1 and pair != {"float32", "float64"}):
+                raise RecordingError(
+                    f"{recording.name}: {name} has {number} of shape {spec.shape}, in the "
+                    f"recordings before {known.number} of {known.shape}; a data set has one "
+                    "shape: export them apart"
+                )
+            if len(spec.shape) >= _LIMIT_AXES:
+                raise RecordingError(
+                    f"{recording.name}: {name} has {len(spec.shape)} axes; at most 4"
+                )
+            self.values[name] = ColumnSpec(common, spec.shape)
+            self.tracks[name] = track_name(spec)
         for name, module in recording.modules.items():
-            feature = feature_name(_module_spec(specs, name))
+            feature = feature_name(next(spec for spec in specs if spec.track == name))
             unit = str(module.unit)
             if self.units.setdefault(feature, unit) != unit:
                 raise RecordingError(
@@ -86,21 +103,6 @@ class SharedColumns:
                     f"{self.units[feature]}; export them apart"
                 )
             self.labelled[feature] = f"{LABEL_PREFIX}{name}".replace("/", ".")
-
-    def _add_values(self, recording: str, spec: ArraySpec) -> None:
-        name, number = feature_name(spec), stored_type(spec)
-        known = self.values.get(name, ColumnSpec(number, spec.shape))
-        common = _common_type(known.number, number)
-        if known.shape != spec.shape or common is None:
-            raise RecordingError(
-                f"{recording}: {name} has {number} of shape {spec.shape}, in the recordings "
-                f"before {known.number} of {known.shape}; a data set has one shape: export "
-                "them apart"
-            )
-        if len(spec.shape) >= _LIMIT_AXES:
-            raise RecordingError(f"{recording}: {name} has {len(spec.shape)} axes; at most 4")
-        self.values[name] = ColumnSpec(common, spec.shape)
-        self.tracks[name] = track_name(spec)
 
     def features(self) -> dict[str, ColumnSpec]:
         """Return all columns of the data, in their order."""
@@ -133,6 +135,7 @@ class FrameSpan(NamedTuple):
             RecordingError: there are far more frames than samples.
         """
         tracks = [times for times, _ in arrays_of(recording).values() if len(times)]
+        # Frame 0 has the first sample of all tracks, so that no track begins before it.
         start = min(float(times[0]) for times in tracks)
         last = max(float(frame_numbers(times[-1:], start, fps)[0]) for times in tracks)
         n_samples = max(map(len, tracks))
@@ -164,29 +167,6 @@ def _check_names(recording: str, specs: Sequence[ArraySpec]) -> None:
         )
 
 
-def _module_spec(specs: Sequence[ArraySpec], module: str) -> ArraySpec:
-    return next(spec for spec in specs if spec.track == module)
-
-
-def _common_type(first: str, second: str) -> str | None:
-    """Return the number type that holds the values of both exactly; None if there is none."""
-    if first == second:
-        return first
-    return "float64" if {first, second} == {"float32", "float64"} else None
-
-
-def _arrow_type(spec: ColumnSpec) -> pa.DataType:
-    """Return the type of a column, in the form in which the library `datasets` writes it."""
-    number = pa.bool_() if spec.number == "bool" else pa.from_numpy_dtype(np.dtype(spec.number))
-    if spec.shape == (1,):
-        return number
-    if len(spec.shape) == 1:
-        return pa.list_(number, spec.shape[0])
-    for _ in spec.shape:
-        number = pa.list_(number)
-    return number
-
-
 def nested(values: npt.NDArray[Any], spec: ColumnSpec) -> pa.Array:
     """Return values (n_frames, ...) as nested lists."""
     array = pa.array(np.ascontiguousarray(values).reshape(-1))
@@ -201,5 +181,15 @@ def nested(values: npt.NDArray[Any], spec: ColumnSpec) -> pa.Array:
 
 
 def arrow_schema(features: Mapping[str, ColumnSpec]) -> pa.Schema:
-    """Return the schema of the tables of frames."""
-    return pa.schema([(name, _arrow_type(spec)) for name, spec in features.items()])
+    """Return the schema of the tables of frames, as the library `datasets` writes it."""
+    types = {}
+    for name, spec in features.items():
+        kind = pa.bool_() if spec.number == "bool" else pa.from_numpy_dtype(np.dtype(spec.number))
+        if len(spec.shape) == 1:
+            types[name] = kind if spec.shape == (1,) else pa.list_(kind, spec.shape[0])
+        else:
+            # Of several axes: lists of no fixed length inside each other.
+            for _ in spec.shape:
+                kind = pa.list_(kind)
+            types[name] = kind
+    return pa.schema(list(types.items()))

@@ -1,7 +1,11 @@
-"""Import of LeRobot data sets (v3.0) that `holdfast export` wrote, without loss."""
+"""Import of LeRobot data sets: those that `holdfast export` wrote (v3.0), without loss.
+
+Of those of other programs (v2 and v3), any feature of numbers is read.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +17,10 @@ from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.header import Header, decode_header
 from holdfast.io.importers import IF_IN_CONTACT
+from holdfast.io.importers.array_tables import in_memory, recordings_of_arrays
+from holdfast.io.importers.arrays import arrays_of_columns
 from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.table import natural_order
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -23,7 +30,6 @@ from holdfast.io.timed_arrays import (
 )
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
-from holdfast_interop.lerobot.foreign_sets import MAX_INFO_SIZE, read_foreign_set
 from holdfast_interop.lerobot.layout import (
     DATA_PATH,
     EPISODES_PATH,
@@ -49,6 +55,8 @@ EPISODES_AT_ONCE = 64
 _EPISODE_COLUMNS = (
     "episode_index", "length", "data/chunk_index", "data/file_index", HEADER_COLUMN, TEXTS_COLUMN
 )  # fmt: skip
+
+_FILE_PARTS = ("chunk", "file")
 
 
 class _Info(msgspec.Struct, frozen=True):
@@ -102,19 +110,29 @@ def read(
     Raises:
         RecordingError: the data set is damaged, or no feature fits a sensor.
     """
-    if sensors or columns or not _has_headers(path):
-        yield from read_foreign_set(path, sensors or {}, columns, report)
-        return
-    for episode in _episodes(path, _info(path)):
-        yield _recording(path, episode)
-
-
-def _has_headers(path: Path) -> bool:
-    """Return whether holdfast wrote the data set: its episodes have headers of recordings."""
     import pyarrow.parquet as pq
 
     files = _episode_files(path)
-    return bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
+    # Only what holdfast wrote has the headers of recordings; options name columns of any set.
+    is_own = bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
+    if sensors or columns or not is_own:
+        yield from read_foreign_set(path, sensors or {}, columns, report)
+        return
+    for episode in _episodes(path, _info(path)):
+        table = _EpisodeTable(episode)
+        specs = array_specs(episode.header)
+        arrays = {spec.topic: table.array(spec) for spec in specs if spec.topic != TRUTH_TIME}
+        if episode.header.truth is not None:
+            times = table.times("truth")
+            arrays[TRUTH_TIME] = (times, times)
+        recording = recording_from(episode.header, arrays, path)
+        # Parquet of other writers has no checksums: the digest finds what was changed since.
+        if recording.digest != episode.header.digest:
+            raise RecordingError(
+                f"{path} is damaged: the samples of episode {episode.number} do not match their "
+                "digest"
+            )
+        yield replace(recording, name=episode.header.name)
 
 
 def _episode_files(path: Path) -> list[Path]:
@@ -155,39 +173,19 @@ def _episodes(path: Path, info: _Info) -> Iterator[_Episode]:
             )
         for batch in parquet.iter_batches(EPISODES_AT_ONCE, columns=list(_EPISODE_COLUMNS)):
             for row in batch.to_pylist():
-                yield _episode(path, row)
+                place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in _FILE_PARTS}
+                yield _Episode(
+                    int(row["episode_index"]),
+                    int(row["length"]),
+                    path / DATA_PATH.format(**place),
+                    decode_header(row[HEADER_COLUMN], path),
+                    msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
+                )
                 n_episodes += 1
     if n_episodes != info.total_episodes:
         raise RecordingError(
             f"{path} is damaged: {n_episodes} episodes, its {INFO_PATH} names {info.total_episodes}"
         )
-
-
-def _episode(path: Path, row: dict[str, Any]) -> _Episode:
-    place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in ("chunk", "file")}
-    file = path / DATA_PATH.format(**place)
-    return _Episode(
-        int(row["episode_index"]),
-        int(row["length"]),
-        file,
-        decode_header(row[HEADER_COLUMN], path),
-        msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
-    )
-
-
-def _recording(path: Path, episode: _Episode) -> Recording:
-    table = _EpisodeTable(episode)
-    specs = array_specs(episode.header)
-    arrays = {spec.topic: table.array(spec) for spec in specs if spec.topic != TRUTH_TIME}
-    if episode.header.truth is not None:
-        times = table.times("truth")
-        arrays[TRUTH_TIME] = (times, times)
-    recording = recording_from(episode.header, arrays, path)
-    if recording.digest != episode.header.digest:
-        raise RecordingError(
-            f"{path} is damaged: the samples of episode {episode.number} do not match their digest"
-        )
-    return replace(recording, name=episode.header.name)
 
 
 class _EpisodeTable:
@@ -201,6 +199,7 @@ class _EpisodeTable:
     """
 
     def __init__(self, episode: _Episode) -> None:
+        import pyarrow.compute as pc
         import pyarrow.parquet as pq
 
         self._episode = episode
@@ -212,7 +211,16 @@ class _EpisodeTable:
         file = pq.ParquetFile(episode.path)
         if missing := [name for name in names if name not in file.schema_arrow.names]:
             raise RecordingError(f"{episode.path}: column {missing[0]!r} is missing")
-        self._table = _rows_of(file, episode.number, names)
+        # Without filters of pyarrow, which use the statistics in the footer: if these are damaged,
+        # they abort the process.
+        groups = [
+            number
+            for number in range(file.num_row_groups)
+            for column in [file.read_row_group(number, columns=[EPISODE_COLUMN])[EPISODE_COLUMN]]
+            if pc.index(column, episode.number).as_py() >= 0
+        ]
+        table = file.read_row_groups(groups, columns=[*names, EPISODE_COLUMN])
+        self._table = table.filter(pc.equal(table[EPISODE_COLUMN], episode.number))
         if len(self._table) != episode.length:
             raise RecordingError(
                 f"{episode.path} is damaged: {len(self._table)} frames of episode "
@@ -259,22 +267,76 @@ class _EpisodeTable:
         return values
 
 
-def _rows_of(file: Any, episode: int, names: list[str]) -> Any:  # noqa: ANN401 (of pyarrow)
-    """Return the rows of an episode.
-
-    Filters of pyarrow use the statistics in the footer; if these are damaged, they abort.
-    """
-    import pyarrow.compute as pc
-
-    column = "episode_index"
-    groups = [
-        number
-        for number in range(file.num_row_groups)
-        if pc.index(file.read_row_group(number, columns=[column])[column], episode).as_py() >= 0
-    ]
-    table = file.read_row_groups(groups, columns=[*names, column])
-    return table.filter(pc.equal(table[column], episode))
-
-
 def _memory_type(spec: ArraySpec) -> str:
     return "U1" if spec.number == "str" else spec.number or "float64"
+
+
+MAX_INFO_SIZE = 1 << 24
+"""Maximum size of the description of a data set [bytes]."""
+EPISODE_COLUMN = "episode_index"
+
+
+class _Feature(msgspec.Struct, frozen=True):
+    """Description of a column: its type, its shape and the names of its values."""
+
+    dtype: str
+    shape: tuple[int, ...]
+    names: Any = None
+
+
+class _SetInfo(msgspec.Struct, frozen=True):
+    """What is read of `meta/info.json` of any version."""
+
+    features: dict[str, _Feature]
+    fps: float | None = None
+
+
+def read_foreign_set(
+    path: Path,
+    sensors: Mapping[str, Sensor],
+    columns: Columns | None,
+    report: Callable[[str], None],
+) -> Iterator[Recording]:
+    """Yield a recording for each episode of a data set.
+
+    Args:
+        path: folder of the data set.
+        sensors: as in `recordings_of_arrays`, by the names of features.
+        columns: the same.
+        report: the same.
+
+    Raises:
+        RecordingError: it is no data set, or no feature fits.
+    """
+    import pyarrow.parquet as pq
+
+    try:
+        info = msgspec.json.decode(read_input(path / INFO_PATH, MAX_INFO_SIZE), type=_SetInfo)
+    except msgspec.DecodeError as cause:
+        raise RecordingError(f"{path / INFO_PATH} is not that of a data set: {cause}") from cause
+    files = sorted(path.glob("data/*/*.parquet"), key=natural_order)
+    if not files:
+        raise RecordingError(f"{path} has no files data/*/*.parquet; a LeRobot data set expected")
+    for number, file in enumerate(files):
+        check_regular(file)
+        parquet = pq.ParquetFile(file)
+        names = [name for name in info.features if name in parquet.schema_arrow.names]
+        arrays = arrays_of_columns(file, parquet, names)
+        for name, array in arrays.items():
+            feature = info.features[name]
+            # Names are a list, or lists by kind of value; they count if each value has its own.
+            lists = feature.names.values() if isinstance(feature.names, dict) else [feature.names]
+            words = [str(word) for one in lists if isinstance(one, list) for word in one]
+            if not len(words) == prod(feature.shape) == len(set(words)):
+                words = []
+            arrays[name] = array._replace(columns=tuple(words))
+        if info.fps is not None:
+            arrays["fps"] = in_memory(np.array(info.fps))
+        # A file has rows of many episodes; they are recordings unless the user says otherwise.
+        own = columns or Columns()
+        if own.episode is None and EPISODE_COLUMN in arrays:
+            own = replace(own, episode=EPISODE_COLUMN)
+        # The other files are like the first: one report for all.
+        once = report if number == 0 else lambda _: None
+        for recording in recordings_of_arrays(file, arrays, sensors, own, once):
+            yield replace(recording, name=f"{path.name}{recording.name.removeprefix(file.stem)}")

@@ -64,6 +64,7 @@ def count_name(track: str) -> str:
 
 def stored_type(spec: ArraySpec) -> str:
     """Return the number type of an array in the data set, which holds its values exactly."""
+    # The data sets of LeRobot are tables of numbers: a text becomes its number in a list.
     number = spec.number or "float64"
     if number == "str":
         return "int64"
@@ -91,6 +92,7 @@ def frame_ends(times: Array, start: float, fps: int, n_frames: int) -> Integers:
 
 def frame_numbers(times: Array, start: float, fps: int) -> Array:
     """Return the first frame that is not before each sample, (n,)."""
+    # Up, not to the nearest: a frame never has a sample of its future.
     return np.maximum(np.ceil((times - start) * fps - FRAME_TOLERANCE), 0.0)
 
 
@@ -111,6 +113,7 @@ def window_rows(ends: Integers, width: int) -> Integers:
 def windows(values: npt.NDArray[Any], rows: Integers) -> npt.NDArray[Any]:
     """Return the samples of each window, NaN (or 0) where there is none yet."""
     missing = np.nan if values.dtype.kind == "f" else 0
+    # The row -1 of a frame before the first sample is the value that is added at the end.
     padded = np.concatenate([values, np.full((1, *values.shape[1:]), missing, values.dtype)])
     return padded[rows]
 

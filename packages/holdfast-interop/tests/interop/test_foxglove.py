@@ -16,8 +16,7 @@ from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
-from holdfast_interop.foxglove.exporter import LAYOUT_FILE, export
-from holdfast_interop.foxglove.layout import layout
+from holdfast_interop.foxglove.exporter import LAYOUT_FILE, export, layout
 from holdfast_interop.foxglove.schemas import SCHEMAS
 from holdfast_interop.foxglove.taxel_arrows import LONGEST_ARROW, orientations
 

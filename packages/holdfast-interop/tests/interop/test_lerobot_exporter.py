@@ -12,8 +12,7 @@ from holdfast.errors import OutputError, RecordingError
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording
-from holdfast_interop.lerobot.exporter import export
-from holdfast_interop.lerobot.frames import ColumnStatistics
+from holdfast_interop.lerobot.exporter import ColumnStatistics, export
 
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"

@@ -49,9 +49,18 @@ class FolderBag:
         inside = [connection for storage in storages for connection in storage.connections]
         # Reversed, so that the first definition of a type is used.
         definitions = {one.kind: one.definition for one in reversed(inside) if one.definition}
-        self._connections = [
-            _connection(number, topic, definitions) for number, topic in enumerate(topics)
-        ]
+        self._connections: list[BagConnection] = []
+        for number, topic in enumerate(topics):
+            try:
+                data = topic["topic_metadata"]
+                name, kind, n = str(data["name"]), str(data["type"]), int(topic["message_count"])
+                encoding = data["serialization_format"]
+            except (KeyError, TypeError) as cause:
+                raise ValueError(f"a topic in {METADATA} is not complete: {cause}") from cause
+            if encoding != "cdr":
+                raise ValueError(f"messages in CDR expected, {str(encoding)[:20]!r} given")
+            connection = BagConnection(number, name, kind, definitions.get(kind, ""), n)
+            self._connections.append(connection)
 
     @property
     def connections(self) -> list[BagConnection]:
@@ -88,7 +97,10 @@ def open_folder(path: Path, budget: ReadBudget) -> Iterator[FolderBag]:
     # A file that is named often would be read as often, for the size of one.
     if len(set(files)) < len(files):
         raise ValueError(f"{METADATA} names a file twice")
-    storage, mode = str(metadata["storage_identifier"]), _compression_mode(metadata)
+    storage, packing = str(metadata["storage_identifier"]), metadata.get("compression_format")
+    mode = str(metadata.get("compression_mode") or "none").lower()
+    if mode not in ("none", "file", "message") or (mode != "none" and packing != "zstd"):
+        raise ValueError(f"compression {mode[:20]!r} by {str(packing)[:20]!r} is not supported")
     if storage not in _OPENERS:
         raise ValueError(f"storage {storage[:20]!r} given, {' or '.join(_OPENERS)} expected")
     with ExitStack() as stack:
@@ -97,7 +109,11 @@ def open_folder(path: Path, budget: ReadBudget) -> Iterator[FolderBag]:
             ReadBudget(file)  # which refuses sparse files
         if mode == "file":
             folder = Path(stack.enter_context(TemporaryDirectory()))
-            files = [_unpacked_file(file, folder, budget) for file in files]
+            for k, file in enumerate(files):
+                files[k] = folder / file.stem
+                if files[k].exists():
+                    raise RecordingError(f"{file} has the name of another file of the bag")
+                unpack_file(file, files[k], budget)
         storages = [stack.enter_context(_OPENERS[storage](file, budget)) for file in files]
         topics = metadata["topics_with_message_count"]
         yield FolderBag(storages, topics, budget, packed=mode == "message")
@@ -119,33 +135,3 @@ def _metadata(path: Path) -> Mapping[str, Any]:
     except (KeyError, TypeError) as cause:
         raise ValueError(f"{METADATA} is not that of a ROS 2 bag: {cause}") from cause
     return metadata
-
-
-def _compression_mode(metadata: Mapping[str, Any]) -> str:
-    """Return `file`, `message` or nothing."""
-    mode = str(metadata.get("compression_mode") or "none").lower()
-    kind = metadata.get("compression_format")
-    if mode not in ("none", "file", "message") or (mode != "none" and kind != "zstd"):
-        raise ValueError(f"compression {mode[:20]!r} by {str(kind)[:20]!r} is not supported")
-    return mode
-
-
-def _unpacked_file(file: Path, folder: Path, budget: ReadBudget) -> Path:
-    target = folder / file.stem
-    if target.exists():
-        raise RecordingError(f"{file} has the name of another file of the bag")
-    unpack_file(file, target, budget)
-    return target
-
-
-def _connection(number: int, topic: Any, definitions: Mapping[str, str]) -> BagConnection:  # noqa: ANN401
-    """Return the connection of a topic in the metadata."""
-    try:
-        data = topic["topic_metadata"]
-        name, kind, n_messages = str(data["name"]), str(data["type"]), int(topic["message_count"])
-        encoding = data["serialization_format"]
-    except (KeyError, TypeError) as cause:
-        raise ValueError(f"a topic in {METADATA} is not complete: {cause}") from cause
-    if encoding != "cdr":
-        raise ValueError(f"messages in CDR expected, {str(encoding)[:20]!r} given")
-    return BagConnection(number, name, kind, definitions.get(kind, ""), n_messages)

@@ -129,7 +129,12 @@ class McapBag:
                 raise ValueError(f"a record of {length} bytes ends after the file")
             if opcode == Opcode.CHUNK and in_chunks:
                 try:
-                    data = self._unpacked(self._file.read(length))
+                    chunk = Chunk.read(ReadDataStream(BytesIO(self._file.read(length))))
+                    size = chunk.uncompressed_size
+                    data = unpack(chunk.data, chunk.compression, self._budget, size)
+                    # A checksum of 0 is none.
+                    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+                        raise ValueError("the checksum of a chunk does not match")
                 except (ValueError, McapError, struct.error):
                     if self.complete:
                         raise
@@ -140,14 +145,6 @@ class McapBag:
                 yield opcode, b""
             elif opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
                 yield opcode, self._file.read(length)
-
-    def _unpacked(self, data: bytes) -> bytes:
-        chunk = Chunk.read(ReadDataStream(BytesIO(data)))
-        found = unpack(chunk.data, chunk.compression, self._budget, chunk.uncompressed_size)
-        # A checksum of 0 is none.
-        if chunk.uncompressed_crc and zlib.crc32(found) != chunk.uncompressed_crc:
-            raise ValueError("the checksum of a chunk does not match")
-        return found
 
 
 @contextmanager

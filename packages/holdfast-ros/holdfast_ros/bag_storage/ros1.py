@@ -52,41 +52,28 @@ class Ros1Bag:
 
     def messages(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         """Yield connection, time [ns] and bytes of each message of connections, by time."""
-        for entry in merge(*(self._reader.indexes[number] for number in set(numbers))):
-            if entry.chunk_pos != self._place:
-                self._chunk = self._unpacked(entry.chunk_pos)
-                self._place = entry.chunk_pos
-            fields, data = self._message(entry.offset)
-            seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
-            yield _LENGTH.unpack(fields[b"conn"])[0], seconds * 10**9 + nanoseconds, data
-
-    def _unpacked(self, place: int) -> bytes:
         from rosbags.rosbag1.reader import decompressors
 
-        chunk = self._reader.chunks[place]
-        # rosbags keeps the function of a compression, not its name.
-        names = [name for name, one in decompressors.items() if one is chunk.decompressor]
         file: Any = self._reader.bio
-        file.seek(chunk.datapos)
-        return unpack(file.read(chunk.datasize), names[0], self._budget)
-
-    def _message(self, place: int) -> tuple[dict[bytes, bytes], bytes]:
-        """Return the fields and the data of the message at a place in the chunk, or after it.
-
-        Raises:
-            ValueError: there is none.
-        """
-        while True:
-            self._budget.step()
-            head, place = self._part(place)
-            data, place = self._part(place)
-            fields = _fields(head)
+        for entry in merge(*(self._reader.indexes[number] for number in set(numbers))):
+            if entry.chunk_pos != self._place:
+                chunk = self._reader.chunks[entry.chunk_pos]
+                # rosbags keeps the function of a compression, not its name.
+                names = [name for name, one in decompressors.items() if one is chunk.decompressor]
+                file.seek(chunk.datapos)
+                self._chunk = unpack(file.read(chunk.datasize), names[0], self._budget)
+                self._place = entry.chunk_pos
+            place, fields = entry.offset, {b"op": _CONNECTION}
             # The record of a connection may stand before its first message.
-            if fields.get(b"op") != _CONNECTION:
-                break
-        if fields.get(b"op") != _MESSAGE:
-            raise ValueError("a record of another kind than a message in the index")
-        return fields, data
+            while fields.get(b"op") == _CONNECTION:
+                self._budget.step()
+                head, place = self._part(place)
+                data, place = self._part(place)
+                fields = _fields(head)
+            if fields.get(b"op") != _MESSAGE:
+                raise ValueError("a record of another kind than a message in the index")
+            seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
+            yield _LENGTH.unpack(fields[b"conn"])[0], seconds * 10**9 + nanoseconds, data
 
     def _part(self, place: int) -> tuple[bytes, int]:
         """Return the bytes at a place, which begin with their length, and the place after them."""

@@ -6,8 +6,10 @@ when they are read, pages that belong to two tables. Only plain tables are read.
 
 import sqlite3
 from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
+from shutil import copyfile
+from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import quote
 
@@ -20,6 +22,8 @@ STEP_SIZE = 100
 MAX_TABLES = 64
 """Maximum number of tables and indexes; a bag has six."""
 
+_N_PAGES = slice(28, 32)
+"""Place of the number of pages in the header of a database."""
 _EXPRESSION = -2
 """Number that SQLite gives a column of an index that is an expression."""
 
@@ -40,8 +44,6 @@ class SqliteBag:
         Raises:
             ValueError: there is something else.
         """
-        if not self.complete:  # else SQLite refuses a file with fewer pages than it states
-            self._rows("PRAGMA writable_schema = ON")
         # The schema of an unknown file must not call functions that have effects.
         self._rows("PRAGMA trusted_schema = OFF")
         # A CHECK is an expression of the file, which `quick_check` would evaluate.
@@ -73,7 +75,14 @@ class SqliteBag:
             raise ValueError("two topics with the same number")
         query = "SELECT topic_id, count(*) FROM messages GROUP BY topic_id"
         counts = dict(self._rows(query)) if self.complete else {}
-        definitions = self._definitions()
+        definitions: dict[str, str] = {}
+        if self._rows("PRAGMA table_info(message_definitions)"):  # older bags have none
+            rows = self._rows(
+                "SELECT topic_type, encoded_message_definition FROM message_definitions "
+                "WHERE encoding = 'ros2msg'",
+                MAX_BAG_CONNECTIONS,
+            )
+            definitions = {str(kind): str(text) for kind, text in rows}
         return [
             BagConnection(
                 int(number), str(name), str(kind), definitions.get(kind, ""), counts.get(number, 0)
@@ -101,17 +110,6 @@ class SqliteBag:
                 if not isinstance(time, int) or not isinstance(data, bytes):
                     raise ValueError("a message without a time or without bytes")
                 yield number, time, data
-
-    def _definitions(self) -> dict[str, str]:
-        """Return the texts of definitions by type; older bags have none."""
-        if not self._rows("PRAGMA table_info(message_definitions)"):
-            return {}
-        rows = self._rows(
-            "SELECT topic_type, encoded_message_definition FROM message_definitions "
-            "WHERE encoding = 'ros2msg'",
-            MAX_BAG_CONNECTIONS,
-        )
-        return {str(kind): str(text) for kind, text in rows}
 
     def _rows(self, query: str, max_rows: int | None = None) -> list[tuple[Any, ...]]:
         """Return the rows of a query, which count in the budget."""
@@ -151,20 +149,27 @@ def open_sqlite(path: Path, budget: ReadBudget) -> Iterator[SqliteBag]:
         ValueError: it holds something else than plain tables.
         sqlite3.Error: it is damaged.
     """
-    # `immutable`: no lock, journal or other file is made or read beside the bag.
-    address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
-    with closing(sqlite3.connect(address, uri=True)) as database:
+    with ExitStack() as stack:
+        with path.open("rb") as file:
+            head = file.read(100)
+        # Places in the header of a database; the size 65536 does not fit and is stored as 1.
+        page_size, n_pages = int.from_bytes(head[16:18]), int.from_bytes(head[_N_PAGES])
+        page_size = 65536 if page_size == 1 else page_size
+        complete = path.stat().st_size >= n_pages * page_size
+        if not complete and page_size:
+            # SQLite reads what is missing of a page as zeros, and so does it with the pages of a
+            # long message: the copy has whole pages only, and states how many.
+            path = Path(copyfile(path, Path(stack.enter_context(TemporaryDirectory())) / "cut.db3"))
+            with path.open("r+b") as file:
+                n_pages = path.stat().st_size // page_size
+                file.truncate(n_pages * page_size)
+                file.seek(_N_PAGES.start)
+                file.write(n_pages.to_bytes(4))
+        # `immutable`: no lock, journal or other file is made or read beside the bag.
+        address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
+        database = stack.enter_context(closing(sqlite3.connect(address, uri=True)))
         # A text that is no UTF-8 becomes part of a message, not an error of its own.
         database.text_factory = lambda data: data.decode(errors="replace")
-        bag = SqliteBag(database, budget, complete=_has_all_pages(path))
+        bag = SqliteBag(database, budget, complete=complete)
         bag.check()
         yield bag
-
-
-def _has_all_pages(path: Path) -> bool:
-    """Return whether a file has as many pages as its header states; else it was cut."""
-    with path.open("rb") as file:
-        head = file.read(100)
-    # Places in the header of a database; the size 65536 does not fit and is stored as 1.
-    size, n_pages = int.from_bytes(head[16:18]), int.from_bytes(head[28:32])
-    return path.stat().st_size >= n_pages * (65536 if size == 1 else size)

@@ -8,7 +8,7 @@ from holdfast_grip.hands.base import HandDevice
 from holdfast_ros.hands.joint_hand import JointHand, JointOutput, JointSetup, check_home
 from holdfast_ros.hands.joints import JointOrder
 from holdfast_ros.hands.parameters import Parameters
-from holdfast_ros.hands.width_hand import WidthHand, WidthSetup
+from holdfast_ros.hands.scalar_hand import WidthHand, WidthSetup
 from holdfast_ros.link import Link
 from holdfast_ros.topic_messages import FLOAT64, FLOAT_ARRAY, GRIPPER_COMMAND, JOINT_TRAJECTORY
 
@@ -33,18 +33,13 @@ class ControllerKind:
         Raises:
             ValueError: a parameter is missing or not valid.
         """
-        setup = self._setup(given)
-        check_home(name, setup)
-        return JointHand(name, link, setup, shared=given.shared)
-
-    def _setup(self, given: Parameters) -> JointSetup:
         order = JointOrder(given.named_joints("joints"))
         n = len(order.names)
         positions = given.word("command", ("positions", "efforts")) == "positions"
         # Check that no parameter of set-points is given for efforts.
-        for name in ("stiffness", "lowest", "highest", "home"):
-            if not positions and given.has(name):
-                raise ValueError(f"{given.text}: {name}= is a parameter of command=positions")
+        for word in ("stiffness", "lowest", "highest", "home"):
+            if not positions and given.has(word):
+                raise ValueError(f"{given.text}: {word}= is a parameter of command=positions")
         torques = given.joints("effort", each=True, n=n) if given.has("effort") else None
         lowest, highest = np.full(n, -np.pi), np.full(n, np.pi)
         if positions:
@@ -55,7 +50,7 @@ class ControllerKind:
         if not (lowest < highest).all():
             raise ValueError(f"{given.text}: lowest below highest expected for each joint")
         types = tuple(JOINT_TYPES) if positions else ("Float64MultiArray",)
-        return JointSetup(
+        setup = JointSetup(
             output=JointOutput.POSITIONS if positions else JointOutput.TORQUES,
             topic=given.topic("topic"),
             message=JOINT_TYPES[given.word("type", types)],
@@ -69,6 +64,8 @@ class ControllerKind:
             home=given.joints("home", each=True, n=n) if positions else None,
             home_topic=None,
         )
+        check_home(name, setup)
+        return JointHand(name, link, setup, shared=given.shared)
 
 
 class WidthKind:

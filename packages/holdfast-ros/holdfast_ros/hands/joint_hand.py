@@ -10,7 +10,7 @@ import numpy as np
 from holdfast.sensors.types import Array
 from holdfast_grip.command import GripCommand
 from holdfast_grip.errors import HandError
-from holdfast_grip.limits import Limits
+from holdfast_grip.limits import SLACK, Limits
 from holdfast_ros.hands.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
 from holdfast_ros.hands.ros_hand import RosHand
 from holdfast_ros.link import Link
@@ -22,9 +22,6 @@ from holdfast_ros.topic_messages import (
     joint_message,
     trajectory_message,
 )
-
-SLACK = 1e-9
-"""Rounding by which a torque may exceed its ceiling, as a share of it."""
 
 
 class JointOutput(StrEnum):
@@ -123,8 +120,16 @@ class JointHand(RosHand):
 
     def _begin(self) -> None:
         given = self.setup.torques
-        positions, measured = self._measured()
-        torques = measured if given is None else given
+        n = len(self.setup.order.names)
+        states = [one for _, one in self._states]
+        # NaN without joint states, and no torques where a state has none.
+        positions, torques = np.full(n, np.nan), np.zeros(n) if given is None else given
+        if states:
+            positions = np.median([state.positions for state in states], axis=0)
+            efforts = [state.efforts for state in states if len(state.efforts)]
+            # A median of some of the states would be of another time than the positions.
+            if given is None and len(efforts) == len(states):
+                torques = np.median(efforts, axis=0)
         if not torques.any():
             raise HandError(
                 f"{self.name}: the joint states of {self.setup.states} have no efforts, so the "
@@ -156,29 +161,22 @@ class JointHand(RosHand):
             )
         return ordered
 
-    def _measured(self) -> tuple[Array, Array]:
-        """Return the median positions and torques (n_joints,) of the last joint states.
-
-        Positions are NaN without joint states, and torques 0 where a state has none.
-        """
-        n = len(self.setup.order.names)
-        states = [one for _, one in self._states]
-        if not states:
-            return np.full(n, np.nan), np.zeros(n)
-        efforts = [state.efforts for state in states if len(state.efforts)]
-        torques = np.zeros(n)
-        # A median of some of the states would be of another time than the positions.
-        if len(efforts) == len(states):
-            torques = np.median(efforts, axis=0)
-        return np.median([state.positions for state in states], axis=0), torques
-
     def _press(self, command: GripCommand) -> None:
         if self._grip is None:
             return
         torques = self.setup.order.scales(command) * self._grip.torques
         if problem := self._excess(torques):
             raise HandError(problem)
-        self._publish(self.setup.topic, self._message(command.time, torques, self._grip))
+        setup, time = self.setup, command.time
+        if setup.output is JointOutput.TORQUES:
+            message = self._values(time, efforts=torques)
+        elif setup.output is JointOutput.LARGEST:
+            # A limit has no sign; the position control of the driver gives it.
+            message = self._values(time, efforts=np.abs(torques))
+        else:
+            targets = self._grip.positions + torques / setup.stiffness
+            message = self._values(time, positions=np.clip(targets, setup.lowest, setup.highest))
+        self._publish(setup.topic, message)
 
     def _release(self) -> None:
         setup = self.setup
@@ -188,16 +186,6 @@ class JointHand(RosHand):
         else:
             message = self._values(0.0, positions=setup.home)
             self._publish(setup.home_topic or setup.topic, message)
-
-    def _message(self, time: float, torques: Array, grip: JointGrip) -> Mapping[str, Any]:
-        setup = self.setup
-        if setup.output is JointOutput.TORQUES:
-            return self._values(time, efforts=torques)
-        if setup.output is JointOutput.LARGEST:
-            # A limit has no sign; the position control of the driver gives it.
-            return self._values(time, efforts=np.abs(torques))
-        targets = grip.positions + torques / setup.stiffness
-        return self._values(time, positions=np.clip(targets, setup.lowest, setup.highest))
 
     def _values(
         self, time: float, *, positions: Array | None = None, efforts: Array | None = None

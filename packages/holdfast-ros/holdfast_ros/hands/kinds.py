@@ -1,11 +1,10 @@
 """Hands on topics of ROS by name: `ros2:plexus`, `ros1:efforts`, ..."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.devices.uri import Address, parse
+from holdfast.devices.uri import parse
 from holdfast.sensors.types import Array
 from holdfast_grip.hands.base import HandDevice
 from holdfast_ros.hands import joints
@@ -76,17 +75,6 @@ class JointKind:
 
     def make(self, name: str, link: Link, given: Parameters) -> HandDevice:
         """Return the hand of a URI."""
-        setup = self._setup(given)
-        return JointHand(name, link, setup, shared=given.shared)
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of its parameters."""
-        stiffness = ("stiffness",) if self.output is JointOutput.POSITIONS else ()
-        return ("namespace", "states", "order", "prefix", "effort", "max_effort", *stiffness,
-                "lowest", "highest", "release", "home")  # fmt: skip
-
-    def _setup(self, given: Parameters) -> JointSetup:
         order = allegro_order(given.fingers(self.order), given.prefix(self.prefix))
 
         def table(values: ByFinger | None) -> np.ndarray | None:
@@ -120,7 +108,14 @@ class JointKind:
             home_topic=self.home_topic and f"{namespace}/{self.home_topic}",
         )
         check_home(given.text, setup)
-        return setup
+        return JointHand(name, link, setup, shared=given.shared)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of its parameters."""
+        stiffness = ("stiffness",) if self.output is JointOutput.POSITIONS else ()
+        return ("namespace", "states", "order", "prefix", "effort", "max_effort", *stiffness,
+                "lowest", "highest", "release", "home")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -249,23 +244,15 @@ def ros_hand(uri: str) -> HandDevice:
         names = ", ".join(f"{scheme}:{name}" for name in kinds)
         raise ValueError(f"{uri}: there are the hands {names}")
     address.only(NETWORKS[scheme], *COMMON, *kind.parameters)
-    link = _LINKS[scheme](address)
-    return kind.make(uri, link, Parameters(address))
+    where = address.parameters.get(NETWORKS[scheme])
+    # Late: of the two, a machine often has the packages of one only.
+    if scheme == "ros2":
+        from holdfast_ros.dds import Ros2Link
 
-
-def _ros2_link(address: Address) -> Link:
-    from holdfast_ros.dds import Ros2Link
-
-    return Ros2Link(address.parameters.get("domain"))
-
-
-def _ros1_link(address: Address) -> Link:
+        return kind.make(uri, Ros2Link(where), Parameters(address))
     from holdfast_ros.rospy_node import Ros1Link
 
-    return Ros1Link(address.parameters.get("master"))
-
-
-_LINKS: dict[str, Callable[[Address], Link]] = {"ros2": _ros2_link, "ros1": _ros1_link}
+    return kind.make(uri, Ros1Link(where), Parameters(address))
 
 
 def _joint_limits(given: Parameters, order: JointOrder, *, is_v4: bool) -> tuple[Array, Array]:

@@ -70,7 +70,15 @@ class MessageAssembler:
         for number, one in found.items():
             if one.counts is not None and self._unit == "N" and not len(one.forces):
                 raise SourceError(no_calibration(number, one.model))
-        self._assembler.devices = self._devices(found)
+        # Only a PapillArray sends newtons without counts.
+        hubs = [number for number, one in found.items() if one.counts is None]
+        if hubs:
+            devices = {number: self._papillarray(number, found[number]) for number in hubs}
+        else:
+            models = {n: (x.model, len(readings_of(x, self._unit))) for n, x in found.items()}
+            calibrated = self._unit == "N"
+            devices = xela_devices(models, self._names, self._sensor, calibrated=calibrated)
+        self._assembler.devices = devices
         # One kind for all devices: stamps of two clocks have no common order.
         self._stamp = next(
             (stamp for stamp in _STAMPS if any(stamp(one) is not None for one in found.values())),
@@ -108,14 +116,6 @@ class MessageAssembler:
         """Return the arrival that reports an invalid message."""
         self._assembler.refuse("message", f"invalid message: {reason}", received)
         return self._assembler.finish(received)
-
-    def _devices(self, found: Mapping[int, DeviceSample]) -> dict[int, Device]:
-        # Only a PapillArray sends newtons without counts.
-        hubs = [number for number, one in found.items() if one.counts is None]
-        if hubs:
-            return {number: self._papillarray(number, found[number]) for number in hubs}
-        models = {n: (one.model, len(readings_of(one, self._unit))) for n, one in found.items()}
-        return xela_devices(models, self._names, self._sensor, calibrated=self._unit == "N")
 
     def _papillarray(self, number: int, sample: DeviceSample) -> Device:
         if unknown := sorted(set(self._names) - {number}):

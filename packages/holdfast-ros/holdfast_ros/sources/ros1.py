@@ -176,17 +176,15 @@ class Ros1Subscription(Subscription):
         if (kind, text) not in self._decoders:
             if len(self._decoders) == MAX_DECODERS:
                 del self._decoders[next(iter(self._decoders))]
-            self._decoders[kind, text] = self._new_decoder(kind, text)
+            decode: Decode
+            try:
+                known = known_definition(kind, ros2=False) if text is None else None
+                decode = SampleDecoder(known or parse_definition(kind, text or ""), ros2=False)
+            except ValueError:
+                message = self.unsupported(kind, SUPPORTED_MESSAGES)
+
+                def decode(_: bytes) -> list[DeviceSample]:
+                    raise UnsupportedMessage(message)
+
+            self._decoders[kind, text] = decode
         return self._decoders[kind, text]
-
-    def _new_decoder(self, kind: str, text: str | None) -> Decode:
-        try:
-            known = known_definition(kind, ros2=False) if text is None else None
-            return SampleDecoder(known or parse_definition(kind, text or ""), ros2=False)
-        except ValueError:
-            message = self.unsupported(kind, SUPPORTED_MESSAGES)
-
-            def refuse(_: bytes) -> list[DeviceSample]:
-                raise UnsupportedMessage(message)
-
-            return refuse

@@ -61,7 +61,10 @@ class Ros2Subscription(Subscription):
         """
         self._node = dds.Node(self._domain)
         # DDS connects a reader only to publishers of the same type.
-        kind = self._type(deadline)
+        while (kind := self.published_topics().get(self._topic)) is None:
+            if time.monotonic() >= deadline:
+                raise SourceError(self.why_no_message())
+            time.sleep(DISCOVERY_INTERVAL)
         definition = known_definition(kind, ros2=True)
         if definition is None:
             raise SourceError(self.unsupported(kind, SUPPORTED_TYPES))
@@ -89,11 +92,3 @@ class Ros2Subscription(Subscription):
         self._queue.clear()
         self._reader = None
         self._node = None
-
-    def _type(self, deadline: float) -> str:
-        """Return the type of the messages of the first publisher."""
-        while (kind := self.published_topics().get(self._topic)) is None:
-            if time.monotonic() >= deadline:
-                raise SourceError(self.why_no_message())
-            time.sleep(DISCOVERY_INTERVAL)
-        return kind

@@ -4,11 +4,11 @@ import pytest
 
 from holdfast.io.cdr import MessageEncoder
 from holdfast.io.definitions import parse_definition
-from holdfast_ros.bags import standard_definition
-from holdfast_ros.pose_messages import (
+from holdfast_ros.bags import (
     PoseDecoder,
     StampedPose,
     has_poses,
+    standard_definition,
 )
 
 

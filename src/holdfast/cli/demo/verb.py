@@ -26,6 +26,15 @@ DEMO_MODEL = "builtin:twin"
 DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS = "mug,carton", "1,2", 1
 """Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
 
+NEXT_STEPS = {
+    "info {shown} --plot grasp.png": "a picture of this grasp",
+    f"evaluate {DEMO_MODEL} {{folder}}": "all figures",
+    f"serve {DEMO_MODEL} 'twin:?object=can'": "a live page of the twin",
+    "serve builtin:any xela://auto": "a live page of your own hand",
+    "import --help": "your own recordings",
+}
+"""Commands that are printed at the end, and what they are for."""
+
 
 def demo(
     out: Annotated[
@@ -40,10 +49,10 @@ def demo(
     """Detect on real and simulated recordings; train; replay live.
 
     Run the detector on a recording of a real robot that loses a box, as holdfast detect does.
-    Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships
-    with holdfast on them; it has not seen these objects. Train a model with the features of the
-    paper on them. Replay one recording sample by sample, as a hand would send it, on a web page
-    or in the terminal.
+    Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships with
+    holdfast on them; it has not seen these objects. Train a model with the features of the paper on
+    them. Replay one recording sample by sample, as a hand would send it, on a web page or in the
+    terminal.
 
     Example:
       holdfast demo
@@ -88,31 +97,24 @@ def demo(
     shown = path_of(recordings.names[-1], folder)
     print_message(f"5/5  replaying {shown.stem} sample by sample")
     wanted = has_browser() and sys.stdin.isatty() if browser is None else browser
-    # At speed 0 a page would show only the end.
-    page = wanted and speed and not as_json
+    page = wanted and speed and not as_json  # at speed 0 a page would show only the end
     replayed = None if page else watch(DEMO_MODEL, shown, speed, fingers=False)
     if page:
         show_page(DEMO_MODEL, shown, out / "recorded", speed)
     seconds = time.monotonic() - start
     if as_json:
         print_json({
-            "real": real, "recordings": folder, "model": model,
-            "accuracy": trained.cross_validation.pooled.accuracy,
+            "real": real, "recordings": folder, "model": model, "replay": replayed,
+            "accuracy": trained.cross_validation.pooled.accuracy, "seconds": seconds,
             "shipped": {"model": DEMO_MODEL, "metrics": evaluation.metrics},
-            "replay": replayed, "seconds": seconds,
         })  # fmt: skip
         return
-    print_line()
-    print_line(f"{DEMO_MODEL} on {len(recordings)} grasps of objects that it was not trained on:")
+    title = f"{DEMO_MODEL} on {len(recordings)} grasps of objects that it was not trained on:"
+    print_lines(("", title))
     print_verdict(evaluation.verdict or "")
     print_line("a model of the paper's features, trained here, each grasp left out once:")
     print_verdict(trained.verdict or "")
     print_line(f"finished in {seconds:.0f} s; recordings and model.json are in {out}/. Next:")
-    for command, purpose in (
-        (f"info {shown} --plot grasp.png", "a picture of this grasp"),
-        (f"evaluate {DEMO_MODEL} {folder}", "all figures"),
-        (f"serve {DEMO_MODEL} 'twin:?object=can'", "a live page of the twin"),
-        ("serve builtin:any xela://auto", "a live page of your own hand"),
-        ("import --help", "your own recordings"),
-    ):
-        print_lines((f"  # {purpose}", f"  holdfast {command}"))
+    for command, purpose in NEXT_STEPS.items():
+        words = command.format(shown=shown, folder=folder)
+        print_lines((f"  # {purpose}", f"  holdfast {words}"))

@@ -80,7 +80,7 @@ def detect_recording(
     recording: Recording | None,
 ) -> Iterator[EstimateChunk]:
     """Yield the estimates of the recording at a path; None if it is read from there."""
-    detector = None
+    detector = None  # made for the first part, which has the sensors and the start
     for part in map(start.of, _read_parts(model, path, options.rate, recording)):
         if detector is None:
             sensors = {name: module.sensor for name, module in part.modules.items()}
@@ -114,6 +114,7 @@ def _read_parts(
         raise RecordingError(f"{path} has no samples; at least one expected")
     # A sensor that the model does not know is refused before any other message.
     model.fingers_of({name: module.sensor for name, module in first.modules.items()})
+    # The rest is a message, not an error: what can be read is worth its estimates.
     if not first.complete:
         print_message(f"{path} is cut off: only its readable part is used")
     updates = true_updates(first)

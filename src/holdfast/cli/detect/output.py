@@ -43,6 +43,7 @@ REASON_WORDS = {
 }
 """Words for the reason of UNKNOWN."""
 LINES_PER_BLOCK = 8192
+"""Number of lines that are encoded at a time: some 3 MB of text, of a chunk of all fingers."""
 MAX_EVENTS_SHOWN = 40
 """Maximum number of events in the table; JSON has all of them."""
 
@@ -89,6 +90,7 @@ class DetectionSummary:
             counts.faults.update(chain.from_iterable(estimate.faults for estimate in estimates))
             slips = self._watch.update(finger, estimates)
             self._ended_slips += [slip for slip in slips if slip.end is not None]
+        # The hand has instants of its own: those of all fingers, each once.
         self._add_changes(HAND, chunk.hand)
         self._counts.setdefault(HAND, _StateCounts()).states.update(
             state for _, state in chunk.hand

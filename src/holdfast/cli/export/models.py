@@ -60,7 +60,7 @@ def export_model(
     """
     from holdfast.exporters import export as write
     from holdfast.exporters import fingers_of_sensor
-    from holdfast.exporters.c_compiler import code_size
+    from holdfast.exporters.c_header import code_size
     from holdfast.io import load_recording
     from holdfast.model import Model
 
@@ -70,6 +70,8 @@ def export_model(
             "either --like RECORDING or both --sensor NAME and --fingers N expected, or none of "
             "them for a model that names its fingers"
         )
+    # A model for any finger has no hand of its own: the header needs that of a recording or of
+    # the options.
     named = fingers_of_sensor(sensor, fingers) if sensor and fingers else None
     like = None if options.like is None else load_recording(options.like)
     written = write(

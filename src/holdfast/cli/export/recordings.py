@@ -65,7 +65,7 @@ def export_recordings(
     def writing(items: "Iterable[Recording]") -> "Iterable[Recording]":
         return progress(items, "exporting")
 
-    plugin = _check(out, name, others)
+    plugin = exporter_of(out, name, others)
     recordings = load_dataset(source)
     if plugin is None:
         written = generic_csv.export(recordings, out, force=force, progress=writing)
@@ -94,8 +94,13 @@ def export_recordings(
     print_line(f"{out}: {', '.join(counts)}")
 
 
-def _check(out: Path, name: str | None, others: ExporterOptions) -> Any:  # noqa: ANN401
-    """Check that the options fit together; return the plug-in of the format, None for CSV."""
+def exporter_of(out: Path, name: str | None, others: ExporterOptions) -> Any:  # noqa: ANN401
+    """Return the plug-in of the format, None for CSV, after a check of all options.
+
+    Raises:
+        ValueError: the format is missing, `out` is no folder, or an option belongs to another
+            format.
+    """
     names = sorted({CSV, *EXPORTER_PLUGINS.names()})
     if name is None:
         raise ValueError(f"--format: {', '.join(names)} expected for recordings")
@@ -108,6 +113,7 @@ def _check(out: Path, name: str | None, others: ExporterOptions) -> Any:  # noqa
                 if value != getattr(chosen.OPTIONS, flag[2:].replace("-", "_"))
             ]
             raise ValueError(f"{given[0]} belongs to --format {other}; {name} given")
+    # A table is one file of its format; all other formats write a folder.
     if out.suffix in FILE_SUFFIXES and name != out.suffix[1:]:
         raise ValueError(f"{out}: a folder expected for the format {name}, a file given")
     return plugin

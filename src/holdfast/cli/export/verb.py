@@ -47,6 +47,7 @@ def export(
       holdfast export grasp.parquet view/ --format foxglove --model builtin:any
       holdfast export grasp.parquet grasp.csv --format csv
     """
+    # The suffix of `out` decides as well: a wrong model is then refused as a model.
     is_named_so = source.startswith("builtin:") or source.endswith(".json")
     if is_named_so or out.suffix in MODEL_OUTPUTS:
         if recordings != RecordingOptions() or formats.chosen():

@@ -10,6 +10,9 @@ MAX_VALUE_LENGTH = 90
 """Maximum number of characters of a metadata value in the table."""
 ANSWERS = {"stable": "STABLE", "slip": "slides"}
 """What a finger does from the threshold of a head on."""
+# As the documents of `content_of` name them; an import of them would slow the start of the verb.
+LABELLED_STATES = ("stable", "unstable", "no_contact")
+LABEL_HEADINGS = tuple(f"{state} [s]" for state in LABELLED_STATES)
 N_NAMES = 3
 """Number of names that are printed of a long list."""
 
@@ -61,7 +64,7 @@ def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
     print_line()
     faults = (", ".join(f"{x} {n}" for x, n in m["faults"].items()) for m in modules.values())
     print_table(
-        ("module", *_label_headings(), "drift [1/min]", "faults"),
+        ("module", *LABEL_HEADINGS, "drift [1/min]", "faults"),
         [
             (
                 name,
@@ -74,19 +77,9 @@ def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
     )
 
 
-def _label_states() -> list[str]:
-    from holdfast.contact import LABEL_STATES
-
-    return [state.value.lower() for state in LABEL_STATES]
-
-
-def _label_headings() -> list[str]:
-    return [f"{state} [s]" for state in _label_states()]
-
-
 def _label_cells(modules: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the duration of the labels of each state, the mean over the modules."""
-    return [f"{mean(m['labels'][state] for m in modules):.2f}" for state in _label_states()]
+    return [f"{mean(m['labels'][state] for m in modules):.2f}" for state in LABELLED_STATES]
 
 
 def print_folder(documents: list[dict[str, Any]]) -> None:
@@ -94,7 +87,7 @@ def print_folder(documents: list[dict[str, Any]]) -> None:
     readable = [document for document in documents if "error" not in document]
     if readable:
         print_table(
-            ("labels of", *_label_headings()),
+            ("labels of", *LABEL_HEADINGS),
             [(x["name"], *_label_cells([*x["modules"].values()])) for x in readable],
         )
         print_line()

@@ -51,6 +51,7 @@ def info(
     from holdfast.features import Tare
 
     is_model = str(path).startswith("builtin:") or (path.suffix == ".json" and path.is_file())
+    # A folder may have the suffix .json, and a model has no samples to draw.
     kind = "model" if is_model else "folder" if path.is_dir() else "recording"
     if figure.plot is not None and kind != "recording":
         raise ValueError(f"--plot draws one recording; the {kind} {path} given")
@@ -63,14 +64,15 @@ def info(
         facts = facts_of(Model.load(path))
         print_json(facts) if as_json else print_model(facts, path.name)
     elif kind == "folder":
-        _show_folder(path, Tare.parse(tare), as_json)
+        show_folder(path, Tare.parse(tare), as_json=as_json)
     else:
-        _show_recording(path, figure, Tare.parse(tare), model, as_json)
+        show_recording(path, figure, Tare.parse(tare), model, as_json=as_json)
 
 
-def _show_recording(
-    path: Path, figure: PlotOptions, tare: "Tare", model: str | None, as_json: bool
+def show_recording(
+    path: Path, figure: PlotOptions, tare: "Tare", model: str | None, *, as_json: bool
 ) -> None:
+    """Print the content of a recording, and draw its figure if it is wanted."""
     from holdfast.io import load_recording
     from holdfast.labelling.review.content import content_of
     from holdfast.model import Model
@@ -90,7 +92,12 @@ def _show_recording(
     print_json(content) if as_json else print_recording(content)
 
 
-def _show_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
+def show_folder(folder: Path, tare: "Tare", *, as_json: bool) -> None:
+    """Print a line for each recording of a folder.
+
+    Raises:
+        RecordingError: one cannot be read; the others are printed before.
+    """
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset
     from holdfast.labelling.review.content import content_of

@@ -46,7 +46,7 @@ def auto(
 
     if rule not in RULES:
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
-    options.arguments(rule)
+    options.arguments(rule)  # wrong options are refused before the first recording is read
 
     def labels_of(recording: "Recording", path: Path) -> "ModuleLabels":
         return options.propose(rule, recording, path)

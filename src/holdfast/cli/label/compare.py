@@ -61,12 +61,13 @@ def compare(
         document = to_builtins(agreement)
         print_json({"a": str(a), "b": str(b), **document, "left_out": left_out})
         return
-    _print(agreement)
+    print_agreement(agreement)
     for name, text in left_out.items():
         print_message(f"{name} is left out: {text}")
 
 
-def _print(agreement: "Agreement") -> None:
+def print_agreement(agreement: "Agreement") -> None:
+    """Print the table of the fingers, and the causes on which both agree or not."""
     from holdfast.contact import Cause
 
     header = (

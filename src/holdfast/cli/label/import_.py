@@ -49,6 +49,7 @@ def import_(
     files = recordings_at(paths)
     if not source.exists():
         raise RecordingError(f"{source} does not exist; labels of Label Studio or CSV expected")
+    # A CSV of labels names fingers, and no recording.
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
         raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
 

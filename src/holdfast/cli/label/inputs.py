@@ -103,6 +103,7 @@ class RuleOptions:
                 )
             return None if self.poses is None else poses_from_csv(self.poses)
         names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks or ())
+        # Slip is motion of a finger against the object: without the object there is none.
         if OBJECT not in names:
             raise ValueError(
                 f"{self.poses} is not a .csv file, so it is read as a bag: --track {OBJECT}=NAME "
@@ -161,6 +162,7 @@ class RuleOptions:
 
         arguments = self.arguments(rule)
         beside = None if path is None else path.with_suffix(".mp4")
+        # A default: the video of the option, which `arguments` has, is not replaced.
         given = self.poses or self.motion
         if rule == "tracking" and not given and beside is not None and beside.exists():
             arguments.setdefault("video", beside)
@@ -174,6 +176,41 @@ class RuleOptions:
         elif self.fps is not None:
             raise ValueError("--fps is for a video: give --video FILE")
         return propose(rule, recording, **arguments)
+
+
+@dataclass(frozen=True)
+class ModeOptions:
+    """Group of options: the commands of `label` as they were written before; at most one."""
+
+    auto: Annotated[str | None, typer.Option(help="As holdfast label auto RULE.")] = None
+    compare: Annotated[bool, typer.Option("--compare", help="As holdfast label compare A B.")] = (
+        False
+    )
+    audit: Annotated[bool, typer.Option("--audit", help="As holdfast label audit.")] = False
+    export: Annotated[
+        tuple[str, Path] | None,
+        typer.Option(metavar="FORMAT FOLDER", help="As holdfast label export FORMAT FOLDER."),
+    ] = None
+    import_from: Annotated[
+        Path | None, typer.Option("--import", help="As holdfast label import FILE.")
+    ] = None
+    page: PageOption = False
+
+    def check(self) -> None:
+        """Check that at most one mode is given, and `--page` only with `--audit`.
+
+        Raises:
+            ValueError: two modes are given, or the page of no audit.
+        """
+        wanted = [
+            name.removesuffix("_from")
+            for name, value in vars(self).items()
+            if name != "page" and value not in (None, False)
+        ]
+        if len(wanted) > 1:
+            raise ValueError(f"--{wanted[0]} and --{wanted[1]} given; only one of them expected")
+        if self.page and not self.audit:
+            raise ValueError("--page shows the result of --audit: give --audit as well")
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def print_labelled(
     if as_json:
         print_json({**origin, "written": not saving.dry_run, "recordings": documents})
     else:
-        _print_documents(documents)
+        print_seconds(documents)
     if n_hidden := sum(bool(document.get("n_inside")) for document in documents):
         outrank = (
             "would outrank them in train and evaluate"
@@ -85,7 +85,7 @@ def print_labelled(
         raise RecordingError(errors[-1])
 
 
-def _print_documents(documents: Sequence[dict[str, Any]]) -> None:
+def print_seconds(documents: Sequence[dict[str, Any]]) -> None:
     """Print seconds per state of each recording, and labels with low confidence."""
     good = [document for document in documents if "error" not in document]
     if not good:

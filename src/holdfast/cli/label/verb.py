@@ -1,16 +1,12 @@
 """`holdfast label`: label recordings on a page or by a rule, compare and audit labels."""
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
-
-import typer
 
 from holdfast.cli.label.inputs import (
     LABEL_ADDRESS,
     AnnotatorOption,
     AuthorOption,
-    PageOption,
+    ModeOptions,
     PathsArgument,
     RuleOptions,
     SaveOptions,
@@ -24,41 +20,6 @@ from holdfast.cli.options import (
     ServerOptions,
 )
 from holdfast.errors import require_extras
-
-
-@dataclass(frozen=True)
-class ModeOptions:
-    """Group of options: the commands of `label` as they were written before; at most one."""
-
-    auto: Annotated[str | None, typer.Option(help="As holdfast label auto RULE.")] = None
-    compare: Annotated[bool, typer.Option("--compare", help="As holdfast label compare A B.")] = (
-        False
-    )
-    audit: Annotated[bool, typer.Option("--audit", help="As holdfast label audit.")] = False
-    export: Annotated[
-        tuple[str, Path] | None,
-        typer.Option(metavar="FORMAT FOLDER", help="As holdfast label export FORMAT FOLDER."),
-    ] = None
-    import_from: Annotated[
-        Path | None, typer.Option("--import", help="As holdfast label import FILE.")
-    ] = None
-    page: PageOption = False
-
-    def check(self) -> None:
-        """Check that at most one mode is given, and `--page` only with `--audit`.
-
-        Raises:
-            ValueError: two modes are given, or the page of no audit.
-        """
-        wanted = [
-            name.removesuffix("_from")
-            for name, value in vars(self).items()
-            if name != "page" and value not in (None, False)
-        ]
-        if len(wanted) > 1:
-            raise ValueError(f"--{wanted[0]} and --{wanted[1]} given; only one of them expected")
-        if self.page and not self.audit:
-            raise ValueError("--page shows the result of --audit: give --audit as well")
 
 
 def label(

@@ -45,17 +45,25 @@ class GraspOptions:
         ),
         RARE,
     ] = False
+    faults: Annotated[
+        str,
+        typer.Option(
+            help="Troubles of magnetic skins, as field=300,turn-time=3,zero-share=0.02,drift=20000,"
+            "cross-talk=0.1,invented-months=4 (counts, s, shares, counts an hour, months)."
+        ),
+        RARE,
+    ] = ""
 
     def plan(self, engine: "Engine") -> "list[Grasp]":
         """Return the grasps of an Allegro hand.
 
         Raises:
-            ValueError: an unknown object, case or profile, or a number out of range.
+            ValueError: an unknown object, case, profile or fault, or a number out of range.
         """
         from holdfast.twin_recordings import plan_grasps
 
         table = None if self.table is None else engine.path(self.table)
         return plan_grasps(
             self.objects, self.cases, self.repeats, self.profile, self.seed,
-            server=self.server, table=table,
+            server=self.server, table=table, faults=self.faults,
         )  # fmt: skip

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from holdfast.training import Setting
 
 
-def _list_classifiers(name: str | None) -> str | None:
+def list_classifiers(name: str | None) -> str | None:
+    """Return a name; print all names and exit if it is `list`."""
     if name == "list":
         from holdfast.classifiers import recipe_names
 
@@ -31,7 +32,7 @@ class TrainingOptions:
             help="Name of the way of fitting, such as logreg (logistic regression) or svm (linear "
             "SVM); list prints all names.",
             show_default="logreg",
-            callback=_list_classifiers,
+            callback=list_classifiers,
             is_eager=True,
         ),
     ] = None

@@ -1,7 +1,7 @@
 """`holdfast train`: a model from labelled recordings, with cross-validated metrics."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -14,6 +14,7 @@ from holdfast.cli.options import (
     StartOptions,
 )
 from holdfast.cli.scores import KEPT_RULE, print_metrics, print_slips, print_verdict
+from holdfast.cli.teach import teach
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast.cli.train.options import TrainingOptions
@@ -35,6 +36,15 @@ def train(
     init: Annotated[
         str | None,
         typer.Option(help="Model to adapt, with its features: a file, or builtin:any."),
+    ] = None,
+    only: Annotated[
+        Literal["slip"] | None,
+        typer.Option(
+            "--for",
+            help="Train the slip rule alone, as holdfast teach, and keep the rest of --init "
+            "(builtin:any).",
+            show_default=False,
+        ),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue a search that was stopped."), RARE
@@ -60,7 +70,16 @@ def train(
       holdfast train recordings/ -o model.json --features holdfast \
         --own-slip-features
       holdfast train recordings/ -o model.json --init builtin:any
+      holdfast train recordings/ -o model.json --for slip
     """
+    if only is not None:
+        if options != TrainingOptions() or resume:
+            raise ValueError("--for slip has no search and its own features: leave the others out")
+        teach(
+            model, data, model=init or "builtin:any", parallel=parallel, force=force, start=start,
+            as_json=as_json,
+        )  # fmt: skip
+        return
     require_extras("train")
     from holdfast.files import refuse_overwrite
     from holdfast.labelling.review.findings import report_hidden_labels

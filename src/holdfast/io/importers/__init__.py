@@ -73,7 +73,7 @@ def import_recordings(
         ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
             `columns` are given for a format that does not take them.
     """
-    place, given = Path(path), _columns(columns)
+    place, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
     name = _format_of(place, format, sensors, given)
     recordings: Iterator[Recording]
     with recording_errors(place):
@@ -110,7 +110,7 @@ def import_parts(
         RecordingError: `path` does not exist, no format fits, or the folder has no such file.
         ValueError: as `import_recordings`.
     """
-    place, given = Path(path), _columns(columns)
+    place, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
     name = _format_of(place, format, sensors, given)
     with recording_errors(place):
         source = importer(name)
@@ -149,10 +149,6 @@ def _named_apart(
             yield replace(recording, name=f"{prefix}{recording.name}")
 
 
-def _columns(columns: Columns | str | None) -> Columns | None:
-    return Columns.parse(columns) if isinstance(columns, str) else columns
-
-
 def _format_of(
     path: Path, name: str | None, sensors: Mapping[str, Sensor] | None, columns: Columns | None
 ) -> str:
@@ -176,10 +172,22 @@ def _format_of(
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
-        _refuse_pointers(path)
-        if name is None and (sensors or columns):
-            return _format_with_sensors(path)
-        return name or _detected_format(path)
+        for file in [path] if path.is_file() else sorted(path.iterdir()):
+            if is_lfs_pointer(file):  # the clone was made without the data
+                raise RecordingError(refusal_of_lfs_pointer(file))
+        if name is not None or not (sensors or columns):
+            return name or _detected_format(path)
+        # Of the formats that take sensors: CSV unless another is certain.
+        if path.suffix.lower() == ".csv" or (path.is_dir() and csv_files(path)):
+            return "csv"
+        loaded = {plugin: IMPORTER_PLUGINS.load(plugin) for plugin in IMPORTER_PLUGINS.names()}
+        loaded["arrays"] = importer("arrays")
+        fitting = (
+            known
+            for known, source in loaded.items()
+            if source is not None and takes_sensors(known) and source.can_read(path)
+        )
+        return next(fitting, "csv")
 
 
 def takes_sensors(name: str) -> bool:
@@ -187,35 +195,16 @@ def takes_sensors(name: str) -> bool:
     return name == "csv" or getattr(importer(name), "TAKES_SENSORS", False)
 
 
-def _format_with_sensors(path: Path) -> str:
-    """Return the format of a path that is imported with sensors; CSV unless another is certain."""
-    if path.suffix.lower() == ".csv" or (path.is_dir() and csv_files(path)):
-        return "csv"
-    loaded = {name: IMPORTER_PLUGINS.load(name) for name in IMPORTER_PLUGINS.names()}
-    loaded["arrays"] = importer("arrays")
-    fitting = (
-        name
-        for name, source in loaded.items()
-        if source is not None and takes_sensors(name) and source.can_read(path)
-    )
-    return next(fitting, "csv")
-
-
-def _refuse_pointers(path: Path) -> None:
-    """Check that a file, or each file in a folder, is no pointer of Git LFS.
-
-    Raises:
-        RecordingError: it is one; the clone was made without the data.
-    """
-    for file in [path] if path.is_file() else sorted(path.iterdir()):
-        if is_lfs_pointer(file):
-            raise RecordingError(refusal_of_lfs_pointer(file))
-
-
 def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> Iterator[Recording]:
     with recording_errors(path):
         for recording in recordings:
-            yield recording if labels else _without_labels(recording)
+            if labels:
+                yield recording
+                continue
+            modules = {name: replace(m, labels=()) for name, m in recording.modules.items()}
+            # The label of a whole recording is a field of its metadata.
+            metadata = {key: one for key, one in recording.metadata.items() if key != SLIPPED}
+            yield replace(recording, modules=modules, metadata=metadata)
 
 
 def import_hint(name: str) -> str | None:
@@ -273,9 +262,3 @@ def _plugin_importer(name: str, loaded: Any) -> ModuleType:  # noqa: ANN401
 
 IMPORTER_PLUGINS = PluginGroup("importers", FORMATS, _plugin_importer)
 """Formats of other packages."""
-
-
-def _without_labels(recording: Recording) -> Recording:
-    modules = {name: replace(module, labels=()) for name, module in recording.modules.items()}
-    metadata = {key: value for key, value in recording.metadata.items() if key != SLIPPED}
-    return replace(recording, modules=modules, metadata=metadata)

@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -307,25 +308,19 @@ def _of_json(path: Path) -> StoredArrays:
     try:
         document = json.loads(text)
     except json.JSONDecodeError:
-        return arrays_of_records(_records(path, text))
+        records: list[dict[str, Any]] = []
+        lines = [line for line in text.splitlines() if line.startswith("{")]
+        for number, line in enumerate(lines, start=1):
+            try:
+                records.append(json.loads(line))
+            except json.JSONDecodeError as cause:
+                # The last one may be cut, as a killed logger leaves it.
+                if number < len(lines):
+                    raise RecordingError(f"{path}: record {number} is damaged: {cause}") from cause
+        return arrays_of_records(records)
     if isinstance(document, list):
         return arrays_of_records(one for one in document if isinstance(one, dict))
     return _flat(document)
-
-
-def _records(path: Path, text: str) -> Iterator[dict[str, Any]]:
-    """Yield the lines of JSON in a text; the last one may be cut, as a killed logger leaves it.
-
-    Raises:
-        RecordingError: another line is damaged.
-    """
-    lines = [line for line in text.splitlines() if line.startswith("{")]
-    for number, line in enumerate(lines, start=1):
-        try:
-            yield json.loads(line)
-        except json.JSONDecodeError as cause:
-            if number < len(lines):
-                raise RecordingError(f"{path}: record {number} is damaged: {cause}") from cause
 
 
 def _of_pickle(path: Path) -> StoredArrays:
@@ -340,23 +335,16 @@ def _flat(content: Any, path: str = "") -> dict[str, StoredArray]:  # noqa: ANN4
     if isinstance(content, Mapping):
         pairs = [(str(key), one) for key, one in content.items()]
     else:
-        values = np.asarray(content) if not isinstance(content, list) else _as_array(content)
-        if values is not None and values.dtype.kind in "biufUM":
-            return {path: in_memory(values)}
+        with suppress(ValueError):  # values of several shapes, or records
+            values = np.asarray(content)
+            if values.dtype.kind in "biufUM":
+                return {path: in_memory(values)}
         pairs = [(str(k), one) for k, one in enumerate(content)] if np.ndim(content) else []
     return {
         name: array
         for key, one in pairs
         for name, array in _flat(one, f"{path}/{key}" if path else key).items()
     }
-
-
-def _as_array(content: list[Any]) -> npt.NDArray[Any] | None:
-    """Return a list as an array; None if its values are of several shapes, or records."""
-    try:
-        return np.asarray(content)
-    except ValueError:
-        return None
 
 
 _READERS: dict[str, Callable[[Path], StoredArrays]] = {

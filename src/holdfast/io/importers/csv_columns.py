@@ -145,7 +145,9 @@ class Columns:
         if missing := [column for column in given.values() if column not in names]:
             raise RecordingError(f"column {missing[0]!r} is missing; it has {some_names(names)}")
         time = given.get("time", self.time)
-        time = time or guessed_time(names) or _first_of_run(names, n_taxels)
+        time = time or guessed_time(names)
+        if time is None and _guessed_run(names[1:], n_taxels):  # the rest is that of a sensor
+            time = names[0]
         others = [name for name in names if name != time]
         taxels = self.taxels or guessed_taxels(others, n_taxels, units)
         taxels = taxels or _few_axes(others) or _guessed_run(others, n_taxels)
@@ -303,28 +305,28 @@ def guessed_taxels(
                 "give --columns"
             )
         found.setdefault(pattern, {})[key] = name
-    sizes = {
-        pattern: len(columns)
-        for pattern, columns in found.items()
-        if _is_complete(_from_one(columns)) and (not n_taxels or len(columns) // 3 in n_taxels)
-    }
+    sizes: dict[str, int] = {}
+    for pattern, columns in found.items():
+        n_complete = len(columns) // 3
+        whole = set(product(taxel_numbers(range(n_complete)), "xyz"))
+        # Of a complete pattern each taxel has its three axes, and no number is left out.
+        fits = not n_taxels or n_complete in n_taxels
+        if n_complete and fits and set(_from_one(columns)) == whole:
+            sizes[pattern] = len(columns)
     if not sizes:
         return None
     most = max(sizes.values())
-    return _with_module(_of_one_unit([p for p, size in sizes.items() if size == most], units))
-
-
-def _of_one_unit(patterns: list[str], units: Collection[str]) -> list[str]:
-    """Return the patterns of one unit: that of the sensors if there are several."""
+    patterns = [pattern for pattern, size in sizes.items() if size == most]
     stated = [match and match["unit"] for match in map(_UNIT.search, patterns)]
-    if len(set(stated)) < 2 or None in stated:
-        return patterns
-    if not (fitting := [p for p, unit in zip(patterns, stated, strict=True) if unit in units]):
-        raise RecordingError(
-            f"columns in {' and '.join(sorted(map(str, set(stated))))} fit: give --columns "
-            f"'taxels={patterns[0]}' or 'taxels={patterns[-1]}'"
-        )
-    return fitting
+    if len(set(stated)) > 1 and None not in stated:
+        fitting = [p for p, unit in zip(patterns, stated, strict=True) if unit in units]
+        if not fitting:
+            raise RecordingError(
+                f"columns in {' and '.join(sorted(map(str, set(stated))))} fit: give --columns "
+                f"'taxels={patterns[0]}' or 'taxels={patterns[-1]}'"
+            )
+        patterns = fitting
+    return _with_module(patterns)
 
 
 def _guessed_run(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
@@ -332,11 +334,6 @@ def _guessed_run(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
     run = [name for name in names if name not in ("label", "cause")]
     fits = any(len(run) == 3 * n for n in n_taxels) and run == list(names[: len(run)])
     return f"{run[0]}{RUN}{run[-1]}" if fits else None
-
-
-def _first_of_run(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
-    """Return the first column as that of times, if the others are those of a sensor."""
-    return names[0] if _guessed_run(names[1:], n_taxels) else None
 
 
 def _patterns(name: str) -> Iterator[tuple[str, tuple[int, str]]]:
@@ -354,11 +351,6 @@ def _patterns(name: str) -> Iterator[tuple[str, tuple[int, str]]]:
             pattern = "".join(both.get(place, word) for place, word in enumerate(tokens))
             yield pattern, (int(tokens[number]), letter)
         yield "".join(axis.get(place, word) for place, word in enumerate(tokens)), (1, letter)
-
-
-def _is_complete(columns: Collection[tuple[int, str]]) -> bool:
-    n = len(columns) // 3
-    return n > 0 and set(columns) == set(product(taxel_numbers(range(n)), "xyz"))
 
 
 def _with_module(patterns: Sequence[str]) -> str:

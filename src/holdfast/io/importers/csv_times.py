@@ -60,7 +60,15 @@ def unit_of_column(name: str, values: Array, where: str) -> str:
     step = _median_step(values)
     unit = stated_unit(name)
     if unit is None:
-        _check_clear(name, step, where)
+        low, high = DOUBTFUL_STEPS
+        if low < step <= high:  # two units are plausible
+            counted = "a number of samples, " if step == 1 else ""
+            samples = ", or time=100Hz with the true rate if it counts samples" if counted else ""
+            raise RecordingError(
+                f"{where}: column {name!r} with steps of {step:.6g} and without a unit given, "
+                f"which may be {counted}{1 / step:.4g} Hz in s or {1e3 / step:.4g} Hz in ms: give "
+                f"--columns time={name}:s or time={name}:ms{samples}"
+            )
         return _unit_of(values)
     rate = 1 / (step * TIME_UNITS[unit]) if step else 0.0
     low, high = STATED_RATES
@@ -147,20 +155,6 @@ def check_steps(name: str, times: Array) -> None:
         f"column {name!r}: times stand still at sample {first + 1}: {after:.12g} after "
         f"{before:.12g}, in {share:.0f} % of the samples{lost}; strictly increasing times "
         f"expected: {option} if the samples are evenly spaced"
-    )
-
-
-def _check_clear(name: str, step: float, where: str) -> None:
-    """Check that times without a unit have a single plausible one."""
-    low, high = DOUBTFUL_STEPS
-    if not low < step <= high:
-        return
-    counted = "a number of samples, " if step == 1 else ""
-    samples = ", or time=100Hz with the true rate if it counts samples" if counted else ""
-    raise RecordingError(
-        f"{where}: column {name!r} with steps of {step:.6g} and without a unit given, which may be "
-        f"{counted}{1 / step:.4g} Hz in s or {1e3 / step:.4g} Hz in ms: give --columns "
-        f"time={name}:s or time={name}:ms{samples}"
     )
 
 

@@ -125,7 +125,13 @@ def _recordings(
             return [_generic(path, head, sensors, report)]
 
         def read(used: set[str], chosen: Columns) -> tuple[Table, dict[str, list[str]]]:
-            numbers = used if _has_clock(head, chosen) else {*used, chosen.time}
+            numbers: set[str | None] = {*used, chosen.time}
+            # Times without a unit may be those of a wall clock, which are cells of text.
+            if chosen.time in head.names and chosen.time_unit is None:
+                place = head.names.index(chosen.time)
+                cells = head.first_row[place : place + 1]
+                if cells and clock_seconds(cells) is not None:
+                    numbers = set(used)
             return read_table(path, [name for name in head.names if name not in numbers], head)
 
         return recordings_of_table(head.names, read, path.name, sensors, columns, report)
@@ -144,15 +150,6 @@ def _generic(
             line = f"{path.name}: times of column {TIME!r} are taken as {unit}; --columns "
             report(unit, (f"{line}time={TIME}:s if they are in s",))
     return recording_of_columns(table, cells, times, layout, settings, sensors)
-
-
-def _has_clock(head: TableHead, columns: Columns) -> bool:
-    """Return whether the column of times has wall-clock times."""
-    if columns.time not in head.names or columns.time_unit is not None:
-        return False
-    place = head.names.index(columns.time)
-    cells = head.first_row[place : place + 1]
-    return bool(cells) and clock_seconds(cells) is not None
 
 
 def _layout(table: Table) -> Layout:
@@ -177,14 +174,10 @@ def _layout(table: Table) -> Layout:
             )
     if not layout:
         raise RecordingError(f"{table.path}: no taxel columns such as 'thumb.t01.x' or 't01_x'")
-    return _counted_from_one(layout)
-
-
-def _counted_from_one(layout: Layout) -> Layout:
-    """Return the layout with taxels from 1, also if the file counts them from 0."""
     first = min(taxel for columns in layout.values() for taxel, _ in columns)
     if first != 0:
         return layout
+    # The file counts taxels from 0.
     return {
         module: {(taxel_number(taxel), axis): name for (taxel, axis), name in columns.items()}
         for module, columns in layout.items()

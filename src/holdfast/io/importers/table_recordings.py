@@ -17,7 +17,7 @@ from holdfast.io.importers.csv_times import check_steps, clock_seconds, seconds_
 from holdfast.io.importers.table import Table, natural_order, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_numbers
-from holdfast.sensors.types import Array, Unit
+from holdfast.sensors.types import Array
 
 TIME = "time"
 DEFAULT_MODULE = "finger1"
@@ -311,7 +311,22 @@ def _module(
     settings: Settings,
     sensors: Mapping[str, Sensor],
 ) -> Tactile:
-    one = sensors.get(name) or sensors.get(ANY_MODULE) or _sensor(name, settings, columns)
+    # What the user gives comes before what the file says.
+    one = sensors.get(name) or sensors.get(ANY_MODULE)
+    if one is None:
+        stated = settings.get(("sensor", name)) or settings.get(("sensor", None))
+        if stated is None:
+            n_taxels = len({taxel for taxel, _ in columns})
+            raise RecordingError(
+                f"the sensor of {name} ({n_taxels} taxels) is missing: --sensor NAME or --sensor "
+                f"FILE.json expected, or a line '# sensor: {name}=NAME' above the header; built in "
+                f"are {', '.join(built_in_sensors())}; `holdfast sensors --template "
+                f"ROWSxCOLUMNS > FILE.json` makes a file of a flat grid"
+            )
+        try:
+            one = sensor(stated)
+        except ValueError as cause:
+            raise RecordingError(str(cause)) from cause
     wanted = [(number, axis) for number in taxel_numbers(range(one.n_taxels)) for axis in "xyz"]
     if set(columns) != set(wanted):
         n_given = len({taxel for taxel, _ in columns})
@@ -319,34 +334,12 @@ def _module(
             f"{name}: {n_given} taxels in {len(columns)} columns given; {one.n_taxels} taxels "
             f"x 3 axes from t01 on expected ({one.name})"
         )
-    values = table.columns([columns[key] for key in wanted])
-    return Tactile(
-        one, times, with_integer_type(values).reshape(-1, one.n_taxels, 3), _unit(name, settings)
-    )
-
-
-def _sensor(name: str, settings: Settings, columns: Mapping[tuple[int, str], str]) -> Sensor:
-    given = settings.get(("sensor", name)) or settings.get(("sensor", None))
-    if given is None:
-        n_taxels = len({taxel for taxel, _ in columns})
-        raise RecordingError(
-            f"the sensor of {name} ({n_taxels} taxels) is missing: --sensor NAME or --sensor "
-            f"FILE.json expected, or a line '# sensor: {name}=NAME' above the header; built in are "
-            f"{', '.join(built_in_sensors())}; `holdfast sensors --template "
-            f"ROWSxCOLUMNS > FILE.json` makes a file of a flat grid"
-        )
-    try:
-        return sensor(given)
-    except ValueError as cause:
-        raise RecordingError(str(cause)) from cause
-
-
-def _unit(name: str, settings: Settings) -> Unit | None:
-    given = settings.get(("unit", name)) or settings.get(("unit", None))
-    match given:
-        case None | "count" | "N":
-            return given
-    raise RecordingError(f"unit 'count' or 'N' expected for {name}, {given!r} given")
+    unit = settings.get(("unit", name)) or settings.get(("unit", None))
+    if unit not in (None, "count", "N"):
+        raise RecordingError(f"unit 'count' or 'N' expected for {name}, {unit!r} given")
+    readings = with_integer_type(table.columns([columns[key] for key in wanted]))
+    shaped = readings.reshape(-1, one.n_taxels, 3)
+    return Tactile(one, times, shaped, unit)  # type: ignore[arg-type]
 
 
 def _labels(
@@ -355,19 +348,16 @@ def _labels(
     blank = [""] * module.n_samples
     states = cells.get(f"{name}.label", cells.get("label", blank))
     causes = cells.get(f"{name}.cause", cells.get("cause", blank))
-    pairs = [
-        _state(f"{table.path}, row {row}", state.strip(), cause.strip())
-        for row, (state, cause) in enumerate(zip(states, causes, strict=True), table.first_line)
-    ]
-    return labels_from_samples(module.times, pairs, period=module.period, evidence="csv")
-
-
-def _state(place: str, state: str, cause: str) -> tuple[ContactState, Cause | None] | None:
-    if not state:
-        return None
+    # A label says UNKNOWN by having no state.
     known = [s.value.lower() for s in ContactState if s is not ContactState.UNKNOWN]
-    if state.lower() not in known:
-        raise RecordingError(f"{place}: label {state!r} given; {', '.join(known)} are known")
-    if cause.lower() not in ("", *Cause):
-        raise RecordingError(f"{place}: cause {cause!r} given; {', '.join(Cause)} are known")
-    return ContactState(state.upper()), Cause(cause.lower()) if cause else None
+    pairs: list[tuple[ContactState, Cause | None] | None] = []
+    for row, words in enumerate(zip(states, causes, strict=True), table.first_line):
+        state, cause = (word.strip() for word in words)
+        place = f"{table.path}, row {row}"
+        if state and state.lower() not in known:
+            raise RecordingError(f"{place}: label {state!r} given; {', '.join(known)} are known")
+        if state and cause.lower() not in ("", *Cause):
+            raise RecordingError(f"{place}: cause {cause!r} given; {', '.join(Cause)} are known")
+        named = Cause(cause.lower()) if state and cause else None
+        pairs.append((ContactState(state.upper()), named) if state else None)
+    return labels_from_samples(module.times, pairs, period=module.period, evidence="csv")

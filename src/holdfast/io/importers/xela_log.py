@@ -36,7 +36,8 @@ def read(path: Path) -> Iterator[Recording]:
             f"{path}: a time column and {n_given} others given; {allegro.n_taxels * 3} expected "
             f"({allegro.n_taxels} taxels x 3 axes of {WHOLE_HAND})"
         )
-    place = _time_column(table.names)
+    # The first column if none has a name with "time".
+    place = next((k for k, name in enumerate(table.names) if "time" in name.lower()), 0)
     times = table.values[:, place]
     readings = with_integer_type(np.delete(table.values, place, axis=1))
     unit = "count" if np.issubdtype(readings.dtype, np.integer) else "N"
@@ -47,8 +48,3 @@ def read(path: Path) -> Iterator[Recording]:
         }
         recording = Recording(path.stem, modules, {"hand": WHOLE_HAND, "source": path.name})
     yield recording
-
-
-def _time_column(names: tuple[str, ...]) -> int:
-    """Return the place of the first column with "time" in its name; 0 if there is none."""
-    return next((k for k, name in enumerate(names) if "time" in name.lower()), 0)

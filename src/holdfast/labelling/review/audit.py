@@ -72,8 +72,13 @@ class Suspect(msgspec.Struct, frozen=True):
 
     @property
     def weight(self) -> float:
-        """Confidence times duration [s]; suspects are sorted by it."""
+        """Confidence times duration [s]."""
         return self.confidence * (self.end - self.start)
+
+    @property
+    def rank(self) -> tuple[float, str, str, float]:
+        """What suspects are sorted by: the largest weight first, and always in the same order."""
+        return -self.weight, self.recording, self.finger, self.start
 
 
 class Audit(msgspec.Struct, frozen=True):
@@ -133,6 +138,20 @@ class LabelledFinger:
         values = self.probabilities[first:last, code - 1]
         values = values[np.isfinite(values)]
         return float(values.mean()) if len(values) else 0.0
+
+    def suspect(
+        self,
+        kind: Literal["interval", "edge"],
+        interval: tuple[float, float],
+        codes: tuple[int, int],
+        confidence: float,
+        shift: float | None = None,
+    ) -> Suspect:
+        """Return a suspect of this finger, from the codes of its given and expected states."""
+        given, expected = (state_name(STATE_BY_CODE[code]) for code in codes)
+        return Suspect(
+            self.recording, self.finger, kind, *interval, given, expected, confidence, shift
+        )
 
 
 def audit(
@@ -201,7 +220,7 @@ def suspects(parts: Sequence[LabelledFinger]) -> list[Suspect]:
     """
     by_finger = groupby(sorted(parts, key=lambda each: each.finger), lambda each: each.finger)
     found = [suspect for _, own in by_finger for suspect in _suspects_of_finger(list(own))]
-    return sorted(found, key=_rank)
+    return sorted(found, key=lambda suspect: suspect.rank)
 
 
 def _suspects_of_finger(parts: Sequence[LabelledFinger]) -> Iterator[Suspect]:
@@ -224,7 +243,7 @@ def _suspects_of_finger(parts: Sequence[LabelledFinger]) -> Iterator[Suspect]:
         # so what lies half or more in a suspect of larger weight is left out.
         kept: list[Suspect] = []
         found = [*_intervals(part, own_spans, thresholds), *(edge for edge in shifted if edge)]
-        for suspect in sorted(found, key=_rank):
+        for suspect in sorted(found, key=lambda suspect: suspect.rank):
             half = (suspect.end - suspect.start) / 2
             overlaps = (min(suspect.end, o.end) - max(suspect.start, o.start) for o in kept)
             if all(overlap < half for overlap in overlaps):
@@ -248,7 +267,7 @@ def _shifted_edge(
     if confidence < EDGE_THRESHOLD_SHARE * thresholds[expected - 1]:
         return None
     start, end = sorted((edge.time, edge.time + shift))
-    return _suspect(part, "edge", (start, end), (given, expected), confidence, shift)
+    return part.suspect("edge", (start, end), (given, expected), confidence, shift)
 
 
 def _intervals(part: LabelledFinger, spans: Sequence[Span], thresholds: Array) -> Iterator[Suspect]:
@@ -272,7 +291,7 @@ def _intervals(part: LabelledFinger, spans: Sequence[Span], thresholds: Array) -
             if end - start < MAX_EDGE_SHIFT and at_start != at_end:
                 continue
             confidence = part.confidence(start, end, expected)
-            yield _suspect(part, "interval", (start, end), (span.code, expected), confidence)
+            yield part.suspect("interval", (start, end), (span.code, expected), confidence)
 
 
 def _contradicted(part: LabelledFinger, codes: Codes, span: Span) -> list[tuple[float, float, int]]:
@@ -291,19 +310,3 @@ def _contradicted(part: LabelledFinger, codes: Codes, span: Span) -> list[tuple[
         else:
             found.append((start, end, code))
     return [each for each in found if each[1] - each[0] >= MIN_CONTRADICTION - TIME_TOLERANCE]
-
-
-def _rank(suspect: Suspect) -> tuple[float, str, str, float]:
-    return -suspect.weight, suspect.recording, suspect.finger, suspect.start
-
-
-def _suspect(
-    part: LabelledFinger,
-    kind: Literal["interval", "edge"],
-    interval: tuple[float, float],
-    codes: tuple[int, int],
-    confidence: float,
-    shift: float | None = None,
-) -> Suspect:
-    given, expected = (state_name(STATE_BY_CODE[code]) for code in codes)
-    return Suspect(part.recording, part.finger, kind, *interval, given, expected, confidence, shift)

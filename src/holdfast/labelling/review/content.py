@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from holdfast.contact import LABEL_STATES, Fault
 from holdfast.detector import Detector
@@ -14,15 +15,16 @@ from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.io import read_chunks
 from holdfast.labelling.review.findings import (
+    faulty_readings,
     findings_of_scan,
     hidden_labels,
-    invalid_readings,
+    with_oddities,
 )
-from holdfast.labelling.review.oddities import with_oddities
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.model import Model
 from holdfast.recordings import Label, Recording
+from holdfast.sensors import taxel_number
 
 SAMPLES_OF_PART = 4096
 """Samples that are read at a time; it bounds the memory."""
@@ -46,11 +48,10 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
         faults.add(part)
         truth = part.truth
     found, hidden = scan.recording, hidden_labels(path)
-    invalid = [
-        invalid_readings(name, faults.of(name).get(Fault.INVALID, 0), module.force.n_samples)
-        for name, module in scan.modules.items()
-    ]
-    findings = [*findings_of_scan(scan), *(each for each in [*invalid, hidden] if each)]
+    findings = [*findings_of_scan(scan), *([hidden] if hidden else [])]
+    for name, module in scan.modules.items():
+        n_invalid, n_samples = faults.of(name).get(Fault.INVALID, 0), module.force.n_samples
+        findings += faulty_readings(name, n_invalid, n_samples, faults.stuck_taxels(name))
     findings = with_oddities(findings, scan, path)
     return {
         "name": found.name,
@@ -109,6 +110,12 @@ class _FaultCounts:
         self._counts: dict[str, dict[Fault, int]] = {}
         self._model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
         self._detectors: dict[str, Detector] = {}
+        self._stuck: dict[str, int] = {}  # bits of the taxels
+
+    def stuck_taxels(self, name: str) -> list[int]:
+        """Return the numbers of the taxels of a module that were stuck, from 1."""
+        bits = self._stuck.get(name, 0)
+        return [taxel_number(i) for i in range(bits.bit_length()) if bits >> i & 1]
 
     def of(self, name: str) -> Mapping[Fault, int]:
         """Return the number of samples of a module with each fault."""
@@ -123,6 +130,11 @@ class _FaultCounts:
             if name not in self._detectors:
                 self._detectors[name] = Detector.for_recording(self._model, alone)
                 self._counts[name] = dict.fromkeys(Fault, 0)
-            masks = self._detectors[name].run(alone).fingers[name].faults
+            trace = self._detectors[name].run(alone).fingers[name]
+            masks = trace.faults
+            # Alone: with another fault at the same sample, it may be of another taxel.
+            is_stuck = masks == 1 << list(Fault).index(Fault.STUCK)
+            bits = int(np.bitwise_or.reduce(trace.faulty_taxels[is_stuck], initial=0))
+            self._stuck[name] = self._stuck.get(name, 0) | bits
             for bit, fault in enumerate(Fault):
                 self._counts[name][fault] += int((masks >> bit & 1).sum())

@@ -1,9 +1,15 @@
-"""Findings about a recording that matter before it is labelled or trained on."""
+"""Findings about a recording that matter before it is labelled or trained on.
+
+`with_oddities` adds what is odd about its times and labels, and what to do about it.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from itertools import combinations
 from pathlib import Path
 from typing import Literal, NamedTuple
+
+import numpy as np
 
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
@@ -12,7 +18,7 @@ from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
 from holdfast.model import RELATIVE_RATES
-from holdfast.recordings import Recording
+from holdfast.recordings import Recording, Tactile, shown_origin
 
 CONSTANT_SECONDS = 0.5
 """Shortest stretch without any change of the readings that is reported [s]."""
@@ -39,6 +45,7 @@ FindingKind = Literal[
     "copy",
     "cross_talk",
     "invalid",
+    "stuck",
 ]
 
 
@@ -92,19 +99,27 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
     return found
 
 
-def invalid_readings(name: str, n_invalid: int, n_samples: int) -> Finding | None:
-    """Return a finding if many samples of a module have readings that cannot be true.
+def faulty_readings(
+    name: str, n_invalid: int, n_samples: int, stuck: Sequence[int]
+) -> list[Finding]:
+    """Return findings about taxels of a module whose readings cannot be true.
 
     Args:
         name: of the module.
-        n_invalid: number of samples with the fault `invalid`.
+        n_invalid: number of samples with the fault `invalid`; a few are none.
         n_samples: number of samples.
+        stuck: numbers of the taxels with the fault `stuck`, from 1.
     """
-    if n_invalid <= INVALID_SHARE * n_samples:
-        return None
-    text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that cannot "
-    text += "be true, of one taxel, which is left out: is a magnetometer read before it is ready?"
-    return Finding(name, "invalid", text)
+    found = []
+    if n_invalid > INVALID_SHARE * n_samples:
+        text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that "
+        text += "cannot be true, of one taxel, which is left out: is a magnetometer read before it "
+        found.append(Finding(name, "invalid", text + "is ready?"))
+    if stuck:
+        taxels = f"taxel{'s' if len(stuck) > 1 else ''} {', '.join(map(str, stuck))}"
+        text = f"no change of {taxels}, or of one axis, from some time on: left out since"
+        found.append(Finding(name, "stuck", text))
+    return found
 
 
 def hidden_labels(path: Path) -> Finding | None:
@@ -181,3 +196,71 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
         yield "unit", text
     if unit == "N" and largest > MAX_TAXEL_FORCE:
         yield "unit", f"readings up to {largest:.4g} N on a taxel: is their unit count?"
+
+
+MAX_RATE_RATIO = 5.0
+"""Ratio of the rate of a module and that of its sensor from which on it is unlikely."""
+MIN_CLOCK_DIFFERENCE = 1e-3
+"""Smallest relative difference of the clocks of two modules that is reported."""
+MAX_GAPS_SHOWN = 2
+DRIFT_KEY = "clock_drift"
+"""Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
+_ORDER: tuple[FindingKind, ...] = (
+    "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
+    "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel", "no_contact",
+    "no_labels",
+)  # fmt: skip
+
+
+def with_oddities(findings: list[Finding], scan: FindingsScan, path: Path) -> list[Finding]:
+    """Return findings with what is odd about times and labels, the most important first.
+
+    Args:
+        findings: of the readings.
+        scan: of the recording.
+        path: of the recording, for the commands.
+    """
+    found = [*findings]
+    modules = {name: one.force for name, one in scan.modules.items() if one.force.n_samples > 1}
+    for name, module in modules.items():
+        nominal = scan.modules[name].sensor.rate
+        ratio = max(module.rate / nominal, nominal / module.rate)
+        if ratio > MAX_RATE_RATIO:
+            text = f"{module.rate:.4g} Hz where the sensor has {nominal:g}: if the times have "
+            text += "another unit, import with --columns time=COLUMN:ms (or s, us, ns)"
+            found.append(Finding(name, "unlikely_rate", text))
+        if module.n_gaps:
+            found.append(Finding(name, "gaps", _gaps(module, shown_origin(scan.recording.start))))
+    found += _drifts(modules, scan.recording.metadata.get(DRIFT_KEY))
+    if modules and not any(one.labels for one in scan.modules.values()):
+        text = f"no labels: draw them with holdfast label {path.name}"
+        found.append(Finding("", "no_labels", text))
+    return sorted(found, key=lambda finding: _ORDER.index(finding.kind))
+
+
+def _gaps(module: Tactile, origin: float) -> str:
+    """Return how many gaps a module has, with the longest ones in the order of time."""
+    steps = np.diff(module.times)
+    places = np.sort(np.argsort(-steps)[: min(module.n_gaps, MAX_GAPS_SHOWN)])
+    shown = ", ".join(f"{steps[k]:.3g} s at {module.times[k] - origin:.2f} s" for k in places)
+    first = "the longest " if module.n_gaps > MAX_GAPS_SHOWN else ""
+    text = f"{module.n_gaps} gap{'s' if module.n_gaps > 1 else ''}: {first}{shown}; features begin "
+    return text + "again after each: look for lost packets (holdfast doctor SOURCE)"
+
+
+def _drifts(modules: dict[str, Tactile], of_bag: object) -> list[Finding]:
+    """Return findings about clocks of modules that run at different speeds."""
+    found = []
+    if isinstance(of_bag, float):
+        text = f"the bag's clock gains {6e4 * of_bag:+.3g} ms a minute on that of the device: "
+        found.append(Finding("", "clock_drift", text + "do not join its times with other topics"))
+    for (first, one), (second, other) in combinations(modules.items(), 2):
+        lengths = np.array([module.times[-1] - module.times[0] for module in (one, other)])
+        drift = lengths[1] / lengths[0] - 1
+        # Only modules that have lost nothing last equally long by the same clock.
+        is_whole = one.n_samples == other.n_samples and not one.n_gaps + other.n_gaps
+        if is_whole and abs(drift) >= MIN_CLOCK_DIFFERENCE:
+            text = f"as many samples as {first} in {lengths[1]:.5g} s, where that has "
+            text += f"{lengths[0]:.5g} s: one of their clocks drifts"
+            return [*found, Finding(second, "clock_drift", text)]
+    return found

@@ -47,8 +47,8 @@ class ModuleScan:
         """Add the next samples."""
         labels = list(module.labels)
         if labels and self.labels and self._end < self.labels[-1].end:
-            # The label goes on after the last sample of the part before: if it begins anew with
-            # the first sample here, and is the same else, the parts have cut it.
+            # The label goes on after the last sample of the part before: if it begins again
+            # with the first sample here, and is the same else, the parts have cut it.
             before, after = self.labels[-1], labels[0]
             is_cut = after.start <= float(module.times[0])
             if is_cut and replace(after, start=before.start, end=before.end) == before:
@@ -123,12 +123,10 @@ class FindingsScan:
                 self.modules[name] = ModuleScan(module)
             self.modules[name].add(module)
         self.n_truth += 0 if part.truth is None else len(part.truth.times)
-        self._compare([(n, m) for n, m in part.modules.items() if m.n_samples])
         self._markers += part.markers
         self._last = replace(part, modules={n: m.slice(0, 1) for n, m in part.modules.items()})
-
-    def _compare(self, modules: list[tuple[str, Tactile]]) -> None:
-        """Compare the modules' latest samples, every 0.05 s."""
+        # The modules' latest samples are compared, as `ReadingsMonitor` compares live ones.
+        modules = [(name, module) for name, module in part.modules.items() if module.n_samples]
         if len(modules) < 2:
             return
         end = min(module.times[-1] for _, module in modules)

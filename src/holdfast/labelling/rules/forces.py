@@ -57,6 +57,28 @@ class FingerForce:
     period: float
     span: tuple[float, float]
 
+    @classmethod
+    def of(cls, module: Tactile, tare: Tare, grid: Array, period: float) -> "FingerForce":
+        """Return the force of a module on the times `grid`, which are `period` apart [s]."""
+        force = tared_force(module, tare, offline=True).force
+        finite = np.isfinite(force).all(axis=1)
+        times = module.times[finite]
+        columns = [np.interp(grid, times, column) for column in force[finite].T]
+        smooth = moving_mean(np.stack(columns, axis=1), n_samples_of(FORCE_SMOOTHING_TIME, period))
+        threshold = None
+        if tare.without_contact:
+            threshold = contact_threshold(np.array([rest_moments(module, tare, module.rate)]))
+        resting = (grid >= times[0]) & (grid < times[0] + tare.seconds)
+        return cls(
+            force=smooth,
+            known=covered(grid, times, GAP_PERIODS * module.period),
+            threshold=threshold,
+            noise=float(np.sqrt(smooth[resting].var(axis=0).mean())) if resting.any() else 0.0,
+            normal=module.sensor.normal,
+            period=period,
+            span=(float(module.times[0]), float(module.times[-1]) + module.period),
+        )
+
     @cached_property
     def amplitude(self) -> Array:
         """(n,) F_a."""
@@ -73,7 +95,7 @@ class FingerForce:
         # whose small force hardly changes, touches nothing any more.
         loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
         rate = np.abs(np.gradient(self.amplitude, self.period))
-        slow = _moving_mean(rate, n) < CREEP_RATE * self._grip
+        slow = moving_mean(rate, n) < CREEP_RATE * self._grip
         creep = loaded & slow & (self.amplitude < CREEP_LEVEL * self._grip)
         return drop_short_runs(fill_short_gaps(touching & ~creep, n), n)
 
@@ -140,7 +162,7 @@ def hand_force(recording: Recording, tare: TareArgument | Tare | None = None) ->
     period = 1 / recording.rate
     times = np.arange(recording.start, recording.end + period / 2, period)
     fingers = {
-        name: _finger(module, how, times, period)
+        name: FingerForce.of(module, how, times, period)
         for name, module in recording.modules.items()
         if _has_tare(module, how)
     }
@@ -161,27 +183,6 @@ def _has_tare(module: Tactile, tare: Tare) -> bool:
     return len(readings) > 0 and bool(np.isfinite(readings[first_finite(readings)]).all())
 
 
-def _finger(module: Tactile, tare: Tare, grid: Array, period: float) -> FingerForce:
-    force = tared_force(module, tare, offline=True).force
-    finite = np.isfinite(force).all(axis=1)
-    times = module.times[finite]
-    columns = [np.interp(grid, times, column) for column in force[finite].T]
-    smooth = _moving_mean(np.stack(columns, axis=1), n_samples_of(FORCE_SMOOTHING_TIME, period))
-    threshold = None
-    if tare.without_contact:
-        threshold = contact_threshold(np.array([rest_moments(module, tare, module.rate)]))
-    resting = (grid >= times[0]) & (grid < times[0] + tare.seconds)
-    return FingerForce(
-        force=smooth,
-        known=covered(grid, times, GAP_PERIODS * module.period),
-        threshold=threshold,
-        noise=float(np.sqrt(smooth[resting].var(axis=0).mean())) if resting.any() else 0.0,
-        normal=module.sensor.normal,
-        period=period,
-        span=(float(module.times[0]), float(module.times[-1]) + module.period),
-    )
-
-
 def centre_of_pressure(module: Tactile, tare: TareArgument | Tare, hand: HandForce) -> Array:
     """Return the centre of pressure of a finger on the grid: taxels weighted by normal readings.
 
@@ -197,7 +198,7 @@ def centre_of_pressure(module: Tactile, tare: TareArgument | Tare, hand: HandFor
     baseline, _ = baseline_of(module.readings, module.times, how, module.period)
     normal = np.nan_to_num(np.maximum(module.readings[:, :, 2] - baseline[:, 2], 0.0))
     load = np.column_stack([normal @ module.sensor.positions, normal.sum(axis=1)])
-    smooth = _moving_mean(load, n_samples_of(FORCE_SMOOTHING_TIME, module.period))
+    smooth = moving_mean(load, n_samples_of(FORCE_SMOOTHING_TIME, module.period))
     mean = load[:, :3].sum(axis=0) / max(load[:, 3].sum(), np.finfo(float).tiny)
     light = smooth[:, 3] < VISIBLE_SHARE * smooth[:, 3].max()
     centre = np.where(light[:, None], mean, smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-300))
@@ -237,7 +238,7 @@ def final_drop(hand: HandForce, duration: float = 0.2, factor: float = 5.0) -> i
     return middle if stays else None
 
 
-def _moving_mean(values: Array, n: int) -> Array:
+def moving_mean(values: Array, n: int) -> Array:
     """Return the mean over n samples around each one, along the first axis; ends are repeated."""
     ends = [(n // 2, n - 1 - n // 2)] + [(0, 0)] * (values.ndim - 1)
     padded = np.pad(values, ends, mode="edge")

@@ -126,7 +126,7 @@ def propose(
     for finger, tip in tips.items():
         held = held_at(base[finger], at) & tip.seen
         force = force_of(recording, finger, how)(at)
-        slips, stuck = [], held
+        slips, stuck, rest = [], held, tip.place
         for time in FIT_TIMES:
             n = n_samples_of(time, grid[1] - grid[0])
             rest = unexplained(tip, force, stuck, n)
@@ -136,6 +136,8 @@ def propose(
                 stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
         note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
         labels[finger] = with_slips(base[finger], slips, note)
+        doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
+        labels[finger] = without_cause(labels[finger], at, doubtful)
     return labels
 
 
@@ -241,6 +243,45 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         ratio = away / max(1e3 * rule.slid, 6 * noise)
         slips.append(SeenSlip(onset, error, until, 1e-3 * distance, 2e-3 * noise, float(ratio)))
     return slips
+
+
+def may_slide(rest: Array, held: Mask, rule: VideoRule, n: int) -> Mask:
+    """Return where so much motion remains that a slip is possible, too small to be found.
+
+    Args:
+        rest: (n, 2) from `unexplained` [mm].
+        held: (n,) where the finger holds the object.
+        rule: thresholds.
+        n: values on either side of a step.
+    """
+    moved = np.where(held, _step_size(rest, n), 0.0)
+    noise = float(np.median(moved[held])) if held.any() else 0.0
+    return hysteresis(moved / max(1e3 * rule.step / 2, 2.5 * noise), 0.7, 1.0)
+
+
+def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
+    """Return labels whose disturbances have no cause where they may slide.
+
+    A disturbance is a negative of the head `slip`. What is unstable without a cause is neither.
+    """
+    spans = [(float(times[a]), float(times[b - 1])) for a, b in runs(doubtful)]
+    made: list[Label] = []
+    for label in labels:
+        if label.cause is not Cause.DISTURBANCE:
+            made.append(label)
+            continue
+        at = label.start
+        for start, end in spans:
+            first, last = max(start, at), min(end, label.end)
+            if first >= last:
+                continue
+            if first > at:
+                made.append(replace(label, start=at, end=first))
+            made.append(replace(label, start=first, end=last, cause=None))
+            at = last
+        if label.end > at:
+            made.append(replace(label, start=at))
+    return tuple(made)
 
 
 def _for_good(rest: Array, moving: Mask, n: int, slid: float, step: float) -> Mask:

@@ -166,8 +166,9 @@ def measured_motion(path: Path, column: str | None = None) -> tuple[Array, TipMo
     from scipy.spatial.transform import Rotation
 
     table, _ = read_table(path)
-    known_kinds: tuple[tuple[str, ...], ...] = (POSE_COLUMNS[1:4], POSE_COLUMNS[4:])
-    kinds = [names for names in known_kinds if {*names} <= {*table.names}]
+    kinds: list[tuple[str, ...]] = [
+        names for names in (POSE_COLUMNS[1:4], POSE_COLUMNS[4:]) if {*names} <= {*table.names}
+    ]
     if column is not None:
         kinds = [(column,)]
     if not kinds:

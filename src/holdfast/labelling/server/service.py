@@ -51,22 +51,21 @@ class LabellingService:
         self._workspace = workspace
         self._bodies = BodyReader(MAX_REQUEST_BYTES, MAX_PENDING_BYTES, web.HTTPUnprocessableEntity)
         self.app = web.Application(middlewares=[guard.middleware, _errors_as_json])
-        self.app.add_routes(self._routes())
-
-    def _routes(self) -> list[web.AbstractRouteDef]:
         recording = r"/api/v1/recordings/{id:\d+}"
-        return [
-            web.get("/", _page),
-            web.static("/page", PAGE),
-            web.static("/web", SHARED),
-            web.get("/api/v1/recordings", self._list),
-            web.get(recording, self._open),
-            web.get(recording + "/signals", self._signals),
-            web.get(recording + "/changes", self._changes),
-            web.put(recording + "/labels", self._save),
-            web.post(recording + "/propose", self._propose),
-            web.get(r"/media/{id:\d+}/{index:\d+}", self._video),
-        ]
+        self.app.add_routes(
+            [
+                web.get("/", _page),
+                web.static("/page", PAGE),
+                web.static("/web", SHARED),
+                web.get("/api/v1/recordings", self._list),
+                web.get(recording, self._open),
+                web.get(recording + "/signals", self._signals),
+                web.get(recording + "/changes", self._changes),
+                web.put(recording + "/labels", self._save),
+                web.post(recording + "/propose", self._propose),
+                web.get(r"/media/{id:\d+}/{index:\d+}", self._video),
+            ]
+        )
 
     async def _list(self, _: web.Request) -> web.Response:
         return await _reply(lambda: list_recordings(self._workspace))

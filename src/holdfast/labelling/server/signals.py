@@ -102,6 +102,29 @@ class _Level(NamedTuple):
         """Number of blocks."""
         return len(self.times[0])
 
+    @classmethod
+    def joined(cls, levels: "Sequence[_Level]") -> "_Level":
+        """Return the blocks of several levels, one after the other."""
+        return cls(*(np.concatenate(arrays, axis=1) for arrays in zip(*levels, strict=True)))
+
+    def halved(self) -> "_Level":
+        """Return the next level: two neighbouring blocks become one; the last may stay alone."""
+        n = self.n_blocks // 2 * 2
+        first, second = self.part(slice(0, n, 2)), self.part(slice(1, n, 2))
+        # Not `fmin`: which block an extreme comes from says whether the maximum comes first.
+        unknown = np.isnan(first.low)
+        low_is_later = (second.low < first.low) | unknown
+        high_is_later = (second.high > first.high) | unknown
+        pairs = _Level(
+            np.stack([first.times[0], second.times[1]]),
+            np.where(low_is_later, second.low, first.low),
+            np.where(high_is_later, second.high, first.high),
+            (low_is_later & ~high_is_later)
+            | (low_is_later & high_is_later & second.falls)  # both are of one block
+            | (~low_is_later & ~high_is_later & first.falls),
+        )
+        return _Level.joined([pairs, self.part(slice(n, None))]) if n < self.n_blocks else pairs
+
 
 class FingerSignals:
     """Force and sigma of one finger, with minima and maxima at every zoom.
@@ -126,10 +149,12 @@ class FingerSignals:
         self._levels: dict[int, _Level] = {}  # by depth, of blocks of 2^depth samples
         starts = range(0, max(len(self.times), 1), PART_SAMPLES)
         depth = FIRST_DEPTH
-        level = _joined([self._reduced(start, start + PART_SAMPLES, depth) for start in starts])
+        level = _Level.joined(
+            [self._reduced(start, start + PART_SAMPLES, depth) for start in starts]
+        )
         self._levels[depth] = level
         while level.n_blocks > 2:
-            depth, level = depth + 1, _halved(level)
+            depth, level = depth + 1, level.halved()
             self._levels[depth] = level
 
     def part(self, start: float, end: float, points: int) -> tuple[bool, Series]:
@@ -167,7 +192,7 @@ class FingerSignals:
         times, values = self.times[start:stop], np.ascontiguousarray(self.values[start:stop].T)
         level = _Level(np.stack([times, times]), values, values, np.zeros(values.shape, dtype=bool))
         for _ in range(depth):
-            level = _halved(level)
+            level = level.halved()
         return level
 
 
@@ -245,29 +270,6 @@ def signal_values(
         part[:, 1:4] = force[start:end]
         part[:, 4] = haar_features(force[start - history : end], window)[history:, 5]
     return values
-
-
-def _halved(level: _Level) -> _Level:
-    """Return the next level: two neighbouring blocks become one; the last may stay alone."""
-    n = level.n_blocks // 2 * 2
-    first, second = level.part(slice(0, n, 2)), level.part(slice(1, n, 2))
-    unknown = np.isnan(first.low)
-    low_is_later = (second.low < first.low) | unknown
-    high_is_later = (second.high > first.high) | unknown
-    pairs = _Level(
-        np.stack([first.times[0], second.times[1]]),
-        np.where(low_is_later, second.low, first.low),
-        np.where(high_is_later, second.high, first.high),
-        (low_is_later & ~high_is_later)
-        | (low_is_later & high_is_later & second.falls)  # both are of one block
-        | (~low_is_later & ~high_is_later & first.falls),
-    )
-    return _joined([pairs, level.part(slice(n, None))]) if n < level.n_blocks else pairs
-
-
-def _joined(levels: Sequence[_Level]) -> _Level:
-    """Return the blocks of several levels, one after the other."""
-    return _Level(*(np.concatenate(arrays, axis=1) for arrays in zip(*levels, strict=True)))
 
 
 def _series(times: Array, values: npt.NDArray[np.floating]) -> Series:

@@ -65,6 +65,28 @@ class LabelInput(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     confidence: float = 1.0
     author: str = ""
 
+    def parsed(self, finger: str) -> Label:
+        """Return the label of a finger.
+
+        Raises:
+            ValueError: see `parse_labels`.
+        """
+        where = f"{finger}, [{self.start:.10g}, {self.end:.10g}) s"
+        if self.state not in STATE_NAMES:
+            raise ValueError(
+                f"{where}: state {', '.join(STATE_NAMES)} expected, {self.state!r} given"
+            )
+        if self.cause not in (None, *CAUSE_NAMES):
+            raise ValueError(
+                f"{where}: cause {', '.join(CAUSE_NAMES)} or none expected, {self.cause!r} given"
+            )
+        state, cause = ContactState(self.state.upper()), self.cause and Cause(self.cause)
+        span = self.start, self.end
+        try:
+            return Label(*span, state, cause or None, self.evidence, self.confidence, self.author)
+        except ValueError as problem:
+            raise ValueError(f"{finger}: {problem}") from problem
+
 
 @dataclass(frozen=True)
 class StoredLabels:
@@ -235,8 +257,7 @@ def parse_labels(inputs: Mapping[str, Sequence[LabelInput]]) -> dict[str, tuple[
             and the times.
     """
     return {
-        finger: tuple(_parse(finger, label) for label in labels)
-        for finger, labels in inputs.items()
+        finger: tuple(label.parsed(finger) for label in labels) for finger, labels in inputs.items()
     }
 
 
@@ -267,22 +288,6 @@ def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tupl
                 kept.append(label)
         cut[finger] = tuple(kept)
     return cut
-
-
-def _parse(finger: str, label: LabelInput) -> Label:
-    where = f"{finger}, [{label.start:.10g}, {label.end:.10g}) s"
-    if label.state not in STATE_NAMES:
-        raise ValueError(f"{where}: state {', '.join(STATE_NAMES)} expected, {label.state!r} given")
-    if label.cause not in (None, *CAUSE_NAMES):
-        raise ValueError(
-            f"{where}: cause {', '.join(CAUSE_NAMES)} or none expected, {label.cause!r} given"
-        )
-    state, cause = ContactState(label.state.upper()), label.cause and Cause(label.cause)
-    span = label.start, label.end
-    try:
-        return Label(*span, state, cause or None, label.evidence, label.confidence, label.author)
-    except ValueError as problem:
-        raise ValueError(f"{finger}: {problem}") from problem
 
 
 def _span_text(label: Label) -> str:

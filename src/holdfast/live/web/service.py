@@ -147,8 +147,8 @@ class LiveService:
             web.get("/api/v1/state", self._get_state),
             web.get("/api/v1/schema", self._get_schema),
             web.post("/api/v1/tare", self._post_tare),
-            web.post("/api/v1/threshold", self._post_threshold),
-            web.delete("/api/v1/threshold", self._delete_threshold),
+            web.post("/api/v1/threshold", self._set_threshold),
+            web.delete("/api/v1/threshold", self._set_threshold),
             web.post("/api/v1/recording", self._post_recording),
             web.delete("/api/v1/recording", self._delete_recording),
             web.post("/api/v1/markers", self._post_marker),
@@ -260,14 +260,13 @@ class LiveService:
         work = partial(session.change, session.stream.restart_tare, "no tare can be taken")
         return await _answer(work)
 
-    async def _post_threshold(self, request: web.Request) -> web.Response:
-        value = (await self._bodies.read(request, _ThresholdRequest)).value
-        return await self._set_threshold(value, f"threshold set to {value:.2f}")
-
-    async def _delete_threshold(self, _: web.Request) -> web.Response:
-        return await self._set_threshold(None, "threshold of the model restored")
-
-    async def _set_threshold(self, value: float | None, notice: str) -> web.Response:
+    async def _set_threshold(self, request: web.Request) -> web.Response:
+        """Set the threshold of a POST; a DELETE restores that of the model."""
+        value: float | None = None
+        notice = "threshold of the model restored"
+        if request.method == "POST":
+            value = (await self._bodies.read(request, _ThresholdRequest)).value
+            notice = f"threshold set to {value:.2f}"
         work = partial(self._session.stream.set_threshold, value)
         change = partial(self._session.change, work, "the threshold was not changed")
         answer = await _answer(change)
@@ -335,24 +334,15 @@ class CalibrationRoutes:
         """Return the routes."""
         return [
             web.get("/api/v1/calibration", self._get),
-            web.post("/api/v1/calibration", self._post),
-            web.delete("/api/v1/calibration", self._delete),
-            web.post("/api/v1/calibration/finish", self._post_finish),
+            web.post("/api/v1/calibration", partial(self._change, self._calibration.start)),
+            web.delete("/api/v1/calibration", partial(self._change, self._calibration.cancel)),
+            web.post("/api/v1/calibration/finish", partial(self._change, self._calibration.finish)),
             web.get("/api/v1/calibration/model", self._get_model),
             web.post("/api/v1/calibration/model", self._post_model),
         ]
 
     async def _get(self, _: web.Request) -> web.Response:
         return _json(self._calibration.document())
-
-    async def _post(self, _: web.Request) -> web.Response:
-        return await self._change(self._calibration.start)
-
-    async def _delete(self, _: web.Request) -> web.Response:
-        return await self._change(self._calibration.cancel)
-
-    async def _post_finish(self, _: web.Request) -> web.Response:
-        return await self._change(self._calibration.finish)
 
     async def _get_model(self, _: web.Request) -> web.Response:
         answer = await _answer(lambda: msgspec.Raw(self._calibration.encoded_model()))
@@ -364,7 +354,7 @@ class CalibrationRoutes:
         name = (await self._bodies.read(request, _FileRequest)).name
         return await _answer(lambda: {"path": str(self._calibration.save(name))})
 
-    async def _change(self, work: Callable[[], None]) -> web.Response:
+    async def _change(self, work: Callable[[], None], _: web.Request) -> web.Response:
         def changed() -> schema.CalibrationDocument:
             work()
             return self._calibration.document()

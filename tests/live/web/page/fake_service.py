@@ -219,7 +219,7 @@ IDLE = {
 }  # fmt: skip
 SEEN = (
     "uskin-curved: held 42 s; the arm moved (the force changed by 7 % within half a second). 14 of "
-    "31 features are scaled anew, and 96 % of this handling is STABLE, 41 % before."
+    "31 features have a new scale, and 96 % of this handling is STABLE, 41 % before."
 )
 
 

@@ -83,7 +83,28 @@ class XelaSource(DeviceSource):
         # A new one: the server may have other sensors than when it was open before.
         self._decoder = self._new_decoder()
         self._connection = self._connected()
-        text, received = self._first_packet(self._connection)
+        # The first packet that defines the modules.
+        deadline = time.monotonic() + XELA_OPEN_TIMEOUT
+        invalid: InvalidPacket | None = None
+        text = b""
+        while not text and (left := deadline - time.monotonic()) > 0:
+            try:
+                given = self._connection.recv(left, decode=False)
+                received = time.monotonic()
+                text = given if self._decoder.identify(given) else b""
+            except InvalidPacket as why:
+                invalid = why  # the next one may be valid: the first may have been cut
+            except TimeoutError:
+                break
+            except ConnectionClosed as why:
+                raise SourceError(f"{self._place} closed the connection: {why}") from why
+        if not text and invalid is not None:
+            raise SourceError(f"{self._place} sends invalid packets: {invalid}") from invalid
+        if not text:
+            raise SourceError(
+                f"connected to {self._place}, but no samples came in {XELA_OPEN_TIMEOUT:g} s: is "
+                "it a XELA server, with its sensors plugged in?"
+            )
         self.sensors = self._decoder.sensors
         self.metadata = {"source": self.name, **self._decoder.metadata}
         self._start(received)
@@ -120,29 +141,6 @@ class XelaSource(DeviceSource):
         else:
             why = f"{where} cannot be reached: {failures[-1]}"
         raise SourceError(why) from failures[-1]
-
-    def _first_packet(self, connection: ClientConnection) -> tuple[bytes, float]:
-        """Return the first packet that defines the modules, and its time of arrival."""
-        deadline = time.monotonic() + XELA_OPEN_TIMEOUT
-        invalid: InvalidPacket | None = None
-        while (left := deadline - time.monotonic()) > 0:
-            try:
-                text = connection.recv(left, decode=False)
-                received = time.monotonic()
-                if self._decoder.identify(text):
-                    return text, received
-            except InvalidPacket as why:
-                invalid = why  # the next one may be valid: the first may have been cut
-            except TimeoutError:
-                break
-            except ConnectionClosed as why:
-                raise SourceError(f"{self._place} closed the connection: {why}") from why
-        if invalid is not None:
-            raise SourceError(f"{self._place} sends invalid packets: {invalid}") from invalid
-        raise SourceError(
-            f"connected to {self._place}, but no samples came in {XELA_OPEN_TIMEOUT:g} s: is it a "
-            "XELA server, with its sensors plugged in?"
-        )
 
     def _receive(self, timeout: float) -> bool:
         if self._connection is None:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import msgspec
 import numpy.typing as npt
 
 from holdfast.devices.sources.assembler import Assembler, Device
@@ -81,7 +80,17 @@ class XelaDecoder:
             return False
         if not packet.sensors:
             raise InvalidPacket("it has no sensors")
-        found = {number: self._model(number, raw) for number, raw in packet.sensors.items()}
+        found: dict[int, tuple[str, int]] = {}
+        for number, raw in packet.sensors.items():
+            try:
+                part = read_sensor(raw, calibrated=self._calibrated)
+                readings = part.readings()
+                # Valid, but without newtons: another packet will not have them either.
+                if readings is None and self._calibrated:
+                    raise SourceError(no_calibration(number, part.model))
+                found[number] = part.model, len(_checked(part.taxels, readings))
+            except InvalidPacket as why:
+                raise InvalidPacket(f"sensor {number}: {why}") from why
         self._assembler.devices = xela_devices(
             found, self._names, self._sensor, calibrated=self._calibrated
         )
@@ -126,17 +135,6 @@ class XelaDecoder:
                 self._assembler.notify(f"sensor {number}", text, received)
         self._assembler.n_refused += invalid
         return self._assembler.finish(received)
-
-    def _model(self, number: int, raw: msgspec.Raw) -> tuple[str, int]:
-        """Return the model and the number of taxels of a sensor."""
-        try:
-            part = read_sensor(raw, calibrated=self._calibrated)
-            readings = part.readings()
-            if readings is None and self._calibrated:
-                raise SourceError(no_calibration(number, part.model))
-            return part.model, len(_checked(part.taxels, readings))
-        except InvalidPacket as why:
-            raise InvalidPacket(f"sensor {number}: {why}") from why
 
 
 def no_calibration(number: int, model: str) -> str:

@@ -86,7 +86,18 @@ class XelaEncoder:
             self._parts = [_WholeHand(sensors, allegro)]
         else:
             self._parts = [_Module(name, sensor) for name, sensor in sensors.items()]
-        self._constant = [_constant_fields(part) for part in self._parts]
+        # Fields of a sensor that are the same in every packet are encoded once.
+        self._constant: list[dict[str, Any]] = []
+        for part in self._parts:
+            temperatures = TEMPERATURE + np.arange(part.n_taxels) % 7 / 10
+            rates = [part.rate] * part.n_taxels
+            self._constant.append(
+                {
+                    "temp": msgspec.Raw(msgspec.json.encode(temperatures.round(1).tolist())),
+                    "handedness": "right",
+                    "ups": msgspec.Raw(msgspec.json.encode(rates)),
+                }
+            )
         self._counter = 0
         self.modules: dict[int, Sequence[str]] = {
             number: part.names for number, part in enumerate(self._parts, 1)
@@ -319,16 +330,6 @@ def _readings(name: str, sensor: Sensor, given: npt.NDArray[Any]) -> _Readings |
             "packets of a XELA server hold no others"
         )
     return np.rint(given).astype(np.uint16), None
-
-
-def _constant_fields(part: _Module | _WholeHand) -> dict[str, Any]:
-    """Return the fields of a sensor that are the same in every packet."""
-    temperatures = TEMPERATURE + np.arange(part.n_taxels) % 7 / 10
-    return {
-        "temp": msgspec.Raw(msgspec.json.encode(temperatures.round(1).tolist())),
-        "handedness": "right",
-        "ups": msgspec.Raw(msgspec.json.encode([part.rate] * part.n_taxels)),
-    }
 
 
 def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:

@@ -3,6 +3,7 @@
 import re
 from array import array
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -188,26 +189,21 @@ def read_sensor(raw: msgspec.Raw, *, calibrated: bool) -> PlainCounts | Counts |
         InvalidPacket: it is no JSON object, or a field has another type than expected.
     """
     try:
-        part = (None if calibrated else _plain_counts(raw)) or (
-            _CALIBRATED if calibrated else _COUNTS
-        ).decode(raw)
+        part: PlainCounts | Counts | Calibrated | None = None
+        if not calibrated:
+            # The form in which the server writes counts is parsed in C, which is faster.
+            with suppress(ValueError, RecursionError):
+                plain = _RAW_COUNTS.decode(raw)
+                parsed = _extension.parse_counts(plain.data, plain.integer)
+                if parsed is not None:
+                    counts = np.frombuffer(parsed, np.uint16)
+                    part = PlainCounts(plain.taxels, plain.time, plain.model, counts)
+        part = part or (_CALIBRATED if calibrated else _COUNTS).decode(raw)
     except (ValueError, RecursionError) as cause:
         raise InvalidPacket(str(cause)[:MAX_REASON_LENGTH]) from cause
     if part.time is not None:
         part.time = _stamp(part.time)
     return part
-
-
-def _plain_counts(raw: msgspec.Raw) -> PlainCounts | None:
-    """Parse a sensor with counts as the server writes them, which is faster; None for others."""
-    try:
-        part = _RAW_COUNTS.decode(raw)
-    except (ValueError, RecursionError):
-        return None
-    parsed = _extension.parse_counts(part.data, part.integer)
-    if parsed is None:
-        return None
-    return PlainCounts(part.taxels, part.time, part.model, np.frombuffer(parsed, np.uint16))
 
 
 def _value(fields: Mapping[str, msgspec.Raw], name: str) -> Any:  # noqa: ANN401 (any JSON value)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
-from holdfast.classifiers.interior_point import fit_svm
+from holdfast.classifiers.svm import fit_svm
 
 from .two_classes import samples
 

@@ -81,6 +81,19 @@ def test_existing_recordings_are_kept(capsys, out):
     assert json.loads(run(capsys, out, *ONE, "--json")[1])["recordings"] == []
 
 
+def test_troubles_of_the_skins(capsys, out):
+    run(capsys, out, *ONE, "--faults", "zero-share=0.1, field=200")
+    recording = load_recording(out / "flask-case1-1.parquet")
+    assert recording.metadata["magnetic_faults"] == {
+        "field": 200.0, "turn_time": 8.0, "zero_share": 0.1, "drift": 0.0, "cross_talk": 0.0,
+        "invented_months": 0.0,
+    }  # fmt: skip
+    zeros = (recording.modules["thumb"].readings == 0).all(axis=2).any(axis=1)
+    assert 0.05 < zeros.mean() < 0.15
+    code, _, err = run(capsys, out, *ONE, "--faults", "zero-share=0.1,field=200")
+    assert (code, "1 of 1 recordings exist already" in err) == (0, True)
+
+
 def test_the_number_of_processes_changes_nothing(capsys, out, tmp_path, monkeypatch):
     monkeypatch.undo()  # other processes know of no patch
     other = tmp_path / "other"
@@ -98,6 +111,7 @@ def test_the_number_of_processes_changes_nothing(capsys, out, tmp_path, monkeypa
         (("--seed", "1"), "seed 0"),
         (("--profile", "gentle"), "profile reference"),
         (("--server",), "server False"),
+        (("--faults", "field=9"), "magnetic_faults {'field': 9.0, "),
     ],
 )
 def test_recordings_with_other_settings_are_refused(capsys, out, words, text):
@@ -198,6 +212,15 @@ class TestFailures:
         (("--seed", "-1"), "a seed of at least 0 expected; 5 and -1 given"),
         (("--seed", "one"), "Invalid value for '--seed'"),
         (("--film", "film.avi"), "film.avi"),
+        (
+            ("--faults", "field=3,rust=1"),
+            "--faults with each of field, turn-time, zero-share, drift, cross-talk, "
+            "invented-months at most once expected, 'rust=1' given",
+        ),
+        (("--faults", "field=3,field=4"), "at most once expected, 'field=4' given"),
+        (("--faults", "zero-share=few"), "--faults zero-share: a number expected, 'few' given"),
+        (("--faults", "drift"), "--faults drift: a number expected, '' given"),
+        (("--faults", "drift=-1"), "drift: at least 0 expected, -1.0 given"),
     ],
 )
 def test_bad_input_is_one_line_and_makes_no_folder(capsys, out, words, text):
