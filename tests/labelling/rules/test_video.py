@@ -362,3 +362,66 @@ def test_a_flash_gives_the_offset_of_clocks(film, monkeypatch):
 def test_a_flash_that_is_not_seen_counts_for_nothing(levels):
     marked = replace(recording(), markers=((3.0, "flash"),))
     assert video_clock.flash_offset(marked, np.arange(len(levels)) / 60, levels) is None
+
+
+class TestDoubt:
+    """What may slide is unstable without a cause: no example of a disturbance."""
+
+    TIMES = np.arange(0.0, 10.0, 0.1)
+    PUSH = Label(2.0, 8.0, "UNSTABLE", "disturbance")
+    HOLD = Label(8.0, 9.0, "STABLE")
+
+    def spans(self, *doubtful, labels=(PUSH, HOLD), times=TIMES):
+        mask = np.zeros(len(times), dtype=bool)
+        for first, last in doubtful:
+            mask[first:last] = True
+        made = video.without_cause(labels, times, mask)
+        return [(round(x.start, 3), round(x.end, 3), x.cause) for x in made]
+
+    @pytest.mark.parametrize(
+        ("doubtful", "parts"),
+        [
+            ((), [(2.0, 8.0, "disturbance")]),
+            (
+                ((30, 41),),
+                [(2.0, 3.0, "disturbance"), (3.0, 4.0, None), (4.0, 8.0, "disturbance")],
+            ),
+            (((0, 31),), [(2.0, 3.0, None), (3.0, 8.0, "disturbance")]),
+            (((0, 100),), [(2.0, 8.0, None)]),
+        ],
+    )
+    def test_a_disturbance_is_cut(self, doubtful, parts):
+        assert self.spans(*doubtful) == [*parts, (8.0, 9.0, None)]
+
+    def test_before_and_after_the_pictures_it_may_slide(self):
+        assert self.spans(times=self.TIMES[30:61]) == [
+            (2.0, 3.0, None), (3.0, 6.0, "disturbance"), (6.0, 8.0, None), (8.0, 9.0, None)
+        ]  # fmt: skip
+
+    def test_a_motion_too_small_for_a_slip_is_doubtful(self):
+        generator = np.random.default_rng(0)
+        times = np.arange(0.0, 10.0, 1 / 60)
+        rest = generator.normal(0, 0.003, (len(times), 2))
+        rest[300:, 0] += 0.1  # half of the least distance of a slip
+        held, rule = np.ones(len(times), dtype=bool), VideoRule()
+        assert seen_slips(times, rest, held, rule) == []
+        doubtful = np.flatnonzero(video.may_slide(rest, held, rule, 3))
+        assert len(doubtful)
+        assert np.abs(doubtful - 300).max() <= 3
+        assert not video.may_slide(rest, np.zeros_like(held), rule, 3).any()
+
+    def test_what_no_picture_shows_is_doubtful(self, film, monkeypatch):
+        times, found = places()
+        film(times, found)
+        seen = video.tip_motions
+
+        def half_seen(*arguments):
+            tips = seen(*arguments)
+            tips["index"] = tips["index"]._replace(seen=times < 20)
+            return tips
+
+        monkeypatch.setattr(video, "tip_motions", half_seen)
+        labels = video.propose(recording(), "run.mp4")["index"]
+        pushes = [x for x in labels if x.state == "UNSTABLE" and x.start > 20.5 and x.end < 36]
+        assert pushes
+        assert not any(x.cause for x in pushes)

@@ -135,9 +135,10 @@ def propose(
             for slip in slips:
                 stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
         note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
-        labels[finger] = with_slips(base[finger], slips, note)
+        # What no picture shows is as doubtful as what the pictures show too little of.
         doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
-        labels[finger] = without_cause(labels[finger], at, doubtful)
+        doubtful |= ~tip.seen
+        labels[finger] = without_cause(with_slips(base[finger], slips, note), at, doubtful)
     return labels
 
 
@@ -260,19 +261,25 @@ def may_slide(rest: Array, held: Mask, rule: VideoRule, n: int) -> Mask:
 
 
 def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
-    """Return labels whose disturbances have no cause where they may slide.
+    """Return labels whose disturbances have no cause where the finger may slide.
 
-    A disturbance is a negative of the head `slip`. What is unstable without a cause is neither.
+    A disturbance trains and scores the head `slip` as no slip. What is unstable without a cause is
+    neither.
+
+    Args:
+        labels: of one finger.
+        times: (n,) of the pictures, on the clock of the labels [s].
+        doubtful: (n,) where it may slide; before and after the pictures it may too.
     """
-    spans = [(float(times[a]), float(times[b - 1])) for a, b in runs(doubtful)]
+    spans = [(-np.inf, float(times[0])), *((times[a], times[b - 1]) for a, b in runs(doubtful))]
     made: list[Label] = []
     for label in labels:
         if label.cause is not Cause.DISTURBANCE:
             made.append(label)
             continue
         at = label.start
-        for start, end in spans:
-            first, last = max(start, at), min(end, label.end)
+        for start, end in (*spans, (times[-1], np.inf)):
+            first, last = max(float(start), at), min(float(end), label.end)
             if first >= last:
                 continue
             if first > at:
