@@ -110,7 +110,7 @@ class CameraRecorder(Closable):
                 stamps_path(self._path).unlink(missing_ok=True)
 
     def _write(self, clock: Callable[[], float], report: Callable[[str], None]) -> None:
-        is_read, picture = True, self._picture
+        is_read, picture, due = True, self._picture, time.monotonic()
         with stamps_path(self._path).open("w") as stamps:
             while is_read and not self._closing.is_set():
                 self._read_at, stamp = time.monotonic(), clock()
@@ -118,7 +118,8 @@ class CameraRecorder(Closable):
                     self._video.write(picture)
                     stamps.write(f"{stamp:.6f}\n")
                     self.n_pictures += 1
-                self._closing.wait(self._pause)
+                due += self._pause
+                self._closing.wait(max(due - time.monotonic(), 0.0))
                 is_read, picture = self._film.read()
         if not is_read:
             report(f"note: the camera ended after {self.n_pictures} pictures")
