@@ -36,8 +36,8 @@
 #define HF_LOUD_RATIO ((hf_real)100)
 /* Taxels from which one may count as noisy; of fewer, one may be touched alone. */
 #define HF_MIN_TAXELS ((hf_real)4)
-/* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6. Whole counts
- * have the same sum only if the sum of each axis is the same. */
+/* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6: about 1, but not
+ * rational. So whole counts have the same sum only if the sum of each axis is the same. */
 #define HF_WEIGHT_Y (HF_SQRT_2 / (hf_real)1.5)
 #define HF_WEIGHT_Z ((hf_real)1.7320508075688772 / (hf_real)1.6)
 /* A pull for this long means that the tare was taken under load: nothing pulls a skin [s]. */
@@ -137,7 +137,8 @@ static bool hf_is_stuck(const hf_finger *f)
 /* Return whether the normal readings add up to a pull, well above noise, for a long time. */
 static bool hf_is_pulled(const hf_finger *f, hf_real normal)
 {
-    /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. */
+    /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. Noise alone never reaches 20
+     * deviations, and an elastomer that creeps falls by less than a tenth. */
     holdfast_finger_memory *const s = f->state;
     const hf_real limit = hf_max(20 * s->noise, (hf_real)0.1 * s->max_amplitude);
     s->n_pulled = normal < -limit ? s->n_pulled + 1 : 0;
@@ -171,7 +172,8 @@ static void hf_note_still(const hf_finger *f, size_t i, int64_t still)
 {
     holdfast_taxel *const taxel = &f->taxels[i];
     const hf_real period = f->hand->period, length = (hf_real)still;
-    if ((length + 1) * hf_min(1, period / HF_NOISE_SMOOTHING) > 1) { /* jumps follow faster */
+    /* Still for longer than the smoothing: the change before is too old for a second difference. */
+    if ((length + 1) * hf_min(1, period / HF_NOISE_SMOOTHING) > 1) {
         hf_forget_change(f, i);
     }
     if (taxel->n_changed == 0) {

@@ -20,6 +20,8 @@
 /* A field, and its motion, count from this many times the noise of a component of the force: less
  * than any contact does. */
 #define HF_FIELD_TO_NOISE ((hf_real)4)
+/* Factor on that for the first field of a sensor whose unit is not known: a skin that warms changes
+ * all readings alike, too. */
 #define HF_FIRST_FIELD ((hf_real)4)
 /* A field moves from this many times the least motion on. */
 #define HF_MOVES ((hf_real)1.5)
@@ -138,6 +140,9 @@ static bool hf_another_turns(const hf_finger *f, hf_real low, hf_real high)
  * a field or a load. */
 static bool hf_update_field(const hf_finger *f, const hf_common *common)
 {
+    /* The checks, in this order: too few taxels to compare; no change above the noise; a press,
+     * which is a load; an open module that turns as fast, which makes it a field after all; taxels
+     * that differ; a field that is too strong. What is left is a field. */
     holdfast_finger_memory *const s = f->state;
     if (common->n < HF_MIN_TAXELS) { /* all may be loaded alike */
         s->is_deep = false;
@@ -255,11 +260,13 @@ static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
         return 0;
     }
     s->has_new_field = false;
+    /* Under a deep load each fourth sample only, unless a module turns: it shows the field. */
     if (s->is_deep && s->n_skipped < HF_SKIPPED_SAMPLES && !hf_another_turns(f, 0, HF_INFINITY)) {
         s->n_skipped += 1;
     } else {
         const hf_common common = hf_find_common(f, left_out);
-        s->n_unclear = hf_update_field(f, &common) ? s->n_unclear + 1 : 0; /* a touch may begin */
+        /* Counted, because a touch that begins is unclear, too, but not for long. */
+        s->n_unclear = hf_update_field(f, &common) ? s->n_unclear + 1 : 0;
         s->n_skipped = 0;
     }
     if (hf_square(s->field) > 0) {

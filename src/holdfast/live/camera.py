@@ -58,6 +58,7 @@ class CameraRecorder(Closable):
         self._pause = 1 / self._rate if Path(camera).is_file() else 0.0
         self.n_pictures = 0
         self._path = path
+        # When the newest picture was read: `_write` sets it, `_watch` compares it with the clock.
         self._read_at = time.monotonic()
         self._closing = Event()
         self._threads: list[Thread] = []
@@ -125,7 +126,7 @@ class CameraRecorder(Closable):
             report(f"note: the camera ended after {self.n_pictures} pictures")
 
     def _watch(self, report: Callable[[str], None]) -> None:
-        reported = 0.0
+        reported = 0.0  # `_read_at` of the stall that was reported last: each becomes one marker
         while self._threads[0].is_alive() and not self._closing.wait(STALL_TIME / 4):
             if time.monotonic() - self._read_at > STALL_TIME and self._read_at != reported:
                 reported = self._read_at

@@ -116,6 +116,8 @@ class ModuleComparison:
     """
 
     def __init__(self) -> None:
+        # First readings and their noise by module, and by pair how often they were equal or alike;
+        # `update` alone changes them.
         self._first: dict[str, npt.NDArray[np.float64]] = {}
         self._noise: dict[str, float] = {}
         self._start = self._last_time = -math.inf
@@ -126,6 +128,7 @@ class ModuleComparison:
 
     def is_due(self, time: float) -> bool:
         """Return whether samples of a time [s] would be compared."""
+        # Times are rounded: without the 1e-6, samples of 20 Hz would be left out.
         return not 0 <= time - self._last_time < CHECK_INTERVAL - 1e-6
 
     def update(self, samples: Mapping[str, npt.NDArray[Any]], time: float) -> list[Likeness]:
@@ -147,7 +150,7 @@ class ModuleComparison:
         for name in names:
             if name not in self._first:
                 self._first[name], self._noise[name] = values[name], 0.0
-                self._start = time
+                self._start = time  # of the newest module: the noise of all is measured on
         change = np.array([(values[name] - self._first[name]).ravel() for name in names])
         products = change @ change.T
         size = np.sqrt(np.diag(products))
