@@ -59,7 +59,14 @@ def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):
 
 
 def test_missing_packages_are_reported(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.errors._version", lambda package: None)
+    known = metadata.version
+
+    def version(package):
+        if package != "holdfast":
+            raise metadata.PackageNotFoundError(package)
+        return known(package)
+
+    monkeypatch.setattr(metadata, "version", version)
     found = report(capsys)
     assert found["packages"]["numpy"] is None
     assert found["extras"]["hdf5"]["installed"] is False
@@ -166,7 +173,7 @@ def test_a_module_of_one_taxel_is_one_line(capsys, tmp_path):
     save_recording(Recording("one", {"index": Tactile(one, np.arange(300) / 100, readings)}), path)
     assert main(["doctor", str(path), "--history", str(tmp_path / "history.json")]) == 0
     out = capsys.readouterr().out
-    assert out.endswith("- index has one taxel: no field or touch can be told apart\n")
+    assert out.endswith("- index has one taxel: a field and a touch look the same in it\n")
 
 
 def test_a_sensor_without_positions_is_one_line(capsys, tmp_path):
