@@ -354,7 +354,7 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int
         >>> hand_state(np.array([STABLE, STABLE, NO_CONTACT], dtype=np.int8), 3) == STABLE
         True
     """
-    # Instability outranks all: a finger that slips must not hide behind one that is not known.
+    # UNSTABLE comes first: a finger that slips must not be hidden by one that is UNKNOWN.
     n_stable = 0
     n_unknown = 0
     for code in codes:

@@ -182,7 +182,7 @@ class Finger:
         self.samples = []  # every finite sample: (time, readings)
         self.frames, self.rest_readings = [], None
         self.jumped = set()
-        self.axes, self.stuck_axes = {}, set()
+        self.axes, self.stuck_axes = {}, [set(), set(), set()]
         self.field = self.still_field = np.zeros(3)
         self.common, self.speeds = np.zeros((2, 3)), np.zeros((2, 3))
         self.is_turned, self.is_load, self.n_unclear = False, False, 0
@@ -284,6 +284,9 @@ class Finger:
         most = max(steps.values())
         if len(others) == n and most < 0.9 * sum(steps.values()):
             return set()
+        fallen = any(step > 0 for i, step in steps.items() if i not in others)
+        if math.isnan(self.noise) and not fallen:
+            noise = max(0.0, sum(steps.values()) - most) / max(len(others) - 1, 1)
         usual = max(noise, sum(others.values()) / max(len(others), 1))
         zeros = {i for i in self.used if i not in others and 0 < steps[i] > 400 * usual}
         quiet = 9 * noise * (len(others) - 1)
@@ -316,6 +319,10 @@ class Finger:
             for other in self.others
             if other.last is not None and self.last - other.last <= 0.10001
         )
+
+    def fits_another(self, is_turned):
+        own = float(np.linalg.norm(self.speeds[int(is_turned)]))
+        return self.another_turns(own / 1.25, own * 1.25)
 
     def follow_field(self, readings, kept, limit):
         if len(kept) < 4:
@@ -357,11 +364,10 @@ class Finger:
         alike, followed = clear, False
         self.is_shared = self.is_shared and small
         if not clear or load:
-            own = np.linalg.norm(self.speeds, axis=1)
-            if first:
-                self.is_turned = bool(own[1] ** 2 > 1.01 * own[0] ** 2)
-            own = float(own[int(self.is_turned)])
-            followed = self.another_turns(own / 1.25, own * 1.25)
+            followed = self.fits_another(self.is_turned)
+            small = float(np.linalg.norm(self.field)) <= 16 * self.noise / n
+            if not followed and small and self.fits_another(not self.is_turned):
+                followed, self.is_turned, self.field = True, not self.is_turned, np.zeros(3)
             self.is_shared = self.is_shared or followed
         if self.is_shared:
             alike, load = apart <= 0.0625 * squares + noise, False
@@ -481,32 +487,36 @@ class Finger:
                 dead.add(i)
             elif not ((now[i] <= low) | (now[i] >= high)).any():
                 stuck.add(i)
-        if self.sensor.magnetic and self.n_news % max(1, round(0.05 / self.period)) == 0:
-            self.compare_axes(now, low, high)
-        stuck |= self.stuck_axes
+        every = max(1, round(0.05 / self.period))
+        if self.sensor.magnetic and self.n_news % every == 0:
+            axis = self.n_news // every % 3
+            self.stuck_axes[axis] = self.compare_axis(axis, now, low, high)
+        stuck |= set().union(*self.stuck_axes)
         noisy = self.noisy_taxels = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}
         self.wrong = {fault for fault, taxels in named.items() if taxels}
         self.wrong_taxels = {i for i in dead | stuck | noisy if i < 63}
 
-    def compare_axes(self, now, low, high):
-        """Find magnetometers of which one axis is the same for long, while those of others move."""
-        self.stuck_axes = set()
-        for axis in range(3):
-            pasts = {i: self.axes.setdefault((i, axis), [0.0, 0, 0, 0]) for i in self.used}
-            moving = [longest for _, same, longest, n in pasts.values() if n >= 10 and same < 5]
-            for i, past in pasts.items():
-                value, same, longest, n = past
-                others = max(moving, default=0) if n < 10 else 0
-                limit = max(200 if n < 10 else 40, 10 * (max(longest, others) + 1))
-                if now[i][axis] != value:
-                    kept = longest if same >= limit else max(longest, same)
-                    past[:] = [now[i][axis], 0, kept, n + 1]
-                    continue
+    def compare_axis(self, axis, now, low, high):
+        """Magnetometers of which one axis is the same for long, while those of others move."""
+        pasts = {i: self.axes.setdefault((i, axis), [0.0, 0, 0, 0]) for i in self.used}
+        for i, past in pasts.items():
+            value, same, longest, n = past
+            if now[i][axis] == value:
                 past[1] += 1
-                inside = low < value < high
-                if same >= limit and inside and len(moving) >= 0.8 * len(self.used):
-                    self.stuck_axes |= {i} if i < 63 else set()
+            else:
+                kept = longest if i in self.stuck_axes[axis] else max(longest, same)
+                past[:] = [now[i][axis], 0, kept, n + 1]
+        moving = [past[2] for past in pasts.values() if past[3] >= 10 and 0.15 * past[1] < 1]
+        if len(moving) < 0.8 * len(self.used):
+            return set()
+        found = set()
+        for i, (value, same, longest, n) in pasts.items():
+            least = (2 if n >= 10 else 30) / 0.15
+            before = longest if n >= 10 else max(longest, *moving)
+            if same >= max(least, 5 * (before + 1)) and low < value < high and i < 63:
+                found.add(i)
+        return found
 
     def moves(self, taxel):
         long = 0.5 / self.period

@@ -84,11 +84,11 @@ def test_a_shear_of_all_taxels_alike_is_lost():
     assert (trace.state[(times > 1) & (times < 8.9)] == NO_CONTACT).all()
 
 
-def shared(name, shares, *, grip=0.0, palm=True):
+def shared(name, shares, *, grip=0.0, palm=True, field=(6, 12, 60)):
     """A hand that turns from 5 to 8 s, and may hold from 2 s on; its palm lies another way."""
     which, rng, times = sensor(name), np.random.default_rng(4), np.arange(1200) / 100
     turn = np.interp(times, [5, 8], [0, 1])[:, None]
-    fields = {"thumb": turn * [6, 12, 60], "palm": turn * [12, 60, -6]}  # of equal size
+    fields = {"thumb": turn * field, "palm": turn * [12, 60, -6]}  # of equal size
     modules = {}
     for finger in ("thumb", "palm") if palm else ("thumb",):
         readings = rng.normal(size=(1200, which.n_taxels, 3)) + (33_000 if which.range else 0)
@@ -118,17 +118,18 @@ def test_an_open_module_decides_what_may_be_a_field_or_a_load(name, shares):
     assert (alone.state[times > 9] != NO_CONTACT).all()
 
 
+@pytest.mark.parametrize("field", [(6, 12, 60), (35, -40, 30), (61, 0, 0)])
 @pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
-def test_an_open_module_shows_the_field_that_a_load_hides(name):
+def test_an_open_module_shows_the_field_that_a_load_hides(name, field):
     def change(palm):
-        times, fingers = shared(name, [1.0], grip=300, palm=palm)
+        times, fingers = shared(name, [1.0], grip=300, palm=palm, field=field)
         force = fingers["thumb"].force
         before, after = (
             force[(times > a) & (times < b)].mean(axis=0) for a, b in ((4, 5), (9, 12))
         )
         return float(np.linalg.norm(after - before)) / sensor(name).n_taxels
 
-    assert change(palm=False) > 50 and change(palm=True) < 10  # of 61
+    assert change(palm=True) < 0.3 * change(palm=False)
 
 
 @pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
@@ -203,9 +204,10 @@ def test_readings_of_one_sample_change_no_state(value, in_contact):
     assert (trace.state[300:850] == STABLE).all()
 
 
-def test_zeros_before_the_noise_is_known_are_found():
+@pytest.mark.parametrize("value", SPOILED.values(), ids=SPOILED)
+def test_readings_before_the_noise_is_known_are_found(value):
     times, readings, _ = still_hold()
-    readings[5, 2] = readings[20, 3] = 0
+    readings[5, 2] = readings[20, 3] = value
     assert np.flatnonzero(estimates(times, readings).faults).tolist() == [5, 20]
     trace = estimates(times, readings, sensor("anyskin"))
     assert np.flatnonzero(trace.faults).tolist() == [5, 20]
@@ -228,23 +230,23 @@ def test_all_magnetometers_at_zero_are_no_sample():
 
 
 @pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
-@pytest.mark.parametrize(("start", "seconds"), [(0, 10), (400, 2)], ids=["always", "from 4 s"])
+@pytest.mark.parametrize(("start", "seconds"), [(0, 30), (400, 2)], ids=["always", "from 4 s"])
 def test_a_stuck_axis_of_one_magnetometer_leaves_it_out(name, start, seconds):
-    """No state changes by it. It is named after 2 s; after 10 s, if it never changed before."""
-    times, _, rng = still_hold(n=1500)
+    """No state changes by it. It is named after 2 s, or 30 s if it never changed before."""
+    times, _, rng = still_hold(n=3500)
     which = sensor(name)
-    grip = np.interp(times, [0, 1.5, 2, 14, 14.4], [0, 0, 1, 1, 0])[:, None, None]
+    grip = np.interp(times, [0, 1.5, 2, 34, 34.4], [0, 0, 1, 1, 0])[:, None, None]
     load = grip * np.resize(SHARES, which.n_taxels)[:, None] * [20, 5, 300]
-    readings = np.rint(33_000 + load + rng.normal(scale=2, size=(1500, which.n_taxels, 3)))
+    readings = np.rint(33_000 + load + rng.normal(scale=2, size=(3500, which.n_taxels, 3)))
     clean = estimates(times, readings, which)
     assert not clean.faults.any()
     readings[start:, 2, 1] = readings[start, 2, 1]
     trace = estimates(times, readings, which)
     named = np.flatnonzero(trace.faulty_taxels == 4)
-    assert 0 <= times[named[0]] - times[start] - seconds < 0.5
+    assert 0 <= times[named[0]] - times[start] - seconds < 1.5
     assert {faults_of(mask) for mask in trace.faults[named].tolist()} == {(Fault.STUCK,)}
-    assert len(named) == 1500 - named[0]  # until the end
-    assert (trace.state[300:1350] == STABLE).all()
+    assert len(named) == 3500 - named[0]  # until the end
+    assert (trace.state[300:3350] == STABLE).all()
     assert (trace.state == STABLE).sum() == pytest.approx((clean.state == STABLE).sum(), abs=10)
 
 

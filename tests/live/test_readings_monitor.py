@@ -108,6 +108,22 @@ def test_a_recording_in_parts_gives_the_same():
     assert found == [f"index: {PULLED}"]
 
 
+def test_a_copy_in_a_recording_is_reported_once():
+    monitor, module = (
+        ReadingsMonitor({"left": PATCH, "right": PATCH}),
+        Tactile(PATCH, TIMES, grasp()),
+    )
+    parts = [
+        Recording("part", dict.fromkeys(("left", "right"), module.slice(k, k + 300)))
+        for k in range(0, 1200, 300)
+    ]
+    found = [notice for part in parts for notice in monitor.update_recording(part)]
+    assert found == [
+        "right has the same readings as left: one sensor is read twice, or written to both; check "
+        "the channels"
+    ]
+
+
 @pytest.mark.parametrize(
     ("name", "expected"), [("builtin:any", 1), ("builtin:noise-floor", 0)], ids=["first", "seconds"]
 )

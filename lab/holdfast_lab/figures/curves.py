@@ -104,7 +104,7 @@ def draw_alarms(
     smallest = min((float(rate.min()) for rate in positive if len(rate)), default=1.0)
     floor = float(10 ** np.floor(np.log10(smallest) - 0.3))
     for axes, (y, curves) in zip(grid, groups.items(), strict=True):
-        # Set a logarithmic x axis whose left end, `floor`, reads 0.
+        # A logarithmic axis has no 0: `floor` stands for it, and is labelled 0.
         axes.set_xscale("log")
         axes.grid(color=FAINT, linewidth=0.5)
         if bar is not None:

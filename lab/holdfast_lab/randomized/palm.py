@@ -124,7 +124,7 @@ def palm_motion(
     phases = generator.uniform(0, 2 * math.pi, size=(N_VIBRATIONS, 3))
     waves = np.sin(2 * math.pi * rates * times[:, None, None] + phases)
     acceleration = np.asarray(vibration * math.sqrt(2.0 / N_VIBRATIONS) * waves.sum(axis=1))
-    # The vibration grows while the arm moves; it fades in and out at the ends of a segment.
+    # An arm vibrates more while it moves. Faded at the ends, because a step would be a jerk.
     factor = np.ones(len(times))
     for segment in segments:
         elapsed = times - segment.start

@@ -334,7 +334,7 @@ def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> lis
     fingers = []
     for name, finger in estimate.fingers.items():
         faults = ", ".join(finger.faults)
-        # Without its samples a finger is out of work; a fault that it works with is a warning.
+        # A finger without an estimate is an error; a fault with which it goes on is a warning.
         is_lost = finger.state is ContactState.UNKNOWN and finger.reason in (
             Reason.FAULT,
             Reason.GAP,

@@ -11,12 +11,15 @@
 /* A contact begins above the threshold and ends below this share of it. Without this hysteresis a
  * hand changed its state around the threshold and while it let go (decision 12). */
 #define HF_CONTACT_RELEASE_RATIO ((hf_real)0.7)
-/* Time constant with which the rest follows the force of a finger without contact [s]. */
+/* Time constant with which the rest follows the force of a finger without contact [s]. With 2 s it
+ * follows all that is slower than a touch, and no drift is left to report; with 5 s a grasp has
+ * half as many changes again (docs/study/tries.md). */
 #define HF_FOLLOW_SECONDS ((hf_real)3)
 /* Share of the largest load so far that a touch exceeds: a contact begins above 0.12 of it, and
  * ends below 0.08, the echo that a released skin may still show (motion.c). */
 #define HF_TOUCH_SHARE ((hf_real)1.5 * HF_RELEASED_SHARE)
-/* A force is at rest if it has not moved, or not been shaken, for this time [s]. */
+/* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
+ * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
 #define HF_REST_SECONDS 0.2
 /* A force is unsteady while it changes within 0.133 s by more than a quarter of the largest load of
  * the last seconds, and by 16 times its noise. The noise of such a change is 5 standard deviations
@@ -34,7 +37,9 @@ enum { HF_IN_CONTACT, HF_UNSTEADY, HF_WITHOUT_CONTACT };
 /* How the load came over the threshold of contact. */
 enum { HF_NO_EXCESS, HF_TOUCH, HF_DRIFT };
 
-/* Return whether a load is below the threshold of contact, which is lower while in contact. */
+/* Return whether a load is below the threshold of contact, which is lower while in contact.
+ *
+ * latest: the state of the last sample, before the minimum duration. */
 static bool hf_is_unloaded(hf_real load, hf_real peak, hf_real threshold, int32_t latest)
 {
     /* In contact: load < max(0.7 threshold, 0.08 peak); else load < max(threshold, 0.12 peak). */
@@ -64,7 +69,9 @@ static int hf_contact_by_load(
     const holdfast_motion *const m = &f->state->motion;
     const hf_real threshold = limit * m->noise;
     hf_real peak = m->peak_contact_load;
-    if (zero_unknown) { /* the load of the start, once it has gone */
+    /* The tare holds a load that is not known. It shows when it goes: as the fall of the normal
+     * force, once that is clearly above the noise. Until then there may be contact. */
+    if (zero_unknown) {
         const hf_real fall = hf_fall(m->contact_zero, f->finger->normal);
         if (fall < HF_NOISE_WEIGHT * m->noise) {
             return HF_IN_CONTACT;
@@ -95,8 +102,9 @@ static int hf_contact_by_force(
     if (!(threshold > 0 && hf_is_unloaded(load, d->peak, threshold, d->candidate))) {
         return HF_IN_CONTACT;
     }
-    /* A share of the peak counts only after 0.2 s in which sigma was that of noise, and so does all
-     * of the load if it counts from the least so far. */
+    /* A load below the threshold itself is no contact at once. One below a share of the peak has to
+     * rest first, for 0.2 s with the sigma of noise; and so has any load if it counts from the
+     * least force so far, because that may still fall. */
     if (time - d->shaken_at > HF_REST_SECONDS ||
         (!zero_unknown && hf_is_unloaded(load, 0, threshold, d->candidate))) {
         return HF_WITHOUT_CONTACT;
@@ -202,7 +210,7 @@ static int hf_find_contact(
     const bool by_noise = rule->contact == HOLDFAST_CONTACT_BY_NOISE;
     const hf_real threshold = by_noise ? rule->contact_limit * noise : rule->contact_limit;
     const hf_real quiet = hf_noise_sigma(noise, f->finger->sigma_window);
-    if (zero_unknown) {
+    if (zero_unknown) { /* first, because the load counts from the rest */
         hf_update_rest(f, d);
     }
     const hf_real load = hf_load_of_force(f, d, quiet, time);

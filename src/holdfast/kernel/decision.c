@@ -139,6 +139,7 @@ static void hf_decide(
     const hf_real period = f->hand->period;
     int32_t state = HOLDFAST_NO_CONTACT;
     d->probability = 0;
+    /* By the load, the probability stays that of the features, also without contact. */
     if (by_load || !unloaded) {
         const holdfast_head *const stable = &heads[HOLDFAST_HEAD_STABLE];
         d->probability = hf_probability(

@@ -106,7 +106,10 @@ typedef struct {
     bool zero_unknown;      /* the first samples are load, and no readings without are known */
 } holdfast_model;
 
-/* What is remembered of the decisions about a finger. Times are NaN where there was none. */
+/* What is remembered of the decisions about a finger. Times are NaN where there was none.
+ *
+ * Who changes it: contact.c excess, smoothed, restless_at, rest, peak, shaken_at and loaded_at;
+ * heads.c scores and all about slips; the caller given; decision.c the rest. */
 typedef struct {
     int32_t state;            /* that is reported */
     int32_t candidate;        /* of the last sample; may not have lasted long enough yet */

@@ -14,11 +14,14 @@
 #define HF_STILL_RATIO ((hf_real)10)
 /* Time between comparisons of single axes [s], and the time for which an axis that moves is the
  * same at most. On real magnetic skins, no axis was the same for longer than 0.45 s. */
-#define HF_COMPARED_SECONDS ((hf_real)0.05)
-#define HF_MOVING_SECONDS ((hf_real)0.25)
+#define HF_COMPARED_SECONDS ((hf_real)0.15)
+#define HF_MOVING_SECONDS ((hf_real)1)
+/* An axis is the same by a fault if it is so this many times as long as ever before: by chance, it
+ * is the same n times with the power n of the chance of once. */
+#define HF_SAME_RATIO ((hf_real)5)
 /* Factor of the time for which an axis is the same that differed fewer than HF_MIN_CHANGES times.
  */
-#define HF_SELDOM_RATIO ((hf_real)5)
+#define HF_SELDOM_RATIO ((hf_real)15)
 /* Changes from which the past of a taxel shows how long it stands still. One that changed less
  * often is compared with the others. */
 #define HF_MIN_CHANGES 10
@@ -36,8 +39,8 @@
 #define HF_LOUD_RATIO ((hf_real)100)
 /* Taxels from which one may count as noisy; of fewer, one may be touched alone. */
 #define HF_MIN_TAXELS ((hf_real)4)
-/* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6. Whole counts
- * have the same sum only if the sum of each axis is the same. */
+/* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6: about 1, but not
+ * rational. So whole counts have the same sum only if the sum of each axis is the same. */
 #define HF_WEIGHT_Y (HF_SQRT_2 / (hf_real)1.5)
 #define HF_WEIGHT_Z ((hf_real)1.7320508075688772 / (hf_real)1.6)
 /* A pull for this long means that the tare was taken under load: nothing pulls a skin [s]. */
@@ -137,7 +140,8 @@ static bool hf_is_stuck(const hf_finger *f)
 /* Return whether the normal readings add up to a pull, well above noise, for a long time. */
 static bool hf_is_pulled(const hf_finger *f, hf_real normal)
 {
-    /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. */
+    /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. Noise alone never reaches 20
+     * deviations, and an elastomer that creeps falls by less than a tenth. */
     holdfast_finger_memory *const s = f->state;
     const hf_real limit = hf_max(20 * s->noise, (hf_real)0.1 * s->max_amplitude);
     s->n_pulled = normal < -limit ? s->n_pulled + 1 : 0;
@@ -171,7 +175,8 @@ static void hf_note_still(const hf_finger *f, size_t i, int64_t still)
 {
     holdfast_taxel *const taxel = &f->taxels[i];
     const hf_real period = f->hand->period, length = (hf_real)still;
-    if ((length + 1) * hf_min(1, period / HF_NOISE_SMOOTHING) > 1) { /* jumps follow faster */
+    /* Still for longer than the smoothing: the change before is too old for a second difference. */
+    if ((length + 1) * hf_min(1, period / HF_NOISE_SMOOTHING) > 1) {
         hf_forget_change(f, i);
     }
     if (taxel->n_changed == 0) {
@@ -405,55 +410,65 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
     }
 }
 
-/* Note the magnetometers of a finger of which one axis is stuck, while that of the others moves.
+/* Return whether an axis of a taxel is the same for far longer than ever before.
+ *
+ * others: most comparisons for which one that moves was the same. */
+static bool hf_is_same(const holdfast_taxel *taxel, size_t axis, int32_t others)
+{
+    /* Same for max(2 s, 5 times as long as ever before); one that differed too seldom, for
+     * max(30 s, 5 times as long as the others, too). */
+    const bool is_live = taxel->n_differed[axis] >= HF_MIN_CHANGES;
+    int32_t before = taxel->longest_same[axis];
+    before = !is_live && others > before ? others : before;
+    const hf_real least = (is_live ? 1 : HF_SELDOM_RATIO) * HF_DEAD_SECONDS / HF_COMPARED_SECONDS;
+    const hf_real limit = hf_max(least, HF_SAME_RATIO * (hf_real)(before + 1));
+    return (hf_real)taxel->n_same[axis] >= limit;
+}
+
+/* Return the bits of the magnetometers of which an axis is stuck, while that of the others moves.
  *
  * Whole counts with little noise repeat, so an axis is compared with its own past. */
-static void hf_find_stuck_axes(const hf_finger *f)
+static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
 {
-    holdfast_finger_memory *const s = f->state;
-    const hf_real moving = HF_MOVING_SECONDS / HF_COMPARED_SECONDS;
-    s->stuck_axes = 0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-        const hf_real *const readings = f->readings + axis * f->n;
-        size_t n_moving = 0;
-        int32_t longest = 0; /* of those that move */
-        for (size_t i = 0; i < f->n_taxels; ++i) {
-            const holdfast_taxel *const taxel = &f->taxels[i];
-            const bool is_live = taxel->n_differed[axis] >= HF_MIN_CHANGES;
-            if (is_live && (hf_real)taxel->n_same[axis] < moving) {
-                n_moving += 1;
-                longest = taxel->longest_same[axis] > longest ? taxel->longest_same[axis] : longest;
-            }
+    const hf_real *const readings = f->readings + axis * f->n;
+    const uint64_t stuck = f->state->stuck_axes[axis];
+    const int32_t least = (int32_t)(HF_DEAD_SECONDS / HF_COMPARED_SECONDS);
+    bool is_any_same = false;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        holdfast_taxel *const taxel = &f->taxels[i];
+        if (readings[i] == taxel->compared[axis]) {
+            taxel->n_same[axis] += 1;
+            is_any_same |= taxel->n_same[axis] >= least && f->used[i] > 0;
+            continue;
         }
-        for (size_t i = 0; i < f->n_taxels; ++i) {
-            holdfast_taxel *const taxel = &f->taxels[i];
-            /* Stuck: same for max(2 s, 10 times as long as ever before); one that differed too
-             * seldom, for max(10 s, 10 times as long as the others, too). */
-            const bool is_live = taxel->n_differed[axis] >= HF_MIN_CHANGES;
-            int32_t before = taxel->longest_same[axis];
-            before = !is_live && longest > before ? longest : before;
-            const hf_real least = (is_live ? 1 : HF_SELDOM_RATIO) * HF_DEAD_SECONDS;
-            const hf_real limit =
-                hf_max(least / HF_COMPARED_SECONDS, HF_STILL_RATIO * (hf_real)(before + 1));
-            const bool is_stuck = (hf_real)taxel->n_same[axis] >= limit;
-            if (readings[i] != taxel->compared[axis]) {
-                if (!is_stuck && taxel->n_same[axis] > taxel->longest_same[axis]) {
-                    taxel->longest_same[axis] = taxel->n_same[axis];
-                }
-                taxel->compared[axis] = readings[i];
-                taxel->n_same[axis] = 0;
-                taxel->n_differed[axis] += 1;
-            } else {
-                taxel->n_same[axis] += 1;
-                const bool at_limit =
-                    readings[i] <= f->finger->low || readings[i] >= f->finger->high;
-                if (is_stuck && !at_limit && f->used[i] > 0 &&
-                    (hf_real)n_moving >= HF_MOVING_SHARE * f->finger->n_used) {
-                    s->stuck_axes |= hf_bit(i);
-                }
-            }
+        if (taxel->n_same[axis] > taxel->longest_same[axis] && !(stuck & hf_bit(i))) {
+            taxel->longest_same[axis] = taxel->n_same[axis];
+        }
+        taxel->compared[axis] = readings[i];
+        taxel->n_same[axis] = 0;
+        taxel->n_differed[axis] += 1;
+    }
+    if (!is_any_same) {
+        return 0;
+    }
+    hf_real n_moving = 0;
+    int32_t longest = 0; /* of those that move */
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        const holdfast_taxel *const taxel = &f->taxels[i];
+        const hf_real same = HF_COMPARED_SECONDS * (hf_real)taxel->n_same[axis];
+        if (taxel->n_differed[axis] >= HF_MIN_CHANGES && same < HF_MOVING_SECONDS) {
+            n_moving += 1;
+            longest = taxel->longest_same[axis] > longest ? taxel->longest_same[axis] : longest;
         }
     }
+    uint64_t bits = 0;
+    for (size_t i = 0; n_moving >= HF_MOVING_SHARE * f->finger->n_used && i < f->n_taxels; ++i) {
+        const bool at_limit = readings[i] <= f->finger->low || readings[i] >= f->finger->high;
+        if (f->used[i] > 0 && !at_limit && hf_is_same(&f->taxels[i], axis, longest)) {
+            bits |= hf_bit(i);
+        }
+    }
+    return bits;
 }
 
 /* Find the faulty taxels of a finger at a sample that changed a reading. */
@@ -465,12 +480,16 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
         hf_forget_change(f, i);
         f->powers[i] = f->powers[f->n + i] = 0;
     }
-    const int64_t interval = (int64_t)lrint((double)(HF_COMPARED_SECONDS / f->hand->period));
-    if (f->finger->is_magnetic && s->n_changes % (interval > 1 ? interval : 1) == 0) {
-        hf_find_stuck_axes(f);
+    if (f->finger->is_magnetic) { /* one axis after the other */
+        const double turns = (double)(HF_COMPARED_SECONDS / 3 / f->hand->period);
+        const int64_t interval = turns > 1 ? (int64_t)lrint(turns) : 1;
+        if (s->n_changes % interval == 0) {
+            const size_t axis = (size_t)(s->n_changes / interval % 3);
+            s->stuck_axes[axis] = hf_find_stuck_axis(f, axis);
+        }
     }
-    s->taxel_faults = s->stuck_axes ? HOLDFAST_STUCK : 0;
-    s->faulty_taxels = s->stuck_axes;
+    s->faulty_taxels = s->stuck_axes[0] | s->stuck_axes[1] | s->stuck_axes[2];
+    s->taxel_faults = s->faulty_taxels ? HOLDFAST_STUCK : 0;
     s->noisy_taxels = 0;
     if (changes.any_still) {
         hf_find_still_taxels(f);

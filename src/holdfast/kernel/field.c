@@ -20,6 +20,8 @@
 /* A field, and its motion, count from this many times the noise of a component of the force: less
  * than any contact does. */
 #define HF_FIELD_TO_NOISE ((hf_real)4)
+/* Factor on that for the first field of a sensor whose unit is not known: a skin that warms changes
+ * all readings alike, too. */
 #define HF_FIRST_FIELD ((hf_real)4)
 /* A field moves from this many times the least motion on. */
 #define HF_MOVES ((hf_real)1.5)
@@ -120,7 +122,7 @@ static bool hf_is_press(const hf_finger *f, const hf_common *common, const hf_re
            along * along >= HF_PRESSED_SHARE * HF_PRESSED_SHARE * hf_square(change);
 }
 
-/* Return whether the field of another module changes at a speed between two. */
+/* Return whether the square of the speed of another module's field is between two numbers. */
 static bool hf_another_turns(const hf_finger *f, hf_real low, hf_real high)
 {
     for (size_t i = 0; i < HF_N_FINGERS(f->hand); ++i) {
@@ -134,10 +136,21 @@ static bool hf_another_turns(const hf_finger *f, hf_real low, hf_real high)
     return false;
 }
 
+/* Return whether what the taxels have in common moves as fast in a frame as another's field. */
+static bool hf_fits_another(const hf_finger *f, bool is_turned)
+{
+    const hf_real speed = hf_square(f->state->speed + (is_turned ? 3 : 0));
+    const hf_real factor = HF_SPEED_TOLERANCE * HF_SPEED_TOLERANCE;
+    return hf_another_turns(f, speed / factor, speed * factor);
+}
+
 /* Update the field of a finger by what its taxels have in common. Return whether it may be either
  * a field or a load. */
 static bool hf_update_field(const hf_finger *f, const hf_common *common)
 {
+    /* The checks, in this order: too few taxels to compare; no change above the noise; a press,
+     * which is a load; an open module that turns as fast, which makes it a field after all; taxels
+     * that differ; a field that is too strong. What is left is a field. */
     holdfast_finger_memory *const s = f->state;
     if (common->n < HF_MIN_TAXELS) { /* all may be loaded alike */
         s->is_deep = false;
@@ -151,13 +164,13 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     /* c(k) = c(k-1) + (T / tau) (mean(k) - c(k-1)), and its speed likewise. */
     const hf_real elapsed = f->hand->period * (hf_real)(s->n_skipped + 1);
     const hf_real gain = hf_min(1, elapsed / HF_COMMON_SECONDS);
-    const hf_real speed_gain = hf_min(1, elapsed / HF_SPEED_SECONDS);
+    const hf_real speed_gain = hf_min(1, elapsed / HF_SPEED_SECONDS), per_second = 1 / elapsed;
     hf_real motions[6], steps[6], change[3];
     for (size_t k = 0; k < 6; ++k) {
         motions[k] = common->means[k] - s->common[k];
         steps[k] = gain * motions[k];
         s->common[k] += steps[k];
-        s->speed[k] += speed_gain * (steps[k] / elapsed - s->speed[k]);
+        s->speed[k] += speed_gain * (steps[k] * per_second - s->speed[k]);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
         change[axis] = mean[axis] - (same_frame ? s->field[axis] : 0);
@@ -179,12 +192,14 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     const hf_real limit = HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE * squares + of_noise;
     const bool is_clear = common->differences <= limit;
     s->is_deep = common->differences > HF_DEEP_LOAD * limit;
-    /* Variance of a component of the speed: (noise / n)^2 T / (2 tau_1 tau_2 (tau_1 + tau_2)). */
-    const hf_real speed = hf_sqrt(hf_square(s->speed + frame));
-    const hf_real seconds = 2 * HF_COMMON_SECONDS * HF_SPEED_SECONDS;
-    const hf_real variance =
-        3 * f->hand->period / (seconds * (HF_COMMON_SECONDS + HF_SPEED_SECONDS));
-    const bool is_turning = speed * common->n > HF_SPEED_TO_NOISE * s->noise * hf_sqrt(variance);
+    /* Variance of the speed: 3 (noise / n)^2 T / (2 tau_1 tau_2 (tau_1 + tau_2)). */
+    const hf_real seconds = HF_COMMON_SECONDS + HF_SPEED_SECONDS;
+    const hf_real scale = HF_SPEED_TO_NOISE * s->noise / common->n;
+    const hf_real variance = scale * scale *
+                             (3 / (2 * HF_COMMON_SECONDS * HF_SPEED_SECONDS * seconds)) *
+                             f->hand->period;
+    const hf_real speed = hf_square(s->speed + frame);
+    const bool is_turning = speed > variance;
     if (square <= least) {
         s->field_is_load = false;
         s->field_speed = is_turning && is_clear ? speed : 0;
@@ -203,13 +218,15 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     bool is_alike = is_clear, is_followed = false;
     s->is_shared = s->is_shared && is_small;
     if (!is_clear || is_load) {
-        /* In the frame of the field; of the first one, in that which moves more. */
-        const hf_real plain = hf_square(s->speed), turned = hf_square(s->speed + 3);
-        if (is_first) {
-            s->field_is_turned = turned > (hf_real)1.01 * plain;
+        /* In the frame of the field; while that is small, in the other if only that fits. */
+        const hf_real small = HF_FIRST_FIELD * HF_FIELD_TO_NOISE * s->noise / common->n;
+        is_followed = hf_fits_another(f, s->field_is_turned);
+        if (!is_followed && hf_square(s->field) <= small * small &&
+            hf_fits_another(f, !s->field_is_turned)) {
+            s->field_is_turned = !s->field_is_turned;
+            hf_fill(s->field, 3, 0);
+            is_followed = true;
         }
-        const hf_real own = hf_sqrt(s->field_is_turned ? turned : plain);
-        is_followed = hf_another_turns(f, own / HF_SPEED_TOLERANCE, own * HF_SPEED_TOLERANCE);
         s->is_shared |= is_followed;
     }
     const hf_real nearly = HF_LOAD_SHARE * HF_LOAD_SHARE;
@@ -255,11 +272,13 @@ static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
         return 0;
     }
     s->has_new_field = false;
+    /* Under a deep load each fourth sample only, unless a module turns: it shows the field. */
     if (s->is_deep && s->n_skipped < HF_SKIPPED_SAMPLES && !hf_another_turns(f, 0, HF_INFINITY)) {
         s->n_skipped += 1;
     } else {
         const hf_common common = hf_find_common(f, left_out);
-        s->n_unclear = hf_update_field(f, &common) ? s->n_unclear + 1 : 0; /* a touch may begin */
+        /* Counted, because a touch that begins is unclear, too, but not for long. */
+        s->n_unclear = hf_update_field(f, &common) ? s->n_unclear + 1 : 0;
         s->n_skipped = 0;
     }
     if (hf_square(s->field) > 0) {

@@ -4,7 +4,8 @@
 
 #include "kernel.h"
 
-/* A step in time of more sample periods is a gap. The part over 3 allows for rounding. */
+/* A step in time of more sample periods is a gap, as in recordings (GAP_PERIODS). The part over 3
+ * allows for rounding. */
 #define HF_GAP_LIMIT_PERIODS ((hf_real)3.0003)
 /* Longest gap that windows in seconds bridge: 0.1 s, with an allowance for rounding. */
 #define HF_MAX_BRIDGED_SECONDS ((hf_real)0.10001)
@@ -59,6 +60,7 @@ static inline hf_real hf_max(hf_real a, hf_real b)
     return b > a ? b : a;
 }
 
+/* The second number if it is smaller, else the first; NaN as above. */
 static inline hf_real hf_min(hf_real a, hf_real b)
 {
     return b < a ? b : a;

@@ -11,7 +11,7 @@ void holdfast_fingertip_force(
         const double *f = readings + 3 * n_taxels * k;
         const double *b = baseline, *turn = rotations;
         hf_sum sum_x = {{0}}, sum_y = {{0}}, sum_z = {{0}};
-        /* F_tip = sum_i R_i (f_i - b_i) (DESIGN, section 1). */
+        /* F_tip = sum_i R_i (f_i - b_i). */
         for (size_t i = 0; i < n_taxels; ++i, f += 3, b += 3, turn += 9) {
             const double x = f[0] - b[0], y = f[1] - b[1], z = f[2] - b[2];
             hf_add(&sum_x, i, turn[0] * x + turn[1] * y + turn[2] * z);

@@ -115,7 +115,8 @@ enum {
     HOLDFAST_FAULT = 4    /* its readings cannot be used, see the faults */
 };
 
-/* Faults, one bit each. The missing bits belong to the transport, which is not part of a kernel. */
+/* Faults, one bit each. Bit 128 is in detector.h. The other missing bits belong to the transport,
+ * which is not part of a kernel. */
 enum {
     HOLDFAST_NOT_FINITE = 1,    /* a reading is NaN or infinite */
     HOLDFAST_STUCK = 2,         /* readings changed, and do not any more */
@@ -162,8 +163,11 @@ enum {
     HF_PRESSURE_SHIFT = 4,
     HF_MOMENT_CHANGE = 5,
     HF_LOAD_TO_NOISE = 6,
-    HF_SECOND = 7,       /* five second differences: of all, shared, shear, own, top */
-    HF_MEAN_SECOND = 12, /* the same, averaged */
+    /* Five second differences of the taxels, see hf_fill_seconds: of all; weighted by pressure; the
+     * part of that across the normal; without the motion that all share; of the pressed taxel that
+     * has the largest. Then the same, averaged. */
+    HF_SECOND = 7,
+    HF_MEAN_SECOND = 12,
     HF_SHEAR_GAIN = 17,
     HF_NORMAL_GAIN = 18,
     HF_RATIO_GAIN = 19
@@ -178,10 +182,10 @@ enum {
 };
 
 enum {
-    HF_N_RING_SUMS = 128,  /* sums of samples that are kept to find repeated ones (untrue.c) */
+    HF_N_RING_SUMS = 128,  /* kept sums of samples: two of the longest periods (untrue.c) */
     HF_N_SUMS = 3,         /* of a block of pairs: P, D and S (window.c) */
     HF_N_COMPONENTS = 4,   /* of the history: F_a, F_x, F_y, F_z */
-    HF_N_MASK_BITS = 63,   /* taxels that a mask can hold */
+    HF_N_MASK_BITS = 63,   /* taxels that a mask can hold: in Python it is an int64 */
     HF_MAX_TAXELS = 65536, /* of a hand: bounds all sizes, so that no product overflows */
     HF_MAX_SAMPLES = 1048576,
     HF_MAX_FEATURES = 4096
@@ -266,7 +270,7 @@ typedef struct {
     int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
     int64_t longest_still; /* most successive samples without a change, of those that changed the
                               finger */
-    /* Of each axis of a magnetometer, which is compared every 0.05 s: */
+    /* Of each axis of a magnetometer, which is compared every 0.15 s: */
     hf_real compared[3];     /* reading */
     int32_t n_same[3];       /* comparisons since it last differed */
     int32_t longest_same[3]; /* most of these that were no fault */
@@ -298,7 +302,7 @@ typedef struct {
 
 /* Load and noise of a finger with relative features (motion.c). */
 typedef struct {
-    int64_t n_samples;       /* since the last gap that is not bridged */
+    int64_t n_samples;       /* since the last fault, or gap that is not bridged */
     hf_real least_normal;    /* normal force of the reference: the least so far, at most 0 */
     hf_real reference[3];    /* F_tip at the least normal force */
     hf_real load;            /* force beyond the reference */
@@ -330,7 +334,7 @@ typedef struct {
     double first_time; /* of the first valid sample [s]; NaN before */
     double last_time;  /* of the last sample [s]; NaN before */
     int64_t n_seen;    /* valid samples so far */
-    int64_t n_stretch; /* forces in the present stretch */
+    int64_t n_stretch; /* forces since a gap, a refused sample or a fault: the windows hold these */
     bool after_gap;    /* a stretch after a gap warms up */
     size_t row;        /* of the newest force in the rings of history and blocks */
     /* Tare and noise (tare.c). */
@@ -339,7 +343,7 @@ typedef struct {
     hf_real squared_steps; /* sum of squared steps of the force, while the noise is measured */
     int64_t n_steps;       /* their number */
     hf_real noise;         /* standard deviation of a component by noise alone; NaN before */
-    hf_real max_amplitude; /* largest F_a so far, of samples without a serious fault */
+    hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
     int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
     /* Changes and faulty taxels (faults.c). */
     int64_t n_unchanged;    /* samples since the readings last changed */
@@ -348,7 +352,7 @@ typedef struct {
     uint32_t taxel_faults;  /* faults of single taxels at the last sample that changed a reading */
     uint64_t faulty_taxels; /* bits of those taxels */
     uint64_t noisy_taxels;  /* bits of the noisy ones among them */
-    uint64_t stuck_axes;    /* bits of the magnetometers of which an axis does not change */
+    uint64_t stuck_axes[3]; /* bits of the magnetometers of which this axis does not change */
     /* Taxels that are left out (masks.c). */
     int64_t n_refused;    /* successive samples of the tare with a reading that is not valid */
     uint64_t lost;        /* bits of the taxels that have no tare */
@@ -366,7 +370,7 @@ typedef struct {
     bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
     hf_real common[6];      /* the readings' mean beyond the tare in both frames, smoothed */
     hf_real speed[6];       /* of these, smoothed, too [unit of the readings / s] */
-    hf_real field_speed;    /* of the field, if the finger is open and it moves; else 0 */
+    hf_real field_speed;    /* square of the field's, if it moves and the finger is open; else 0 */
     bool field_is_load;     /* the taxels moved alike, as no field does */
     bool is_shared;         /* the field was found by the help of another module */
     bool is_deep;           /* a load hides the field */
@@ -377,7 +381,7 @@ typedef struct {
     /* Samples that cannot be true (untrue.c). */
     uint64_t jumped;      /* bits of the taxels that were refused as a jump at the last sample */
     hf_real rest_sum;     /* weighted sum of the readings at rest, see hf_scan; NaN before */
-    uint64_t n_frames;    /* samples without an invalid reading */
+    uint64_t n_valid;     /* samples whose readings are all valid, or were replaced */
     uint64_t ring_period; /* of the ring of samples that is followed; 0 without one */
     uint64_t ring_length; /* successive samples with the sum of that a period before */
     uint64_t ring_age;    /* samples since the ring is followed */

@@ -21,7 +21,8 @@
 /* A taxel without a valid reading for this long in the tare is left out until the next [s]. */
 #define HF_LOST_SECONDS ((hf_real)0.5)
 
-/* Let the taxels of some bits, which are at a limit now, count for their last reading. */
+/* Let the taxels of some bits, which are at a limit now, count for their last reading. The
+ * difference is in `fade`, which `hf_load_of` adds when the mask changes at this sample. */
 static void hf_note_saturated(const hf_finger *f, uint64_t bits)
 {
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -40,7 +41,7 @@ static void hf_hold_lost(const hf_finger *f)
     for (size_t i = 0; i < f->n_taxels; ++i) {
         if (f->state->lost & hf_bit(i)) {
             f->readings[i] = f->readings[f->n + i] = f->readings[2 * f->n + i] = neutral;
-            f->taxels[i].changed_at = f->state->n_changes; /* not still */
+            f->taxels[i].changed_at = f->state->n_changes; /* no taxel that is still */
         }
     }
 }

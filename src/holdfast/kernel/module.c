@@ -18,7 +18,7 @@
 #include "detector.h"
 #include "kernel.h"
 
-/* The size of the scratch memory of a longer window could overflow. */
+/* The size of the scratch memory of a longer window, ten rows of doubles, could overflow. */
 #define MAX_WINDOW (PY_SSIZE_T_MAX / 1024)
 
 /* Return 0 if the last n_out of n arrays share no memory with others, else set an exception. */
@@ -76,7 +76,7 @@ typedef struct {
     PyObject_HEAD
     holdfast_hand hand;
     holdfast_memory memory;
-    void *blocks[8]; /* all that was allocated for this stream */
+    void *blocks[8]; /* all that was allocated for this stream: `read_tables` does so eight times */
     size_t n_blocks;
     bool *present;    /* (n_fingers) of one sample */
     size_t n_taxels;  /* of all fingers */

@@ -13,9 +13,11 @@
 /* A block over which noise is measured has at least this duration [s] and these steps. */
 #define HF_NOISE_BLOCK_SECONDS 0.2
 #define HF_MIN_BLOCK_STEPS 5
-/* Noise in the denominator: changes of a load below this many times its noise count less. */
+/* Noise in the denominator: changes of a load below this many times its noise count less. It is
+ * also the least load of a grip (contact.c). */
 #define HF_NOISE_WEIGHT ((hf_real)100)
-/* A force moves if it changes within this time [s] by this many times its noise. */
+/* A force moves if it changes within this time [s] by this many times its noise. The time is that
+ * of a lag of the features, eight samples at 60 Hz. */
 #define HF_MOVE_SECONDS 0.133
 #define HF_MOVED_TO_NOISE ((hf_real)5)
 /* Share of the largest load that a released skin may still show. */

@@ -1,4 +1,5 @@
-/* One sample of a hand: tare, force, faults and features, in this order. */
+/* One sample of a hand, in the order of kernel.h: is it valid and true, changes, tare, field,
+ * masks, force and features. */
 #include "finger.h"
 
 /* Return one finger of a hand: its constants, and its part of the memory. */
@@ -110,6 +111,7 @@ static int32_t hf_process_force(
         v->m = moments.m;
         v->sigma = hf_sqrt(moments.variance);
     }
+    /* With other tares a hand may hold an object at the start: then it is a notice and no fault. */
     if (f->hand->tare_kind == HOLDFAST_TARE_SECONDS && hf_is_pulled(f, normal)) {
         finger_faults |= HOLDFAST_TARE_LOADED;
         v->faults |= HOLDFAST_TARE_LOADED;
@@ -156,6 +158,7 @@ static int32_t hf_process(const hf_finger *f, double time)
     holdfast_finger_memory *const s = f->state;
     holdfast_values *const v = f->values;
     const hf_real low = f->finger->low, high = f->finger->high;
+    /* Haar windows begin again after any gap, also after one that windows in seconds bridge. */
     const bool after_gap = (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
     hf_clear_values(v);
     s->last_time = time;
@@ -169,6 +172,7 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_hold_lost(f);
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
+    /* After a gap the last sample is too old to show a jump. */
     const uint64_t jumps = after_gap ? 0 : hf_find_jumps(f, &scan);
     if (jumps || !hf_are_valid(f, &scan)) {
         if (!hf_replace_or_refuse(f, &scan, jumps)) {
@@ -177,6 +181,7 @@ static int32_t hf_process(const hf_finger *f, double time)
         }
         scan = hf_scan_readings(f, f->readings);
     }
+    /* Before the sample is counted: one that cannot be true reaches no tare, force or window. */
     const uint32_t untrue = hf_find_untrue(f, &scan);
     if (untrue) {
         s->n_stretch = 0;
@@ -186,7 +191,6 @@ static int32_t hf_process(const hf_finger *f, double time)
     hf_track_changes(f, time, after_gap);
     /* Half a period of tolerance: the rounding of times moves no sample. */
     const hf_real elapsed = (hf_real)(time - s->first_time) + f->hand->period / 2;
-    /* Saturated: a reading at low or at high. */
     const bool is_saturated = scan.least <= low || scan.most >= high;
     uint64_t at_limit = 0;
     if (is_saturated) {
@@ -204,6 +208,7 @@ static int32_t hf_process(const hf_finger *f, double time)
         v->faults |= HOLDFAST_SATURATED;
         v->taxels |= at_limit;
     }
+    /* Before the masks, which compare loads without the field. */
     const uint32_t field = hf_take_out_field(f, v->taxels | s->masked);
     const bool has_mask = v->faults || s->masked || s->fading;
     const bool enough = !has_mask || hf_mask_taxels(f, v->taxels, time);
@@ -317,7 +322,7 @@ static void hf_compute_of_hand(const holdfast_hand *hand, holdfast_memory *memor
     }
 }
 
-/* Fill Phi = [F_a, F_x, F_y, F_z, m, sigma], or what the model asks for, of one finger. */
+/* Fill Phi = [F_a, F_x, F_y, F_z, m, sigma], or the features of the model, of one finger. */
 static void hf_fill_features(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
 {
     const size_t width = HF_N_FEATURES(hand);

@@ -31,11 +31,13 @@ static const char *hf_check_sizes(const holdfast_hand *hand)
     if (hand->n_channels != 1 && hand->n_channels != HF_N_COMPONENTS) {
         return "n_channels";
     }
-    /* As many sizes of blocks as N_w / 2 of the longest window has binary digits. */
+    /* As many sizes of blocks as N_w / 2 of the longest window has binary digits; 30 keeps the
+     * shift defined. */
     if (hand->n_levels < 1 || hand->n_levels > 30 ||
         (hand->n_history / 2) >> (hand->n_levels - 1) != 1) {
         return "n_levels";
     }
+    /* A second difference needs three samples. */
     if (hand->n_lags > HF_MAX_FEATURES || hand->n_track > HF_MAX_SAMPLES ||
         hand->n_track < (hand->n_lags > 0 ? 3u : 1u)) {
         return "n_lags or n_track";
@@ -159,6 +161,7 @@ static uint64_t hf_place(const holdfast_hand *hand, holdfast_memory *m, void *bl
     const uint64_t lags = fingers * hand->n_lags;
     const size_t width = sizeof(hf_real);
     uint64_t used = 0;
+    /* The values first: `holdfast_begin` clears the block from them on. */
     m->values = (holdfast_values *)hf_take(block, &used, fingers, sizeof *m->values);
     m->features = (hf_real *)hf_take(block, &used, fingers * features, width);
     m->fingers = (holdfast_finger_memory *)hf_take(block, &used, fingers, sizeof *m->fingers);

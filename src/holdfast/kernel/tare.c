@@ -41,13 +41,15 @@ static void hf_update_baseline(const hf_finger *f, bool running)
     }
 }
 
-/* Add a sample to the noise and to the tare. Return whether the tare is complete. */
+/* Add a sample to the noise and to the tare, and keep it as the previous one. Return whether the
+ * tare is complete. */
 static bool hf_update_tare(const hf_finger *f, hf_real elapsed)
 {
     holdfast_finger_memory *const s = f->state;
     if (isnan(s->noise)) {
         hf_measure_noise(f, elapsed >= f->hand->noise_seconds);
     }
+    /* Here, because field and masks change the readings later: the previous ones are raw. */
     memcpy(f->previous, f->readings, 3 * f->n * sizeof(hf_real));
     if (!s->is_tared) {
         s->n_refused = 0;

@@ -52,8 +52,8 @@ static inline hf_vectors hf_turned(const hf_real *rotations, size_t n, size_t i,
     return turned;
 }
 
-/* Compute F_tip = sum_i R_i (f_i - b_i) (DESIGN, section 1), and return the sum of the normal
- * readings. */
+/* Compute F_tip = sum_i R_i (f_i - b_i), and return the sum of the normal readings, which are z in
+ * the taxel frames. */
 static hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_real force[3])
 {
     const size_t n = f->n;
@@ -83,7 +83,7 @@ static hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_rea
 /* Sums over the taxels at a sample. */
 typedef struct {
     hf_real force[3];         /* F_tip */
-    hf_real normal;           /* sum of the normal readings */
+    hf_real normal;           /* sum of the normal readings: z in the taxel frames */
     hf_real weight;           /* sum p_i */
     hf_real pressure_squares; /* sum p_i^2 */
     hf_real squares;          /* sum |h_i|^2 */

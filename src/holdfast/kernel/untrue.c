@@ -47,7 +47,7 @@ static uint64_t hf_equal_lag(
 static void hf_begin_ring(const hf_finger *f, uint64_t period)
 {
     holdfast_finger_memory *const s = f->state;
-    const uint64_t n = s->n_frames - 1;
+    const uint64_t n = s->n_valid - 1;
     uint64_t length = 1;
     while (length + period < HF_N_RING_SUMS &&
            hf_sum_before(f, n, length) == hf_sum_before(f, n, length + period)) {
@@ -65,10 +65,11 @@ static void hf_begin_ring(const hf_finger *f, uint64_t period)
     }
 }
 
-/* Return whether three samples of a ring differ. */
+/* Return whether three samples of a ring differ. Two in turn are no ring: readings with little
+ * noise go to and fro by one step. */
 static bool hf_has_three_sums(const hf_finger *f)
 {
-    const uint64_t n = f->state->n_frames - 1;
+    const uint64_t n = f->state->n_valid - 1;
     const hf_real first = hf_sum_before(f, n, 0);
     hf_real second = first;
     for (uint64_t lag = 1; lag < f->state->ring_period; ++lag) {
@@ -121,8 +122,8 @@ static bool hf_follow_ring(const hf_finger *f, hf_real total)
      * and a ninth of the others: a ring is found so early that it is followed for a period by
      * then. */
     holdfast_finger_memory *const s = f->state;
-    const uint64_t n = s->n_frames;
-    s->n_frames = n + 1;
+    const uint64_t n = s->n_valid;
+    s->n_valid = n + 1;
     f->sums[n % HF_N_RING_SUMS] = total;
     if (s->ring_period > 0) {
         if (hf_sum_before(f, n, s->ring_period) == total) {
@@ -207,9 +208,9 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
     if (steps.largest < HF_LONE_SHARE * steps.total && !hf_has_zeros(f, scan)) {
         return 0;
     }
-    /* Steps of noise: two samples in three axes. Not known before the noise is. */
+    /* Steps of noise: two samples in three axes. Before it is known, those of the others. */
     const size_t n = f->n;
-    const hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
+    hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
     uint64_t bits = 0;
     hf_real n_others = f->finger->n_used;
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -221,6 +222,9 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
             bits |= hf_square(fallen) > 0 ? hf_bit(i) : 0;
         }
     }
+    if (isnan(s->noise) && !bits) {
+        of_noise = hf_max(0, steps.total - steps.largest) / hf_max(n_others - 1, 1);
+    }
     /* Zero: |f_i(k-1)|^2 > (20)^2 max(mean |df|^2 of the others, of noise). */
     const hf_real typical = hf_max(of_noise, hf_max(0, steps.total) / hf_max(n_others, 1));
     for (size_t i = 0; bits && i < f->n_taxels; ++i) {
@@ -230,7 +234,8 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
             bits &= ~hf_bit(i);
         }
     }
-    /* Jump: |df_i|^2 > (50)^2 of noise, and the others' mean |df|^2 <= (3)^2 of noise. */
+    /* Jump: |df_i|^2 > (50)^2 of noise, and the others' mean |df|^2 <= (3)^2 of noise. Their sum is
+     * at most `quiet`, so a taxel beyond it is the one that jumps. */
     const hf_real quiet = HF_QUIET_STEPS * HF_QUIET_STEPS * of_noise * (n_others - 1);
     if (steps.largest > HF_JUMP_TO_NOISE * HF_JUMP_TO_NOISE * of_noise && of_noise > 0 &&
         n_others >= HF_MIN_TAXELS && steps.total - steps.largest <= quiet) {
@@ -240,7 +245,7 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
                 step[axis] = f->readings[axis * n + i] - f->previous[axis * n + i];
             }
             if (!(bits & hf_bit(i)) && hf_square(step) > quiet) {
-                s->jumped |= hf_bit(i) & ~before;
+                s->jumped |= hf_bit(i) & ~before; /* at its second sample, a jump is true */
             }
         }
     }

@@ -15,7 +15,7 @@ from holdfast.openable import Closable
 
 STALL_TIME = 1.0
 """Time without a picture after which a camera is reported [s]."""
-DEFAULT_RATE = 30.0
+UNSTATED_RATE = 30.0
 """Rate that is written to the file if the camera gives none [Hz]. The stamps are exact."""
 
 
@@ -53,11 +53,12 @@ class CameraRecorder(Closable):
                 f"no camera {camera}: the number of a camera (0 is the first), or a video file "
                 "or stream expected"
             )
-        self._rate = self._film.get(cv2.CAP_PROP_FPS) or DEFAULT_RATE
+        self._rate = self._film.get(cv2.CAP_PROP_FPS) or UNSTATED_RATE
         # A file has all its pictures at once; a camera sends them one period apart.
         self._pause = 1 / self._rate if Path(camera).is_file() else 0.0
         self.n_pictures = 0
         self._path = path
+        # When the newest picture was read: `_write` sets it, `_watch` compares it with the clock.
         self._read_at = time.monotonic()
         self._closing = Event()
         self._threads: list[Thread] = []
@@ -110,7 +111,7 @@ class CameraRecorder(Closable):
                 stamps_path(self._path).unlink(missing_ok=True)
 
     def _write(self, clock: Callable[[], float], report: Callable[[str], None]) -> None:
-        is_read, picture = True, self._picture
+        is_read, picture, due = True, self._picture, time.monotonic()
         with stamps_path(self._path).open("w") as stamps:
             while is_read and not self._closing.is_set():
                 self._read_at, stamp = time.monotonic(), clock()
@@ -118,13 +119,14 @@ class CameraRecorder(Closable):
                     self._video.write(picture)
                     stamps.write(f"{stamp:.6f}\n")
                     self.n_pictures += 1
-                self._closing.wait(self._pause)
+                due += self._pause
+                self._closing.wait(max(due - time.monotonic(), 0.0))
                 is_read, picture = self._film.read()
         if not is_read:
             report(f"note: the camera ended after {self.n_pictures} pictures")
 
     def _watch(self, report: Callable[[str], None]) -> None:
-        reported = 0.0
+        reported = 0.0  # `_read_at` of the stall that was reported last: each becomes one marker
         while self._threads[0].is_alive() and not self._closing.wait(STALL_TIME / 4):
             if time.monotonic() - self._read_at > STALL_TIME and self._read_at != reported:
                 reported = self._read_at

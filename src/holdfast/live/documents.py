@@ -65,6 +65,7 @@ def _nullable(kind: Any) -> Any:  # noqa: ANN401 (a type, or a form of typing)
     return Number if kind is float else kind
 
 
+# Type checkers do not see the fields of a class that is made at run time, so they get one by hand.
 if TYPE_CHECKING:
 
     class FingerDocument(ContactEstimate, frozen=True):
@@ -92,7 +93,7 @@ EstimateLine = document_type(
     "JSON line: the estimate of a finger at a sample. Taxels are numbers, from 1.",
     nullable=lambda name: name != "time",
     added=[("finger", str)],
-    at=1,
+    at=1,  # after the time
 )
 
 

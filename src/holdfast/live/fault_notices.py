@@ -133,7 +133,8 @@ class FaultWatch:
         # When each fault began, of those that last now; and when each was last seen to last.
         self._since: dict[tuple[Fault, str], float] = {}
         self._reported: dict[tuple[Fault, str], float] = {}
-        self._invalid: dict[str, deque[float]] = {}  # times of the last invalid readings
+        # Times of the last `MANY_INVALID` invalid readings; with fewer, the first is -inf.
+        self._invalid: dict[str, deque[float]] = {}
 
     def update(self, estimate: HandEstimate) -> list[Problem]:
         """Return the problems that have begun to last."""

@@ -28,7 +28,7 @@ from holdfast.training.calibration import (
 from holdfast.training.own_handling import ENOUGH_HANDLING, MIN_HANDLING
 
 HELD_SECONDS = 60.0
-"""Held time after which the handling ends by itself [s]."""
+"""Held time after which the handling ends by itself [s]: twice `ENOUGH_HANDLING`."""
 MAX_WAITING = 300.0
 """Time after which it ends by itself, however little is held [s]."""
 MAX_HANDLING_BYTES = 1 << 28
@@ -225,6 +225,7 @@ class SessionCalibration:
         Raises:
             StreamError: no calibration is running, or too little was held so far.
         """
+        # Without the lock: if another thread ends this buffer meanwhile, `_fit_soon` does nothing.
         buffer = self._buffer
         if buffer is None:
             raise StreamError("no calibration is running: start one, and hold an object")

@@ -174,7 +174,8 @@ def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> M
     period = float(np.median(steps))
     is_gap = steps > GAP_PERIODS * period
     still = ~(np.nan_to_num(changes) != 0).any(axis=0)
-    # Of white noise, but not of a single step: a touch makes no noise.
+    # The median step of white noise is 1 / 1.05 of its standard deviation. A touch is one large
+    # step, which makes no noise in a median.
     usual = 1.05 * np.nanmedian(np.abs(changes), axis=0)
     field = _common_field(name, sensor, times, valid, usual)
     axes = [(i, a) for i, a in np.argwhere(still & ~still.all(axis=1)[:, None]).tolist()]
@@ -202,6 +203,7 @@ def _common_field(name: str, sensor: Sensor, times: Array, valid: Array, noise: 
     means = np.nanmedian(valid[: n * block].reshape(n, block, *valid.shape[1:]), axis=1)
     moved = means - np.nanmedian(means, axis=0)
     turned = np.einsum("ijk,nik->nij", sensor.rotations, moved)
+    # A field is common in one of two frames (`kernel/field.c`): in that where less is left.
     both = [x - x.mean(axis=1, keepdims=True) for x in (moved, turned)]
     frame = int((both[1] ** 2).sum() < (both[0] ** 2).sum())
     common = (moved, turned)[frame].mean(axis=1)
@@ -209,6 +211,7 @@ def _common_field(name: str, sensor: Sensor, times: Array, valid: Array, noise: 
     # The noise of the module: one taxel that is far noisier than the others was not touched.
     typical = max(float(np.median(noise)), ROUNDING_NOISE[sensor.unit])
     size = np.sqrt((common**2).sum(axis=1))
+    # By a tenth, the gains of magnetometers differ: so much of a field is not common.
     limit = TOUCH_TO_NOISE * np.maximum(noise, typical) + 0.1 * size[:, None, None]
     touched = (np.abs(apart) > limit).any(axis=(1, 2))
     if touched.any():

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.recordings import Recording
+
 CHECK_INTERVAL = 0.05
 """Time between the samples that are compared [s]; more would cost time and show nothing else."""
 BLOCK_SECONDS = 1.0
@@ -116,6 +118,8 @@ class ModuleComparison:
     """
 
     def __init__(self) -> None:
+        # First readings and their noise by module, and by pair how often they were equal or alike;
+        # `update` alone changes them.
         self._first: dict[str, npt.NDArray[np.float64]] = {}
         self._noise: dict[str, float] = {}
         self._start = self._last_time = -math.inf
@@ -126,6 +130,7 @@ class ModuleComparison:
 
     def is_due(self, time: float) -> bool:
         """Return whether samples of a time [s] would be compared."""
+        # Times are rounded: without the 1e-6, samples of 20 Hz would be left out.
         return not 0 <= time - self._last_time < CHECK_INTERVAL - 1e-6
 
     def update(self, samples: Mapping[str, npt.NDArray[Any]], time: float) -> list[Likeness]:
@@ -141,13 +146,31 @@ class ModuleComparison:
         self._reported.update((each.module, each.other) for each in new)
         return new
 
+    def update_recording(self, part: Recording) -> list[Likeness]:
+        """Compare the modules of the next part of a recording; return what is new."""
+        modules = {name: m for name, m in part.modules.items() if m.n_samples}
+        if len(modules) < 2:
+            return []
+        first = max(m.times[0] for m in modules.values())
+        times = np.arange(first, min(m.times[-1] for m in modules.values()), CHECK_INTERVAL)
+        rows = {n: np.searchsorted(m.times, times, side="right") - 1 for n, m in modules.items()}
+        found = []
+        for k, time in enumerate(times.tolist()):
+            samples = {
+                name: m.readings[rows[name][k]]
+                for name, m in modules.items()
+                if time - m.times[rows[name][k]] < CHECK_INTERVAL
+            }
+            found += self.update(samples, time)
+        return found
+
     def _compare(
         self, names: list[str], values: Mapping[str, npt.NDArray[np.float64]], time: float
     ) -> list[Likeness]:
         for name in names:
             if name not in self._first:
                 self._first[name], self._noise[name] = values[name], 0.0
-                self._start = time
+                self._start = time  # of the newest module: the noise of all is measured on
         change = np.array([(values[name] - self._first[name]).ravel() for name in names])
         products = change @ change.T
         size = np.sqrt(np.diag(products))

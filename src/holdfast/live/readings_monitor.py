@@ -23,7 +23,8 @@ STILL_SECONDS = 10.0
 MOVED_SECONDS = 2.0
 """Time of changed readings after which an axis without any change is reported [s]."""
 PULL_SECONDS = 0.25
-"""Minimum time for which the normal force is below its first value [s]."""
+"""Minimum time for which the normal force is below its first value [s]. This and the next two are
+those of the fault `tare_loaded` (`kernel/faults.c`) and of labels (`labelling/rules/forces.py`)."""
 PULL_OF_NOISE = 20.0
 """Least fall below the first value, in standard deviations of its noise."""
 PULL_OF_LARGEST = 0.1
@@ -90,7 +91,8 @@ class ReadingsMonitor:
 
     def update_recording(self, part: Recording) -> list[str]:
         """Look at the next part of a recording; return new notices."""
-        notices: list[str] = []
+        alike = self._comparison.update_recording(part)
+        notices = [f"{each.module} {each.text}" for each in alike]
         for name in self._fingers.keys() & part.modules.keys():
             module = part.modules[name]
             stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
@@ -130,7 +132,7 @@ class _FingerReadings:
         if time - self._last < CHECK_INTERVAL or not np.isfinite(readings).all():
             return []
         self._last = time
-        if self._first is None or time < self._start:  # the next recording of a player
+        if self._first is None:
             self._first, self._start = np.array(readings, dtype=np.float64), time
             return []
         change = readings - self._first

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 FLUSH_INTERVAL = 0.2
 """Time between two writes to disk [s]."""
 SYNC_INTERVAL = 0.5
-"""Time between two waits for the disk with `fsync`; the first write after it waits [s]."""
+"""Time between two waits for the disk with `fsync`; the first write after it waits [s]. With
+`FLUSH_INTERVAL`, a power failure loses at most 0.7 s and one wait (docs/reliability.md)."""
 MAX_QUEUED_ARRIVALS = 4096
 """Maximum number of arrivals that wait for the disk: some 30 MB of a whole hand, or 27 s at
 150 Hz."""
@@ -38,7 +39,7 @@ _YIELD_TIME = 1e-4
 _RATE_PERIOD = 1.0
 """Period over which the rate is measured [s]."""
 _N_CLOCK_ARRIVALS = 256
-"""Newest arrivals of which the quickest gives the time of the session."""
+"""Newest arrivals of which the quickest gives the time of the session: 1.7 s at 150 Hz."""
 _FILE_NAME = re.compile(r"\w[\w .-]{0,99}", re.ASCII)
 
 
@@ -75,6 +76,18 @@ class RecorderStatus(NamedTuple):
     faults: Mapping[Fault, int]
     recent_faults: Mapping[str, tuple[Fault, ...]]
     failure: str
+
+    def document(self) -> dict[str, Any]:
+        """Return the progress of a finished recording as JSON values."""
+        # `n_samples` of the document is that of each module; the rate is the mean, not the last.
+        rate = (self.n_samples - 1) / self.seconds if self.seconds else math.nan
+        counts = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
+        return {
+            "seconds": self.seconds,
+            "n_samples": self.modules,
+            "rate": rate,
+            **{field: getattr(self, field) for field in counts},
+        }
 
 
 class _QueuedMarker(NamedTuple):
@@ -200,7 +213,7 @@ class Recorder(Closable):
 
     def session_time(self) -> float:
         """Return the time now, on the clock of the samples [s]; NaN before the first one."""
-        # The quickest of the newest arrivals waited least on its way.
+        # The quickest of the newest arrivals waited least on its way. A copy, as `put` appends.
         return time.monotonic() + max(self._ahead.copy(), default=math.nan)
 
     def add_marker(self, text: str, time: float | None = None) -> None:
@@ -279,6 +292,7 @@ class Recorder(Closable):
             self._writer.sync()
         self._check_file()
         self._n_bytes = self._writer.n_bytes
+        # Two counts stay at least: the newest, and the last one that is a period old.
         counts = self._counts
         counts.append((time.monotonic(), self._buffer.n_samples))
         while len(counts) > 2 and counts[-1][0] - counts[1][0] >= _RATE_PERIOD:

@@ -123,6 +123,7 @@ class RecordingBuffer:
         self.faults: Counter[Fault] = Counter()
         # By module: the faults that last, so that a marker is set where one begins only.
         self._active_faults: dict[str, tuple[Fault, ...]] = {}
+        # When an arrival reported each fault last, for `recent_faults`.
         self._fault_times: dict[tuple[str, Fault], float] = {}
         # When each text became a marker last: a notice that repeats fills no file.
         self._notice_times: dict[str, float] = {}

@@ -19,7 +19,7 @@ from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
 Work = Callable[[], None]
 MAX_LATENCIES = 8192
-"""Number of newest latencies from which the percentiles are computed."""
+"""Number of newest latencies from which the percentiles are computed: 55 s at 150 Hz."""
 SWITCH_INTERVAL = 5e-4
 """Python's thread switch interval while a session runs [s]; a tenth of the default, so that
 other busy threads delay the detector less."""
@@ -100,6 +100,7 @@ class InterpreterSettings:
 
     def __init__(self) -> None:
         self._lock = Lock()
+        # Sessions that run; the switch interval before the first one; whether objects are frozen.
         self._n_users = 0
         self._before = 0.0
         self._freezes = False
@@ -196,6 +197,7 @@ class Session:
     def start(self) -> None:
         """Start to read the source."""
         self._thread.start()
+        # After the thread: if that cannot start, there is nothing to set back.
         _SETTINGS.begin()
         self._started = True
 

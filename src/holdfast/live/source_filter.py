@@ -22,7 +22,8 @@ from holdfast.resampling import MIN_UPDATE_RATE, Resampler, UpdateFilter, rows_p
 from holdfast.sensors import Sensor
 
 MAX_RATE_CHANGE = 0.2
-"""A rate that differs by more than this from that at the start has changed."""
+"""A rate that differs by more than this share from that at the start has changed. That of a model
+may differ by as much (`RATE_TOLERANCE`)."""
 RATE_CHECK_INTERVAL = 0.3
 """Time over which the rate is measured again [s]; longer for rates below 33 Hz."""
 MIN_STEPS = 10
@@ -37,7 +38,7 @@ MAX_BUFFERED_ARRIVALS = 4096
 The clock of a device may stand still, so the time alone does not limit it."""
 
 FingerFaults = Mapping[str, tuple[Fault, ...]]
-"""FingerFaults by finger."""
+"""Faults by finger."""
 
 
 def measure_rate(arrivals: Iterable[Arrival], fingers: Iterable[str]) -> float | None:
@@ -140,7 +141,7 @@ class SourceFilter:
     Attributes:
         rate: measured rate of the source, of the true updates [Hz]; NaN while it is not known.
         resampled: whether the source is resampled to the model's rate.
-        notices: messages for the user; whoever passes them on clears the list.
+        notices: messages for the user; the caller that passes them on clears the list.
     """
 
     def __init__(
@@ -191,7 +192,7 @@ class SourceFilter:
         if not arrival.samples or arrival.time - sampled[0].time < RATE_MEASUREMENT_TIME:
             return
         rate = measure_rate(sampled, self._fingers)
-        if rate is None:  # no samples of the model's fingers yet
+        if rate is None:  # no steps of the model's fingers yet: the half second begins anew
             buffer.clear()
             buffer.append(arrival)
             return
@@ -201,6 +202,7 @@ class SourceFilter:
         """Yield the samples of a source that ended before its rate was known."""
         sampled = [arrival for arrival in self._buffer if arrival.samples]
         if sampled:
+            # A single sample has no step: then the rate of the model counts, or that of a sensor.
             nominal = next(iter(self._fingers.values())).rate
             rate = measure_rate(sampled, self._fingers) or model.rate or nominal
             yield from self._begin(rate, model)

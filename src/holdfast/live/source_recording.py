@@ -103,6 +103,7 @@ def create_recorder(
         SourceError: the source has no fingers.
         OutputError: the file cannot be written.
     """
+    # Pads and patches of the palm have a name with a slash.
     sensors = {
         name: sensor
         for name, sensor in source.sensors.items()
@@ -115,7 +116,6 @@ def create_recorder(
     except OSError as cause:
         raise OutputError(f"cannot write to {path.parent}: {cause.strerror}") from cause
     recorded_at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    # What was typed outranks what the source says of itself.
     facts = {**source.metadata, "recorded_at": recorded_at, **metadata}
     return Recorder(path, sensors, metadata=facts, force=force, fsync=fsync)
 

@@ -152,6 +152,7 @@ class StreamDetector:
         self.set_threshold(None)
         self._last: HandEstimate | None = None  # from the readings alone, without `hidden`
         self._changes = StateChanges((*self.fingers, HAND))
+        # A source slower than real time sends its samples later; a faster one keeps the timeout.
         self._slowdown = 1 / min(source.speed or 1.0, 1.0)
         self._last_sample_at = time.monotonic()
 
@@ -200,7 +201,7 @@ class StreamDetector:
             self.silent = False
             self._last_sample_at = time.monotonic()
             return self.update(arrival)
-        # A source that is not paced does not keep real time: only a read in vain is silence.
+        # A source that is not paced does not keep real time: only a read that times out is silence.
         timed_out = arrival is None or (
             self.source.paced and time.monotonic() - self._last_sample_at >= timeout
         )
@@ -292,6 +293,7 @@ class StreamDetector:
         Without it, the tare of the recording would be what the hand holds now.
         """
         detector = self._detector
+        # Where the zero is not known, only contact now shows that the first samples are load.
         if detector is not None and not detector.knows_zero:
             fingers = () if self._last is None else self._last.fingers.values()
             return {STARTS_LOADED: True} if any(x.state in TOUCHING for x in fingers) else {}
@@ -300,7 +302,7 @@ class StreamDetector:
             return {}
         baselines = {name: values.copy() for name, values in known.items()}
         for name, values in baselines.items():
-            values[list(self._ignore.get(name, ()))] = 0.0
+            values[list(self._ignore.get(name, ()))] = 0.0  # as `without_ignored` does to readings
         stated = {name: values.tolist() for name, values in baselines.items()}
         return {STARTS_LOADED: True, **({BASELINES: stated} if stated else {})}
 

@@ -71,7 +71,7 @@ def plot_noise(noise: Mapping[str, npt.ArrayLike]) -> Figure:
         axes.set_xticks(numbers, [str(taxel_number(i)) for i in numbers.tolist()], fontsize=6)
         axes.tick_params(axis="y", labelsize=6)
         axes.set_ylabel("noise", fontsize=7)
-    panels[0].legend(fontsize=6, ncols=3, frameon=False)
+    panels[0].legend(fontsize=6, ncols=3, frameon=False, loc="lower right", bbox_to_anchor=(1, 1))
     panels[-1].set_xlabel("taxel", fontsize=7)
     return figure
 

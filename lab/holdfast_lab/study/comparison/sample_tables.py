@@ -223,7 +223,7 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     n_disturbances: dict[str, int] = {}
     for keys, breakdowns in _lines(plan, results):
         for direction in (*PULL_DIRECTIONS, OBLIQUE):
-            # The counts of the disturbances in a direction that have labelled samples.
+            # Counts are (labelled samples, wrong ones): without labelled samples there is no rate.
             events = [
                 [count for name, count in breakdown.disturbances if count[0] and name == direction]
                 for breakdown in breakdowns

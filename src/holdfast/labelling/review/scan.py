@@ -123,22 +123,9 @@ class FindingsScan:
                 self.modules[name] = ModuleScan(module)
             self.modules[name].add(module)
         self.n_truth += 0 if part.truth is None else len(part.truth.times)
+        self.alike += self._comparison.update_recording(part)
         self._markers += part.markers
         self._last = replace(part, modules={n: m.slice(0, 1) for n, m in part.modules.items()})
-        # The modules' latest samples are compared, as `ReadingsMonitor` compares live ones.
-        modules = [(name, module) for name, module in part.modules.items() if module.n_samples]
-        if len(modules) < 2:
-            return
-        end = min(module.times[-1] for _, module in modules)
-        times = np.arange(max(m.times[0] for _, m in modules), end, CHECK_INTERVAL)
-        rows = [np.searchsorted(m.times, times, side="right") - 1 for _, m in modules]
-        for k, time in enumerate(times.tolist()):
-            samples = {
-                name: module.readings[own[k]]
-                for (name, module), own in zip(modules, rows, strict=True)
-                if time - module.times[own[k]] < CHECK_INTERVAL
-            }
-            self.alike += self._comparison.update(samples, time)
 
     @cached_property
     def recording(self) -> Recording:

@@ -26,6 +26,7 @@ class _Rule(NamedTuple):
 
     @property
     def arguments(self) -> list[str]:
+        # Without the recording, and without the thresholds, whose fields are given one by one.
         return [name for name in list(signature(self.propose).parameters)[1:] if name != "rule"]
 
     @property

@@ -86,7 +86,7 @@ class LabelWriter:
         times, labels = timeline.times, []
         change = (np.diff(timeline.codes) != 0) | (np.diff(timeline.causes) != 0)
         edges = np.concatenate([[0], np.flatnonzero(change) + 1, [len(times)]])
-        ends = np.append(times, np.inf)
+        ends = np.append(times, np.inf)  # the last label goes to the end of the span
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             start, end = max(float(times[first]), span[0]), min(float(ends[last]), span[1])
             if timeline.codes[first] != UNKNOWN and start < end:

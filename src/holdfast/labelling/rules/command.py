@@ -142,6 +142,7 @@ def _timeline(
         # A repeated marker changes nothing, but a person who begins a push twice has forgotten to
         # end one: what lies between is less certain.
         command, end = group[0], following[0].time
+        # `disturbance end` is read as `locked`; a push may also lose the object.
         ended = len(group) == 1 and following[0].word in ("locked", "lost")
         open_ended = command.word == "disturbance" and not ended
         ratio = OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
@@ -151,9 +152,9 @@ def _timeline(
         if command.word == "released":
             timeline.set_state(inside & (times >= command.time + opening), NO_CONTACT, None, ratio)
     if finger.threshold is not None:
-        # Not every finger takes part in every grasp: its force outranks the marker where it shows
-        # no contact. Where it shows contact against the marker, the label is only in doubt: a
-        # baseline may have drifted.
+        # Not every finger takes part in every grasp: a force without contact counts more than the
+        # marker. Where it shows contact against the marker, the label is only in doubt: a baseline
+        # may have drifted.
         held = np.isin(timeline.codes, (STABLE, UNSTABLE))
         free = (times >= commands[0].time) & ~finger.contact & held
         timeline.set_state(free, NO_CONTACT, None, CLEAR_RATIO)

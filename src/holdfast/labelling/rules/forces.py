@@ -32,7 +32,8 @@ LOADED_SECONDS = 0.25
 CREEP_LEVEL = 0.2
 """Share of the grip force below which a released elastomer may still keep a load (creep)."""
 CREEP_RATE = 0.1
-"""Share of the grip force per second below which a change of the force is creep [1/s]."""
+"""Share of the grip force per second below which a change of the force is creep [1/s]. Both are
+from one recording of each profile of the twin (docs/study/labels-by-rules.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +201,7 @@ def centre_of_pressure(module: Tactile, tare: TareArgument | Tare, hand: HandFor
     load = np.column_stack([normal @ module.sensor.positions, normal.sum(axis=1)])
     smooth = moving_mean(load, n_samples_of(FORCE_SMOOTHING_TIME, module.period))
     mean = load[:, :3].sum(axis=0) / max(load[:, 3].sum(), np.finfo(float).tiny)
+    # A small load has no centre: it would be one of noise.
     light = smooth[:, 3] < VISIBLE_SHARE * smooth[:, 3].max()
     centre = np.where(light[:, None], mean, smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-300))
     return np.stack([np.interp(hand.times, module.times, column) for column in centre.T], axis=1)
@@ -243,14 +245,16 @@ def moving_mean(values: Array, n: int) -> Array:
     ends = [(n // 2, n - 1 - n // 2)] + [(0, 0)] * (values.ndim - 1)
     padded = np.pad(values, ends, mode="edge")
     steps = padded[n:] - padded[:-n]
-    first = np.cumsum(padded[:n], axis=0)[-1:]  # one after the other, as SciPy adds them
+    # One value after the other, as `uniform_filter1d` of SciPy adds them: the sums are the same.
+    first = np.cumsum(padded[:n], axis=0)[-1:]
     return np.asarray(np.cumsum(np.concatenate([first, steps]), axis=0) / n)
 
 
 DEFAULT_TARE = Tare("seconds", 0.5)
 """Tare of a recording that begins without contact."""
 FALL_OF_NOISE = 20.0
-"""Least fall of the normal force below its first value, in standard deviations of its noise."""
+"""Least fall of the normal force below its first value, in standard deviations of its noise. With
+the next one and `LOADED_SECONDS`, as live in `live/readings_monitor.py`."""
 FALL_OF_RANGE = 0.1
 """Least fall below the first value as a share of the largest force; elastomers creep by less."""
 

@@ -56,6 +56,7 @@ class RelativeMotion:
         """
         lever = np.zeros(3) if point is None else matrix.T @ (point - position)
         moved = self.position - position + (self.matrix - matrix) @ lever
+        # |R - R_0| = sqrt(8) sin(angle / 2), in the Frobenius norm.
         chord = np.linalg.norm(self.matrix - matrix, axis=(1, 2)) / np.sqrt(8)
         return np.linalg.norm(moved, axis=1), 2 * np.arcsin(np.minimum(chord, 1.0))
 
@@ -129,6 +130,7 @@ def motion_of(
     known = covered(grid, times, MAX_POSE_GAP)
     noise = _slope_noise(numbers, float(np.median(np.diff(times))))
     lever_length = float(np.median(np.linalg.norm(lever, axis=1)))
+    # |dR/dt| = sqrt(2) spin, in the Frobenius norm: of the noise here, of the motion below.
     spin_noise = float(np.linalg.norm(noise[3:]) / np.sqrt(2))
     return RelativeMotion(
         position=position,
@@ -147,6 +149,7 @@ def slope(values: Array, period: float) -> Array:
 
     half = max(n_samples_of(SPEED_WINDOW, period) // 2, 1)
     steps = np.arange(-half, half + 1)
+    # Least squares: slope = sum k x_k / (sum k^2 T). A convolution turns its weights round.
     weights = steps / ((steps**2).sum() * period)
     return np.asarray(convolve1d(values, weights[::-1], axis=0, mode="nearest"))
 
@@ -213,7 +216,7 @@ def _interpolated(track: PoseTrack, times: Array) -> PoseTrack:
 def _rotation(quaternions: Array) -> "Rotation":
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))
+    return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))  # SciPy has the scalar last
 
 
 def _ranks(values: Array, known: Mask) -> Array:

@@ -101,7 +101,8 @@ def propose(
     change = {name: _change_ratio(finger, rule) for name, finger in hand.fingers.items()}
     # A change of two fingers is one of the object, and so of every finger that touches it.
     shared = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
-    gap = n_samples_of(rule.merge - rule.window, hand.period)  # the window fills the rest
+    # The window shows a change half of it too early and too late, which fills the rest of a gap.
+    gap = n_samples_of(rule.merge - rule.window, hand.period)
     changing, timelines = {}, {}
     for name, finger in hand.fingers.items():
         changes = ((change[name] > 1) | shared) & finger.contact
@@ -117,7 +118,7 @@ def propose(
         grasp = _GraspLabeller(hand, change, changing, slice(start, end), rule)
         for name in hand.fingers:
             grasp.label(name, timelines[name])
-    # Where it begins in contact no threshold says when contact ends: only a final drop does.
+    # Where it begins in contact no threshold shows when contact ends: only a final drop does.
     loaded = all(finger.threshold is None for finger in hand.fingers.values())
     if loaded and (drop := final_drop(hand)) is not None:
         after = np.arange(len(hand.times)) >= drop
@@ -139,6 +140,7 @@ def _change_ratio(finger: FingerForce, rule: SignalRule) -> Array:
     least = CHANGE_NOISE_FACTOR * finger.noise or REST_FACTOR * float(
         np.quantile(change[touching], 0.2)
     )
+    # Without a threshold, F_a counts from a load, and a share of it means nothing.
     if finger.threshold is not None:
         least = max(rule.share * grip_force(finger, touching), least)
     return np.where(touching, evidence_ratio(change, least), 0.0)
@@ -162,8 +164,8 @@ class _GraspLabeller:
         self._starts_loaded = all(finger.threshold is None for finger in hand.fingers.values())
         self._locked = span.start
         if not self._starts_loaded:
-            # Locked is the hand once no finger changes for long enough, at least two of them
-            # touching if two ever do: one finger that waits for the other does not hold.
+            # The hand is locked once no finger changes for long enough, and two of them touch, if
+            # two ever do: one finger that waits for the other does not hold.
             fingers = hand.fingers.values()
             n_grasping = sum((finger.contact & self._inside).any() for finger in fingers)
             calm = self._inside & (hand.n_touching >= min(2, n_grasping))

@@ -193,7 +193,7 @@ class _FingerLabeller:
     ) -> None:
         self._finger, self._times, self._rule = finger, times, rule
         self._contact = finger.contact.copy()
-        # With a threshold, the force itself says when contact ends.
+        # With a threshold, the force itself shows when contact ends.
         self._drop = None if finger.threshold is not None else drop
         if self._drop is not None:
             self._contact[self._drop :] = False
@@ -278,6 +278,7 @@ class _FingerLabeller:
             return  # it begins in contact: the recording does not show how it closed
         unstable = timeline.codes[start:end] == UNSTABLE
         still = np.flatnonzero(timeline.codes[start:end] == STABLE)
+        # A contact that is never still closes to its end.
         first, last = (still[0], still[-1] + 1) if len(still) else (end - start, end - start)
         inside = np.zeros(len(self._times), dtype=bool)
         inside[start : start + first] = unstable[:first]
@@ -290,6 +291,7 @@ class _FingerLabeller:
         """Label a loss if the object is out of sight when the force ends, and stays so."""
         n = n_samples_of(OUT_OF_SIGHT_TIME, self._finger.period)
         seen = np.flatnonzero(known[start:end])
+        # Never in sight, or seen again soon after the end of the force: no loss is known.
         if not len(seen) or end == len(known) or known[max(end - 1, start) : end + n].any():
             return
         unseen = np.zeros(len(known), dtype=bool)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import Cause, ContactState
+from holdfast.contact import UNSTABLE_MARGIN, Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io.foreign import read_stickers
@@ -38,7 +38,7 @@ from holdfast.labelling.rules.video_motion import (
     robust_fit,
     tip_motions,
 )
-from holdfast.metrics.masks import Mask, fill_short_gaps, hysteresis, n_samples_of, runs
+from holdfast.metrics.masks import Mask, fill_short_gaps, hysteresis, n_samples_of, runs, widen_runs
 from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Array
 
@@ -137,7 +137,7 @@ def propose(
         note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
         # What no picture shows is as doubtful as what the pictures show too little of.
         doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
-        doubtful |= ~tip.seen
+        doubtful = widen_runs(doubtful | ~tip.seen, at, UNSTABLE_MARGIN)
         labels[finger] = without_cause(with_slips(base[finger], slips, note), at, doubtful)
     return labels
 
@@ -192,7 +192,7 @@ def unexplained(tip: TipMotion, force: Array, held: Mask, n: int) -> Array:
     known = np.column_stack([force, tip.turns])
     both = held[n:] & held[:-n]
     if both.sum() < 4 * known.shape[1]:
-        # Too few for a fit: no motion remains, and so no slip.
+        # Too few changes for a fit: no motion remains, and so no slip.
         return tip.place - tip.place
     change = known[n:] - known[:-n]
     fit, _ = robust_fit(change[both], (tip.place[n:] - tip.place[:-n])[both])
@@ -214,7 +214,8 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
     n = max(round(rule.window / step), 2)
     moved, noise = _step_size(rest, n), 0.0
     if held.any():
-        noise = float(np.median(moved[held])) / 1.18  # of a component of two
+        # Of a component: the median length of a normal pair is 1.18 standard deviations.
+        noise = float(np.median(moved[held])) / 1.18
     # A step is the difference of two means of n values: the noise of one value is larger.
     single = noise * np.sqrt(n / 2)
     least = max(1e3 * rule.step, 6 * noise)
@@ -229,13 +230,14 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         # What is fitted as stuck must not reach into the slip before.
         start, free = max(first - round(rule.before / step), free), last - n
         if away < max(1e3 * rule.slid, 6 * noise):
-            continue  # it came back: nothing slid
+            continue  # a part of a longer motion that came back by itself: nothing slid
         gone = np.linalg.norm(rest[first:last] - before, axis=1)
         far = np.flatnonzero(gone > min(max(1e3 * rule.slid, 6 * single), 0.8 * away))
         end = first + (int(far[0]) if len(far) else len(gone) - 1)
-        start = max(min(start, end - 4), 0)
+        start = max(min(start, end - 4), 0)  # a change point needs four values or more
         along = rest[end] - before
         line = (rest[start : end + 1] - before) @ along / max(float(np.linalg.norm(along)), 1e-9)
+        # Noise of at least 0.005 mm: the place of a sticker is exact to 0.01 mm.
         onset, error = change_point(times[start : end + 1], line, max(single, 0.005))
         path = np.linalg.norm(np.diff(mean_over(rest[first:last], 3), axis=0), axis=1).sum()
         distance = max(float(path), float(away))
@@ -353,6 +355,7 @@ def with_slips(
             )
             if made and made[-1].evidence == text:  # it goes on over an edge of the labels
                 start = made.pop().start
+            # A slip of the least distance has an evidence ratio of 2, a confidence up to 0.75.
             ratio = float(evidence_ratio(slip.ratio, 0.5))
             sure = round(label_confidence(ratio, end - start), 3)
             made.append(

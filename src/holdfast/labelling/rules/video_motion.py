@@ -134,7 +134,7 @@ def tip_motions(
                 f"{1e3 * rule.tip_size:g} mm beside the {1e3 * rule.object_size:g} mm of the "
                 "object; give the sides of the black squares as tip_size and object_size [m]"
             )
-        # The side of a sticker in the picture tells how long a pixel is at its distance.
+        # The side of a sticker in the picture gives the length of a pixel at its distance.
         away = 1e3 * (
             rule.tip_size * track[:, :, 2] / scales[body][:, None]
             - rule.object_size * base[:, :, 2] / scales[OBJECT][:, None]
@@ -145,8 +145,8 @@ def tip_motions(
             [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
         )
         place = upright @ flatten.T
-        # Tilts are 50 times less exact than places, but late where they are averaged: a push that
-        # rolls the object would remain as motion.
+        # Tilts are 50 times less exact than places, but not averaged: averages are late, and a push
+        # that rolls the object would remain as motion.
         turns = np.column_stack([tip_turn - turn, tilt, tip_tilt])
         motions[body] = TipMotion(place, TURN_SCALE * turns, seen & tip_seen)
     return motions

@@ -24,7 +24,6 @@ from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard
-from holdfast.web.server import run_server
 
 LIVE_DOCUMENT_RATE = 20.0
 """Number of live documents per second [Hz]."""
@@ -370,43 +369,3 @@ class CalibrationRoutes:
             return self._calibration.document()
 
         return await _answer(changed)
-
-
-def run_page(
-    session: Session,
-    announce: Callable[[str], None],
-    *,
-    host: str,
-    port: int,
-    guard: Guard | None = None,
-    folder: Path,
-    report: Callable[[str], None],
-    panels: Sequence[Panel] = (),
-    stay: bool,
-) -> None:
-    """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
-
-    Args:
-        session: it is started here; the caller stops it.
-        announce: function that is called with the URL when the page can be opened.
-        host: address to listen on.
-        port: port to listen on; 0 selects a free one.
-        guard: access control; by default only this machine can connect.
-        folder: folder for recordings.
-        report: called with the text of each notice.
-        panels: that run beside the session.
-        stay: continue when the source has ended.
-
-    Raises:
-        OutputError: the address is not available.
-        Exception: the failure of the session.
-    """
-    service = LiveService(session, guard or Guard(host), folder, report, panels)
-    session.start()
-    run_server(
-        service.app, host, port, announce,
-        # A page that stays still ends when the session fails.
-        lambda: session.ended and not (stay and session.failure is None),
-    )  # fmt: skip
-    if session.failure is not None:
-        raise session.failure

@@ -83,7 +83,7 @@ class XelaSource(DeviceSource):
         # A new one: the server may have other sensors than when it was open before.
         self._decoder = self._new_decoder()
         self._connection = self._connected()
-        # The first packet that defines the modules.
+        # The modules are known by a packet, and the first packets may define none.
         deadline = time.monotonic() + XELA_OPEN_TIMEOUT
         invalid: InvalidPacket | None = None
         text = b""

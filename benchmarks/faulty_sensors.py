@@ -1,0 +1,244 @@
+"""Draw what faulty and misled magnetic sensors cost, and print what is found in real recordings.
+
+    python benchmarks/faulty_sensors.py --out docs/img    # faulty-sensors.png, health.png
+    python benchmarks/faulty_sensors.py --data DATA       # a table
+
+Before: the detector without what it knows of magnetometers (`Sensor.magnetic`). The readings of the
+picture are made: AnySkin at 100 Hz with a noise of 1 uT, pressed with 300 uT.
+"""
+
+import argparse
+import io
+import textwrap
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from PIL import Image
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
+from holdfast.detector import FingerTrace, detect
+from holdfast.io.importers import import_recordings
+from holdfast.live.health import module_health
+from holdfast.live.module_checks import HoldDrift, ModuleComparison
+from holdfast.model import Model
+from holdfast.plots.sensors import plot_noise
+from holdfast.plots.style import (
+    COLOURS,
+    FONT_SIZE,
+    STATE_COLOURS,
+    add_labels,
+    add_legend,
+    add_title,
+    panels,
+)
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+
+Values = npt.NDArray[np.float64]
+ANYSKIN, RATE = sensor("anyskin"), 100.0
+SHARES = np.array([0.35, 0.8, 1.0, 0.6, 0.2])[:, None]
+FIELD = (35.0, -40.0, 30.0)
+"""Change of the field by a turn of the hand [uT]."""
+SETS = ("uskin_pick_move", "eflesh_slip", "gtac", "gtac_v2")
+NAMES = {STABLE: "STABLE", UNSTABLE: "UNSTABLE", NO_CONTACT: "NO_CONTACT", UNKNOWN: "UNKNOWN"}
+COLOURS_OF_STATES = STATE_COLOURS | {UNKNOWN: "white"}
+
+
+def pressed(grip: Values, seed: int = 0) -> Values:
+    """Return readings (n, 5, 3) of a press with this course."""
+    rng = np.random.default_rng(seed)
+    zero = rng.uniform(150, 300, (5, 3)) * rng.choice([-1, 1], (5, 3))
+    return zero + grip[:, None, None] * SHARES * [20, 5, 300] + rng.normal(size=(len(grip), 5, 3))
+
+
+def module(readings: Values) -> Tactile:
+    return Tactile(ANYSKIN, np.arange(len(readings)) / RATE, readings)
+
+
+def without_rules(module: Tactile) -> Tactile:
+    """Return a module whose detector has no rules of magnetometers."""
+    return replace(module, sensor=replace(module.sensor, magnetic=False))
+
+
+def traces(modules: Mapping[str, Tactile]) -> tuple[FingerTrace, FingerTrace]:
+    """Return the estimates of the first module without the rules of magnetometers, and with."""
+    model, name = Model.load("builtin:any"), next(iter(modules))
+    others = {name: without_rules(module) for name, module in modules.items()}
+    before, after = (detect(model, Recording("made", own)).fingers for own in (others, modules))
+    return before[name], after[name]
+
+
+def course(*points: tuple[float, float]) -> Values:
+    """Return a course by its corners (time [s], value), to the last."""
+    times, values = zip(*points, strict=True)
+    return np.interp(np.arange(round(times[-1] * RATE)) / RATE, times, values)
+
+
+def states_of_faults() -> dict[str, dict[str, Tactile]]:
+    """Return the modules of each fault that changes states."""
+    grip = course((0, 0), (1.5, 0), (2, 1), (9, 1), (9.4, 0), (12, 0))
+    late = course((9, 0), (9.5, 1), (13, 1), (13.4, 0), (15, 0))
+    turn = course((3, 0), (5, 1), (15, 1))[:, None, None] * FIELD
+    held = course((4, 0), (6, 1), (12, 1))[:, None, None] * FIELD
+    zeros, stuck, rng = pressed(grip, 3), pressed(grip, 4), np.random.default_rng(13)
+    zeros[np.arange(31, 1200, 40), rng.integers(5, size=30)] = 0
+    stuck[300:, 2, 1] = stuck[300, 2, 1]
+    palm = pressed(0 * grip, 6) + np.roll(held, 1, axis=2)
+    return {
+        "the open hand turns from 3 to 5 s": {"a": module(pressed(late, 1) + turn)},
+        "it turns while it holds; an open palm shows it": {
+            "a": module(pressed(grip, 2) + held), "palm": module(palm),
+        },
+        "a magnetometer reads zeros, in one row of 40": {"a": module(zeros)},
+        "one axis of a taxel is stuck from 3 s on": {"a": module(stuck)},
+    }  # fmt: skip
+
+
+def draw_states(axes: Axes, modules: Mapping[str, Tactile]) -> None:
+    before, after = traces(modules)
+    top = float(np.nanmax(np.linalg.norm(before.force, axis=1)))
+    for k, (trace, colour) in enumerate(((before, COLOURS[1]), (after, COLOURS[0]))):
+        axes.plot(trace.times, np.linalg.norm(trace.force, axis=1), color=colour, linewidth=0.8)
+        low = -(0.18 + 0.2 * k) * top
+        for state, shade in COLOURS_OF_STATES.items():
+            axes.fill_between(
+                trace.times, low, low - 0.14 * top, where=trace.state == state, color=shade,
+                linewidth=0, step="mid",
+            )  # fmt: skip
+        axes.text(
+            -0.015, low - 0.07 * top, ("before", "after")[k], ha="right", va="center",
+            fontsize=FONT_SIZE - 1.5, transform=axes.get_yaxis_transform(),
+        )  # fmt: skip
+    faulty = after.times[after.faults != 0]
+    axes.plot(faulty, np.full(len(faulty), -0.6 * top), "|", color="#bb0000", markersize=4)
+    axes.set_ylim(-0.7 * top, 1.1 * top)
+    axes.set_yticks([y for y in axes.get_yticks() if 0 <= y <= top])
+    add_labels(axes, "time [s]", "force [µT]")
+
+
+def draw_notice(axes: Axes, modules: Mapping[str, Values], notice: str) -> None:
+    """Draw the forces of modules, and what is said about them."""
+    for (name, readings), colour in zip(modules.items(), (COLOURS[0], COLOURS[5]), strict=False):
+        force = np.linalg.norm((readings - readings[:50].mean(axis=0)).sum(axis=1), axis=1)
+        style = "-" if colour == COLOURS[0] else (0, (3, 2))
+        times = np.arange(len(force)) / RATE
+        axes.plot(times, force, color=colour, linewidth=0.8, linestyle=style, label=name)
+    axes.set_ylim(0, 1.9 * max(axes.get_ylim()))
+    text = "before: no finding\nafter: " + "\n".join(textwrap.wrap(notice, 58))
+    axes.text(0.02, 0.97, text, transform=axes.transAxes, va="top", fontsize=FONT_SIZE - 1)
+    axes.legend(fontsize=FONT_SIZE - 1, frameon=False, loc="lower right")
+    add_labels(axes, "time [s]", "force [µT]")
+
+
+def likeness_of(modules: Mapping[str, Values]) -> str:
+    comparison, n = ModuleComparison(), len(next(iter(modules.values())))
+    found = [
+        f"{each.module} {each.text}"
+        for k in range(0, n, 5)
+        for each in comparison.update({name: own[k] for name, own in modules.items()}, k / RATE)
+    ]
+    return found[0]
+
+
+def notices() -> dict[str, tuple[dict[str, Values], str]]:
+    """Return modules and what is said about them, by fault."""
+    grip = course((0, 0), (1.5, 0), (2, 1), (9, 1), (9.4, 0), (12, 0))
+    long = course((0, 0), (2, 0), (3, 1), (70, 0.9), (72, 0.9))
+    press, noise = pressed(grip, 7), pressed(0 * grip, 8)
+    drifting, drift = pressed(long, 9), HoldDrift()
+    for k in range(0, len(drifting), 5):
+        drift.update((drifting[k] - drifting[:50].mean(axis=0)).sum(axis=0), k / RATE)
+    text = f"drift {drift.per_minute:.3g} µT a minute, in info and as a notice after a minute"
+    talk = {"left": press, "right": noise + 0.12 * (press - press[:50].mean(axis=0))}
+    copies = {"left": press, "right": press.copy()}
+    return {
+        "the skin warms or creeps": ({"index": drifting}, text),
+        "a module shows a share of the load of another": (talk, likeness_of(talk)),
+        "one sensor is read twice": (copies, likeness_of(copies)),
+    }
+
+
+def save(figure: Figure, path: Path) -> None:
+    file = io.BytesIO()
+    figure.savefig(file, dpi=130, format="png")
+    Image.open(file).quantize(64).save(path, optimize=True)  # a third of the size
+
+
+def draw_health(path: Path) -> None:
+    """Draw the noise of an open hand, one of whose taxels is loud, as `doctor --plot` does."""
+    noise = {}
+    for seed, name in enumerate(("thumb", "index")):
+        which, rng = sensor("uskin-curved"), np.random.default_rng(seed)
+        readings = 33_000 + rng.normal(0, 3, (1000, which.n_taxels, 3))
+        readings[:, 6] += rng.normal(0, 15 * seed, (1000, 3))
+        times = np.arange(1000) / RATE
+        noise[name] = module_health(name, which, times, np.rint(readings)).noise
+    save(plot_noise(noise), path)
+
+
+def draw(path: Path) -> None:
+    """Draw one panel of each fault."""
+    figure, grid = panels(7, 2, 1.75)
+    for axes, (title, modules) in zip(grid, states_of_faults().items(), strict=False):
+        add_title(axes, title)
+        draw_states(axes, modules)
+    for axes, (title, (values, notice)) in zip(grid[4:], notices().items(), strict=True):
+        add_title(axes, title)
+        draw_notice(axes, values, notice)
+    handles = [
+        Patch(facecolor=COLOURS_OF_STATES[x], edgecolor="#999999", linewidth=0.4, label=NAMES[x])
+        for x in NAMES
+    ]
+    handles += [
+        Patch(color=COLOURS[1], label="force before"), Patch(color=COLOURS[0], label="force after"),
+        Patch(color="#bb0000", label="a fault is named"),
+    ]  # fmt: skip
+    add_legend(figure, handles, per_row=4)
+    save(figure, path)
+
+
+def print_table(data: Path) -> None:
+    """Print the states of real recordings before and after, and the share of the two faults."""
+    states = " | ".join(f"{name} [%]" for name in NAMES.values())
+    print(f"| set | modules | samples | | {states} | field [%] | invalid [%] |")
+    model, bits = (
+        Model.load("builtin:any"),
+        [list(Fault).index(x) for x in (Fault.FIELD, Fault.INVALID)],
+    )
+    for name in SETS:
+        recordings = list(import_recordings(data / name))
+        for title in ("before", "after"):
+            states, faults, n_modules = np.zeros(4), np.zeros(2), 0
+            for recording in recordings:
+                modules = recording.modules
+                if title == "before":
+                    modules = {n: without_rules(m) for n, m in modules.items()}
+                for trace in detect(model, replace(recording, modules=modules)).fingers.values():
+                    states += np.bincount(trace.state, minlength=4)
+                    faults += [(trace.faults >> bit & 1).sum() for bit in bits]
+                    n_modules += 1
+            n = states.sum()
+            shares = " | ".join(f"{100 * x / n:.2f}" for x in (*states[list(NAMES)], *faults))
+            print(f"| `{name}` | {n_modules} | {n:.0f} | {title} | {shares} |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, help="folder for the picture")
+    parser.add_argument("--data", type=Path, help="folder with the real recordings")
+    options = parser.parse_args()
+    if options.out:
+        draw(options.out / "faulty-sensors.png")
+        draw_health(options.out / "health.png")
+    if options.data:
+        print_table(options.data)
+
+
+if __name__ == "__main__":
+    main()
