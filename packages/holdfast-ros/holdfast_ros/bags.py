@@ -18,7 +18,7 @@ from holdfast.io.definitions import Definition, field_paths, parse_definition, s
 from holdfast.io.importers.table import natural_order
 from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.sensors.types import Array
-from holdfast_ros.bag_storage import BagConnection, BagStorage
+from holdfast_ros.bag_storage import BagStorage
 from holdfast_ros.bag_storage.folder import METADATA, open_folder
 from holdfast_ros.bag_storage.mcap import open_mcap
 from holdfast_ros.bag_storage.ros1 import open_ros1
@@ -70,16 +70,23 @@ class Bag:
     def __init__(self, storage: BagStorage, budget: ReadBudget, *, ros2: bool) -> None:
         self._storage = storage
         self._budget = budget
-        self._definitions: dict[tuple[str, str], Definition | None] = {}
         self.ros2 = ros2
         self.complete = storage.complete
-        connections = sorted(storage.connections, key=lambda one: one.topic)
-        self.topics = [
-            BagTopic(
-                one.topic, short_name(one.kind), self._definition(one), one.n_messages, one.number
-            )
-            for one in connections
-        ]
+        self.topics: list[BagTopic] = []
+        # Publishers of a type send the same definition, which is parsed once.
+        definitions: dict[tuple[str, str], Definition | None] = {}
+        for one in sorted(storage.connections, key=lambda one: one.topic):
+            key, kind = (one.kind, one.definition), short_name(one.kind)
+            if key not in definitions and one.definition.strip():
+                definitions[key] = None
+                with suppress(ValueError):  # a topic that cannot be read does not hide the others
+                    definitions[key] = parse_definition(*key)
+            elif key not in definitions:
+                standard = standard_definition(one.kind) if ros2 else None
+                # Messages of known sensors first: ROS itself has none of these types.
+                definitions[key] = known_definition(one.kind, ros2=ros2) or standard
+            topic = BagTopic(one.topic, kind, definitions[key], one.n_messages, one.number)
+            self.topics.append(topic)
 
     def messages(self, topics: Iterable[BagTopic]) -> Iterator[tuple[BagTopic, float, bytes]]:
         """Yield topic, time of recording [s] and bytes of each message, in the order of time.
@@ -107,20 +114,6 @@ class Bag:
             RecordingError: the values take more memory than the bag may have.
         """
         self._budget.keep(n_bytes, 1)
-
-    def _definition(self, one: BagConnection) -> Definition | None:
-        """Return the definition in the bag; if there is none, the one of a known type."""
-        # Publishers of a type send the same definition, which is parsed once.
-        key = (one.kind, one.definition)
-        if key not in self._definitions and one.definition.strip():
-            self._definitions[key] = None
-            with suppress(ValueError):  # a topic that cannot be read does not hide the others
-                self._definitions[key] = parse_definition(*key)
-        elif key not in self._definitions:
-            standard = standard_definition(one.kind) if self.ros2 else None
-            # Messages of known sensors first: ROS itself has none of these types.
-            self._definitions[key] = known_definition(one.kind, ros2=self.ros2) or standard
-        return self._definitions[key]
 
 
 def standard_definition(kind: str) -> Definition | None:

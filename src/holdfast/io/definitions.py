@@ -6,7 +6,7 @@ fields of that type. A definition is data: nothing is generated from it or execu
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 NUMBER_CODES = {
@@ -135,7 +135,29 @@ def parse_definition(name: str, text: str) -> Definition:
     pairs = zip(others[::2], others[1::2], strict=True)
     blocks.update((short_name(other), body) for other, body in pairs)
     blocks.update((stamp, "\n".join(lines)) for stamp, lines in _STAMPS.items())
-    types = {block: tuple(_fields(block, body, blocks)) for block, body in blocks.items()}
+    types: dict[str, tuple[MessageField, ...]] = {}
+    for block, body in blocks.items():
+        fields: list[MessageField] = []
+        for code in (line.split("#", maxsplit=1)[0].strip() for line in body.splitlines()):
+            match = _FIELD.fullmatch(code)
+            if code and match is None:
+                raise ValueError(f"{block}: {code[:60]!r} is no field of a message")
+            if match is None or match["rest"].lstrip().startswith("="):
+                continue  # an empty line, or a constant
+            size = int(match["size"] or 0) if match["many"] else None
+            # `[<=N]` is encoded as a sequence of any length, `[N]` has no length.
+            bounded = match["many"] and "<=" in match["many"]
+            kind = match["kind"]
+            if kind not in NUMBER_CODES and kind not in ("string", *_STAMPS):
+                short, package = short_name(kind), block.split("/", maxsplit=1)[0]
+                # The package of the message comes first; `Header` alone is that of std_msgs, as in
+                # ROS 1.
+                names = (short, f"{package}/{short}", f"std_msgs/{short}")
+                kind = next((one for one in names if one in blocks), "")
+                if not kind:
+                    raise ValueError(f"{block}: a field is of {short}, which is not defined")
+            fields.append(MessageField(match["name"], kind, 0 if bounded else size))
+        types[block] = tuple(fields)
     extents: dict[str, _Extent] = {}
     _measure(short_name(name), types, extents)
     return Definition(short_name(name), types, {kind: one.size for kind, one in extents.items()})
@@ -160,31 +182,6 @@ def field_paths(definition: Definition) -> set[str]:
 
     visit(definition.name, "")
     return found
-
-
-def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[MessageField]:
-    for line in body.splitlines():
-        code = line.split("#", maxsplit=1)[0].strip()
-        if not code:
-            continue
-        match = _FIELD.fullmatch(code)
-        if match is None:
-            raise ValueError(f"{block}: {code[:60]!r} is no field of a message")
-        if match["rest"].lstrip().startswith("="):
-            continue  # a constant
-        size = int(match["size"] or 0) if match["many"] else None
-        # `[<=N]` is encoded as a sequence of any length, `[N]` has no length.
-        bounded = match["many"] and "<=" in match["many"]
-        kind = match["kind"]
-        if kind not in NUMBER_CODES and kind not in ("string", *_STAMPS):
-            short, package = short_name(kind), block.split("/", maxsplit=1)[0]
-            # The package of the message comes first; `Header` alone is that of std_msgs, as in
-            # ROS 1.
-            names = (short, f"{package}/{short}", f"std_msgs/{short}")
-            kind = next((name for name in names if name in blocks), "")
-            if not kind:
-                raise ValueError(f"{block}: a field is of {short}, which is not defined")
-        yield MessageField(match["name"], kind, 0 if bounded else size)
 
 
 def _measure(

@@ -7,7 +7,7 @@ from importlib import resources
 import numpy as np
 
 from holdfast.recordings import Recording
-from holdfast.sensors import Hand, hand
+from holdfast.sensors import hand
 from holdfast.sensors.types import Array
 
 WORLD, PALM_LINK = "world", "palm_link"
@@ -86,11 +86,24 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
         return [*_side_by_side(recording, rest), *_object(recording)], "side by side"
     times, joints, origin = _joints(recording)
     tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
-    mounts = {name: _mount(known, name) for name in on_hand}
+    mounts: dict[str, tuple[str, RigidPose]] = {}
+    for name in on_hand:
+        module = known.modules[name]
+        # The hand names links by finger (`index_link3`), the table by joint, as the URDF of the
+        # maker.
+        link = module.link
+        if link != PALM_LINK:
+            finger, number = link.split("_link")
+            link = f"link_{FIRST_JOINTS[finger] + int(number)}.0"
+        # The table has the pose of each taxel on the link, the sensor has it in its own frame: one
+        # taxel is enough, as the sensor is rigid.
+        rotation = module.rotations[0] @ module.sensor.rotations[0].T
+        mounts[name] = link, (module.positions[0] - rotation @ module.sensor.positions[0], rotation)
     for angles in joints:
         links = allegro_links(angles)
         for name in on_hand:
-            (place, turned), mount = links[_table_link(known, name)], mounts[name]
+            link, mount = mounts[name]
+            place, turned = links[link]
             tracks[name].append(_pose((place + turned @ mount[0], turned @ mount[1])))
     frames = [
         Frame(module_frame(name), PALM_LINK, times, np.array(track))
@@ -156,25 +169,6 @@ def _joints(recording: Recording) -> tuple[Array, Array, str]:
         if joints is not None and joints.shape[1:] == (N_ALLEGRO_JOINTS,):
             return truth.times, joints.astype(np.float64), "measured joints"
     return np.array([recording.start]), np.zeros((1, N_ALLEGRO_JOINTS)), "straight fingers"
-
-
-def _table_link(known: Hand, name: str) -> str:
-    """Return the name of a module's link in the table of links."""
-    # The hand names links by finger (`index_link3`), the table by joint, as the URDF of the maker.
-    link = known.modules[name].link
-    if link == PALM_LINK:
-        return link
-    finger, number = link.split("_link")
-    return f"link_{FIRST_JOINTS[finger] + int(number)}.0"
-
-
-def _mount(known: Hand, name: str) -> RigidPose:
-    """Return the pose of the frame of a sensor on its link."""
-    module = known.modules[name]
-    # The table has the pose of each taxel on the link, the sensor has it in its own frame: one
-    # taxel is enough, as the sensor is rigid.
-    rotation = module.rotations[0] @ module.sensor.rotations[0].T
-    return module.positions[0] - rotation @ module.sensor.positions[0], rotation
 
 
 def _pose(pose: RigidPose) -> Array:
