@@ -166,7 +166,7 @@ def test_a_module_of_one_taxel_is_one_line(capsys, tmp_path):
     save_recording(Recording("one", {"index": Tactile(one, np.arange(300) / 100, readings)}), path)
     assert main(["doctor", str(path), "--history", str(tmp_path / "history.json")]) == 0
     out = capsys.readouterr().out
-    assert out.endswith("- index has one taxel: no field or touch can be told apart\n")
+    assert out.endswith("- index has one taxel: a field and a touch look the same in it\n")
 
 
 def test_a_sensor_without_positions_is_one_line(capsys, tmp_path):
