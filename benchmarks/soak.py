@@ -70,7 +70,7 @@ class Day(DeviceSource):
         self._decoder = XelaDecoder()
         self._decoder.identify(self._packet(0))
         self.sensors = self._decoder.sensors
-        self._start(0.0)
+        self.begin_reading(0.0)
 
     @property
     def ended(self) -> bool:
@@ -80,13 +80,13 @@ class Day(DeviceSource):
     def open(self) -> None:
         """Do nothing: there is no device."""
 
-    def _receive(self, timeout: float) -> bool:
+    def receive(self, timeout: float) -> bool:
         if self.n % 256 == 0:
             self._wait_for_the_recorder()
         packet = self._packet(self.n)
         self.begun = time.perf_counter()
         received = self.n / RATE
-        self._queue(self._decoder.decode(packet, received), received)
+        self.queue(self._decoder.decode(packet, received), received)
         self.n += 1
         return True
 
@@ -102,10 +102,10 @@ class Day(DeviceSource):
         stamp = b"%.6f" % (EPOCH + k / RATE)
         return (before + b"%d" % (k + 1) + after).replace(b"1234567890.5", stamp)
 
-    def _reconnect(self) -> bool:
+    def reconnect(self) -> bool:
         return True
 
-    def _disconnect(self) -> None:
+    def disconnect(self) -> None:
         pass
 
 

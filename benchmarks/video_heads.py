@@ -19,7 +19,7 @@ from holdfast.labelling.rules.video import VIDEO_RULE
 from holdfast.metrics.slip_thresholds import choose_threshold, slip_curve
 from holdfast.metrics.slips import SlipCurve, slip_metrics
 from holdfast.training.evaluation import compute_decisions
-from holdfast.training.teaching import FALSE_ALARMS, teach
+from holdfast.training.teaching import WANTED_FALSE_ALARMS, teach
 
 
 def labelled_fingers(recording, with_truth):
@@ -47,7 +47,7 @@ def main():
             fingers = compute_decisions(model, recording).fingers.values()
             curves += [slip_curve(finger.slip) for finger in fingers if finger.slip]
         total = SlipCurve.total(curves)
-        at = choose_threshold(total, FALSE_ALARMS)
+        at = choose_threshold(total, WANTED_FALSE_ALARMS)
         metrics = slip_metrics(total[at])
         found[onsets] = (metrics.incipient["0.1"], metrics.before_1mm, metrics.auc)
         print(

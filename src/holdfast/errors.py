@@ -39,7 +39,7 @@ EXTRA_PURPOSES = {
     "twin": "holdfast simulate and the source twin:",
     "plot": "figures, --plot",
     "label": "holdfast label",
-    "video": "holdfast label markers, and stickers in videos",
+    "video": "holdfast label markers, record --camera, and stickers in videos",
     "onnx": "classifiers as ONNX files",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",

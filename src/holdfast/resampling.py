@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import StreamError
-from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.recordings import GAP_PERIODS, Recording
 from holdfast.sensors.types import Array, Flags, Integers
 
 TOLERANCE_PERIODS = 1e-3
@@ -151,28 +151,26 @@ def resample(recording: Recording, rate: float) -> Recording:
         ValueError: the rate is not above 0.
     """
     _check_rate(rate)
-    modules = {name: _resample(module, rate) for name, module in recording.modules.items()}
+    modules = dict(recording.modules)
+    for name, module in recording.modules.items():
+        if not module.n_samples:
+            continue
+        cuts = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
+        bounds = [0, *cuts.tolist(), module.n_samples]
+        pieces = []
+        for first, last in pairwise(bounds):
+            own = module.times[first:last]
+            values = np.asarray(module.readings[first:last], dtype=np.float64)
+            reached = ((own - own[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
+            change = _interpolated if rate * module.period >= 1 else _averaged
+            pieces.append(change(own, values, reached, rate))
+        times = np.concatenate([times for times, _ in pieces])
+        readings = np.concatenate([readings for _, readings in pieces])
+        bare = replace(module, times=times, readings=readings, labels=())
+        end = float(times[-1]) + bare.period  # labels may reach past what the new samples reach
+        labels = [replace(x, end=min(x.end, end)) for x in module.labels if x.start < end]
+        modules[name] = replace(bare, labels=tuple(labels))
     return replace(recording, modules=modules)
-
-
-def _resample(module: Tactile, rate: float) -> Tactile:
-    if not module.n_samples:
-        return module
-    cuts = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
-    bounds = [0, *cuts.tolist(), module.n_samples]
-    pieces = []
-    for first, last in pairwise(bounds):
-        own = module.times[first:last]
-        values = np.asarray(module.readings[first:last], dtype=np.float64)
-        reached = ((own - own[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
-        change = _interpolated if rate * module.period >= 1 else _averaged
-        pieces.append(change(own, values, reached, rate))
-    times = np.concatenate([times for times, _ in pieces])
-    readings = np.concatenate([readings for _, readings in pieces])
-    bare = replace(module, times=times, readings=readings, labels=())
-    end = float(times[-1]) + bare.period  # labels may reach past what the new samples reach
-    labels = [replace(x, end=min(x.end, end)) for x in module.labels if x.start < end]
-    return replace(bare, labels=tuple(labels))
 
 
 def _interpolated(

@@ -10,7 +10,7 @@ SHOWN = {
     "detect": "--summary --in-contact --sensor --seconds --json",
     "serve": "--host --port --token-file --record-to --speed --once --in-contact --ros1 --ros2 "
     "--json",
-    "record": "--seconds --object --case --note --set --force --json",
+    "record": "--seconds --object --case --note --set --camera --force --json",
     "play": "--host --port --speed --once --json",
     "import": "--format --sensor --columns --no-labels --suffix --jobs --force --json",
     "label": "--tare --poses --track --video --author --browser --json",

@@ -9,6 +9,7 @@ from holdfast.cli.options import DEFAULT_JOBS
 
 OTHER_MEANING = {
     "--false-alarms": "by labels of events, and of all alarms in handling without labels",
+    "--for": "the threshold that tune chooses, and the one answer that train fits",
     "--format": "of the input, and of exported recordings",
     "--fps": "of an exported dataset, and of a video of stickers",
     "--hand": "the hand that play stands for is driven by another program",
@@ -65,7 +66,8 @@ def test_jobs_have_one_default_in_every_verb():
         if "--jobs" in {flag for flag, _ in declarations(app.load_verb(name))}
     }
     assert set(defaults) == {
-        "import", "label", "label audit", "train", "evaluate", "simulate", "trial", "study",
+        "import", "label", "label audit", "train", "evaluate", "teach", "simulate", "trial",
+        "study",
     }  # fmt: skip
     assert set(defaults.values()) == {DEFAULT_JOBS}
 

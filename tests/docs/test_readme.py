@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from holdfast import twin_recordings
-from holdfast.cli.demo import verb as demo
+from holdfast.cli import demo
 from holdfast.io import save_recording
 from holdfast.parallel import Engine
 from holdfast.recordings import Tactile

@@ -12,10 +12,10 @@ import pytest
 from msgspec.structs import fields
 
 import holdfast
-from holdfast.cli.detect.estimates import EstimateChunk
 from holdfast.cli.detect.output import json_lines
 from holdfast.contact import ContactEstimate
 from holdfast.live.documents import FingerDocument, document_type, finger_document
+from holdfast.live.estimate_chunks import EstimateChunk
 from live import estimates
 
 PACKAGE = Path(holdfast.__file__).parent
@@ -24,7 +24,7 @@ NEW_FIELD = "    slip_distance: float | None = None\n"
 PROGRAM = """
 import json, sys
 import holdfast
-from holdfast.cli.detect.estimates import EstimateChunk
+from holdfast.live.estimate_chunks import EstimateChunk
 from holdfast.cli.detect.output import json_lines
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.live.documents import finger_document

@@ -436,3 +436,14 @@ def test_a_full_disk_keeps_what_was_written(path):
     thumb = recording.modules["thumb"]
     np.testing.assert_array_equal(thumb.readings[:, 0, 0], np.arange(thumb.n_samples))
     assert 10_000 < path.stat().st_size <= 30_000
+
+
+def test_the_time_of_the_session_is_that_of_the_quickest_arrival(tmp_path, monkeypatch):
+    with Recorder(tmp_path / "a.mcap", {"thumb": sensor("anyskin")}) as recorder:
+        assert math.isnan(recorder.session_time())
+        for now, late in ((5.0, 0.3), (6.0, 0.1), (7.0, 0.2)):  # on their way
+            samples = {"thumb": np.zeros((5, 3))}
+            recorder.put(Arrival(1000.0 + now - late, samples, received=now))
+        monkeypatch.setattr(module.time, "monotonic", lambda: 9.0)
+        assert recorder.session_time() == pytest.approx(1008.9)
+        monkeypatch.undo()

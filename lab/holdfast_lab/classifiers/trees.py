@@ -101,6 +101,7 @@ class GradientBoosting:
             max_leaf_nodes=parameters["n_leaves"],
             min_samples_leaf=parameters["leaf_samples"],
             class_weight="balanced",
+            # It would hold out random samples, neighbours of those that it is fitted to.
             early_stopping=False,
             random_state=seed,
         )

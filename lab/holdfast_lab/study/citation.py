@@ -112,6 +112,7 @@ def methods_text(plan: StudyPlan, summary: Mapping[str, Any], tables: Sequence[R
         f"- {title}{f' [@{CITED[name]}]' if name in CITED else ''}: {METHODS[name].source}."
         for name, title in method_titles(plan).items()
     ]
+    # Packages that are not installed have no version.
     versions = [f"{name} {number}" for name, number in summary["versions"].items() if number]
     quick = " This was a quick study; quote a full one." if summary["quick"] else ""
     paragraphs = [

@@ -83,11 +83,13 @@ class KnownLoad(Law):
     def know(self, simulation: Simulation, trial: Trial) -> None:
         """Take the truth of a sample."""
         self.force = min(needed_force(trial).at(simulation.held_for))
+        # The first grip is the unit of every scale, so it is what was measured last before it.
         if not self._began:
             self.start_force = float(simulation.world.loads.sum())
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
         """Return the scale that gives the multiple of the least force."""
+        # Nothing to press with, or no force that holds: an oracle has no answer, so it stays.
         if not (self.start_force > 0 and self.force < np.inf):
             return [(touch.scale, GripReason.NONE) for touch in touches]
         scale = self.multiple * self.force / self.start_force
@@ -166,6 +168,7 @@ def true_estimate(estimate: HandEstimate, simulation: Simulation) -> HandEstimat
     fingers = {}
     for finger, row in zip(FINGERS, tips, strict=True):
         touching, slides = row[TIP_LOAD] > CONTACT_FORCE, row[TIP_SLIP] > SLIP_SPEED
+        # Where the laws have no estimate, in a tare or a fault, this row has none either.
         if estimate.fingers[finger].state is ContactState.UNKNOWN:
             fingers[finger] = estimate.fingers[finger]
             continue
@@ -178,6 +181,7 @@ def true_estimate(estimate: HandEstimate, simulation: Simulation) -> HandEstimat
             slip_probability=float(touching and slides),
             slip_speed=1e3 * float(row[TIP_SLIP]) if touching and slides else 0.0,
         )
+    # The state of the hand follows from those of its fingers by the rule of the detector.
     codes = np.array([finger.state.code for finger in fingers.values()], dtype=np.int64)
     number = hand_state(codes, len(fingers))
     state = next(kind for kind in ContactState if kind.code == number)

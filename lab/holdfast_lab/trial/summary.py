@@ -50,6 +50,7 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         >>> summarize([held, held])["dropped"]
         {'value': 100.0, 'interval': [100.0, 100.0]}
     """
+    # What no force can hold tells nothing about a law.
     held = [result for result in results if result.held and result.feasible]
     slips = [result.slip for result in held]
     reacting = [result for result in held if not math.isnan(reaction_time(result))]
@@ -104,6 +105,7 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
         `slid_less`, `slid_more` [%] and, of those in which something slipped under both laws,
         `reacted_sooner` and `reacted_later` [%]. Each number is {"value": x, "interval": ...}.
     """
+    # Paired by trial: what differs between trials, such as weight and friction, cancels.
     by_number = {one.number: one for one in others if one.held and one.feasible}
     pairs = [
         (result, by_number[result.number])
@@ -112,6 +114,7 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
     ]
     ones = [1.0] * len(pairs)
     reactions = [(reaction_time(one), reaction_time(other)) for one, other in pairs]
+    # NaN: there was no slip to react to under one of the laws.
     known = [times for times in reactions if not np.isnan(times).any()]
     return {
         "n": len(pairs),

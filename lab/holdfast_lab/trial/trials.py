@@ -125,6 +125,7 @@ def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     """
     objects = _objects()
     name, item, table = objects[number % len(objects)]
+    # Shifted by one after each round of the objects, so that every object meets every kind.
     kind = LOAD_KINDS[(number + number // len(objects)) % len(LOAD_KINDS)]
     generator = np.random.default_rng([seed, number])
     grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table, plant=plant)
@@ -139,7 +140,7 @@ def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     if kind is LoadKind.WEIGHT:
         load = Load(kind, start, 0.0, item.mass * between(0.6, 1.4))
     elif kind is LoadKind.FRICTION:
-        load = Load(kind, start, 0.0, between(0.65, 0.4))
+        load = Load(kind, start, 0.0, between(0.65, 0.4))  # a larger share is a harder load
     elif kind is LoadKind.PULL:
         duration = float(generator.uniform(0.6, 1.2))
         load = Load(kind, start, duration, item.mass * GRAVITY * between(0.8, 1.6), direction)
@@ -152,6 +153,7 @@ def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     three = item.shape != "sphere" and number // len(objects) % 2 == 1
     speed = float(generator.uniform(*CLOSING_SPEED))
     shortest, longest = plant_named(plant).latency
+    # From a stream of its own: a plant with another latency has the same loads.
     latency = int(grasp.generator("latency").integers(shortest, longest + 1))
     return Trial(number, grasp, 3 if three else 4, load, speed, latency)
 

@@ -74,7 +74,7 @@ def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
 
 def simulate_split(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> None:
     """Simulate the missing recordings of a part of the benchmark."""
-    from holdfast.cli.simulate import GraspOptions
+    from holdfast.cli.simulate.options import GraspOptions
     from holdfast.twin.objects import OTHER_OBJECTS
     from holdfast.twin_recordings import plan_grasps, simulate_grasps
     from holdfast_lab.study.benchmark.protocol import MEASURED_ALL

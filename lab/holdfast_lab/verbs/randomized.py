@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import RARE
-from holdfast.cli.simulate import GraspOptions
+from holdfast.cli.simulate.options import GraspOptions
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
 

@@ -170,7 +170,8 @@ def _axis_paths(prefix: str, kind: str, axes: str = "xyz") -> set[str]:
     return {f"{prefix}{axis} {kind}" for axis in axes}
 
 
-def _from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+def from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the samples of a SensStream: all sensors of a XELA server."""
     return [
         DeviceSample(
             one["sensor_pos"],
@@ -185,21 +186,23 @@ def _from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     ]
 
 
-def _from_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+def from_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the samples of an XStream, which has neither models nor times."""
     return [
         DeviceSample(one["sensor"], "", None, None, None, _counts(_points(one["xyz"])), _NO_FORCES)
         for one in message["data"]
     ]
 
 
-def _from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
+def from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the sample of an xServerMsg, of one sensor."""
     counts = _counts(_points([one["point"] for one in message["points"]]))
     number, model = message["sensor"], message["model"]
     stamp = _seconds(message["header"]["stamp"])
     return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
 
 
-def _from_sensor_state(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
+def from_sensor_state(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
     """Return the sample of a PapillArray; ROS 2 allows small letters only in names of fields."""
     forces = _points(message["pillars"], names)
     time = message["tus"] * 1e-6 if message["tus"] > 0 else None
@@ -218,21 +221,21 @@ _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSamp
         }
         | _axis_paths("sensors[].taxels[].", "uint16")
         | _axis_paths("sensors[].forces[].", "float32"),
-        _from_sens_stream,
+        from_sens_stream,
     ),
-    ({"data[].sensor int16"} | _axis_paths("data[].xyz[].", "uint32"), _from_x_stream),
+    ({"data[].sensor int16"} | _axis_paths("data[].xyz[].", "uint32"), from_x_stream),
     (
         {"sensor int16", "model string", "header.frame_id string"}
         | _axis_paths("points[].point.", "float64"),
-        _from_x_server,
+        from_x_server,
     ),
     (
         {"tus int64"} | _axis_paths("pillars[].f", "float32", "XYZ"),
-        partial(_from_sensor_state, names=("fX", "fY", "fZ")),
+        partial(from_sensor_state, names=("fX", "fY", "fZ")),
     ),
     (
         {"tus int64"} | _axis_paths("pillars[].f", "float32"),
-        partial(_from_sensor_state, names=("fx", "fy", "fz")),
+        partial(from_sensor_state, names=("fx", "fy", "fz")),
     ),
 )
 

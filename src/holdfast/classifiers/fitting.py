@@ -195,6 +195,7 @@ def sigmoid(
     """
     from sklearn.linear_model import LogisticRegression
 
+    # Divided by their spread, so that the penalty of C is small whatever the scale of the values.
     spread = float(values.std()) or 1.0
     fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, positive)
     slope = float(fit.coef_[0, 0]) / spread

@@ -155,7 +155,7 @@ def _evaluate(
         share = np.where(is_positive, class_weights[1], class_weights[0])
         z = weights[:d] @ x + weights[d]
         margin = np.where(is_positive, z, -z)
-        size = np.exp(-np.abs(z))
+        size = np.exp(-np.abs(z))  # of the negative one, which never overflows
         likely = 1.0 / (1.0 + size)  # probability of the sign of z
         unlikely = size * likely
         objective += float(share @ (np.maximum(-margin, 0.0) - np.log(likely)))
@@ -197,12 +197,13 @@ def _evaluate_multinomial(
         is_class = np.arange(n_classes)[:, None] == classes[part]
         share = class_weights[classes[part]]
         z = weights.reshape(n_classes, width) @ x
-        top = z.max(axis=0)
+        top = z.max(axis=0)  # taken off, so that no exponential overflows
         p = np.exp(z - top)  # p_k = exp(z_k) / sum_l exp(z_l)
         total = p.sum(axis=0)
         p /= total
         objective += float(share @ (np.log(total) + top - (z * is_class).sum(axis=0)))
         gradient += ((share * (p - is_class)) @ x.T).ravel()
+        # Of the symmetric Hessian the lower half, which is copied after the last part.
         for k in range(n_classes):
             for m in range(k + 1):
                 bend = share * p[k] * ((k == m) - p[m])

@@ -96,6 +96,7 @@ def run_rows(
     options = import_module("onnxruntime").RunOptions()
     options.log_severity_level = 4
     parts = np.split(rows, range(MAX_ROWS, len(rows), MAX_ROWS))
+    # By process: a thread does not go on in a process that is forked.
     _start_watch(os.getpid())
     _running[options] = monotonic() + limit * len(parts)
     try:
@@ -119,6 +120,7 @@ def _start_watch(_: int) -> None:
 def _watch() -> None:
     while True:
         sleep(WATCH_INTERVAL)
+        # Of a copy: runs of other threads begin and end at any time.
         for options, deadline in list(_running.items()):
             if monotonic() > deadline:
                 options.terminate = True

@@ -111,5 +111,6 @@ def _session(content: bytes, n_features: int) -> tuple[Any, str, type[np.floatin
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES or len(session.get_outputs()) != 1:
         raise ModelError("an ONNX file with one input of floating-point numbers, and one output")
     name, dtype = inputs[0].name, INPUT_TYPES[inputs[0].type]
+    # One row first, against its own limit: a file that is too slow is refused at once.
     run_rows(session, name, np.zeros((1, n_features), dtype), ROW_LIMIT)
     return session, name, dtype

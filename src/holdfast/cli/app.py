@@ -283,6 +283,8 @@ def load_verb(name: str) -> Callable[..., None]:
     # `import` is a keyword, so its module is import_.py.
     names = [f"{word}_" if keyword.iskeyword(word) else word for word in name.split()]
     module = import_module(".".join(("holdfast.cli", *names)))
+    if hasattr(module, "__path__"):  # a folder, which has the verb beside its other files
+        module = import_module(f"{module.__name__}.verb")
     verb: Callable[..., None] = getattr(module, names[-1])
     return verb
 

@@ -1,6 +1,5 @@
 """`holdfast record`: record a source to a file, with markers."""
 
-import math
 from pathlib import Path
 from typing import Annotated
 
@@ -109,19 +108,13 @@ def record(
                     break
     status = recorder.status
     if as_json:
-        mean = (status.n_samples - 1) / status.seconds if status.seconds else math.nan
-        fields = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
-        counts = {field: getattr(status, field) for field in fields}
-        known = {"path": path, "seconds": status.seconds, "n_samples": status.modules}
-        print_json({**known, "rate": mean, **counts, "complete": True})
+        print_json({"path": path, **status.document(), "complete": True})
         return
     print_line(
         f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "
         f"in {path} ({format_size(status.n_bytes)})"
     )
-    if status.n_dropped:
-        print_message(
-            f"{status.n_dropped} samples were dropped: the disk is too slow, "
-            "or the file cannot store them"
-        )
+    if n := status.n_dropped:
+        reason = "the disk is too slow, or the file cannot store them"
+        print_message(f"{n} samples were dropped: {reason}")
     print_message(f"next: holdfast info {path}")

@@ -66,7 +66,7 @@ def serve(
     """
     from holdfast.devices.sources import open_source
     from holdfast.live.session import Session, publishing
-    from holdfast.live.web.service import run_page
+    from holdfast.live.web.serving import run_page
     from holdfast.web.guard import Guard
     from holdfast.web.server import page_url
 

@@ -72,20 +72,22 @@ class MessageDecoder:
         return message
 
     def _message(self, source: "_Ros1Bytes", name: str) -> dict[str, Any]:
-        return {f.name: self._field(source, f) for f in self._definition.types[name]}
-
-    def _field(self, source: "_Ros1Bytes", field: MessageField) -> Any:  # noqa: ANN401 (any ROS type)
-        if field.size is None:
-            return self._value(source, field.kind)
-        n = field.size or source.length()
-        if field.kind in NUMBER_CODES:
-            return source.array(field.kind, n)
-        if (number := self._points.get(field.kind)) is not None:
-            return source.array(number, 3 * n).reshape(n, 3)
-        # Before the list is made: a short message may claim 2^32 elements.
-        if n * self._sizes[field.kind] > source.n_left:
-            raise ValueError(f"{field.name}: {n} given, {source.n_left} bytes left")
-        return [self._value(source, field.kind) for _ in range(n)]
+        found: dict[str, Any] = {}
+        for field in self._definition.types[name]:
+            if field.size is None:
+                found[field.name] = self._value(source, field.kind)
+                continue
+            n = field.size or source.length()
+            if field.kind in NUMBER_CODES:
+                found[field.name] = source.array(field.kind, n)
+            elif (number := self._points.get(field.kind)) is not None:
+                found[field.name] = source.array(number, 3 * n).reshape(n, 3)
+            # Before the list is made: a short message may claim 2^32 elements.
+            elif n * self._sizes[field.kind] > source.n_left:
+                raise ValueError(f"{field.name}: {n} given, {source.n_left} bytes left")
+            else:
+                found[field.name] = [self._value(source, field.kind) for _ in range(n)]
+        return found
 
     def _value(self, source: "_Ros1Bytes", kind: str) -> Any:  # noqa: ANN401 (any ROS type)
         if kind in NUMBER_CODES:
@@ -123,21 +125,19 @@ class MessageEncoder:
 
     def _message(self, data: bytearray, name: str, message: Mapping[str, Any]) -> None:
         for field in self._definition.types[name]:
-            self._field(data, field, message[field.name])
-
-    def _field(self, data: bytearray, field: MessageField, value: Any) -> None:  # noqa: ANN401
-        if field.size is None:
-            self._value(data, field.kind, value)
-            return
-        if field.size == 0:
-            _append_numbers(data, "uint32", (len(value),))
-        elif len(value) != field.size:
-            raise ValueError(f"{field.name}: {field.size} values expected, {len(value)} given")
-        if field.kind in NUMBER_CODES:
-            _append_numbers(data, field.kind, value)
-            return
-        for one in value:
-            self._value(data, field.kind, one)
+            value = message[field.name]
+            if field.size is None:
+                self._value(data, field.kind, value)
+                continue
+            if field.size == 0:  # of any length, which precedes the values
+                _append_numbers(data, "uint32", (len(value),))
+            elif len(value) != field.size:
+                raise ValueError(f"{field.name}: {field.size} values expected, {len(value)} given")
+            if field.kind in NUMBER_CODES:
+                _append_numbers(data, field.kind, value)
+            else:
+                for one in value:
+                    self._value(data, field.kind, one)
 
     def _value(self, data: bytearray, kind: str, value: Any) -> None:  # noqa: ANN401
         if kind in NUMBER_CODES:

@@ -358,7 +358,14 @@ def _next_answer(values: Iterator[tuple[bytes, Arrays]], path: Path) -> _Answer:
             return _Answer("value")
     except Exception as cause:
         text = str(cause)[:MAX_TEXT].encode(errors="backslashreplace").decode()
-        return _Answer("memory" if _is_of_memory(cause) else "error", text)
+        # A library may hide that no memory is left behind an error of its own.
+        inner: BaseException | None = cause
+        while inner is not None and not isinstance(inner, MemoryError):
+            # The file of values has reached its limit, FSIZE.
+            if isinstance(inner, OSError) and inner.errno == errno.EFBIG:
+                break
+            inner = inner.__cause__ or inner.__context__
+        return _Answer("error" if inner is None else "memory", text)
     return _Answer("end")
 
 
@@ -377,7 +384,8 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
             _limit("CPU", int(end) + 1)
 
 
-def _import(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the recordings in a file, and the reports about them."""
     from holdfast.io.importers import extra_of, importer, takes_sensors
     from holdfast.io.importers.csv_columns import Columns
 
@@ -410,7 +418,8 @@ def _texts(lines: list[str]) -> Iterator[tuple[bytes, Arrays]]:
         yield os.fsencode(lines.pop(0)), []
 
 
-def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def poses_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the poses of bodies in a file as one value."""
     from holdfast.io.importers import importer
 
     source = importer(str(request.options["format"]))
@@ -419,7 +428,8 @@ def _poses(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     yield msgspec.json.encode(list(poses)), list(poses.values())
 
 
-def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def stickers_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield the places of stickers in a video, part by part."""
     from holdfast.io.stickers import sticker_places
 
     import_module("cv2")
@@ -428,7 +438,8 @@ def _stickers(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
         yield msgspec.json.encode(list(places)), [times, levels, *places.values()]
 
 
-def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+def limits_task(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
+    """Yield which limits hold; that of memory is tried."""
     _limit_memory(request)
     try:
         # Twice the limit, so that it must fail where the limit holds.
@@ -441,10 +452,10 @@ def _try_limits(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
-    "import": _import,
-    "poses": _poses,
-    "stickers": _stickers,
-    "limits": _try_limits,
+    "import": import_task,
+    "poses": poses_task,
+    "stickers": stickers_task,
+    "limits": limits_task,
 }
 
 
@@ -467,13 +478,3 @@ def _limit(name: str, value: int) -> None:
         hard = resource.getrlimit(kind)[1]
         value = value if hard == resource.RLIM_INFINITY else min(value, hard)
         resource.setrlimit(kind, (value, hard))
-
-
-def _is_of_memory(cause: BaseException | None) -> bool:
-    """Return whether an error, or what caused it, is that no memory is left, or no file for it."""
-    while cause is not None and not isinstance(cause, MemoryError):
-        # The file of values has reached its limit, FSIZE.
-        if isinstance(cause, OSError) and cause.errno == errno.EFBIG:
-            return True
-        cause = cause.__cause__ or cause.__context__
-    return cause is not None

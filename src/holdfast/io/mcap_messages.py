@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.io.cdr import MessageDecoder, MessageEncoder
-from holdfast.io.definitions import Definition, parse_definition
+from holdfast.io.definitions import parse_definition
 from holdfast.sensors.types import Array
 
 TEXT_TYPE = "holdfast_msgs/msg/Text"
@@ -72,7 +72,7 @@ def encode_samples(times: Array, values: npt.NDArray[Any]) -> bytes:
         "shape": values.shape[1:],
         "values": flat.tolist() if number == "str" else flat,
     }
-    return _samples_encoder(number)(message)
+    return _samples_codecs(number)[0](message)
 
 
 def decode_samples(data: bytes, number: str) -> tuple[Array, npt.NDArray[Any]]:
@@ -81,7 +81,7 @@ def decode_samples(data: bytes, number: str) -> tuple[Array, npt.NDArray[Any]]:
     Raises:
         ValueError: the bytes are not a message of samples of this number type.
     """
-    message = _samples_decoder(number)(data)
+    message = _samples_codecs(number)[1](data)
     times, shape = message["times"], tuple(message["shape"].tolist())
     values = message["values"]
     if number == "str":
@@ -111,15 +111,8 @@ def decode_text(data: bytes) -> tuple[float, str]:
     return message["time"], message["text"]
 
 
-def _samples_definition(number: str) -> Definition:
-    return parse_definition(samples_type(number), samples_schema(number))
-
-
 @cache
-def _samples_encoder(number: str) -> MessageEncoder:
-    return MessageEncoder(_samples_definition(number))
-
-
-@cache
-def _samples_decoder(number: str) -> MessageDecoder:
-    return MessageDecoder(_samples_definition(number), ros2=True)
+def _samples_codecs(number: str) -> tuple[MessageEncoder, MessageDecoder]:
+    """Return the encoder and the decoder of the samples of a number type, which are made once."""
+    definition = parse_definition(samples_type(number), samples_schema(number))
+    return MessageEncoder(definition), MessageDecoder(definition, ros2=True)

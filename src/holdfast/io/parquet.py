@@ -368,7 +368,21 @@ class _GroupReader:
             RecordingError: it is damaged.
         """
         try:
-            arrays = _columns(specs, self._file.read_row_group(group, columns=names), self._order)
+            table = self._file.read_row_group(group, columns=names)
+            columns = (column.combine_chunks() for column in table.columns)
+            arrays: dict[str, TimedArray] = {}
+            times: Array = np.empty(0)
+            for spec in specs:
+                # Columns have the order of the arrays; those of truth share the times of the first.
+                if spec.track != "truth" or spec.topic == TRUTH_TIME:
+                    column = next(columns)
+                    # Nulls are only after the last sample of the module in this span.
+                    times = _rows([column], len(column) - column.null_count)[0]
+                if spec.topic == TRUTH_TIME:
+                    arrays[spec.topic] = (times, times)
+                    continue
+                components = list(islice(columns, spec.n_components))
+                arrays[spec.topic] = (times, _rows(components, len(times), self._order))
         except (pa.ArrowException, OSError, ValueError) as cause:
             raise RecordingError(
                 f"{self._path} is damaged in row group {group}: {one_line(cause)}"
@@ -381,24 +395,6 @@ def _value_size(spec: ArraySpec) -> int:
     """Return the size of a value and its time in memory [bytes]."""
     n_bytes: int = 8 + spec.n_components * np.dtype(_memory_type(spec)).itemsize
     return n_bytes
-
-
-def _columns(specs: list[ArraySpec], table: pa.Table, order: Literal["C", "F"]) -> TimedArrays:
-    """Return times and values of each array, a row for each component, in this order in memory."""
-    columns = (column.combine_chunks() for column in table.columns)
-    arrays: dict[str, TimedArray] = {}
-    times: Array = np.empty(0)
-    for spec in specs:
-        if spec.track != "truth" or spec.topic == TRUTH_TIME:
-            column = next(columns)
-            # Nulls are only after the last sample of the module in this span.
-            times = _rows([column], len(column) - column.null_count)[0]
-        if spec.topic == TRUTH_TIME:
-            arrays[spec.topic] = (times, times)
-            continue
-        components = list(islice(columns, spec.n_components))
-        arrays[spec.topic] = (times, _rows(components, len(times), order))
-    return arrays
 
 
 def _rows(columns: list[pa.Array], n: int, order: Literal["C", "F"] = "C") -> npt.NDArray[Any]:

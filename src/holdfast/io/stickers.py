@@ -6,6 +6,7 @@ the place is exact to a few hundredths of a pixel, where single corners are five
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ Array = npt.NDArray[np.float64]
 
 MAX_VIDEO = 4_000_000_000
 """Largest video that is read [bytes]: an hour of a phone."""
+MAX_STAMPS = 50_000_000
+"""Largest file of times of pictures [bytes]: four million pictures."""
 MAX_PIXELS = 3840 * 2160
 """Most pixels of a picture."""
 PICTURES_PER_PART = 60
@@ -53,11 +56,11 @@ def picture_stamps(video: Path) -> Array | None:
     path = stamps_path(video)
     if not path.exists():
         return None
-    try:
-        # A process that was killed may have written half of the last line.
-        stamps = np.array([float(line) for line in path.read_text().split("\n")[:-1]])
-    except (OSError, ValueError):
-        stamps = np.zeros(2)
+    stamps = np.zeros(2)
+    with suppress(OSError, ValueError):
+        if path.stat().st_size <= MAX_STAMPS:
+            # A process that was killed may have written half of the last line.
+            stamps = np.array([float(line) for line in path.read_text().split("\n")[:-1]])
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0).any():
         raise RecordingError(f"{path}: a time in each line [s], each later than the last, expected")
     return stamps

@@ -15,7 +15,7 @@ from holdfast.openable import Closable
 
 STALL_TIME = 1.0
 """Time without a picture after which a camera is reported [s]."""
-DEFAULT_RATE = 30.0
+UNSTATED_RATE = 30.0
 """Rate that is written to the file if the camera gives none [Hz]. The stamps are exact."""
 
 
@@ -53,7 +53,7 @@ class CameraRecorder(Closable):
                 f"no camera {camera}: the number of a camera (0 is the first), or a video file "
                 "or stream expected"
             )
-        self._rate = self._film.get(cv2.CAP_PROP_FPS) or DEFAULT_RATE
+        self._rate = self._film.get(cv2.CAP_PROP_FPS) or UNSTATED_RATE
         # A file has all its pictures at once; a camera sends them one period apart.
         self._pause = 1 / self._rate if Path(camera).is_file() else 0.0
         self.n_pictures = 0
@@ -111,7 +111,7 @@ class CameraRecorder(Closable):
                 stamps_path(self._path).unlink(missing_ok=True)
 
     def _write(self, clock: Callable[[], float], report: Callable[[str], None]) -> None:
-        is_read, picture = True, self._picture
+        is_read, picture, due = True, self._picture, time.monotonic()
         with stamps_path(self._path).open("w") as stamps:
             while is_read and not self._closing.is_set():
                 self._read_at, stamp = time.monotonic(), clock()
@@ -119,7 +119,8 @@ class CameraRecorder(Closable):
                     self._video.write(picture)
                     stamps.write(f"{stamp:.6f}\n")
                     self.n_pictures += 1
-                self._closing.wait(self._pause)
+                due += self._pause
+                self._closing.wait(max(due - time.monotonic(), 0.0))
                 is_read, picture = self._film.read()
         if not is_read:
             report(f"note: the camera ended after {self.n_pictures} pictures")

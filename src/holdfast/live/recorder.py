@@ -77,6 +77,18 @@ class RecorderStatus(NamedTuple):
     recent_faults: Mapping[str, tuple[Fault, ...]]
     failure: str
 
+    def document(self) -> dict[str, Any]:
+        """Return the progress of a finished recording as JSON values."""
+        # `n_samples` of the document is that of each module; the rate is the mean, not the last.
+        rate = (self.n_samples - 1) / self.seconds if self.seconds else math.nan
+        counts = ("n_gaps", "n_lost", "n_refused", "n_dropped", "n_bytes", "n_markers", "faults")
+        return {
+            "seconds": self.seconds,
+            "n_samples": self.modules,
+            "rate": rate,
+            **{field: getattr(self, field) for field in counts},
+        }
+
 
 class _QueuedMarker(NamedTuple):
     time: float

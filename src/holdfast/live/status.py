@@ -10,7 +10,7 @@ from holdfast.contact import ContactState, Fault, HandEstimate
 from holdfast.detector.slips import SlipWatch
 from holdfast.errors import ModelError
 from holdfast.live.documents import Vector, finger_document
-from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch, Problem
+from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
 from holdfast.live.handling import SessionCalibration
 from holdfast.live.panels import Panel
 from holdfast.live.recorder import Recorder
@@ -118,7 +118,13 @@ class StatusPublisher:
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
             problems=[
-                schema.ProblemDocument(problem.fault, problem.fingers, self._problem_text(problem))
+                schema.ProblemDocument(
+                    problem.fault,
+                    problem.fingers,
+                    f"{problem.text} ({1000 * self._session.delay:.0f} ms)"
+                    if problem.fault is Fault.LATE
+                    else problem.text,
+                )
                 for problem in self._faults.current
             ],
             thresholds=dict(self._session.stream.thresholds),
@@ -132,11 +138,6 @@ class StatusPublisher:
             ],
             **{panel.name: panel.document() for panel in self._panels},
         )
-
-    def _problem_text(self, problem: Problem) -> str:
-        if problem.fault is not Fault.LATE:
-            return problem.text
-        return f"{problem.text} ({1000 * self._session.delay:.0f} ms)"
 
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
         """Keep the newest readings of every finger, minus the tare."""

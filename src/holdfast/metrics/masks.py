@@ -59,6 +59,7 @@ def drop_short_runs(mask: Mask, n_samples: int) -> Mask:
 
 def without_short_runs(mask: Mask, positions: Positions, length: float) -> Mask:
     """Fill the gaps that are shorter than `length`, then remove the runs that are."""
+    # A run is a gap of the opposite mask.
     return ~join_runs(~join_runs(mask, positions, length), positions, length)
 
 
@@ -108,6 +109,7 @@ def covered(grid: Array, times: Array, max_gap: float) -> Mask:
     later = times[np.minimum(after, len(times) - 1)]
     earlier = times[np.maximum(after - 1, 0)]
     inside = (grid >= times[0] - max_gap / 2) & (grid <= times[-1] + max_gap / 2)
+    # Times of exactly `max_gap` may differ by rounding.
     return np.asarray(inside & (later - earlier <= max_gap * (1 + 1e-9)))
 
 

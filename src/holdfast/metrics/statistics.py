@@ -46,6 +46,7 @@ def mann_whitney_u(positive: Array, negative: Array) -> float:
         >>> mann_whitney_u(np.array([0.5, 0.9]), np.array([0.1, 0.5]))
         3.5
     """
+    # By ranks in sorted scores: the pairs themselves would be billions.
     upper, lower = np.sort(positive), np.sort(negative)
     below = np.searchsorted(lower, upper, side="left").sum()
     not_above = np.searchsorted(lower, upper, side="right").sum()
@@ -201,7 +202,7 @@ def draw_recordings(n_recordings: int, n: int, seed: int) -> Array:
     """Return (n, n_recordings) number of times that each resample drew each recording."""
     shares = np.full(n_recordings, 1 / n_recordings)
     draws = np.random.default_rng(seed).multinomial(n_recordings, shares, size=n).astype(float)
-    draws.flags.writeable = False
+    draws.flags.writeable = False  # every statistic of a study gets the same array
     return draws
 
 

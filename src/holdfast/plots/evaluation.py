@@ -73,6 +73,7 @@ def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
     for axes in figure.axes:
         style_axes(axes)
     right.tick_params(labelleft=False)
+    # The legend has lines of its own: panels draw a finger as dots, or as a line without them.
     fingers = [
         left.plot([], [], linewidth=0.9, markersize=4, label=literal(name), **style._asdict())[0]
         for name, style in styles.items()

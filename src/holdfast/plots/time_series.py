@@ -85,6 +85,7 @@ def finger_series(
         force = np.full((module.n_samples, 3), np.nan)
     phases, slip = np.full(module.n_samples, ""), None
     if truth is not None and "phase" in truth.hand and len(truth.times):
+        # The truth has its own times: its latest sample that is not later.
         latest = np.searchsorted(truth.times, module.times, side="right") - 1
         phases = np.asarray(truth.hand["phase"])[np.clip(latest, 0, None)].astype(str)
     if truth is not None and "slip_speed" in truth.fingers.get(finger, {}):
@@ -132,6 +133,7 @@ def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Arra
     if n <= 2 * n_stretches:
         return times, values
     edges = np.linspace(0, n, n_stretches + 1).astype(int)
+    # fmin and fmax pass over NaN: one unknown sample hides no stretch.
     low = np.fmin.reduceat(values, edges[:-1])
     high = np.fmax.reduceat(values, edges[:-1])
     falls = _first_of_each(values, high, edges) < _first_of_each(values, low, edges)
@@ -153,6 +155,7 @@ def draw_curve(
     axes: Axes, series: FingerSeries, values: Array, colour: str, width: float = 1.0
 ) -> None:
     """Draw (n,) values of a finger over time, interrupted at gaps."""
+    # A NaN interrupts a line of matplotlib.
     times = np.insert(series.times, series.gaps, series.times[series.gaps - 1])
     draw_line(axes, times, np.insert(values, series.gaps, np.nan), colour, width)
 

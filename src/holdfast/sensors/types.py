@@ -142,6 +142,7 @@ class Sensor:
         )
 
     def __hash__(self) -> int:
+        # Without the numbers that are compared with a tolerance: equal sensors have one hash.
         return hash((self.name, self.n_taxels))
 
     def to_dict(self) -> dict[str, Any]:
@@ -291,6 +292,7 @@ class Hand:
     modules: Mapping[str, HandModule]
 
     def __post_init__(self) -> None:
+        # Each index once: else `split` would give a reading to two modules, or to none.
         flat = np.sort(np.concatenate([m.flat_indices for m in self.modules.values()]))
         if not np.array_equal(flat, np.arange(len(flat))):
             raise ValueError(f"{self.name}: every flat index must belong to exactly one module")

@@ -46,6 +46,7 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
         raise ValueError(
             f"{path} is not a URDF file (a xacro file must be expanded first): {cause}"
         ) from cause
+    # A link has one parent in a URDF; of a file that gives it two, the last counts.
     parents = {joint.child: joint for joint in joints}
     links = set(parents) | {joint.parent for joint in joints}
     if base not in links:

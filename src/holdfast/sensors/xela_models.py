@@ -28,7 +28,7 @@ DEFAULT_PITCH = 4.7e-3
 NEWTONS_PER_SHEAR_COUNT, NEWTONS_PER_NORMAL_COUNT = 0.000628, 0.000729
 """Resolution of the tangential axes and of the normal of a uSkin taxel, by the data sheet of the
 uSPa46 [N/count]."""
-DEFAULT_RATE = 100.0
+UNKNOWN_MODEL_RATE = 100.0
 """Rate of an unknown model [Hz]; nominal."""
 
 
@@ -104,4 +104,4 @@ def flat_grid(name: str, n_taxels: int) -> Sensor:
     positions = DEFAULT_PITCH * np.column_stack([x, y, np.zeros(n_taxels)])
     rotations = np.tile(np.eye(3), (n_taxels, 1, 1))
     normal = np.array([0.0, 0.0, 1.0])
-    return Sensor(name, positions, rotations, normal, DEFAULT_RATE, range=UINT16)
+    return Sensor(name, positions, rotations, normal, UNKNOWN_MODEL_RATE, range=UINT16)

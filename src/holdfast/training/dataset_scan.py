@@ -166,6 +166,7 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
         RecordingError: two fingers have the same readings.
     """
     recording.check_modules_differ()
+    # Of the file as it is, before repeats are left out: a model names what it was trained on.
     digest, readings_digest = recording.digest, recording.readings_digest
     recording = true_updates(recording)
     modules = {name: module for name, module in recording.modules.items() if module.labels}

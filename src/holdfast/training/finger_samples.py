@@ -129,6 +129,7 @@ def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
         F_a from which on there is contact [unit of the readings]; None with fewer than two
         samples.
     """
+    # Moments of each tare, not its samples: they add up over any choice of recordings.
     n, total, squares = moments.sum(axis=0)
     if n < 2:
         return None

@@ -186,6 +186,7 @@ def fit_recordings(
     Raises:
         TrainingError: the recordings have no labels, or only one class.
     """
+    # Nothing is held out; the random split asks for no second recording and no object's name.
     data = TrainingData.of(recordings, replace(setting, split="random"))
     return fit_full_model(data, setting, dict.fromkeys(data.fingers, parameters))
 

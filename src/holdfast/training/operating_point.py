@@ -249,6 +249,8 @@ class HandlingCurve:
         if false_alarms is None:
             near = [t for t in self.thresholds if self.is_near(t)] or [self.thresholds[-1]]
             return [near[0], *takewhile(self.is_quiet, near)][-1]
+        # Up to the first that alarms too often: beyond it alarms may be fewer again, as a finger
+        # that is never STABLE has none.
         quiet = list(takewhile(lambda t: self.alarms(t) <= false_alarms, self.thresholds))
         if not quiet:
             raise TrainingError(

@@ -52,6 +52,7 @@ class ThresholdReplay:
 
     def states(self, finger: FingerDecisions, threshold: float) -> Codes:
         """Return the states of a finger at a threshold."""
+        # In C: every threshold is tried on every recording.
         out = np.zeros(len(finger.times), dtype=np.int8)
         rule = self.debounce
         limits = np.array([

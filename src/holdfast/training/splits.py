@@ -56,10 +56,13 @@ class DataSplit:
             (n_samples,); -1 for a sample between two blocks of time.
         """
         if self.split == "time":
+            # Neighbours in time are alike, so blocks have a gap between them; a quarter of a block
+            # at most, or a short recording would have nothing but gaps.
             longest = n_samples // (4 * len(self.units))
             gap = min(round(TIME_GAP * self.rates[index]), longest)
             return block_folds(n_samples, len(self.units), gap)
         if self.split == "random":
+            # A recording is read more than once, in any order and process: its own stream.
             generator = np.random.default_rng([self.seed, index])
             return random_folds(n_samples, len(self.units), generator)
         return np.full(n_samples, self.group_of[index])

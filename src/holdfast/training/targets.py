@@ -124,6 +124,7 @@ def slip_target(given: TargetInput, features: Array) -> TargetSamples:
     usable = finite_rows(features, slides | is_still)
     quiet = usable[(is_still & truth.quiet)[usable]][:: step * (1 if given.is_any else QUIET_STEP)]
     disturbed = usable[(is_still & ~truth.quiet)[usable]][::step]
+    # What slides is not thinned: it is rare.
     rows = np.sort(np.concatenate([usable[slides[usable]], quiet, disturbed]))
     return given.samples(features, slides, rows, len(usable))
 
@@ -194,6 +195,7 @@ def true_speed(recording: Recording, finger: str, times: Array) -> Array:
     """
     if recording.truth is None:
         raise ValueError(f"recording {recording.name!r} has no truth; one with a speed expected")
+    # The truth has its own clock: the latest of its samples that is not after the time.
     truth = recording.truth
     index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
     return np.asarray(MILLIMETRES * truth.fingers[finger]["slip_speed"][index])

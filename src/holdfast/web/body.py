@@ -62,6 +62,7 @@ class BodyReader:
         try:
             async with asyncio.timeout(BODY_TIMEOUT):
                 async for chunk in request.content.iter_any():
+                    # What has arrived, not what was announced: that costs a client nothing.
                     self._n_bytes += len(chunk)
                     data += chunk
                     self._check(request, len(data))

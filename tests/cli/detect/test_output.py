@@ -2,10 +2,15 @@ import tracemalloc
 
 import pytest
 
-from holdfast.cli.detect.estimates import EstimateChunk, chunk_from_detection, chunk_from_stream
-from holdfast.cli.detect.output import DetectionSummary, json_lines
+from holdfast.cli.detect.output import json_lines, print_tables
 from holdfast.contact import ContactState
 from holdfast.detector import Detector, detect
+from holdfast.live.estimate_chunks import (
+    DetectionSummary,
+    EstimateChunk,
+    chunk_from_detection,
+    chunk_from_stream,
+)
 from holdfast.live.stream_detector import StreamEstimate
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
@@ -64,7 +69,7 @@ def test_the_summary_of_a_source_without_samples(capsys):
         "events": [],
         "slips": None,
     }
-    summary.print()
+    print_tables(summary.to_dict(), 0.0)
     assert capsys.readouterr().out.splitlines()[1].split()[:2] == ["hand", "0"]
 
 

@@ -38,25 +38,25 @@ class ScriptedDevice(DeviceSource):
 
     def open(self):
         self.close()
-        self._start(self._clock.now)
+        self.begin_reading(self._clock.now)
 
-    def _receive(self, timeout):
+    def receive(self, timeout):
         if not self._script or self._script[0][0] > self._clock.now + timeout:
             self._clock.now += timeout
             return False
         self._clock.now = max(self._clock.now, self._script[0][0])
         at, arrivals = self._script.pop(0)
         if arrivals is None:
-            self._lose("unplugged")
+            self.lose("unplugged")
             return False
-        self._queue(arrivals, at)
+        self.queue(arrivals, at)
         return True
 
-    def _reconnect(self):
+    def reconnect(self):
         self.attempted_at.append(self._clock.now)
         return next(self._attempts, False)
 
-    def _disconnect(self):
+    def disconnect(self):
         self.n_disconnects += 1
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
+from holdfast.io import stickers
 from holdfast.labelling.rules import propose, video, video_clock
 from holdfast.labelling.rules.video import change_point, seen_slips, with_slips
 from holdfast.labelling.rules.video_motion import VideoRule
@@ -253,8 +254,9 @@ def test_the_stamps_of_a_recorded_camera_count(film, tmp_path):
     assert float(found[0].evidence.split("later by ")[1].split()[0]) == pytest.approx(0, abs=0.008)
 
 
-@pytest.mark.parametrize("lines", ["no time\n", "3.0\n", "nan\n"])
-def test_stamps_that_are_none(film, tmp_path, lines):
+@pytest.mark.parametrize("lines", ["no time\n", "3.0\n", "nan\n", "40.0\n" + 20_000 * " "])
+def test_stamps_that_are_none(film, tmp_path, monkeypatch, lines):
+    monkeypatch.setattr(stickers, "MAX_STAMPS", 40_000)
     with pytest.raises(RecordingError, match=r"run\.times: a time in each line \[s\], each later"):
         propose("tracking", recording(), video=stamped(tmp_path, film, lines))
 

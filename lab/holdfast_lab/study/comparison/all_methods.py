@@ -69,6 +69,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
     evaluated = [method_task(plan, name) for name in method_titles(plan)]
     pooled = []
     for name in sample_tables.pooled_methods(plan):
+        # One split, and no thresholds to choose.
         cost = METHOD_SECONDS.get(name, DEFAULT_SECONDS) / 4
         arguments = (method_job(plan, name),)
         pooled.append(
@@ -79,6 +80,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """Return all tables of the comparison that have rows."""
+    # Without a truth there are no grip forces and directions.
     made = [make(plan, results) for make in TABLES]
     return [table for table in made if table.rows]
 
@@ -123,6 +125,8 @@ def alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items():
         rates, missed = [], []
         for alarms in (evaluation.alarms[name] for name in BY_RATE):
+            # Sums over the recordings, not means of their rates: most have too few alarms for a
+            # rate of their own.
             seconds = sum(alarm.stable_seconds for alarm in alarms)
             n_false = sum(alarm.n_under_stable for alarm in alarms)
             rates.append(60 * n_false / seconds if seconds else np.nan)
@@ -181,19 +185,6 @@ def error_figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
         )
         made.append(ReportFigure("directions", caption, drawn))
     return made
-
-
-def _direction_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:
-    rows = sample_tables.directions(plan, results).rows
-    groups = {"direction of the push": _groups(plan, rows, "direction")}
-    if not any(groups.values()):
-        return None
-    caption = (
-        "Disturbances called stable, by direction, by recording. The paper states that "
-        "disturbances in all directions are found."
-    )
-    drawn = draw_groups(groups, "disturbed, called stable [%]", per_row=1)
-    return ReportFigure("directions", caption, drawn)
 
 
 def _groups(

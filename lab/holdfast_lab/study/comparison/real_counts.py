@@ -152,6 +152,7 @@ def count_pairs(
     """
     pairs = []
     for label, *both in zip(labels, first, second, strict=True):
+        # Of the two alone, not of all methods: a method with a long history costs no samples here.
         common = np.all([each.known.array for each in both], axis=0)
         counts = [_count(label, each, common) for each in both]
         by_finger = all(count.fingers for count in counts)

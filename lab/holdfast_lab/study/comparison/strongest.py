@@ -106,7 +106,7 @@ def measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterato
     if OURS not in known:
         return
     titles = method_titles(plan)
-    # Chosen anew for each measure and group: the rival is the best at the very thing shown.
+    # Chosen for each measure and group alone: the rival is the best at the very thing shown.
     for group, names in ((FAMILY, PAPER_FAMILY), (EVERY, tuple(known))):
         best = _fewest_errors({n: known[n] for n in names if n in known and n != OURS})
         if best is None:
@@ -118,6 +118,7 @@ def measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterato
         yield ratio_row(keys | {"figure": "baseline [%]"}, base[:, 0], base[:, 1], plan.seed)
         yield quotient_row(keys | {"figure": RATIO}, base, ours, plan.seed)
         if measure.reading:
+            # Misses alone say nothing: a method that alarms all the time misses none.
             for who, name in (("holdfast", OURS), ("baseline", best)):
                 alarms = evaluations[name].readings[measure.reading][COMPARED]
                 figure = f"{who}, {FALSE_ALARMS_UNDER_STABLE}"
@@ -152,6 +153,7 @@ def held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
     """Return the errors of fingers while the hand holds the object."""
     if evaluation.fingers is None or not any(each.phases for each in evaluation.breakdown):
         return None
+    # Before the grasp and after the release every method is right, which hides the differences.
     counts = []
     for breakdown in evaluation.breakdown:
         grasped = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]

@@ -63,6 +63,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
         _task(plan, f"fingers/{finger}", finger, DEFAULT_WINDOW, _PAPER_VARIANTS, thorough=True)
         for finger in _fingers(plan)
     ]
+    # The paper does not name the finger of its other tables: one stands for it.
     every.append(_task(plan, f"balanced/{first}", first, DEFAULT_WINDOW, _BALANCED, thorough=True))
     for window in _windows(plan):
         variants = (

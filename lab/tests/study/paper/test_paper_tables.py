@@ -23,7 +23,7 @@ def corpora(tmp_path_factory):
 def made(plan):
     """All tables of a plan, each task's result once through msgpack; one trial, few samples."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_tables, "_budget", lambda _: FitBudget(trials=1, n_fit=1000))
+        patch.setattr(paper_tables, "fit_budget", lambda _: FitBudget(trials=1, n_fit=1000))
         patch.setattr(random_split, "SEARCH_SAMPLES", 1000)
         results = {}
         for task in paper_tables.tasks(plan):

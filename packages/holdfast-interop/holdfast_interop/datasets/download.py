@@ -10,15 +10,15 @@ import os
 import shutil
 import stat
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from urllib.parse import quote, urljoin
 
-from holdfast.errors import OutputError, SourceError
+from holdfast.errors import OutputError, RecordingError, SourceError
 from holdfast.files import is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.threads import in_thread
 from holdfast_interop.datasets.registry import PublicFile, PublicSet, other_sets
@@ -26,6 +26,8 @@ from holdfast_interop.datasets.registry import PublicFile, PublicSet, other_sets
 if TYPE_CHECKING:
     from pooch import Pooch
     from requests import Response
+
+    from holdfast.recording_import import ImportResult
 
 FOLDER_VARIABLE = "HOLDFAST_DATASETS"
 """Environment variable with the folder of all downloads."""
@@ -89,8 +91,88 @@ def download(
         registry={file.path: file.sha256 and f"sha256:{file.sha256}" for file in files},
         urls={path: f"{base}{remote}" for path, remote in remotes.items()},
     )
-    with _quiet_log():
+    logger = pooch.get_logger()
+    before = logger.level
+    logger.setLevel("ERROR")  # else pooch prints a line for each file
+    try:
         return [_fetch(public, storage, file, folder, report) for file in files]
+    finally:
+        logger.setLevel(before)
+
+
+def download_files(
+    public: PublicSet,
+    files: Sequence[PublicFile],
+    mirror: str | None,
+    advance: Callable[[float], None],
+) -> None:
+    """Download files of a set to its folder, or continue a download that was interrupted.
+
+    Args:
+        public: the set.
+        files: from `select_files`.
+        mirror: address of a copy of all sets; None for that of the set.
+        advance: called with the number of bytes after each part.
+
+    Raises:
+        ValueError: the mirror is no address.
+        HoldfastError: the files cannot be downloaded.
+    """
+    if mirror is not None and not mirror.startswith(("http://", "https://")):
+        raise ValueError(
+            f"--mirror: an address such as http://HOST:8000 expected, {mirror!r} given"
+        )
+    folder = download_folder(public.name)
+    address = None if mirror is None else f"{mirror.rstrip('/')}/{public.name}/"
+    check_space(files, folder)
+    download(public, files, folder, address, advance)
+
+
+def import_files(
+    public: PublicSet,
+    files: Sequence[PublicFile],
+    out: Path,
+    *,
+    force: bool,
+    notify: Callable[[str], None],
+    steps: Callable[[Iterable[Any], str, float], Iterable[Any]],
+) -> "ImportResult":
+    """Import downloaded files of a set, all of them or none.
+
+    Args:
+        public: the set.
+        files: from `select_files`.
+        out: folder for the recordings.
+        force: replace existing recordings.
+        notify: called with each message of the import.
+        steps: shows the progress of the import.
+
+    Raises:
+        HoldfastError: the files cannot be imported.
+    """
+    from holdfast.parallel import Engine
+    from holdfast.recording_import import ImportTask, import_all
+
+    task = ImportTask(out, public.importer, force=force)
+    with _folder_of(files, download_folder(public.name)) as selected:
+        return import_all(selected, task, Engine(), notify=notify, steps=steps)
+
+
+@contextmanager
+def _folder_of(files: Sequence[PublicFile], folder: Path) -> Iterator[Path]:
+    """Yield a temporary folder with some of the files; errors name the original folder."""
+    with TemporaryDirectory(prefix=".import.", dir=folder) as name:
+        for file in files:
+            target = Path(name) / file.path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                os.link(folder / file.path, target)
+            except OSError:  # a file system without links
+                shutil.copy(folder / file.path, target)
+        try:
+            yield Path(name)
+        except (RecordingError, OutputError) as cause:
+            raise type(cause)(str(cause).replace(name, str(folder))) from cause
 
 
 def check_space(files: Sequence[PublicFile], folder: Path) -> None:
@@ -327,17 +409,3 @@ def _in_time(call: Callable[[], _T]) -> _T:
     except TimeoutError as cause:
         result.add_done_callback(close_late)
         raise requests.Timeout(f"less than {DOWNLOAD_CHUNK} bytes in time") from cause
-
-
-@contextmanager
-def _quiet_log() -> Iterator[None]:
-    """Keep pooch from printing a line for each file."""
-    import pooch
-
-    logger = pooch.get_logger()
-    before = logger.level
-    logger.setLevel("ERROR")
-    try:
-        yield
-    finally:
-        logger.setLevel(before)

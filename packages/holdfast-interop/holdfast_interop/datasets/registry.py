@@ -5,11 +5,16 @@ listings of the repositories. A sha256 is that of a copy, whose size equals that
 where this could be compared, or that of a pointer of Git LFS in the repository.
 """
 
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from functools import cache
 from importlib import resources
 from typing import Annotated, Any
 
 import msgspec
+
+from holdfast.errors import SourceError, require_extras
+from holdfast.io.importers import extra_of
 
 REGISTRY_SCHEMA = "holdfast.datasets/1"
 
@@ -155,3 +160,47 @@ def other_sets(name: str) -> str:
     """Return the names of the sets that can be downloaded, but for one."""
     names = [other.name for other in public_sets().values() if other.files and other.name != name]
     return ", ".join(names)
+
+
+def select_files(
+    name: str | None, patterns: Sequence[str], with_checksum: bool
+) -> tuple[PublicSet, list[PublicFile]]:
+    """Return the set and its files that are wanted.
+
+    Args:
+        name: of the set; None is refused.
+        patterns: only files that fit one of them; all without one.
+        with_checksum: only files whose sha256 is known.
+
+    Raises:
+        ValueError: there is no such set or file.
+        SourceError: holdfast does not download the set.
+        MissingExtra: a package that downloads or imports is not installed.
+    """
+    if name is None:
+        raise ValueError(f"get NAME expected; there are {', '.join(public_sets())}")
+    public = find_set(name)
+    if not public.files:
+        page = f" ({public.page})" if public.page else ""
+        raise SourceError(
+            f"{name} is not downloaded: {public.reason}{page}; there are also {other_sets(name)}"
+        )
+    require_extras(*filter(None, [extra_of(str(public.importer))]))
+    files = [
+        file for file in public.files
+        if (not with_checksum or file.sha256)
+        and (not patterns or any(fnmatchcase(file.path, pattern) for pattern in patterns))
+    ]  # fmt: skip
+    if not files:
+        raise ValueError(
+            f"{name}: no file is left; it has {len(public.files)}, such as {public.files[0].path}"
+        )
+    return public, files
+
+
+def size_of(public: PublicSet, files: Sequence[PublicFile]) -> int:
+    """Return about how large files of a set are [bytes]; 0 if nothing is known."""
+    known = sum(file.size or 0 for file in files)
+    if all(file.size for file in files):
+        return known
+    return max(known, int(len(files) / len(public.files) * (public.size or 0)))

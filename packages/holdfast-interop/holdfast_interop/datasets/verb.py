@@ -70,15 +70,15 @@ def datasets(
     if action is DatasetAction.LIST:
         tables.print_set(name, as_json=as_json) if name else tables.print_sets(as_json=as_json)
     elif action is DatasetAction.GET:
-        from holdfast_interop.datasets import fetch
+        from holdfast_interop.datasets import download, registry
 
-        public, files = fetch.select_files(name, only or [], with_checksum)
-        size = fetch.size_of(public, files)
+        public, files = registry.select_files(name, only or [], with_checksum)
+        size = registry.size_of(public, files)
         if not yes:
             confirm(public.name, size)
         with ProgressBar("downloading", size or None) as bar:
-            fetch.download_files(public, files, mirror, bar.advance)
-        result = fetch.import_files(
+            download.download_files(public, files, mirror, bar.advance)
+        result = download.import_files(
             public, files, out or Path(public.name),
             force=force, notify=print_message, steps=progress,
         )  # fmt: skip

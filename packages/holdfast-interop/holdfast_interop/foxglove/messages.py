@@ -142,23 +142,22 @@ def _series(topic: str, tracks: Mapping[str, Track]) -> Iterator[Message]:
     """Yield messages at the samples of the fastest finger; null where a finger has a gap."""
     # One message has the values of all fingers, so that a plot has one path for each of them.
     grid = max((times for times, _ in tracks.values()), key=len)
-    columns = [_held(times, values, grid) for times, values in tracks.values()]
+    columns: list[Array] = []
+    for times, values in tracks.values():
+        if not len(times):
+            columns.append(np.full(len(grid), np.nan))
+            continue
+        # The latest value at each time, unless it is more than 3 periods old.
+        rows = np.searchsorted(times, grid, side="right") - 1
+        period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+        # Before the first sample `rows` is -1, which would read the last one.
+        is_old = (rows < 0) | (grid - times[rows] > GAP_PERIODS * period)
+        columns.append(np.where(is_old, np.nan, values[rows]))
     labels = [series_label(finger) for finger in tracks]
     for time, row in zip(grid.tolist(), np.column_stack(columns).tolist(), strict=True):
         pairs = zip(labels, row, strict=True)
         scalars = [{"label": label, "value": value} for label, value in pairs]
         yield Message(time, topic, {"scalars": scalars})
-
-
-def _held(times: Array, values: npt.NDArray[Any], grid: Array) -> Array:
-    """Return the latest values at some times; NaN where they are more than 3 periods old."""
-    if not len(times):
-        return np.full(len(grid), np.nan)
-    rows = np.searchsorted(times, grid, side="right") - 1
-    period = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
-    # Before the first sample `rows` is -1, which would read the last one.
-    is_old = (rows < 0) | (grid - times[rows] > GAP_PERIODS * period)
-    return np.where(is_old, np.nan, values[rows])
 
 
 def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Iterator[Message]]:

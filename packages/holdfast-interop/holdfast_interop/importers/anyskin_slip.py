@@ -17,7 +17,6 @@ from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.io.importers.table import CsvFormat, Table, errors_named, header_line, read_table
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import sensor
-from holdfast.sensors.types import Array
 
 HINT = f"{IF_IN_CONTACT}; check the labels of contact with holdfast label"
 SOURCE = "pollen-robotics/anyskin_slip_detection"
@@ -62,26 +61,23 @@ def read(path: Path) -> Iterator[Recording]:
         times = np.arange(len(readings)) / skin.rate
         metadata["clock"] = f"none; {skin.rate:g} Hz assumed"
     else:
-        times = _times(table, time_name, cells[time_name])
+        stamps = [_nanoseconds(cell.strip()) for cell in cells[time_name]]
+        if None in stamps:
+            row = stamps.index(None)
+            raise RecordingError(
+                f"{path}, row {table.first_line + row}, column {time_name!r}: "
+                f"{cells[time_name][row][:40]!r} given; a date and time, or a number of seconds "
+                "expected"
+            )
+        whole = np.array(stamps, dtype=np.int64)
+        # Of differences of whole numbers a float keeps every digit.
+        times = np.asarray((whole - whole[0]) * 1e-9)
         metadata["clock"] = time_name
     with errors_named(path):
         module = Tactile(skin, times, readings)
         labels = {"finger1": _labels(table, cells.get(SLIP_COLUMN), module)}
         recording = Recording(path.stem, {"finger1": module}, metadata).with_labels(labels)
     yield recording
-
-
-def _times(table: Table, name: str, cells: Sequence[str]) -> Array:
-    """Return the times since the first sample [s]."""
-    stamps = [_nanoseconds(cell.strip()) for cell in cells]
-    if None in stamps:
-        row = stamps.index(None)
-        raise RecordingError(
-            f"{table.path}, row {table.first_line + row}, column {name!r}: {cells[row][:40]!r} "
-            "given; a date and time, or a number of seconds expected"
-        )
-    whole = np.array(stamps, dtype=np.int64)
-    return np.asarray((whole - whole[0]) * 1e-9)
 
 
 def _nanoseconds(cell: str) -> int | None:

@@ -122,7 +122,7 @@ def task_of(recording: Recording, link: str, *, predictions: bool = False) -> di
                     "id": f"{finger}-{number}",
                     "type": "timeserieslabels",
                     "from_name": finger,
-                    "to_name": _series_name(finger),
+                    "to_name": f"{finger}-signals",
                     "value": value,
                     "score": float(label.confidence),
                     "meta": {name: text for name, text in meta.items() if text},
@@ -189,7 +189,7 @@ def labelling_config(units: Mapping[str, str], extra: Iterable[str] = ()) -> str
             f"units={quoteattr(unit)}/>"
             for column, name in zip(map(text_cell, _column_names([finger])), SERIES, strict=True)
         )
-        series = quoteattr(_series_name(finger))
+        series = quoteattr(f"{finger}-signals")
         parts.append(
             f"  <Header value={quoteattr(finger)}/>\n"
             f'  <TimeSeriesLabels name={quoteattr(finger)} toName={series} choice="single">\n'
@@ -199,10 +199,6 @@ def labelling_config(units: Mapping[str, str], extra: Iterable[str] = ()) -> str
         )
     body = "\n".join(parts)
     return f"<View>\n{body}\n</View>\n"
-
-
-def _series_name(finger: str) -> str:
-    return f"{finger}-signals"
 
 
 def _column_names(fingers: Iterable[str]) -> list[str]:

@@ -1,7 +1,5 @@
 """The twin behind the topics of a hand, so that a loop closes through the wire."""
 
-import numpy as np
-
 from holdfast.devices.sources import Arrival
 from holdfast.devices.uri import parse
 from holdfast.io.cdr import MessageDecoder
@@ -64,7 +62,18 @@ class DrivenTwin(LiveTwin):
         if found:  # the newest alone: a driver keeps its last command
             self.n_commands += 1
             try:
-                self.send(self._command(self._decode(found[-1])["data"]))
+                values, torques = self._decode(found[-1])["data"], self._setup.torques
+                if len(values) != N_JOINTS or torques is None:
+                    raise ValueError(f"{N_JOINTS} values expected, {len(values)} given")
+                # The mean of the largest torques of a finger, over that when the grip began.
+                shape = (-1, JOINTS_PER_FINGER)
+                scales = values.reshape(shape).mean(axis=1) / torques.reshape(shape).mean(axis=1)
+                fingers = {
+                    finger: FingerCommand(float(scale))
+                    for finger, scale in zip(self._setup.order.fingers, scales, strict=True)
+                }
+                release = not values.any()  # zeros open the hand
+                self.send(GripCommand(0.0, LoopState.HOLD, fingers, release=release))
             except (ValueError, HandError):
                 self.n_refused += 1
         return super().read(timeout)
@@ -73,21 +82,3 @@ class DrivenTwin(LiveTwin):
         """End the grasp and the subscription."""
         self._reader = None
         super().close()
-
-    def _command(self, values: np.ndarray) -> GripCommand:
-        """Return the command that the largest torques (16,) mean.
-
-        Raises:
-            ValueError: there are not 16.
-        """
-        if len(values) != N_JOINTS or self._setup.torques is None:
-            raise ValueError(f"{N_JOINTS} values expected, {len(values)} given")
-        shape = (-1, JOINTS_PER_FINGER)
-        scales = values.reshape(shape).mean(axis=1) / self._setup.torques.reshape(shape).mean(
-            axis=1
-        )
-        fingers = {
-            finger: FingerCommand(float(scale))
-            for finger, scale in zip(self._setup.order.fingers, scales, strict=True)
-        }
-        return GripCommand(0.0, LoopState.HOLD, fingers, release=not values.any())

@@ -3,9 +3,8 @@
 import time
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import Any
 
 from holdfast.errors import SourceError
@@ -117,9 +116,27 @@ class RosHand(HandDevice):
         if self._states_topic is not None and not self.standby:
             self._take_states = self._link.joint_states(self._states_topic)
         for topic, publisher in self._publishers.items():
-            self._wait(publisher.n_listeners, begun_at, partial(self._not_heard, topic))
-        if self._take_states is not None:
-            self._wait(self._poll, begun_at, self._no_states)
+            while not publisher.n_listeners():
+                if time.monotonic() - begun_at > HAND_OPEN_TIMEOUT:
+                    others = ", ".join(self._link.subscribed_topics()) or "none"
+                    raise HandError(
+                        f"{self.name}: nothing listens on {topic} {self._link.where} after "
+                        f"{HAND_OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
+                    )
+                time.sleep(HAND_POLL_INTERVAL)
+        while self._take_states is not None and not self._poll():
+            if time.monotonic() - begun_at > HAND_OPEN_TIMEOUT:
+                where = f"{self._states_topic} {self._link.where} in {HAND_OPEN_TIMEOUT:g} s"
+                if self._states or self._refusal:
+                    raise HandError(
+                        f"{self.name}: {len(self._states)} valid joint states on {where}, at least "
+                        f"{MIN_STATES} expected{self._refused()}"
+                    )
+                others = ", ".join(self._link.published_topics()) or "none"
+                raise HandError(
+                    f"{self.name}: no joint states on {where}; published topics: {others}"
+                )
+            time.sleep(HAND_POLL_INTERVAL)
         if self._shared or self.standby:  # a watchdog stands beside the loop that publishes
             return
         # Discovery of other publishers takes time, of which the waits above were a part.
@@ -211,29 +228,6 @@ class RosHand(HandDevice):
     def _refused(self) -> str:
         """Return how many joint states were refused, and why the last one was."""
         return f" ({self.n_refused} refused: {self._refusal})" if self._refusal else ""
-
-    def _wait(self, done: Callable[[], object], begun_at: float, why: Callable[[], str]) -> None:
-        while not done():
-            if time.monotonic() - begun_at > HAND_OPEN_TIMEOUT:
-                raise HandError(why())
-            time.sleep(HAND_POLL_INTERVAL)
-
-    def _not_heard(self, topic: str) -> str:
-        others = ", ".join(self._link.subscribed_topics()) or "none"
-        return (
-            f"{self.name}: nothing listens on {topic} {self._link.where} after "
-            f"{HAND_OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
-        )
-
-    def _no_states(self) -> str:
-        where = f"{self._states_topic} {self._link.where} in {HAND_OPEN_TIMEOUT:g} s"
-        if self._states or self._refusal:
-            return (
-                f"{self.name}: {len(self._states)} valid joint states on {where}, at least "
-                f"{MIN_STATES} expected{self._refused()}"
-            )
-        others = ", ".join(self._link.published_topics()) or "none"
-        return f"{self.name}: no joint states on {where}; published topics: {others}"
 
 
 @contextmanager

@@ -132,14 +132,14 @@ class TopicSource(DeviceSource):
         self.sensors = self._assembler.sensors
         self.metadata = {"source": self.name, **self._assembler.metadata}
         now = self._checked_at = time.monotonic()
-        self._start(now)
+        self.begin_reading(now)
         notices = [text for device in self._assembler.devices.values() for text in device.notices]
         if notices:
-            self._notify(now, *notices)
+            self.notify(now, *notices)
         # The messages that identified the devices have samples, too.
         for message in messages:
             self._assemble(message)
-        self._note_clock()
+        self.note_clock()
 
     def _first_messages(self, deadline: float) -> tuple[list[ReceivedMessage], list[DeviceSample]]:
         """Return the first messages, until a device repeats, and the first sample of each."""
@@ -170,11 +170,12 @@ class TopicSource(DeviceSource):
             raise SourceError(f"{self.name} sends invalid messages: {invalid}") from invalid
         raise SourceError(self._subscription.why_no_message())
 
-    def _receive(self, timeout: float) -> bool:
+    def receive(self, timeout: float) -> bool:
+        """Process what the device sends within `timeout` [s]; return False if nothing came."""
         message = self._subscription.take(min(timeout, PUBLISHER_CHECK_INTERVAL))
         if n_dropped := self._subscription.n_dropped():
             text = f"{n_dropped} messages dropped: they were read too slowly"
-            self._notify(time.monotonic(), text)
+            self.notify(time.monotonic(), text)
         if message is not None:
             self._assemble(message)
             return True
@@ -182,7 +183,7 @@ class TopicSource(DeviceSource):
         if now - self._checked_at >= PUBLISHER_CHECK_INTERVAL:
             self._checked_at = now
             if not self._subscription.n_publishers():
-                self._lose("the topic has no publisher")
+                self.lose("the topic has no publisher")
         return False
 
     def _assemble(self, message: ReceivedMessage) -> None:
@@ -191,25 +192,28 @@ class TopicSource(DeviceSource):
             arrivals = self._assembler.assemble(message.decode(message.data), received)
         except ValueError as why:
             arrivals = self._assembler.refuse(str(why), received)
-        self._queue(arrivals, received)
+        self.queue(arrivals, received)
 
-    def _pause(self, seconds: float) -> None:
+    def pause(self, seconds: float) -> None:
         """Wait for a message of a new publisher."""
         message = self._subscription.take(seconds)
         if message is not None or self._subscription.n_publishers():
-            self._resume()
+            self.resume()
         if message is not None:
             self._assemble(message)
 
-    def _reconnect(self) -> bool:
+    def reconnect(self) -> bool:
+        """Try to connect again; return whether the device is connected."""
         self._subscription.renew()
         return self._subscription.n_publishers() > 0
 
-    def _resume(self) -> None:
+    def resume(self) -> None:
+        """Report that the device is connected again, and accept new numbers of its messages."""
         self._assembler.reconnected()
-        super()._resume()
+        super().resume()
 
-    def _disconnect(self) -> None:
+    def disconnect(self) -> None:
+        """Close the connection, if there is one."""
         self._subscription.close()
 
 

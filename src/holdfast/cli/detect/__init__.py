@@ -1,5 +1,1 @@
 """The verb `holdfast detect`, and what it prints."""
-
-from holdfast.cli.detect.verb import detect
-
-__all__ = ["detect"]

@@ -1,11 +1,10 @@
 """Estimates of `holdfast detect`, in chunks: of a recording, or of a live source."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
 from time import monotonic
-from typing import NamedTuple
 
 from holdfast.cli.options import (
     DetectorOptions,
@@ -19,57 +18,20 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.control import handle_stop_signals
-from holdfast.contact import ContactEstimate, ContactState
-from holdfast.detector import Detection, Detector
+from holdfast.detector import Detector
 from holdfast.devices.sources import open_source
 from holdfast.errors import ModelError, RecordingError
 from holdfast.features import Tare
 from holdfast.io import load_recording, read_chunks
+from holdfast.live.estimate_chunks import EstimateChunk, chunk_from_detection, chunk_from_stream
 from holdfast.live.fault_notices import FaultWatch
 from holdfast.live.readings_monitor import ReadingsMonitor
-from holdfast.live.stream_detector import StreamEstimate
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample, true_updates
 
 CHUNK_SIZE = 4096
 """Number of samples that are read and processed at a time; it bounds the memory."""
-
-
-class EstimateChunk(NamedTuple):
-    """Estimates of consecutive samples, oldest first.
-
-    Attributes:
-        name: of the recording or source.
-        fingers: estimates of each finger.
-        hand: time [s] and state of the hand at each instant.
-    """
-
-    name: str
-    fingers: Mapping[str, Sequence[ContactEstimate]]
-    hand: Sequence[tuple[float, ContactState]]
-
-
-def chunk_from_detection(detection: Detection) -> EstimateChunk:
-    """Convert the arrays of a detection."""
-    states = tuple(ContactState)
-    hand = zip(detection.times.tolist(), detection.hand.tolist(), strict=True)
-    return EstimateChunk(
-        detection.name,
-        {finger: trace.estimates() for finger, trace in detection.fingers.items()},
-        [(time, states[code]) for time, code in hand],
-    )
-
-
-def chunk_from_stream(name: str, estimates: Iterable[StreamEstimate]) -> EstimateChunk:
-    """Collect the new estimates of a live source."""
-    fingers: dict[str, list[ContactEstimate]] = {}
-    hand = []
-    for estimate, updated_fingers in estimates:
-        hand.append((estimate.time, estimate.state))
-        for finger in updated_fingers:
-            fingers.setdefault(finger, []).append(estimate.fingers[finger])
-    return EstimateChunk(name, fingers, hand)
 
 
 def detect_recording(

@@ -1,5 +1,1 @@
 """The verb `holdfast export`: models and recordings."""
-
-from holdfast.cli.export.verb import export
-
-__all__ = ["export"]

@@ -1,5 +1,1 @@
 """The verb `holdfast label`; one file for each of its modes."""
-
-from holdfast.cli.label.verb import label
-
-__all__ = ["label"]

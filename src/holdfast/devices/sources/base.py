@@ -135,8 +135,9 @@ class Source(Openable):
 class DeviceSource(Source):
     """Source that is a device: it reconnects, and reports loss and silence of the device.
 
-    A subclass connects in `open` and then calls `_start`. Its `_receive` passes arrivals to
-    `_queue`, and a loss of the connection to `_lose`.
+    A subclass connects in `open` and then calls `begin_reading`. It has `receive`, `reconnect` and
+    `disconnect`, which only this class calls; its `receive` passes arrivals to `queue`, and a loss
+    of the connection to `lose`.
 
     Attributes:
         silence_timeout: time without a new sample after which a notice reports silence [s].
@@ -158,7 +159,7 @@ class DeviceSource(Source):
             else:
                 # Wake up when the device counts as silent, so that the notice comes in time.
                 until_silent = self._last_sample_at + self.silence_timeout - time.monotonic()
-                if not self._receive(left if self._silent else min(left, max(until_silent, 0.0))):
+                if not self.receive(left if self._silent else min(left, max(until_silent, 0.0))):
                     self._check_silence(time.monotonic())
             if not left:  # after a read: a timeout of 0 reads what is there
                 break
@@ -166,22 +167,22 @@ class DeviceSource(Source):
 
     def close(self) -> None:
         """Disconnect, and drop arrivals that were not read."""
-        self._disconnect()
+        self.disconnect()
         self._reset()
 
     @abstractmethod
-    def _receive(self, timeout: float) -> bool:
+    def receive(self, timeout: float) -> bool:
         """Process what the device sends within `timeout` [s]; return False if nothing came."""
 
     @abstractmethod
-    def _reconnect(self) -> bool:
+    def reconnect(self) -> bool:
         """Try to connect again; return whether the device is connected."""
 
     @abstractmethod
-    def _disconnect(self) -> None:
+    def disconnect(self) -> None:
         """Close the connection, if there is one."""
 
-    def _pause(self, seconds: float) -> None:
+    def pause(self, seconds: float) -> None:
         """Wait for the next attempt to reconnect."""
         time.sleep(seconds)
 
@@ -193,24 +194,24 @@ class DeviceSource(Source):
         self._retry_delay = MIN_RETRY_DELAY
         self._retry_at = 0.0
 
-    def _start(self, received: float) -> None:
+    def begin_reading(self, received: float) -> None:
         """Begin to read, with the first sample received at that time [s]."""
         self._is_open = True
         self._last_sample_at = received
 
-    def _queue(self, arrivals: Sequence[Arrival], received: float) -> None:
+    def queue(self, arrivals: Sequence[Arrival], received: float) -> None:
         """Queue arrivals for `read`."""
         if not any(arrival.samples for arrival in arrivals):
             self._check_silence(received)  # faults and notices do not end a silence
         else:
             if self._silent:
                 silence = received - self._last_sample_at
-                self._notify(received, f"samples again after {silence:.1f} s")
+                self.notify(received, f"samples again after {silence:.1f} s")
             self._silent = False
             self._last_sample_at = received
         self._pending.extend(arrivals)
 
-    def _note_clock(self) -> None:
+    def note_clock(self) -> None:
         """Add a notice to the first samples if the device's clock differs much from the host's."""
         for k, arrival in enumerate(self._pending):
             if arrival.samples:
@@ -219,7 +220,8 @@ class DeviceSource(Source):
                     self._pending[k] = arrival._replace(notices=(*arrival.notices, text))
                 return
 
-    def _notify(self, received: float, *notices: str) -> None:
+    def notify(self, received: float, *notices: str) -> None:
+        """Queue an arrival that only has notices."""
         self._pending.append(notice_arrival(received, *notices))
 
     def _check_silence(self, now: float) -> None:
@@ -227,33 +229,33 @@ class DeviceSource(Source):
             return
         if now - self._last_sample_at >= self.silence_timeout:
             self._silent = True
-            self._notify(now, f"no new sample for {self.silence_timeout:g} s")
+            self.notify(now, f"no new sample for {self.silence_timeout:g} s")
 
-    def _lose(self, reason: object) -> None:
+    def lose(self, reason: object) -> None:
         """Report the loss of the connection, and schedule the first attempt to reconnect."""
         self._lost_at = time.monotonic()
         self._retry_delay = MIN_RETRY_DELAY
         self._retry_at = self._lost_at + self._retry_delay
-        self._notify(self._lost_at, f"connection lost ({reason})")
+        self.notify(self._lost_at, f"connection lost ({reason})")
 
     def _retry(self, timeout: float) -> None:
         """Wait for the next attempt to reconnect, up to `timeout` [s], and make it."""
         wait = self._retry_at - time.monotonic()
         if wait > 0:
-            self._pause(min(wait, timeout))
-        if wait > timeout or self._lost_at is None:  # `_pause` may have found it again
+            self.pause(min(wait, timeout))
+        if wait > timeout or self._lost_at is None:  # `pause` may have found it again
             return
-        if self._reconnect():
-            self._resume()
+        if self.reconnect():
+            self.resume()
         else:
             self._retry_delay = min(2 * self._retry_delay, MAX_RETRY_DELAY)
             self._retry_at = time.monotonic() + self._retry_delay
 
-    def _resume(self) -> None:
+    def resume(self) -> None:
         """Report that the device is connected again."""
         now = time.monotonic()
         if self._lost_at is not None:
-            self._notify(now, f"connected again after {now - self._lost_at:.1f} s")
+            self.notify(now, f"connected again after {now - self._lost_at:.1f} s")
         self._lost_at = None
         self._last_sample_at = now
         self._silent = False

@@ -155,14 +155,14 @@ class Player(Source):
         """
         self.close()
         try:
-            chunks = iter(self._chunks(0))
+            chunks = iter(self.chunks_of(0))
             first = next(chunks, None)
         except OSError as cause:
             raise RecordingError(f"cannot read {self.name}: {cause.strerror or cause}") from cause
         if first is None:
             raise RecordingError(f"{self.name} has no samples; at least one expected")
         self.sensors = {name: module.sensor for name, module in first.modules.items()}
-        self.metadata = self._metadata(first)
+        self.metadata = self.metadata_of(first)
         if not first.complete:
             self._notices.append(f"{self.name} was cut off; what could be recovered is played")
         self._content = timed_samples(chain([first], chunks))
@@ -178,7 +178,7 @@ class Player(Source):
         # Before the next item is read from disk: that time counts as waiting.
         now = time.monotonic()
         item = self._peek()
-        if item is None and self._continues and self._is_ready(self._number + 1, timeout):
+        if item is None and self._continues and self.is_ready(self._number + 1, timeout):
             self._number += 1
             item = self._begin(self._late_chunks(self._number))
         if item is None:
@@ -213,8 +213,8 @@ class Player(Source):
             return
         # Two clients that connect together get the same recording, not its successor.
         only_begun = self._start is None or self._last <= self._start[1]
-        if only_begun or not (self._continues and self._is_ready(self._number + 1, RESTART_WAIT)):
-            self._begin(self._same_chunks())
+        if only_begun or not (self._continues and self.is_ready(self._number + 1, RESTART_WAIT)):
+            self._begin(self.same_chunks())
         else:
             self._number += 1
             self._begin(self._late_chunks(self._number))
@@ -224,14 +224,14 @@ class Player(Source):
         self._reset()
 
     @abstractmethod
-    def _chunks(self, number: int) -> Iterable[Recording]:
+    def chunks_of(self, number: int) -> Iterable[Recording]:
         """Return the chunks of recording `number`, from 0. May add to `_notices`."""
 
     @abstractmethod
-    def _metadata(self, first: Recording) -> dict[str, object]:
+    def metadata_of(self, first: Recording) -> dict[str, object]:
         """Return the metadata of the source, given the first chunk of the first recording."""
 
-    def _is_ready(self, number: int, timeout: float) -> bool:
+    def is_ready(self, number: int, timeout: float) -> bool:
         """Return whether recording `number` can begin within `timeout` [s]."""
         return True
 
@@ -260,13 +260,13 @@ class Player(Source):
             self._start = max(now, self._due(first.time, now)), first.time + self._shift
         return first
 
-    def _same_chunks(self) -> Iterator[Recording]:
+    def same_chunks(self) -> Iterator[Recording]:
         """Yield the chunks of the current recording once more."""
-        yield from self._chunks(self._number)
+        yield from self.chunks_of(self._number)
 
     def _late_chunks(self, number: int) -> Iterator[Recording]:
         """Yield the chunks of a recording; errors occur at the first one, in `_peek`."""
-        yield from self._chunks(number)
+        yield from self.chunks_of(number)
 
     def _due(self, at: float, now: float) -> float:
         """Return when an item is due, on the host's clock; minus infinity for at once [s]."""
@@ -299,13 +299,14 @@ class ReplaySource(Player):
     def __init__(self, path: str | Path, *, speed: float = 1.0, loop: bool = False) -> None:
         super().__init__(str(path), speed=speed, loop=loop)
 
-    def _chunks(self, number: int) -> Iterable[Recording]:
+    def chunks_of(self, number: int) -> Iterable[Recording]:
+        """Return the chunks of the file, with a notice if it is repeated."""
         chunks = read_chunks(self.name, SAMPLES_PER_CHUNK, labels=False)
         if number:
             self._notices.append(f"{self.name} starts again")
         return chunks
 
-    def _metadata(self, first: Recording) -> dict[str, object]:
+    def metadata_of(self, first: Recording) -> dict[str, object]:
         """Return the metadata of the recording, with this source and the original one."""
         own = dict(first.metadata)
         recorded_from = {"recorded_from": own["source"]} if "source" in own else {}

@@ -92,30 +92,33 @@ class SerialSource(DeviceSource):
             "n_mags": self._n_mags,
             "pyserial": version("pyserial"),
         }
-        self._start(time.monotonic())
+        self.begin_reading(time.monotonic())
 
     def _connect(self) -> None:
         self._decoder.reset()
         # Exclusive: two programs would each get half of the bytes.
         self._port = Serial(self._path, self._baud, exclusive=True)
 
-    def _receive(self, timeout: float) -> bool:
+    def receive(self, timeout: float) -> bool:
+        """Process what the device sends within `timeout` [s]; return False if nothing came."""
         try:
             decoded = self._read_port(timeout)
         except OSError as cause:
-            self._disconnect()
-            self._lose(_reason(cause))
+            self.disconnect()
+            self.lose(_reason(cause))
             return False
         return bool(decoded.samples)
 
-    def _reconnect(self) -> bool:
+    def reconnect(self) -> bool:
+        """Try to connect again; return whether the device is connected."""
         try:
             self._connect()
         except OSError:
             return False
         return True
 
-    def _disconnect(self) -> None:
+    def disconnect(self) -> None:
+        """Close the connection, if there is one."""
         if self._port is not None:
             self._port.close()
             self._port = None
@@ -140,7 +143,7 @@ class SerialSource(DeviceSource):
                 self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
             else:
                 self._assembler.notify("packet", "invalid packets are dropped", received)
-            self._queue(self._assembler.finish(received), received)
+            self.queue(self._assembler.finish(received), received)
         n = len(decoded.samples)
         period = 1 / self._sensor.rate
         # Spread over their period, but not back beyond the newest sample.
@@ -150,7 +153,7 @@ class SerialSource(DeviceSource):
             self._assembler.add(_BOARD, sample)
             arrivals = self._assembler.finish(received)
             self._newest = arrivals[-1].time
-            self._queue(arrivals, received)
+            self.queue(arrivals, received)
         return decoded
 
     def _wrong_count(self, decoded: DecodedBytes) -> str:

@@ -51,7 +51,8 @@ class Twin(Player):
             self._simulator.close()
             self._simulator = None
 
-    def _chunks(self, number: int) -> Iterable[Recording]:
+    def chunks_of(self, number: int) -> Iterable[Recording]:
+        """Return the chunks of a grasp, and begin to simulate the next one."""
         simulator = self._simulator
         chunks = iter([simulated(self._grasp)]) if simulator is None else simulator.chunks()
         self._current = list(chunks)
@@ -64,13 +65,16 @@ class Twin(Player):
             simulator.start(replace(self._grasp, repeat=self._grasp.repeat + number + 1))
         return self._current
 
-    def _same_chunks(self) -> Iterator[Recording]:
+    def same_chunks(self) -> Iterator[Recording]:
+        """Yield the chunks of the current grasp once more."""
         yield from self._current
 
-    def _metadata(self, first: Recording) -> dict[str, object]:
+    def metadata_of(self, first: Recording) -> dict[str, object]:
+        """Return the metadata of the first grasp, with this source."""
         return {**first.metadata, "source": self.name}
 
-    def _is_ready(self, number: int, timeout: float) -> bool:
+    def is_ready(self, number: int, timeout: float) -> bool:
+        """Return whether a grasp is simulated within `timeout` [s]."""
         return self._simulator is None or self._simulator.is_ready(timeout)
 
 

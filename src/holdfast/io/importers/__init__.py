@@ -5,9 +5,8 @@ Formats of plug-ins have such a module too, in another package. A module has `ca
 extra of holdfast that it needs. A child process reads the recordings, see `foreign.py`.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -75,17 +74,30 @@ def import_recordings(
     """
     place, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
     name = _format_of(place, format, sensors, given)
-    recordings: Iterator[Recording]
     with recording_errors(place):
         source = importer(name)
         if extra := extra_of(name):
             require_extras(extra)
-        if name == "csv":
-            recordings = read_foreign(place, name, sensors, given, report)
-        else:
-            read = partial(read_foreign, name=name, sensors=sensors, columns=given, report=report)
-            recordings = _named_apart(source.parts(place), read)
-    return _guarded(place, recordings, labels=labels)
+        # The generic CSV itself gives names to the recordings of a folder.
+        parts = {place: ""} if name == "csv" else name_prefixes(source.parts(place))
+
+    # Not a generator itself: a wrong path is refused by the call, not by the first recording.
+    def recordings() -> Iterator[Recording]:
+        with recording_errors(place):
+            for part, prefix in parts.items():
+                if not part.is_dir():
+                    check_regular(part)
+                for found in read_foreign(part, name, sensors, given, report):
+                    recording = replace(found, name=f"{prefix}{found.name}") if prefix else found
+                    if labels:
+                        yield recording
+                        continue
+                    modules = {key: replace(m, labels=()) for key, m in recording.modules.items()}
+                    # The label of a whole recording is a field of its metadata.
+                    facts = {key: one for key, one in recording.metadata.items() if key != SLIPPED}
+                    yield replace(recording, modules=modules, metadata=facts)
+
+    return recordings()
 
 
 def import_parts(
@@ -138,17 +150,6 @@ def read_poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
     return read_foreign_arrays("poses", path, {"format": name, "bodies": dict(bodies)})
 
 
-def _named_apart(
-    parts: Sequence[Path], read: Callable[[Path], Iterator[Recording]]
-) -> Iterator[Recording]:
-    """Read the parts one by one; see `name_prefixes`."""
-    for part, prefix in name_prefixes(parts).items():
-        if not part.is_dir():
-            check_regular(part)
-        for recording in read(part):
-            yield replace(recording, name=f"{prefix}{recording.name}")
-
-
 def _format_of(
     path: Path, name: str | None, sensors: Mapping[str, Sensor] | None, columns: Columns | None
 ) -> str:
@@ -193,18 +194,6 @@ def _format_of(
 def takes_sensors(name: str) -> bool:
     """Return whether the importer of a format takes sensors, columns and a report."""
     return name == "csv" or getattr(importer(name), "TAKES_SENSORS", False)
-
-
-def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> Iterator[Recording]:
-    with recording_errors(path):
-        for recording in recordings:
-            if labels:
-                yield recording
-                continue
-            modules = {name: replace(m, labels=()) for name, m in recording.modules.items()}
-            # The label of a whole recording is a field of its metadata.
-            metadata = {key: one for key, one in recording.metadata.items() if key != SLIPPED}
-            yield replace(recording, modules=modules, metadata=metadata)
 
 
 def import_hint(name: str) -> str | None:

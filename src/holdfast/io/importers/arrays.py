@@ -75,10 +75,10 @@ def read(
     if not path.stat().st_size:
         raise RecordingError(f"{path} is empty; arrays of numbers expected")
     try:
-        arrays = _READERS.get(path.suffix.lower(), _of_json)(path)
+        arrays = _READERS.get(path.suffix.lower(), arrays_of_json)(path)
     except ValueError as cause:
         if "allow_pickle" in str(cause):  # NumPy stores objects as pickles
-            _of_pickle(path)
+            refuse_pickle(path)
         raise
     if len(arrays) > MAX_ARRAYS:
         raise RecordingError(f"{path}: at most {MAX_ARRAYS} arrays expected, {len(arrays)} given")
@@ -103,20 +103,27 @@ def _has_arrays(file: Path) -> bool:
         return _JSON_LINE.search(content.read(HEAD_SIZE)) is not None
 
 
-def _of_npy(path: Path) -> StoredArrays:
+def arrays_of_npy(path: Path) -> StoredArrays:
+    """Return the array of a file of NumPy, or the arrays of its fields."""
     values = np.load(path, allow_pickle=False)
     fields = values.dtype.names
     return _flat({name: values[name] for name in fields} if fields else {path.stem: values})
 
 
-def _of_npz(path: Path) -> StoredArrays:
+def arrays_of_npz(path: Path) -> StoredArrays:
+    """Return the arrays of an archive of NumPy.
+
+    Raises:
+        RecordingError: they take too much memory.
+    """
     with zipfile.ZipFile(path) as file:
         ReadBudget(path).keep(sum(one.file_size for one in file.infolist()))
     with np.load(path, allow_pickle=False) as content:
         return _flat(dict(content))
 
 
-def _of_matlab(path: Path) -> StoredArrays:
+def arrays_of_matlab(path: Path) -> StoredArrays:
+    """Return the arrays of a file of MATLAB; from version 7.3 on it is HDF5."""
     with path.open("rb") as file:
         head = file.read(128)
     if head.startswith(b"MATLAB 7.3") or head.startswith(HDF5_MAGIC):
@@ -242,7 +249,8 @@ def check_filters(path: Path, name: str, dataset: Any) -> None:  # noqa: ANN401 
         )
 
 
-def _of_parquet(path: Path) -> StoredArrays:
+def arrays_of_parquet(path: Path) -> StoredArrays:
+    """Return all columns of a Parquet file that `arrays_of_columns` reads."""
     require_extras("parquet")
     import pyarrow.parquet as pq
 
@@ -301,7 +309,7 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
     return found
 
 
-def _of_json(path: Path) -> StoredArrays:
+def arrays_of_json(path: Path) -> StoredArrays:
     """Return the arrays in lines of JSON, or in one document: a record, or a list of records."""
     ReadBudget(path).keep(path.stat().st_size * JSON_EXPANSION // 4)
     text = path.read_text(encoding="utf-8-sig")
@@ -323,7 +331,12 @@ def _of_json(path: Path) -> StoredArrays:
     return _flat(document)
 
 
-def _of_pickle(path: Path) -> StoredArrays:
+def refuse_pickle(path: Path) -> StoredArrays:
+    """Refuse a pickle, and name what to do instead.
+
+    Raises:
+        RecordingError: always.
+    """
     raise RecordingError(
         f"{path} is a pickle, which can run code and is not read: load it in Python and save its "
         f"arrays with numpy.savez({path.stem + '.npz'!r}, **arrays), then import {path.stem}.npz"
@@ -348,11 +361,11 @@ def _flat(content: Any, path: str = "") -> dict[str, StoredArray]:  # noqa: ANN4
 
 
 _READERS: dict[str, Callable[[Path], StoredArrays]] = {
-    ".npy": _of_npy,
-    ".npz": _of_npz,
-    ".mat": _of_matlab,
+    ".npy": arrays_of_npy,
+    ".npz": arrays_of_npz,
+    ".mat": arrays_of_matlab,
     **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), arrays_of_hdf5),
-    **dict.fromkeys((".parquet", ".pq"), _of_parquet),
-    **dict.fromkeys((".jsonl", ".ndjson", ".json"), _of_json),
-    **dict.fromkeys((".pkl", ".pickle", ".joblib"), _of_pickle),
+    **dict.fromkeys((".parquet", ".pq"), arrays_of_parquet),
+    **dict.fromkeys((".jsonl", ".ndjson", ".json"), arrays_of_json),
+    **dict.fromkeys((".pkl", ".pickle", ".joblib"), refuse_pickle),
 }

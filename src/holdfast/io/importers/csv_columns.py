@@ -215,14 +215,11 @@ def named_column(names: Sequence[str], text: str) -> str:
 
 def guessed_time(names: Sequence[str]) -> str | None:
     """Return the column of times: a usual name, with or without a unit, or one with "time"."""
-    bare = {re.sub(r"[\W_]*\b(s|ms|us|ns)\b\W*$", "", _spaced(name)): name for name in names}
+    unit = re.compile(r"[\W_]*\b(s|ms|us|ns)\b\W*$")
+    bare = {unit.sub("", re.sub(r"[\W_]+", " ", name).strip().lower()): name for name in names}
     usual = (bare[name] for name in _TIME_NAMES if name in bare)
     part = (name for name in names if "time" in name.lower() or "stamp" in name.lower())
     return next(usual, next(part, None))
-
-
-def _spaced(name: str) -> str:
-    return re.sub(r"[\W_]+", " ", name).strip().lower()
 
 
 def pattern_layout(pattern: str, names: Sequence[str]) -> Layout:

@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple, TextIO, cast
+from typing import NamedTuple, TextIO
 
 import numpy as np
 import numpy.typing as npt
@@ -209,21 +209,19 @@ def _numbers(
     if not _OTHER_FORMS.search("".join(row)):
         with suppress(ValueError):  # a cell is empty or wrong
             return list(map(float, row))
-    numbers = [_number(cell) for cell in row]
-    for name, cell, value in zip(names, row, numbers, strict=True):
+    # Cell by cell, which is slower: some are empty, or the error names the first that is wrong.
+    numbers: list[float] = []
+    for name, cell in zip(names, row, strict=True):
+        value = None
+        if not _OTHER_FORMS.search(cell):
+            with suppress(ValueError):
+                value = float(cell or "nan")
         if value is None:
             raise RecordingError(
                 f"{path}, row {number}, column {name!r}: {_start(cell)} given, a number expected"
             )
-    return cast(list[float], numbers)
-
-
-def _number(cell: str) -> float | None:
-    """Return the number in a cell, NaN for an empty one; None if it is not a number."""
-    try:
-        return None if _OTHER_FORMS.search(cell) else float(cell or "nan")
-    except ValueError:
-        return None
+        numbers.append(value)
+    return numbers
 
 
 @contextmanager

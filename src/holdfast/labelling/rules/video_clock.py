@@ -120,7 +120,7 @@ def video_clock(
             costs[k] += np.bincount(part, rest, N_CLOCK_PARTS)
     whole = costs.sum(axis=1)
     if not whole.any():
-        raise RecordingError(f"{video}: no finger with a sticker is loaded while it is filmed")
+        raise RecordingError(f"{video}: no finger whose motion it shows is loaded meanwhile")
     # Fast pictures are cut into parts in order of time; each fit leaves out one of them.
     parts = np.array([_lowest(offsets, whole - costs[:, k]) for k in range(N_CLOCK_PARTS)])
     # The variance of a jackknife is n - 1 times that of the results without one part.

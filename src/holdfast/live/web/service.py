@@ -24,7 +24,6 @@ from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard
-from holdfast.web.server import run_server
 
 LIVE_DOCUMENT_RATE = 20.0
 """Number of live documents per second [Hz]."""
@@ -138,20 +137,20 @@ class LiveService:
         self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
         routes: list[web.AbstractRouteDef] = [
-            web.get("/", self._get_page),
+            web.get("/", self.get_page),
             web.static("/page", PAGE_FOLDER),
             web.static("/web", SHARED_FOLDER),
             web.get("/api/v1/live", partial(self._serve_socket, kind="live")),
             web.get("/api/v1/estimates", partial(self._serve_socket, kind="estimates")),
-            web.get("/api/v1/info", self._get_info),
-            web.get("/api/v1/state", self._get_state),
-            web.get("/api/v1/schema", self._get_schema),
-            web.post("/api/v1/tare", self._post_tare),
-            web.post("/api/v1/threshold", self._set_threshold),
-            web.delete("/api/v1/threshold", self._set_threshold),
-            web.post("/api/v1/recording", self._post_recording),
-            web.delete("/api/v1/recording", self._delete_recording),
-            web.post("/api/v1/markers", self._post_marker),
+            web.get("/api/v1/info", self.get_info),
+            web.get("/api/v1/state", self.get_state),
+            web.get("/api/v1/schema", self.get_schema),
+            web.post("/api/v1/tare", self.post_tare),
+            web.post("/api/v1/threshold", self.set_threshold),
+            web.delete("/api/v1/threshold", self.set_threshold),
+            web.post("/api/v1/recording", self.post_recording),
+            web.delete("/api/v1/recording", self.delete_recording),
+            web.post("/api/v1/markers", self.post_marker),
             *CalibrationRoutes(self._calibration, self._bodies).routes(),
             *(web.static(f"/panels/{panel.name}", panel.folder) for panel in self._panels),
             *(route for panel in self._panels for route in panel.routes(self._status.add_notice)),
@@ -240,27 +239,31 @@ class LiveService:
     def _hello(self) -> schema.HelloDocument:
         return hello_document(self._session, self._started, self._recorder.enabled)
 
-    async def _get_page(self, _: web.Request) -> web.Response:
+    async def get_page(self, _: web.Request) -> web.Response:
+        """Return the page, with the panels of plug-ins."""
         return web.Response(text=page_with(self._panels), content_type="text/html")
 
-    async def _get_schema(self, _: web.Request) -> web.Response:
+    async def get_schema(self, _: web.Request) -> web.Response:
         """Return the JSON Schema of all documents of the WebSockets."""
         documents = (schema.HelloDocument, self._live_type, schema.EstimateDocument)
         schemas, components = msgspec.json.schema_components(documents)
         return _json({"anyOf": schemas, "$defs": components})
 
-    async def _get_info(self, _: web.Request) -> web.Response:
+    async def get_info(self, _: web.Request) -> web.Response:
+        """Return the constants of the session, as the first document of a WebSocket."""
         return _json(self._hello())
 
-    async def _get_state(self, _: web.Request) -> web.Response:
+    async def get_state(self, _: web.Request) -> web.Response:
+        """Return the newest live document."""
         return web.Response(body=self._newest_document, content_type="application/json")
 
-    async def _post_tare(self, _: web.Request) -> web.Response:
+    async def post_tare(self, _: web.Request) -> web.Response:
+        """Take a new tare; the hand must be open."""
         session = self._session
         work = partial(session.change, session.stream.restart_tare, "no tare can be taken")
         return await _answer(work)
 
-    async def _set_threshold(self, request: web.Request) -> web.Response:
+    async def set_threshold(self, request: web.Request) -> web.Response:
         """Set the threshold of a POST; a DELETE restores that of the model."""
         value: float | None = None
         notice = "threshold of the model restored"
@@ -274,7 +277,8 @@ class LiveService:
             self._status.add_notice(notice)
         return answer
 
-    async def _post_recording(self, request: web.Request) -> web.Response:
+    async def post_recording(self, request: web.Request) -> web.Response:
+        """Begin to record."""
         name = (await self._bodies.read(request, _FileRequest)).name
 
         def start() -> dict[str, str]:
@@ -286,10 +290,12 @@ class LiveService:
 
         return await _answer(start)
 
-    async def _delete_recording(self, _: web.Request) -> web.Response:
+    async def delete_recording(self, _: web.Request) -> web.Response:
+        """End the recording, and return its progress."""
         return await _answer(lambda: recording_info(self._recorder.stop()))
 
-    async def _post_marker(self, request: web.Request) -> web.Response:
+    async def post_marker(self, request: web.Request) -> web.Response:
+        """Add a marker to the recording."""
         text = (await self._bodies.read(request, _MarkerRequest)).text
         return await _answer(lambda: self._recorder.add_marker(text))
 
@@ -333,24 +339,27 @@ class CalibrationRoutes:
     def routes(self) -> list[web.AbstractRouteDef]:
         """Return the routes."""
         return [
-            web.get("/api/v1/calibration", self._get),
+            web.get("/api/v1/calibration", self.get),
             web.post("/api/v1/calibration", partial(self._change, self._calibration.start)),
             web.delete("/api/v1/calibration", partial(self._change, self._calibration.cancel)),
             web.post("/api/v1/calibration/finish", partial(self._change, self._calibration.finish)),
-            web.get("/api/v1/calibration/model", self._get_model),
-            web.post("/api/v1/calibration/model", self._post_model),
+            web.get("/api/v1/calibration/model", self.get_model),
+            web.post("/api/v1/calibration/model", self.post_model),
         ]
 
-    async def _get(self, _: web.Request) -> web.Response:
+    async def get(self, _: web.Request) -> web.Response:
+        """Return the state of the calibration."""
         return _json(self._calibration.document())
 
-    async def _get_model(self, _: web.Request) -> web.Response:
+    async def get_model(self, _: web.Request) -> web.Response:
+        """Return the calibrated model as a file."""
         answer = await _answer(lambda: msgspec.Raw(self._calibration.encoded_model()))
         if answer.status == HTTPStatus.OK:
             answer.headers["Content-Disposition"] = 'attachment; filename="calibrated.json"'
         return answer
 
-    async def _post_model(self, request: web.Request) -> web.Response:
+    async def post_model(self, request: web.Request) -> web.Response:
+        """Save the calibrated model in the folder of recordings."""
         name = (await self._bodies.read(request, _FileRequest)).name
         return await _answer(lambda: {"path": str(self._calibration.save(name))})
 
@@ -360,43 +369,3 @@ class CalibrationRoutes:
             return self._calibration.document()
 
         return await _answer(changed)
-
-
-def run_page(
-    session: Session,
-    announce: Callable[[str], None],
-    *,
-    host: str,
-    port: int,
-    guard: Guard | None = None,
-    folder: Path,
-    report: Callable[[str], None],
-    panels: Sequence[Panel] = (),
-    stay: bool,
-) -> None:
-    """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
-
-    Args:
-        session: it is started here; the caller stops it.
-        announce: function that is called with the URL when the page can be opened.
-        host: address to listen on.
-        port: port to listen on; 0 selects a free one.
-        guard: access control; by default only this machine can connect.
-        folder: folder for recordings.
-        report: called with the text of each notice.
-        panels: that run beside the session.
-        stay: continue when the source has ended.
-
-    Raises:
-        OutputError: the address is not available.
-        Exception: the failure of the session.
-    """
-    service = LiveService(session, guard or Guard(host), folder, report, panels)
-    session.start()
-    run_server(
-        service.app, host, port, announce,
-        # A page that stays still ends when the session fails.
-        lambda: session.ended and not (stay and session.failure is None),
-    )  # fmt: skip
-    if session.failure is not None:
-        raise session.failure

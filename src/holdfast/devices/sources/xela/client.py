@@ -107,12 +107,12 @@ class XelaSource(DeviceSource):
             )
         self.sensors = self._decoder.sensors
         self.metadata = {"source": self.name, **self._decoder.metadata}
-        self._start(received)
+        self.begin_reading(received)
         notices = [text for device in self._decoder.devices.values() for text in device.notices]
         first, *others = self._decoder.decode(text, received)
         first = first._replace(notices=(*notices, *first.notices))
-        self._queue([first, *others], received)
-        self._note_clock()
+        self.queue([first, *others], received)
+        self.note_clock()
 
     def _new_decoder(self) -> XelaDecoder:
         names, calibrated, sensor = self._options
@@ -142,7 +142,8 @@ class XelaSource(DeviceSource):
             why = f"{where} cannot be reached: {failures[-1]}"
         raise SourceError(why) from failures[-1]
 
-    def _receive(self, timeout: float) -> bool:
+    def receive(self, timeout: float) -> bool:
+        """Process what the device sends within `timeout` [s]; return False if nothing came."""
         if self._connection is None:
             return False
         try:
@@ -151,13 +152,14 @@ class XelaSource(DeviceSource):
         except TimeoutError:
             return False
         except ConnectionClosed as why:
-            self._disconnect()
-            self._lose("the server closed it" if isinstance(why, ConnectionClosedOK) else why)
+            self.disconnect()
+            self.lose("the server closed it" if isinstance(why, ConnectionClosedOK) else why)
             return False
-        self._queue(self._decoder.decode(text, received), received)
+        self.queue(self._decoder.decode(text, received), received)
         return True
 
-    def _reconnect(self) -> bool:
+    def reconnect(self) -> bool:
+        """Try to connect again; return whether the device is connected."""
         try:
             self._connection = self._connected()
         except SourceError:
@@ -165,7 +167,8 @@ class XelaSource(DeviceSource):
         self._decoder.reconnected()
         return True
 
-    def _disconnect(self) -> None:
+    def disconnect(self) -> None:
+        """Close the connection, if there is one."""
         # Set to None first: nothing uses it while it closes.
         connection, self._connection = self._connection, None
         if connection is None:

@@ -7,7 +7,7 @@ import pytest
 
 from command_line import Verb
 from holdfast import twin_recordings
-from holdfast.cli.demo import verb
+from holdfast.cli import demo as verb
 from holdfast.io import load_dataset
 from holdfast.model import Model
 from holdfast.parallel import Engine

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.demo.replay import show_page, watch
 from holdfast.cli.options import (
     BrowserOption,
     ForceOption,
@@ -60,9 +59,10 @@ def demo(
       holdfast demo results/ --speed 0 --json
     """
     require_extras("twin", "train", "parquet")
+    from holdfast import Model, load_dataset, load_recording
+    from holdfast.cli.detect.output import watch
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset, load_recording
-    from holdfast.model import Model
+    from holdfast.live.web.serving import show_recording
     from holdfast.parallel import Engine
     from holdfast.recorded import BOX_SLIPS
     from holdfast.training import Setting, train
@@ -100,7 +100,7 @@ def demo(
     page = wanted and speed and not as_json  # at speed 0 a page would show only the end
     replayed = None if page else watch(DEMO_MODEL, shown, speed, fingers=False)
     if page:
-        show_page(DEMO_MODEL, shown, out / "recorded", speed)
+        show_recording(DEMO_MODEL, shown, out / "recorded", speed, print_message)
     seconds = time.monotonic() - start
     if as_json:
         print_json({

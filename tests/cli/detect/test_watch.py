@@ -1,10 +1,9 @@
-"""The recording of a real hand that ships, and how the demo shows recordings."""
+"""The recording of a real hand that ships, and how it is shown as a live source."""
 
 import pytest
 
-from holdfast.cli.demo import replay
-from holdfast.cli.demo.replay import watch
-from holdfast.devices import sources
+from holdfast.cli.detect import output
+from holdfast.cli.detect.output import watch
 from holdfast.io import load_recording
 from holdfast.recorded import BOX_SLIPS
 
@@ -39,9 +38,9 @@ def test_of_the_hand_alone(capsys):
 
 
 def test_it_plays_at_its_speed(monkeypatch):
-    asked, real = [], sources.open_source
+    asked, real = [], output.open_source
     monkeypatch.setattr(
-        sources, "open_source", lambda path, speed: asked.append(speed) or real(path, speed=0)
+        output, "open_source", lambda path, speed: asked.append(speed) or real(path, speed=0)
     )
-    replay.watch("builtin:any", BOX_SLIPS, 2.0)
+    watch("builtin:any", BOX_SLIPS, 2.0)
     assert asked == [2.0]
