@@ -134,11 +134,17 @@ def _turned(recording):
 
 def test_labels_of_a_person_count_instead_of_the_truth_of_a_simulation():
     recording = sliding_recording(0)
-    assert taught_recording(recording).truth is None  # these have no author: somebody's
-    module = recording.modules["thumb"]
-    by_twin = tuple(replace(label, author="twin") for label in module.labels)
-    simulated = replace(recording, modules={"thumb": replace(module, labels=by_twin)})
+    modules = {
+        name: replace(module, labels=tuple(replace(x, author="twin") for x in module.labels))
+        for name, module in recording.modules.items()
+    }
+    simulated = replace(recording, modules=modules)
     assert taught_recording(simulated) is simulated
+    labelled = replace(simulated, modules=modules | {"index": recording.modules["index"]})
+    taught = taught_recording(labelled)
+    assert taught.truth is None
+    assert taught.modules["index"].labels == recording.modules["index"].labels
+    assert taught.modules["thumb"].labels == ()  # no camera saw it
 
 
 def _without_slips(recording):
@@ -225,6 +231,14 @@ class TestBoundedThreshold:
         # The same mean, but all alarms in one of five recordings: the bound is above the mean.
         curves = self.curves([30.0, 0, 0, 0, 0], [40.0, 0, 0, 0, 0])
         assert bounded_threshold(curves, 1.4) == 1
+
+    def test_labels_by_a_rule_need_no_bound(self):
+        """The slips that it has not seen are among the false alarms."""
+        curves = [
+            replace(curve, silent=replace(curve.silent, onsets=frozenset({"rule"})))
+            for curve in self.curves([30.0, 0, 0, 0, 0], [40.0, 0, 0, 0, 0])
+        ]
+        assert bounded_threshold(curves, 1.4) == 0
 
     def test_only_quiet_time_counts_alone(self):
         silent = {"quiet_seconds": 600.0, "held_seconds": 600.0}

@@ -61,9 +61,8 @@ def teach(
     push, tap and carry the object as well.
 
     About 30 slips of fingers, half in pulls and half in pushes, in ten grasps are enough. Three
-    slips in two recordings suffice, with a warning. The figures are of grasps that the rule was
-    not fitted to. So is the threshold: it gives the wanted rate of false alarms in four of five
-    draws of such grasps.
+    slips in two recordings suffice, with a warning. Figures and threshold come from grasps that
+    the rule was not fitted to.
 
     Example:
       holdfast teach --from grasps/ -o mine.json

@@ -37,9 +37,11 @@ MAX_RAISED_QUIET = 2.0
 DISTURBED_SHARE = 0.4
 """Share of held time in use in which something pushes or moves the object: an assumption, near that
 of the paper's experiment."""
-RATE_BOUND = 0.8
-"""Quantile of the rate of false alarms that is held against the wanted one. Measured on the twin,
-without it 2.1 false alarms a minute (median) came of 1.5 that were wanted, with it 1.4."""
+RATE_BOUND, MEASURED_RATE_BOUND = 0.8, 0.5
+"""Quantile of the rate of false alarms that is held against the wanted one. With exact labels on
+the twin, 2.1 false alarms a minute (median) came of 1.5 that were wanted without a bound, and 1.4
+with it. A rule that measures slips from outside does not see the smallest ones, which count as
+false alarms then: that is a bound of its own, and the median is enough."""
 
 MAX_FLAGS = 1 << 22
 """Number of samples times thresholds that are counted at a time: bounds the memory."""
@@ -116,8 +118,9 @@ def bounded_threshold(
 
         rate = (1 - DISTURBED_SHARE) rate_quiet + DISTURBED_SHARE rate_disturbed
 
-    The bound is the quantile `RATE_BOUND` of the rate over resampled recordings: the rate of the
-    next grasps is above it in one of five cases, as far as these grasps are like the next.
+    The bound is a quantile of the rate over resampled recordings, `RATE_BOUND`: the rate of the
+    next grasps is above it in one of five cases, as far as these grasps are like the next. With
+    labels by a rule it is `MEASURED_RATE_BOUND`.
 
     Args:
         curves: of each recording, out of fold.
@@ -150,7 +153,9 @@ def bounded_threshold(
         rate += share * np.divide(draws @ false, drawn, out=np.zeros_like(rate), where=drawn > 0)
         weight += share * (drawn > 0)  # a resample without one of the two has only the other
     rate /= np.maximum(weight, DISTURBED_SHARE)
-    fits = np.quantile(rate, RATE_BOUND, axis=0) <= false_alarms
+    by_rule = any("rule" in s.onsets for s in silent)
+    bound = MEASURED_RATE_BOUND if by_rule else RATE_BOUND
+    fits = np.quantile(rate, bound, axis=0) <= false_alarms
     fits &= 100 * raised.sum(axis=0) <= MAX_RAISED_QUIET * 60 * quiet.sum()
     # As in `_places`: what is left of the unbroken run of thresholds at the end that fit.
     index = len(fits) - int(np.logical_and.accumulate(fits[::-1]).sum())

@@ -245,11 +245,20 @@ def taught_recording(recording: Recording) -> Recording:
     """Return the recording without its truth where a person or a rule has labelled it.
 
     Only simulated recordings have a truth. Their own labels come from it, and mark whole episodes
-    as slip, so that the truth counts there; labels that were made since count instead of it.
+    as slip, so that the truth counts there. Labels that were made since count instead of it, and
+    fingers without such labels have none.
     """
-    labels = (label for module in recording.modules.values() for label in module.labels)
-    is_labelled = any(label.author != TRUTH_AUTHOR for label in labels)
-    return replace(recording, truth=None) if is_labelled else recording
+    made = {
+        name: any(label.author != TRUTH_AUTHOR for label in module.labels)
+        for name, module in recording.modules.items()
+    }
+    if not any(made.values()):
+        return recording
+    modules = {
+        name: module if made[name] else replace(module, labels=())
+        for name, module in recording.modules.items()
+    }
+    return replace(recording, modules=modules, truth=None)
 
 
 def _read_part(model: Model, index: int, part: Sequence[Recording]) -> TaughtPart:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import UNSTABLE_MARGIN, Cause, ContactState
+from holdfast.contact import Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io.foreign import read_stickers
@@ -38,7 +38,7 @@ from holdfast.labelling.rules.video_motion import (
     robust_fit,
     tip_motions,
 )
-from holdfast.metrics.masks import Mask, fill_short_gaps, hysteresis, n_samples_of, runs, widen_runs
+from holdfast.metrics.masks import Mask, fill_short_gaps, hysteresis, n_samples_of, runs
 from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Array
 
@@ -137,7 +137,7 @@ def propose(
         note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
         # What no picture shows is as doubtful as what the pictures show too little of.
         doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
-        doubtful = widen_runs(doubtful | ~tip.seen, at, UNSTABLE_MARGIN)
+        doubtful |= ~tip.seen
         labels[finger] = without_cause(with_slips(base[finger], slips, note), at, doubtful)
     return labels
 
