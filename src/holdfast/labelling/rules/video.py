@@ -11,7 +11,8 @@ sliding is an outlier. What remains, d, is flat while the finger sticks, and mov
 has slid.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -273,24 +274,36 @@ def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tu
         times: (n,) of the pictures, on the clock of the labels [s].
         doubtful: (n,) where it may slide; before and after the pictures it may too.
     """
-    spans = [(-np.inf, float(times[0])), *((times[a], times[b - 1]) for a, b in runs(doubtful))]
+    inside = [(float(times[first]), float(times[last - 1])) for first, last in runs(doubtful)]
+    spans = [(-math.inf, float(times[0])), *inside, (float(times[-1]), math.inf)]
     made: list[Label] = []
     for label in labels:
-        if label.cause is not Cause.DISTURBANCE:
+        if label.cause is Cause.DISTURBANCE:
+            parts = _cut(label, spans)
+            made += [part if span is None else replace(part, cause=None) for part, span in parts]
+        else:
             made.append(label)
-            continue
-        at = label.start
-        for start, end in (*spans, (times[-1], np.inf)):
-            first, last = max(float(start), at), min(float(end), label.end)
-            if first >= last:
-                continue
-            if first > at:
-                made.append(replace(label, start=at, end=first))
-            made.append(replace(label, start=first, end=last, cause=None))
-            at = last
-        if label.end > at:
-            made.append(replace(label, start=at))
     return tuple(made)
+
+
+def _cut(label: Label, spans: Sequence[tuple[float, float]]) -> Iterator[tuple[Label, int | None]]:
+    """Yield the parts of a label between spans and in them, and the index of the span of each.
+
+    Args:
+        label: to cut.
+        spans: start and end [s], in order of time; where two overlap, the first counts.
+    """
+    at = label.start
+    for index, (start, end) in enumerate(spans):
+        first, last = max(start, at), min(end, label.end)
+        if first >= last:
+            continue
+        if first > at:
+            yield replace(label, start=at, end=first), None
+        yield replace(label, start=first, end=last), index
+        at = last
+    if label.end > at:
+        yield replace(label, start=at), None
 
 
 def _for_good(rest: Array, moving: Mask, n: int, slid: float, step: float) -> Mask:
@@ -342,13 +355,11 @@ def with_slips(
         if label.state is ContactState.NO_CONTACT or label.cause not in (None, Cause.DISTURBANCE):
             made.append(label)
             continue
-        at = label.start
-        for slip in slips:
-            start, end = max(slip.onset, at), min(slip.end, label.end)
-            if start >= end:
+        for part, index in _cut(label, [(slip.onset, slip.end) for slip in slips]):
+            if index is None:
+                made.append(part)
                 continue
-            if start > at:
-                made.append(replace(label, end=start, start=at))
+            slip, start = slips[index], part.start
             text = (
                 f"slides {1e3 * slip.distance:.2f} mm (+/- {1e3 * slip.distance_error:.2f}), "
                 f"onset +/- {1e3 * slip.onset_error:.0f} ms; {note}"
@@ -357,13 +368,10 @@ def with_slips(
                 start = made.pop().start
             # A slip of the least distance has an evidence ratio of 2, a confidence up to 0.75.
             ratio = float(evidence_ratio(slip.ratio, 0.5))
-            sure = round(label_confidence(ratio, end - start), 3)
+            sure = round(label_confidence(ratio, part.end - start), 3)
             made.append(
-                Label(start, end, ContactState.UNSTABLE, Cause.SLIP, text, sure, VIDEO_RULE)
+                Label(start, part.end, ContactState.UNSTABLE, Cause.SLIP, text, sure, VIDEO_RULE)
             )
-            at = end
-        if label.end > at:
-            made.append(replace(label, start=at))
     return tuple(made)
 
 
