@@ -131,9 +131,9 @@ def standard_definition(kind: str) -> Definition | None:
 
 def find_bags(path: Path) -> list[Path]:
     """Return the bag at `path`, or the bags in that folder in natural order."""
-    if _is_bag(path):
+    if is_bag(path):
         return [path]
-    return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural_order)
+    return sorted((inside for inside in path.glob("*") if is_bag(inside)), key=natural_order)
 
 
 @contextmanager
@@ -186,7 +186,8 @@ def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
     return {body: np.array(rows[name]) for body, name in wanted.items()}
 
 
-def _is_bag(path: Path) -> bool:
+def is_bag(path: Path) -> bool:
+    """Return whether a folder or file is a bag, by its first bytes."""
     if path.is_dir():
         return (path / METADATA).is_file()
     if path.suffix not in MAGICS or not path.is_file():
@@ -242,9 +243,9 @@ class PoseDecoder:
         message = self._decode(data)
         if "transforms" not in message:
             pose = message["pose"]
-            return [_pose("", message["header"], pose["position"], pose["orientation"])]
+            return [stamped_pose("", message["header"], pose["position"], pose["orientation"])]
         return [
-            _pose(
+            stamped_pose(
                 one["child_frame_id"],
                 one["header"],
                 one["transform"]["translation"],
@@ -260,24 +261,26 @@ def has_poses(definition: Definition) -> bool:
     return any(needed <= paths for needed in (_POSE_PATHS, _TF_PATHS))
 
 
-def _pose_paths(prefix: str, position: str, rotation: str) -> set[str]:
+def pose_paths(prefix: str, position: str, rotation: str) -> set[str]:
+    """Return the paths of the fields of a stamped pose, with their types."""
     axes = [f"{position}.{axis}" for axis in "xyz"] + [f"{rotation}.{axis}" for axis in "wxyz"]
     return {f"{prefix}header.frame_id string", *(f"{prefix}{axis} float64" for axis in axes)}
 
 
-_POSE_PATHS = _pose_paths("", "pose.position", "pose.orientation")
+_POSE_PATHS = pose_paths("", "pose.position", "pose.orientation")
 _TF_PATHS = {
     "transforms[].child_frame_id string",
-    *_pose_paths("transforms[].", "transform.translation", "transform.rotation"),
+    *pose_paths("transforms[].", "transform.translation", "transform.rotation"),
 }
 
 
-def _pose(
+def stamped_pose(
     body: str,
     header: Mapping[str, Any],
     position: Mapping[str, float],
     rotation: Mapping[str, float],
 ) -> StampedPose:
+    """Return a pose with the names that tf2 has, and its time [s]."""
     # ROS 1 and ROS 2 give the two fields other names, in the same order.
     seconds, nanoseconds = header["stamp"].values()
     return StampedPose(

@@ -97,15 +97,15 @@ class Node:
     def published_topics(self) -> dict[str, str]:
         """Return the types of all published topics by name, both as in ROS."""
         return {
-            _ros_topic(endpoint): ros_type(endpoint.type_name)
-            for endpoint in _endpoints(self._publications)
+            ros_topic(endpoint): ros_type(endpoint.type_name)
+            for endpoint in ros_endpoints(self._publications)
         }
 
     def subscribed_topics(self) -> dict[str, str]:
         """Return the types of all topics with a subscriber by name, both as in ROS."""
         return {
-            _ros_topic(endpoint): ros_type(endpoint.type_name)
-            for endpoint in _endpoints(self._subscriptions)
+            ros_topic(endpoint): ros_type(endpoint.type_name)
+            for endpoint in ros_endpoints(self._subscriptions)
         }
 
     def n_other_writers(self, topic: str) -> int:
@@ -114,22 +114,21 @@ class Node:
         Those of a program that was killed count until DDS notices, 10 s by default.
         """
         mine = self._participant.guid
-        found = [endpoint.participant_key for endpoint in _endpoints(self._publications)
-                 if _ros_topic(endpoint) == topic]  # fmt: skip
+        found = [endpoint.participant_key for endpoint in ros_endpoints(self._publications)
+                 if ros_topic(endpoint) == topic]  # fmt: skip
         return sum(key != mine for key in found)
 
     def reader(self, topic: str, definition: Definition) -> "TopicReader":
         """Subscribe to a topic."""
-        qos = _qos(
-            Policy.Reliability.BestEffort, READER_QUEUE_SIZE
-        )  # also matches reliable publishers
+        # Also matches reliable publishers.
+        qos = qos_of(Policy.Reliability.BestEffort, READER_QUEUE_SIZE)
         reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
         return TopicReader(reader, WaitSet(self._participant))
 
     def writer(self, topic: str, definition: Definition) -> "TopicWriter":
         """Return a function that publishes messages on a topic, with the defaults of ROS 2."""
         reliable = Policy.Reliability.Reliable(duration(milliseconds=0))  # never blocks
-        qos = _qos(reliable, WRITER_QUEUE_SIZE)
+        qos = qos_of(reliable, WRITER_QUEUE_SIZE)
         writer = DataWriter(self._participant, self._topic(topic, definition, qos), qos=qos)
         return TopicWriter(writer, _raw(definition))
 
@@ -184,7 +183,7 @@ class TopicWriter:
         return len(self._writer.get_matched_subscriptions())
 
 
-def _endpoints(reader: BuiltinDataReader) -> list[Any]:
+def ros_endpoints(reader: BuiltinDataReader) -> list[Any]:
     """Return the publishers or subscribers of all topics of ROS."""
     # Publishers that have left stay in the reader, as not alive.
     alive = InstanceState.Alive | ViewState.Any | SampleState.Any
@@ -196,13 +195,14 @@ def _endpoints(reader: BuiltinDataReader) -> list[Any]:
     ]
 
 
-def _ros_topic(endpoint: Any) -> str:  # noqa: ANN401 (cyclonedds has no types)
-    name: str = endpoint.topic_name
+def ros_topic(endpoint: Any) -> str:  # noqa: ANN401 (cyclonedds has no types)
+    """Return the topic of an endpoint as ROS has it."""
     # The slash stays: `rt/name` is `/name` in ROS.
-    return name.removeprefix(TOPIC_PREFIX[:-1])
+    return str(endpoint.topic_name).removeprefix(TOPIC_PREFIX[:-1])
 
 
-def _qos(reliability: object, depth: int) -> Qos:
+def qos_of(reliability: object, depth: int) -> Qos:
+    """Return the quality of service of ROS 2's defaults, with this reliability and depth."""
     return Qos(
         # ROS 2 encodes messages in XCDR1; Cyclone DDS would also offer XCDR2.
         Policy.DataRepresentation(use_cdrv0_representation=True),
@@ -269,17 +269,17 @@ class _Raw:
 
 @cache
 def _raw_type(name: str, types: tuple[tuple[str, tuple[MessageField, ...]], ...]) -> type[Any]:
-    made = _struct(name, dict(types))
+    made = idl_struct(name, dict(types))
     for method in ("__init__", "serialize", "deserialize", "deserialize_key"):
         setattr(made, method, vars(_Raw)[method])
     return made
 
 
-def _struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type[Any]:
+def idl_struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type[Any]:
     """Return a type of DDS with the fields of a message, and of those inside it."""
     fields: dict[str, Any] = {}
     for field in types[name]:
-        one: Any = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
+        one: Any = _PRIMITIVES.get(field.kind) or idl_struct(field.kind, types)
         if field.size is not None:  # 0 for a list of any length
             one = idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]
         fields[field.name] = one
@@ -320,7 +320,7 @@ class Ros2Link(Link):
         """Subscribe to the joint states of a topic."""
         definition = topic_definition(JOINT_STATE)
         decode = MessageDecoder(definition, ros2=True)
-        return partial(_take, topic, self._node.reader(topic, definition), decode)
+        return partial(take_states, topic, self._node.reader(topic, definition), decode)
 
     def n_other_publishers(self, topic: str) -> int:
         """Return the number of publishers on a topic, other than those of this link."""
@@ -345,7 +345,8 @@ class Ros2Link(Link):
         return self._joined
 
 
-def _take(topic: str, reader: TopicReader, decode: MessageDecoder) -> list[JointStates]:
+def take_states(topic: str, reader: TopicReader, decode: MessageDecoder) -> list[JointStates]:
+    """Return the joint states that wait at a reader."""
     waiting: list[bytes] = []
     while found := reader.take(0.0):
         waiting += found

@@ -55,7 +55,7 @@ def rospy_module() -> ModuleType:
     """
     with suppress(ImportError):
         return import_module("rospy")
-    for folder in _rospy_folders():
+    for folder in rospy_folders():
         # Last, so that its packages replace none of this environment.
         sys.path.append(folder)
         try:
@@ -226,16 +226,16 @@ class _TimeoutTransport(Transport):
         return connection
 
 
-def _rospy_folders() -> Iterator[str]:
+def rospy_folders() -> Iterator[str]:
     """Yield the folders with a rospy for this version of Python."""
     python = f"python{sys.version_info[0]}.{sys.version_info[1]}"
     for pattern in ROSPY_FOLDERS:
         for folder in sorted(Path("/").glob(pattern.removeprefix("/"))):
-            if (folder / "rospy").is_dir() and python in _system_pythons():
+            if (folder / "rospy").is_dir() and python in system_pythons():
                 yield str(folder)
 
 
-def _system_pythons() -> Sequence[str]:
+def system_pythons() -> Sequence[str]:
     """Return the names of the Pythons of the operating system, which use these folders."""
     return [path.name for path in Path("/usr/bin").glob("python3.*")]
 
@@ -284,7 +284,7 @@ class Ros1Link(Link):
         kind = message_type(JOINT_STATE)
         subscriber = self._rospy.Subscriber(topic, kind, waiting.append, tcp_nodelay=True)
         self._registered.append(subscriber)
-        return partial(_take, waiting)
+        return partial(take_states, waiting)
 
     def n_other_publishers(self, topic: str) -> int:
         """Return the number of publishers on a topic, other than those of this process."""
@@ -344,6 +344,7 @@ class Ros1Link(Link):
                 setattr(message, field.name, parts)
 
 
-def _take(waiting: deque[Any]) -> list[JointStates]:
+def take_states(waiting: deque[Any]) -> list[JointStates]:
+    """Return the joint states that wait in a queue."""
     messages = [waiting.popleft() for _ in range(len(waiting))]
     return [JointStates.of_message(m.name, m.position, m.effort) for m in messages]

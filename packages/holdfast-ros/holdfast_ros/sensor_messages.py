@@ -166,7 +166,8 @@ SUPPORTED_MESSAGES = (
 """Supported message types, for error messages."""
 
 
-def _axis_paths(prefix: str, kind: str, axes: str = "xyz") -> set[str]:
+def axis_paths(prefix: str, kind: str, axes: str = "xyz") -> set[str]:
+    """Return the paths of the fields of a vector, with their type."""
     return {f"{prefix}{axis} {kind}" for axis in axes}
 
 
@@ -179,8 +180,8 @@ def from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
             one["time"] if np.isfinite(one["time"]) and one["time"] > 0 else None,
             None,
             one["message"],
-            _counts(_points(one["taxels"])),
-            _points(one["forces"]).astype(np.float64),
+            whole_counts(one["taxels"]),
+            point_rows(one["forces"]).astype(np.float64),
         )
         for one in message["sensors"]
     ]
@@ -189,25 +190,25 @@ def from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
 def from_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     """Return the samples of an XStream, which has neither models nor times."""
     return [
-        DeviceSample(one["sensor"], "", None, None, None, _counts(_points(one["xyz"])), _NO_FORCES)
+        DeviceSample(one["sensor"], "", None, None, None, whole_counts(one["xyz"]), _NO_FORCES)
         for one in message["data"]
     ]
 
 
 def from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
     """Return the sample of an xServerMsg, of one sensor."""
-    counts = _counts(_points([one["point"] for one in message["points"]]))
+    counts = whole_counts([one["point"] for one in message["points"]])
     number, model = message["sensor"], message["model"]
-    stamp = _seconds(message["header"]["stamp"])
+    stamp = stamp_seconds(message["header"]["stamp"])
     return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
 
 
 def from_sensor_state(message: Mapping[str, Any], names: Sequence[str]) -> list[DeviceSample]:
     """Return the sample of a PapillArray; ROS 2 allows small letters only in names of fields."""
-    forces = _points(message["pillars"], names)
+    forces = point_rows(message["pillars"], names)
     time = message["tus"] * 1e-6 if message["tus"] > 0 else None
     header = message.get("header")  # the maker's messages of ROS 2 have none
-    stamp = _seconds(header["stamp"]) if header else None
+    stamp = stamp_seconds(header["stamp"]) if header else None
     return [DeviceSample(None, PAPILLARRAY, time, stamp, None, None, forces)]
 
 
@@ -219,28 +220,28 @@ _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSamp
             "sensors[].model string",
             "sensors[].sensor_pos uint8",
         }
-        | _axis_paths("sensors[].taxels[].", "uint16")
-        | _axis_paths("sensors[].forces[].", "float32"),
+        | axis_paths("sensors[].taxels[].", "uint16")
+        | axis_paths("sensors[].forces[].", "float32"),
         from_sens_stream,
     ),
-    ({"data[].sensor int16"} | _axis_paths("data[].xyz[].", "uint32"), from_x_stream),
+    ({"data[].sensor int16"} | axis_paths("data[].xyz[].", "uint32"), from_x_stream),
     (
         {"sensor int16", "model string", "header.frame_id string"}
-        | _axis_paths("points[].point.", "float64"),
+        | axis_paths("points[].point.", "float64"),
         from_x_server,
     ),
     (
-        {"tus int64"} | _axis_paths("pillars[].f", "float32", "XYZ"),
+        {"tus int64"} | axis_paths("pillars[].f", "float32", "XYZ"),
         partial(from_sensor_state, names=("fX", "fY", "fZ")),
     ),
     (
-        {"tus int64"} | _axis_paths("pillars[].f", "float32"),
+        {"tus int64"} | axis_paths("pillars[].f", "float32"),
         partial(from_sensor_state, names=("fx", "fy", "fz")),
     ),
 )
 
 
-def _points(
+def point_rows(
     given: npt.NDArray[Any] | list[dict[str, Any]], names: Sequence[str] = "xyz"
 ) -> npt.NDArray[Any]:
     """Return (n, 3) of points that are an array or dictionaries."""
@@ -250,12 +251,13 @@ def _points(
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def _counts(values: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
-    """Convert counts of a wider number type.
+def whole_counts(given: npt.NDArray[Any] | list[dict[str, Any]]) -> npt.NDArray[np.uint16]:
+    """Return (n, 3) of points whose counts may have a wider number type.
 
     Raises:
         ValueError: one is not a whole number of 16 bits.
     """
+    values = point_rows(given)
     if values.dtype == np.uint16:
         return values
     with np.errstate(invalid="ignore"):
@@ -266,7 +268,7 @@ def _counts(values: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
     return counts
 
 
-def _seconds(stamp: Mapping[str, int]) -> float | None:
+def stamp_seconds(stamp: Mapping[str, int]) -> float | None:
     """Return a stamp of ROS 1 or ROS 2 [s]; None if it was not set."""
     # ROS 1 and ROS 2 give the two fields other names, in the same order.
     seconds, nanoseconds = stamp.values()

@@ -10,11 +10,7 @@ import numpy as np
 
 from holdfast.errors import RecordingError
 from holdfast.io.cdr import MessageDecoder
-from holdfast.io.importers.array_tables import (
-    StoredArray,
-    arrays_of_records,
-    joined_axes,
-)
+from holdfast.io.importers.array_tables import StoredArray, arrays_of_records, joined_axes
 from holdfast.io.importers.table import first_texts
 from holdfast_ros.bags import Bag
 
@@ -64,7 +60,7 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
     records: dict[str, list[dict[str, Any]]] = {}
     for topic, time, data in bag.messages(topics[n] for n in decoders):
         bag.keep(2 * len(data))
-        message = dict(_fields(decoders[topic.number](data)))
+        message = dict(shaped_fields(decoders[topic.number](data)))
         records.setdefault(topic.name, []).append({**message, "bag_time": time})
     found: dict[str, StoredArray] = {}
     for name, own in records.items():
@@ -80,16 +76,16 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
     return found
 
 
-def _fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def shaped_fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the fields of a message; points and arrays with a layout in their shape."""
     if {"point_step", "data", "fields"} <= message.keys():
-        yield from _points(message).items()
+        yield from point_fields(message).items()
         # The other fields of a PointCloud2 only describe its data.
         message = {"header": message.get("header", {})}
     for name, value in message.items():
         if name == "header" and isinstance(value, Mapping):
-            yield from ((n, one) for n, one in _fields(value) if n == "stamp")
-        elif isinstance(value, Mapping) and (stamp := _stamp(value)) is not None:
+            yield from ((n, one) for n, one in shaped_fields(value) if n == "stamp")
+        elif isinstance(value, Mapping) and (stamp := seconds_of(value)) is not None:
             yield name, stamp
         elif name == "data" and isinstance(value, np.ndarray) and "layout" in message:
             sizes = [int(one["size"]) for one in message["layout"].get("dim", ())]
@@ -98,14 +94,15 @@ def _fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
-def _stamp(value: Mapping[str, Any]) -> float | None:
+def seconds_of(value: Mapping[str, Any]) -> float | None:
+    """Return the time [s] of a stamp of ROS 1 or ROS 2; None of anything else."""
     for seconds, nanoseconds, size in STAMPS:
         if value.keys() == {seconds, nanoseconds}:
             return float(value[seconds] + size * value[nanoseconds])
     return None
 
 
-def _points(message: Mapping[str, Any]) -> dict[str, Any]:
+def point_fields(message: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a PointCloud2; positions are left out where there is another vector.
 
     Raises:

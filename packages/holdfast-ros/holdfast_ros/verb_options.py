@@ -38,7 +38,7 @@ class Ros2:
         """Return the publisher of a stream; it is not open yet."""
         from holdfast_ros.publisher import Ros2Publisher
 
-        return Ros2Publisher(_units(stream), grip=panels.get("grip"))
+        return Ros2Publisher(finger_units(stream), grip=panels.get("grip"))
 
 
 class Ros1:
@@ -53,10 +53,10 @@ class Ros1:
         """Return the publisher of a stream; it is not open yet."""
         from holdfast_ros.publisher import Ros1Publisher
 
-        return Ros1Publisher(_units(stream), grip=panels.get("grip"))
+        return Ros1Publisher(finger_units(stream), grip=panels.get("grip"))
 
 
-def _units(stream: "StreamDetector") -> dict[str, Any]:
+def finger_units(stream: "StreamDetector") -> dict[str, Any]:
     """Return the unit of the readings of each finger."""
     return {name: sensor.unit for name, sensor in stream.fingers.items()}
 

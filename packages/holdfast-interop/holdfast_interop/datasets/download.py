@@ -155,12 +155,12 @@ def import_files(
     from holdfast.recording_import import ImportTask, import_all
 
     task = ImportTask(out, public.importer, force=force)
-    with _folder_of(files, download_folder(public.name)) as selected:
+    with linked_folder(files, download_folder(public.name)) as selected:
         return import_all(selected, task, Engine(), notify=notify, steps=steps)
 
 
 @contextmanager
-def _folder_of(files: Sequence[PublicFile], folder: Path) -> Iterator[Path]:
+def linked_folder(files: Sequence[PublicFile], folder: Path) -> Iterator[Path]:
     """Yield a temporary folder with some of the files; errors name the original folder."""
     with TemporaryDirectory(prefix=".import.", dir=folder) as name:
         for file in files:
@@ -300,7 +300,7 @@ class _Download:
         """
         import requests
 
-        n_done = _incomplete_size(self._part)
+        n_done = incomplete_size(self._part)
         if n_done and n_done == self._file.size:
             return
         # A packed body has no place from which to continue, and may unpack to any size.
@@ -329,8 +329,8 @@ class _Download:
             self._size = n_bytes + int(stated) if stated.isdecimal() else None
         # The length that a server states is not believed: bytes are counted, and so is the time.
         chunks = answer.iter_content(DOWNLOAD_CHUNK)
-        with _open_part(self._part, continues=continues) as file:
-            while chunk := _in_time(partial(next, chunks, b"")):
+        with open_part(self._part, continues=continues) as file:
+            while chunk := in_time(partial(next, chunks, b"")):
                 n_bytes += len(chunk)
                 if n_bytes > self._max_size:
                     break
@@ -348,7 +348,7 @@ class _Download:
             )
 
 
-def _incomplete_size(part: Path) -> int:
+def incomplete_size(part: Path) -> int:
     """Return the size of an incomplete file [bytes]; a link to another file is removed."""
     try:
         state = part.lstat()
@@ -360,7 +360,7 @@ def _incomplete_size(part: Path) -> int:
     return 0
 
 
-def _open_part(part: Path, *, continues: bool) -> BinaryIO:
+def open_part(part: Path, *, continues: bool) -> BinaryIO:
     """Open an incomplete file at its end, or a new one; never what a link points to."""
     if not continues:
         part.unlink(missing_ok=True)
@@ -381,7 +381,7 @@ def _answer(url: str, headers: dict[str, str]) -> "Response":
         session = requests.Session()
         find_target = session.get_redirect_target
         session.get_redirect_target = lambda _: None  # type: ignore[assignment,method-assign]
-        answer = _in_time(
+        answer = in_time(
             partial(session.get, url, headers=headers, stream=True, timeout=SERVER_TIMEOUTS)
         )
         if (location := find_target(answer)) is None:
@@ -391,7 +391,7 @@ def _answer(url: str, headers: dict[str, str]) -> "Response":
     raise requests.TooManyRedirects(f"more than {MAX_REDIRECTS} redirections")
 
 
-def _in_time(call: Callable[[], _T]) -> _T:
+def in_time(call: Callable[[], _T]) -> _T:
     """Return what a call returns, or give up its thread: each byte renews a socket's timeout.
 
     Raises:

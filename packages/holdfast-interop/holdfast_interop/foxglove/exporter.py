@@ -144,9 +144,13 @@ class _MessageFile:
         texts = {key: x if isinstance(x, str) else encode(x).decode() for key, x in facts.items()}
         self._writer.add_metadata("holdfast", texts)
 
+    def nanoseconds(self, time: float) -> int:
+        """Return a time [s] as the file has it [ns]."""
+        return max(0, round((time + self._offset) * 1e9))
+
     def stamp(self, time: float) -> dict[str, int]:
         """Return a time [s] as Foxglove's messages have it."""
-        seconds, nanoseconds = divmod(self._nanoseconds(time), 1_000_000_000)
+        seconds, nanoseconds = divmod(self.nanoseconds(time), 1_000_000_000)
         return {"sec": seconds, "nsec": nanoseconds}
 
     def write(self, message: Message) -> None:
@@ -164,16 +168,13 @@ class _MessageFile:
         # Scenes and transforms have the stamp inside each entity, where Foxglove reads it.
         if "entities" not in document and "transforms" not in document:
             document = {"timestamp": self.stamp(message.time), **document}
-        time = self._nanoseconds(message.time)
+        time = self.nanoseconds(message.time)
         self._writer.add_message(self._channels[topic], time, self._encoder.encode(document), time)
         self.n_messages[topic] = self.n_messages.get(topic, 0) + 1
 
     def close(self) -> None:
         """Write the end of the file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
-
-    def _nanoseconds(self, time: float) -> int:
-        return max(0, round((time + self._offset) * 1e9))
 
 
 LAYOUT_VERSION = 1
@@ -205,7 +206,7 @@ def layout(fingers: Collection[str], topics: Collection[str]) -> dict[str, objec
         'row'
     """
     plots = [
-        _plot(title, topic, fingers)
+        plot_panel(title, topic, fingers)
         for title, topic in (
             ("Force", FORCE_TOPIC),
             ("Instability", INSTABILITY_TOPIC),
@@ -230,12 +231,13 @@ def layout(fingers: Collection[str], topics: Collection[str]) -> dict[str, objec
     scene = {"topics": shown, "cameraState": CAMERA, "followTf": ROOT_FRAME}
     hand = _panel("ThreeDee", "Hand", scene)
     log = _panel("Log", "Log", {"topicToRender": LOG_TOPIC, "minLogLevel": INFO_LEVEL})
-    left = _split("column", [(hand, 3), (log, 1)])
-    right = _split("column", [(panel, 1) for panel in plots])
-    return {"version": LAYOUT_VERSION, "content": _split("row", [(left, 1), (right, 1)])}
+    left = split_panel("column", [(hand, 3), (log, 1)])
+    right = split_panel("column", [(panel, 1) for panel in plots])
+    return {"version": LAYOUT_VERSION, "content": split_panel("row", [(left, 1), (right, 1)])}
 
 
-def _plot(title: str, topic: str, fingers: Iterable[str]) -> dict[str, object]:
+def plot_panel(title: str, topic: str, fingers: Iterable[str]) -> dict[str, object]:
+    """Return a plot of the series of all fingers on a topic."""
     paths = [
         {
             "value": f'{topic}.scalars[:]{{label=="{series_label(finger)}"}}.value',
@@ -258,6 +260,7 @@ def _panel(kind: str, title: str, config: dict[str, object]) -> dict[str, object
     }
 
 
-def _split(direction: str, items: Iterable[tuple[object, float]]) -> dict[str, object]:
+def split_panel(direction: str, items: Iterable[tuple[object, float]]) -> dict[str, object]:
+    """Return panels beside or below each other, with their shares of the space."""
     parts = [{"proportion": share, "content": content} for content, share in items]
     return {"type": "split", "direction": direction, "items": parts}

@@ -68,12 +68,13 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
         tips = {
             finger: np.asarray(arrays["tip_pose"], dtype=np.float64)
             for finger, arrays in truth.fingers.items()
-            if finger in recording.modules and _are_poses(arrays.get("tip_pose"))
+            if finger in recording.modules and are_poses(arrays.get("tip_pose"))
         }
         if tips:
             frames = [Frame(module_frame(f), WORLD, truth.times, tips[f]) for f in tips]
             rest = [name for name in recording.modules if name not in tips]
-            return [*frames, *_object(recording), *_side_by_side(recording, rest)], "measured poses"
+            frames += object_frames(recording)
+            return [*frames, *side_by_side(recording, rest)], "measured poses"
     known = hand(ALLEGRO)
     # By name and sensor: a pad of another hand may have the name of one of this.
     on_hand = [
@@ -83,8 +84,8 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
     ]
     rest = [name for name in recording.modules if name not in on_hand]
     if not on_hand:
-        return [*_side_by_side(recording, rest), *_object(recording)], "side by side"
-    times, joints, origin = _joints(recording)
+        return [*side_by_side(recording, rest), *object_frames(recording)], "side by side"
+    times, joints, origin = hand_joints(recording)
     tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
     mounts: dict[str, tuple[str, RigidPose]] = {}
     for name in on_hand:
@@ -111,7 +112,7 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
     ]
     # Where the palm is in the world is not known: it stands at the origin.
     palm = Frame(PALM_LINK, WORLD, times[:1], np.array([_pose((np.zeros(3), np.eye(3)))]))
-    return [palm, *frames, *_side_by_side(recording, rest)], origin
+    return [palm, *frames, *side_by_side(recording, rest)], origin
 
 
 def quaternions(rotations: Array) -> Array:
@@ -155,13 +156,13 @@ def allegro_links(joints: Array) -> dict[str, RigidPose]:
         # As in URDF: about the fixed axes x, then y, then z.
         roll, pitch, yaw = (float(row[a]) for a in ("roll", "pitch", "yaw"))
         x, y, z = np.eye(3)
-        fixed = _about(z, yaw) @ _about(y, pitch) @ _about(x, roll)
-        turned = rotation @ fixed @ _about(axis, float(joints[joint]))
+        fixed = rotation_about(z, yaw) @ rotation_about(y, pitch) @ rotation_about(x, roll)
+        turned = rotation @ fixed @ rotation_about(axis, float(joints[joint]))
         poses[row["link"]] = place + rotation @ offset, turned
     return poses
 
 
-def _joints(recording: Recording) -> tuple[Array, Array, str]:
+def hand_joints(recording: Recording) -> tuple[Array, Array, str]:
     """Return times (n,) [s] and joints (n, 16) [rad] of the hand, and where they are from."""
     truth = recording.truth
     if truth is not None and len(truth.times):
@@ -175,44 +176,39 @@ def _pose(pose: RigidPose) -> Array:
     return np.concatenate([pose[0], quaternions(pose[1])])
 
 
-def _side_by_side(recording: Recording, names: list[str]) -> list[Frame]:
+def side_by_side(recording: Recording, names: list[str]) -> list[Frame]:
     """Return modules in a row along x, with their normals along z."""
     widths = [np.ptp(recording.modules[n].sensor.positions, axis=0).max() for n in names]
     # At least 1 cm: a sensor of one taxel has no width.
     step = SIDE_GAP * max([*widths, 0.01])
     frames = []
     for k, name in enumerate(names):
-        rotation = _from_normal(recording.modules[name].sensor.normal)
+        x, y, z = recording.modules[name].sensor.normal
+        if abs(z) > 1 - 1e-9:  # along the z axis there is no axis of rotation to compute
+            rotation = np.eye(3) if z > 0 else np.diag([1.0, -1.0, -1.0])
+        else:
+            axis = np.array([y, -x, 0.0]) / np.hypot(x, y)
+            rotation = rotation_about(axis, float(np.arccos(z)))
         pose = _pose((np.array([(k - (len(names) - 1) / 2) * step, 0.0, 0.0]), rotation))
         frames.append(Frame(module_frame(name), WORLD, np.array([recording.start]), pose[None]))
     return frames
 
 
-def _object(recording: Recording) -> list[Frame]:
+def object_frames(recording: Recording) -> list[Frame]:
+    """Return the frame of the object if its poses were measured."""
     truth = recording.truth
     poses = None if truth is None or not len(truth.times) else truth.hand.get("object_pose")
-    if truth is None or poses is None or not _are_poses(poses):
+    if truth is None or poses is None or not are_poses(poses):
         return []
     return [Frame(OBJECT_FRAME, WORLD, truth.times, poses.astype(np.float64))]
 
 
-def _are_poses(array: Array | None) -> bool:
+def are_poses(array: Array | None) -> bool:
+    """Return whether an array has a position and a quaternion in each row, all finite."""
     return array is not None and array.shape[1:] == (7,) and bool(np.isfinite(array).all())
 
 
-def _from_normal(normal: Array) -> Array:
-    """Return a rotation that turns a unit vector to the z axis."""
-    # Along the z axis there is no axis of rotation to compute.
-    if normal[2] > 1 - 1e-9:
-        return np.eye(3)
-    if normal[2] < 1e-9 - 1:
-        return np.diag([1.0, -1.0, -1.0])
-    x, y = normal[:2]
-    axis = np.array([y, -x, 0.0]) / np.hypot(x, y)
-    return _about(axis, float(np.arccos(normal[2])))
-
-
-def _about(axis: Array, angle: float) -> Array:
+def rotation_about(axis: Array, angle: float) -> Array:
     """Return the rotation about a unit axis by an angle [rad], by Rodrigues' formula."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -53,21 +53,23 @@ INFO, WARNING = 2, 3
 Colour = dict[str, float]
 Track = tuple[Array, npt.NDArray[Any]]
 """Times (n,) [s] and values (n,)."""
+Traces = Mapping[str, FingerTrace]
 Stamp = Callable[[float], dict[str, int]]
 
 
-def _colour(red: float, green: float, blue: float, alpha: float = 1.0) -> Colour:
+def rgba(red: float, green: float, blue: float, alpha: float = 1.0) -> Colour:
+    """Return a colour as Foxglove has it, each part from 0 to 1."""
     return {"r": red, "g": green, "b": blue, "a": alpha}
 
 
 ARROW_COLOURS = {
-    ContactState.UNKNOWN: _colour(0.34, 0.71, 0.91),
-    ContactState.NO_CONTACT: _colour(0.78, 0.78, 0.78),
-    ContactState.UNSTABLE: _colour(0.88, 0.54, 0.24),
-    ContactState.STABLE: _colour(0.0, 0.62, 0.45),
+    ContactState.UNKNOWN: rgba(0.34, 0.71, 0.91),
+    ContactState.NO_CONTACT: rgba(0.78, 0.78, 0.78),
+    ContactState.UNSTABLE: rgba(0.88, 0.54, 0.24),
+    ContactState.STABLE: rgba(0.0, 0.62, 0.45),
 }
 """Colours of the arrows of a finger, by its state (or, without a model, its label)."""
-TAXEL_COLOUR = _colour(0.4, 0.4, 0.4, 0.6)
+TAXEL_COLOUR = rgba(0.4, 0.4, 0.4, 0.6)
 TAXEL_DIAMETER = 0.0012
 NAME_SIZE = 0.006
 """Size of the name of a module [m]."""
@@ -98,19 +100,23 @@ def messages(
         stamp: makes the time stamp of a message of a time [s].
     """
     traces = {} if detection is None else detection.fingers
+    # From the start, so that the arrows of all modules are of the same instants. At a rate for
+    # eyes: arrows at every sample would make files of gigabytes.
+    n_instants = int(recording.duration * SCENE_RATE) + 1
+    instants = recording.start + np.arange(n_instants) / SCENE_RATE
     parts = [
-        _transforms(frames, recording, stamp),  # before what is drawn in these frames
-        _taxels(recording, stamp),
-        _arrows(recording, traces, stamp),
-        *_scalars(recording, traces),
-        *_states(recording, traces),
-        _log(recording, traces),
+        transform_messages(frames, instants, stamp),  # before what is drawn in these frames
+        taxel_messages(recording, stamp),
+        arrow_messages(recording, traces, instants, stamp),
+        *scalar_messages(recording, traces),
+        *state_messages(recording, traces),
+        log_messages(recording, traces),
     ]
     # Merged, not sorted: all messages of a recording would not fit into memory.
     return heapq.merge(*parts, key=attrgetter("time"))
 
 
-def _scalars(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Iterator[Message]]:
+def scalar_messages(recording: Recording, traces: Traces) -> list[Iterator[Message]]:
     """Return the series of plots; a topic has the values of all fingers."""
     forces: dict[str, Track] = {}
     for name, module in recording.modules.items():
@@ -160,9 +166,10 @@ def _series(topic: str, tracks: Mapping[str, Track]) -> Iterator[Message]:
         yield Message(time, topic, {"scalars": scalars})
 
 
-def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Iterator[Message]]:
+def state_messages(recording: Recording, traces: Traces) -> list[Iterator[Message]]:
+    """Return the states of estimates, of labels and of the experiment."""
     parts = [
-        _state_messages(
+        changes_of_state(
             finger_topic(STATE_TOPIC, finger),
             trace.times,
             np.stack([trace.state, trace.reason, trace.cause]),
@@ -179,7 +186,7 @@ def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Ite
             topic, codes = finger_topic(LABEL_TOPIC, name), module.label_states[None]
             # Samples without a label have the code of UNKNOWN, which a label never is.
             parts.append(
-                _state_messages(
+                changes_of_state(
                     topic,
                     module.times,
                     codes,
@@ -192,14 +199,14 @@ def _states(recording: Recording, traces: Mapping[str, FingerTrace]) -> list[Ite
     if truth is not None and "phase" in truth.hand and truth.hand["phase"].dtype.kind == "U":
         phases, numbers = np.unique(truth.hand["phase"], return_inverse=True)
         parts.append(
-            _state_messages(
+            changes_of_state(
                 PHASE_TOPIC, truth.times, numbers[None], lambda code: {"state": str(phases[code])}
             )
         )
     return parts
 
 
-def _state_messages(
+def changes_of_state(
     topic: str, times: Array, codes: npt.NDArray[Any], document: Callable[..., dict[str, Any]]
 ) -> Iterator[Message]:
     """Yield a message at every change of the codes (n_codes, n), and at least once a second."""
@@ -211,7 +218,7 @@ def _state_messages(
             yield Message(time, topic, document(*row))
 
 
-def _log(recording: Recording, traces: Mapping[str, FingerTrace]) -> Iterator[Message]:
+def log_messages(recording: Recording, traces: Traces) -> Iterator[Message]:
     """Yield markers, alarms, slips and faults."""
     events = [(time, INFO, "marker", text) for time, text in recording.markers]
     for finger, trace in traces.items():
@@ -241,14 +248,8 @@ def _log(recording: Recording, traces: Mapping[str, FingerTrace]) -> Iterator[Me
         yield Message(time, LOG_TOPIC, document)
 
 
-def _instants(recording: Recording) -> Array:
-    # From the start, so that the arrows of all modules are of the same instants.
-    n = int(recording.duration * SCENE_RATE) + 1
-    return recording.start + np.arange(n) / SCENE_RATE
-
-
-def _arrows(
-    recording: Recording, traces: Mapping[str, FingerTrace], stamp: Stamp
+def arrow_messages(
+    recording: Recording, traces: Traces, instants: Array, stamp: Stamp
 ) -> Iterator[Message]:
     """Yield the arrows of all modules at each instant; none of a module in a gap."""
     # The codes of the states that colour the arrows: estimates, or else labels.
@@ -259,8 +260,6 @@ def _arrows(
         for name, module in recording.modules.items()
         if module.n_samples
     }
-    # At a rate for eyes: arrows at every sample would make files of gigabytes.
-    instants = _instants(recording)
     arrows = module_forces(recording, instants)
     scale = arrow_scale(arrows)
     places = {name: recording.modules[name].sensor.positions for name in arrows}
@@ -272,14 +271,15 @@ def _arrows(
             # Estimates begin later than readings: before the first, its colour.
             row = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
             colour = ARROW_COLOURS[STATE_BY_CODE[codes[row]]]
-            drawn = [] if k is None else _module_arrows(module, k, scale, places[name], colour)
+            drawn = [] if k is None else shapes_of_arrows(module, k, scale, places[name], colour)
             entities.append(_entity(name, stamp(time), arrows=drawn))
         yield Message(time, ARROWS_TOPIC, {"deletions": [], "entities": entities})
 
 
-def _module_arrows(
+def shapes_of_arrows(
     module: ModuleArrows, k: int, scale: float, places: Array, colour: Colour
 ) -> list[dict[str, Any]]:
+    """Return the arrows of a module at sample `k` that are long enough to be seen."""
     lengths = scale * np.linalg.norm(module.forces[k], axis=1)
     kept: Integers = np.flatnonzero(lengths > SHORTEST_ARROW)
     if not len(kept):
@@ -302,7 +302,7 @@ def _module_arrows(
     ]
 
 
-def _taxels(recording: Recording, stamp: Stamp) -> Iterator[Message]:
+def taxel_messages(recording: Recording, stamp: Stamp) -> Iterator[Message]:
     """Yield a dot for each taxel, and the name of each module, once."""
     entities = []
     size = dict.fromkeys("xyz", TAXEL_DIAMETER)
@@ -315,7 +315,7 @@ def _taxels(recording: Recording, stamp: Stamp) -> Iterator[Message]:
             "billboard": True,
             "font_size": NAME_SIZE,
             "scale_invariant": False,
-            "color": _colour(0.2, 0.2, 0.2),
+            "color": rgba(0.2, 0.2, 0.2),
             "text": name,
         }
         entities.append(_entity(name, stamp(recording.start), spheres=dots, texts=[text]))
@@ -350,10 +350,10 @@ def _pose(place: Iterable[float], turned: Iterable[float] | None = None) -> dict
     return {"position": dict(zip("xyz", place, strict=True)), "orientation": quaternion}
 
 
-def _transforms(frames: Sequence[Frame], recording: Recording, stamp: Stamp) -> Iterator[Message]:
+def transform_messages(frames: Sequence[Frame], instants: Array, stamp: Stamp) -> Iterator[Message]:
     """Yield all frames at the start, then those that move at each instant."""
     moving = [frame for frame in frames if len(frame.times) > 1]
-    for k, time in enumerate(_instants(recording).tolist()):
+    for k, time in enumerate(instants.tolist()):
         sent = frames if k == 0 else moving
         if sent:
             transforms = []

@@ -61,7 +61,7 @@ def read(path: Path) -> Iterator[Recording]:
         times = np.arange(len(readings)) / skin.rate
         metadata["clock"] = f"none; {skin.rate:g} Hz assumed"
     else:
-        stamps = [_nanoseconds(cell.strip()) for cell in cells[time_name]]
+        stamps = [nanoseconds_of(cell.strip()) for cell in cells[time_name]]
         if None in stamps:
             row = stamps.index(None)
             raise RecordingError(
@@ -75,12 +75,12 @@ def read(path: Path) -> Iterator[Recording]:
         metadata["clock"] = time_name
     with errors_named(path):
         module = Tactile(skin, times, readings)
-        labels = {"finger1": _labels(table, cells.get(SLIP_COLUMN), module)}
+        labels = {"finger1": flag_labels(table, cells.get(SLIP_COLUMN), module)}
         recording = Recording(path.stem, {"finger1": module}, metadata).with_labels(labels)
     yield recording
 
 
-def _nanoseconds(cell: str) -> int | None:
+def nanoseconds_of(cell: str) -> int | None:
     """Return a time [ns], a whole number so that no digit is lost; None if it is no time."""
     try:
         number = float(cell)
@@ -99,7 +99,8 @@ def _nanoseconds(cell: str) -> int | None:
     return round(found * unit) if abs(found * unit) < MAX_NANOSECONDS else None
 
 
-def _labels(table: Table, cells: Sequence[str] | None, module: Tactile) -> tuple[Label, ...]:
+def flag_labels(table: Table, cells: Sequence[str] | None, module: Tactile) -> tuple[Label, ...]:
+    """Return the labels from the cells of slip; none without that column."""
     if cells is None:
         return ()
     states: list[tuple[ContactState, Cause | None] | None] = []

@@ -50,7 +50,7 @@ _HELD_BEFORE = (_RELEASE, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
 
 def can_read(path: Path) -> bool:
     """Return whether `path` is an HDF5 file, or a folder with one."""
-    return any(file.suffix in HDF5_SUFFIXES or _is_hdf5(file) for file in _files(path))
+    return any(file.suffix in HDF5_SUFFIXES or is_hdf5(file) for file in hdf5_files(path))
 
 
 def parts(path: Path) -> list[Path]:
@@ -59,19 +59,21 @@ def parts(path: Path) -> list[Path]:
     Raises:
         RecordingError: there is none.
     """
-    files = _files(path)
+    files = hdf5_files(path)
     if not files:
         raise RecordingError(f"no HDF5 file in {path}; {' or '.join(HDF5_SUFFIXES)} expected")
     return files
 
 
-def _files(path: Path) -> list[Path]:
+def hdf5_files(path: Path) -> list[Path]:
+    """Return the file, or the HDF5 files of a folder in natural order."""
     if path.is_file():
         return [path]
     return sorted((p for p in path.glob("*") if p.suffix in HDF5_SUFFIXES), key=natural_order)
 
 
-def _is_hdf5(path: Path) -> bool:
+def is_hdf5(path: Path) -> bool:
+    """Return whether a file begins as HDF5 does, whatever its name."""
     with path.open("rb") as file:
         return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
 
@@ -82,7 +84,7 @@ def read(path: Path) -> Iterator[Recording]:
     Raises:
         RecordingError: it has another form.
     """
-    if not _is_hdf5(path):
+    if not is_hdf5(path):
         raise RecordingError(f"{path} is not an HDF5 file")
     try:
         arrays = arrays_of_hdf5(path)
@@ -95,7 +97,7 @@ def read(path: Path) -> Iterator[Recording]:
             )
         for name in sorted(groups, key=lambda name: natural_order(Path(name.replace("/", "_")))):
             inside = {last: arrays[of] for of, (group, _, last) in places.items() if group == name}
-            yield _recording(f"{path}: {name}", name.split("/"), inside)
+            yield recording_of_group(f"{path}: {name}", name.split("/"), inside)
     except RecordingError:
         raise
     except Exception as cause:  # h5py raises errors of any type for a damaged file
@@ -104,7 +106,8 @@ def read(path: Path) -> Iterator[Recording]:
         ) from cause
 
 
-def _recording(place: str, parts: list[str], group: StoredArrays) -> Recording:
+def recording_of_group(place: str, parts: list[str], group: StoredArrays) -> Recording:
+    """Return the recording of a group; errors name its place."""
     if TIMES_NAME not in group:
         raise RecordingError(f"{place} has no {TIMES_NAME}; it has {', '.join(group)}")
     wanted = {name: group[name] for name in (RAW_DATA, TIMES_NAME, LABELS_NAME) if name in group}
@@ -121,7 +124,7 @@ def _recording(place: str, parts: list[str], group: StoredArrays) -> Recording:
     # Stored as taxels x axes x samples.
     readings = with_integer_type(raw.transpose(2, 0, 1))
     with errors_named(place):
-        module = Tactile(_sensor(readings.shape[1]), times, readings)
+        module = Tactile(patch_of(readings.shape[1]), times, readings)
         if LABELS_NAME in arrays:
             codes = arrays[LABELS_NAME].ravel()
             if len(codes) != module.n_samples:
@@ -130,7 +133,7 @@ def _recording(place: str, parts: list[str], group: StoredArrays) -> Recording:
                 raise RecordingError(f"labels 0 to {_OTHER} expected, {codes.max():g} given")
             labels = labels_from_samples(
                 module.times,
-                _states([int(code) for code in codes]),
+                states_of_codes([int(code) for code in codes]),
                 period=module.period,
                 evidence="annotated by hand",
                 author=SOURCE,
@@ -141,7 +144,8 @@ def _recording(place: str, parts: list[str], group: StoredArrays) -> Recording:
         return Recording("_".join(parts), {"finger1": module}, {"source": SOURCE, **dict(facts)})
 
 
-def _sensor(n_taxels: int) -> Sensor:
+def patch_of(n_taxels: int) -> Sensor:
+    """Return the patch with a number of taxels."""
     if n_taxels == 24:
         return sensor("uskin-4x6")
     if n_taxels != 18:
@@ -156,7 +160,7 @@ def _sensor(n_taxels: int) -> Sensor:
     return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, range=(0.0, 65535.0))
 
 
-def _states(codes: list[int]) -> list[_State | None]:
+def states_of_codes(codes: list[int]) -> list[_State | None]:
     """Return the state of each sample; that of label 0 depends on the labels around it.
 
     Label 0 means both "nothing held" and "held, arm at rest". It is stable between labels of a

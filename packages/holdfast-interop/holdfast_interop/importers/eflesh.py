@@ -19,11 +19,7 @@ import numpy.typing as npt
 from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.importers import IN_CONTACT
-from holdfast.io.importers.table import (
-    SLIPPED,
-    natural_order,
-    read_table,
-)
+from holdfast.io.importers.table import SLIPPED, natural_order, read_table
 from holdfast.io.safe_reading import ReadBudget
 from holdfast.recordings import STARTS_LOADED, Recording, Tactile
 from holdfast.sensors import sensor
@@ -52,7 +48,7 @@ _FORM = f"{N_FINGERTIPS} fingertips x {N_MAGNETOMETERS} magnetometers x 3 axes o
 def can_read(path: Path) -> bool:
     """Return whether `path` is a file of torch, or a folder with sequences."""
     if path.is_dir():
-        return bool(_sequences(path))
+        return bool(sequences_in(path))
     if path.suffix != TENSOR_SUFFIX:
         return False
     with path.open("rb") as file:
@@ -65,13 +61,14 @@ def parts(path: Path) -> list[Path]:
     Raises:
         RecordingError: there is none.
     """
-    files = [path] if path.is_file() else _sequences(path)
+    files = [path] if path.is_file() else sequences_in(path)
     if not files:
         raise RecordingError(f"no eflesh sequence in {path}; files seq_N{TENSOR_SUFFIX} expected")
     return files
 
 
-def _sequences(folder: Path) -> list[Path]:
+def sequences_in(folder: Path) -> list[Path]:
+    """Return the sequences of a folder in natural order."""
     return sorted(folder.glob(f"seq_*{TENSOR_SUFFIX}"), key=natural_order)
 
 
@@ -84,7 +81,7 @@ def read(path: Path) -> Iterator[Recording]:
     check_regular(path)
     if not path.stat().st_size:
         raise RecordingError(f"{path} is empty; a tensor saved by torch expected")
-    values = _values(path)
+    values = read_tensor(path)
     times = np.arange(len(values)) / SEQUENCE_RATE
     skin = sensor("anyskin")
     modules = {
@@ -95,13 +92,13 @@ def read(path: Path) -> Iterator[Recording]:
         "clock": f"none; {SEQUENCE_RATE:g} Hz assumed",
         STARTS_LOADED: True,
     }
-    slipped = _labels(path.parent).get(path.stem)
+    slipped = slipped_by_sequence(path.parent).get(path.stem)
     yield Recording(
         path.stem, modules, metadata if slipped is None else metadata | {SLIPPED: slipped}
     )
 
 
-def _values(path: Path) -> npt.NDArray[np.float32]:
+def read_tensor(path: Path) -> npt.NDArray[np.float32]:
     """Return (n_samples, n_fingertips, n_magnetometers, 3).
 
     Raises:
@@ -166,7 +163,7 @@ def _content(
     return archive.read(info)
 
 
-def _labels(folder: Path) -> dict[str, bool]:
+def slipped_by_sequence(folder: Path) -> dict[str, bool]:
     """Return whether the object slipped, by name of the sequence; empty without such a file.
 
     Raises:

@@ -37,7 +37,8 @@ TO_TAXEL_FRAME = np.array([1, -1, -1])
 increases."""
 
 
-def _is_header(names: tuple[str, ...]) -> bool:
+def is_header(names: tuple[str, ...]) -> bool:
+    """Return whether a file with these columns is one of the gripper."""
     if set(NODE_COLUMNS) <= set(names):
         return True
     # Files without names of columns: these are 0, 1, 2, ... after an index without a name.
@@ -45,7 +46,7 @@ def _is_header(names: tuple[str, ...]) -> bool:
     return len(names) > len(NODE_COLUMNS) + 2 and names == ("", *numbered)
 
 
-_FORMAT = CsvFormat(_is_header, "no gtac file in {}; CSV files with columns mag_x1.. expected")
+_FORMAT = CsvFormat(is_header, "no gtac file in {}; CSV files with columns mag_x1.. expected")
 can_read, parts = _FORMAT.can_read, _FORMAT.parts
 
 
@@ -56,7 +57,7 @@ def read(path: Path) -> Iterator[Recording]:
         RecordingError: it has another form.
     """
     table, _ = read_table(path)
-    if not _is_header(table.names):
+    if not is_header(table.names):
         raise RecordingError(
             f"{path}: columns mag_x1,mag_y1,...,mag_z{N_NODES} expected, or a header of numbers "
             f"after an unnamed index; {', '.join(map(repr, table.names[:4]))}... given"

@@ -17,12 +17,7 @@ from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.files import read_input
 from holdfast.io.importers import IN_CONTACT
-from holdfast.io.importers.table import (
-    Table,
-    errors_named,
-    read_table,
-    with_integer_type,
-)
+from holdfast.io.importers.table import Table, errors_named, read_table, with_integer_type
 from holdfast.recordings import STARTS_LOADED, Label, Recording, Tactile, Truth, labels_from_samples
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -40,7 +35,7 @@ SOURCE = "imanlab/proactive-slip-control"
 
 def can_read(path: Path) -> bool:
     """Return whether `path` is the folder of a recording, or a folder with some."""
-    return bool(_folders(path))
+    return bool(sample_folders(path))
 
 
 def parts(path: Path) -> list[Path]:
@@ -49,7 +44,7 @@ def parts(path: Path) -> list[Path]:
     Raises:
         RecordingError: there is none.
     """
-    folders = _folders(path)
+    folders = sample_folders(path)
     if not folders:
         raise RecordingError(
             f"{path} has no uskin-pick-move recording: folders data_sample_* with "
@@ -59,7 +54,8 @@ def parts(path: Path) -> list[Path]:
     return folders
 
 
-def _folders(path: Path) -> list[Path]:
+def sample_folders(path: Path) -> list[Path]:
+    """Return the folder itself, or those in it, that hold a recording."""
     if (path / FILES["finger1"]).is_file():
         return [path]
     return sorted(file.parent for file in path.glob(f"*/{FILES['finger1']}"))
@@ -75,8 +71,8 @@ def read(folder: Path) -> Iterator[Recording]:
     robot, _ = read_table(folder / "robot_state.csv")
     times = robot.columns(["time"])[:, 0]
     with errors_named(folder):
-        modules = {name: _module(folder / file, times) for name, file in FILES.items()}
-        labels = _labels(folder / "slip_label.csv", modules["finger1"])
+        modules = {name: read_module(folder / file, times) for name, file in FILES.items()}
+        labels = read_slip_labels(folder / "slip_label.csv", modules["finger1"])
         labelled = {name: replace(module, labels=labels) for name, module in modules.items()}
         marker, _ = read_table(folder / "marker.csv")
         names = [f"marker_position_{axis}" for axis in "xyz"]
@@ -96,12 +92,13 @@ def read(folder: Path) -> Iterator[Recording]:
             "robot_velocity": robot.columns(["v_x", "v_y"]),
         }
         truth = Truth(times, arrays)
-        metadata = _metadata(folder / "meta_data.csv")
+        metadata = read_metadata(folder / "meta_data.csv")
         recording = Recording(folder.name, labelled, metadata, truth)
     yield recording
 
 
-def _module(path: Path, times: Array) -> Tactile:
+def read_module(path: Path, times: Array) -> Tactile:
+    """Return the readings of a patch, which has a row for each of the times."""
     patch = sensor("uskin-4x4")
     table, _ = read_table(path)
     expected = [f"txl{taxel + 1}_{axis}" for taxel in range(patch.n_taxels) for axis in "xyz"]
@@ -122,7 +119,8 @@ def _check_rows(table: Table, n_rows: int) -> None:
         )
 
 
-def _labels(path: Path, module: Tactile) -> tuple[Label, ...]:
+def read_slip_labels(path: Path, module: Tactile) -> tuple[Label, ...]:
+    """Return the labels of all fingers from the flags of slip and failure."""
     table, _ = read_table(path)
     flags = table.columns(["slip", "fail"])
     _check_rows(table, module.n_samples)
@@ -146,7 +144,8 @@ def _labels(path: Path, module: Tactile) -> tuple[Label, ...]:
     )
 
 
-def _metadata(path: Path) -> dict[str, Any]:
+def read_metadata(path: Path) -> dict[str, Any]:
+    """Return what is known of all recordings, and of this one if it has such a file."""
     metadata: dict[str, Any] = {"object": "box", "source": SOURCE, STARTS_LOADED: True}
     if path.is_file():
         text = read_input(path, MAX_METADATA_SIZE).decode("utf-8-sig")

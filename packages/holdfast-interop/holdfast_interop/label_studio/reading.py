@@ -56,6 +56,38 @@ class _Result(msgspec.Struct):
     score: float | None = None
     meta: Any = None
 
+    def label(self, annotator: str) -> Label:
+        """Return the label of a region.
+
+        Raises:
+            ValueError: the region is no valid label.
+        """
+        try:
+            value = msgspec.convert(self.value, _Value)
+        except msgspec.ValidationError as cause:
+            raise ValueError(
+                f"start and end in seconds and one label expected ({cause}); a labelling config "
+                "with a timeFormat exports dates: leave it out"
+            ) from cause
+        if value.instant or value.start == value.end:
+            raise ValueError(f"an instant at {value.start:.15g} s given, an interval expected")
+        if len(value.timeserieslabels) != 1:
+            given = ", ".join(value.timeserieslabels) or "none"
+            raise ValueError(f"one label for an interval expected, given: {given}")
+        state, cause_of = state_of(value.timeserieslabels[0])
+        meta = self.meta if isinstance(self.meta, dict) else {}
+        # A region that a person has changed is no longer by its first author.
+        changed = self.origin == "prediction-changed"
+        return Label(
+            value.start,
+            value.end,
+            state,
+            cause_of,
+            evidence=str(meta.get("evidence", "")),
+            confidence=1.0 if self.score is None else self.score,
+            author=annotator if changed else str(meta.get("author", annotator)),
+        )
+
 
 class _Annotation(msgspec.Struct):
     id: int | str | None = None
@@ -76,6 +108,18 @@ class _Task(msgspec.Struct):
     annotations: list[_Annotation] = []
     predictions: list[_Prediction | int] = []
     """Numbers if the export leaves the content of predictions out."""
+
+    def names(self) -> list[str]:
+        """Return possible names of the recording of the task."""
+        given = self.data.get("recording")
+        texts = [each for each in self.data.values() if isinstance(each, str)]
+        files = [*texts, self.file_upload or ""]
+        # Of a path or a URL, whose last part may be a query.
+        last = [re.split(r"[/\\=]", unquote(file))[-1] for file in files if _IS_TABLE(file)]
+        stems = [_SUFFIX.sub("", name) for name in last]
+        # Without the prefix of an upload.
+        bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]
+        return [*([given] if isinstance(given, str) else []), *bare, *stems]
 
 
 def label_name(state: ContactState, cause: Cause | None = None) -> str:
@@ -199,7 +243,7 @@ def labels_from_label_studio(
 
 def _task_of(tasks: Sequence[_Task], recording: Recording, path: Path) -> _Task:
     """Return the task of a recording, by its hash or else by name."""
-    named = [task for task in tasks if recording.name in _names(task)]
+    named = [task for task in tasks if recording.name in task.names()]
     # The hash first: files are renamed, and names are given twice.
     known = [task for task in tasks if task.data.get("digest") == recording.digest]
     if not known and any("digest" in task.data for task in named):
@@ -210,23 +254,11 @@ def _task_of(tasks: Sequence[_Task], recording: Recording, path: Path) -> _Task:
     found = known or named
     if len(found) == 1:
         return found[0]
-    names = ", ".join(dict.fromkeys(name for task in tasks for name in _names(task)[:1]))
+    names = ", ".join(dict.fromkeys(name for task in tasks for name in task.names()[:1]))
     raise RecordingError(
         f"{path}: one task of {recording.name!r} expected, {len(found)} found; "
         f"its {len(tasks)} tasks are of {names or 'recordings without a name'}"
     )
-
-
-def _names(task: _Task) -> list[str]:
-    """Return possible names of the recording of a task."""
-    given = task.data.get("recording")
-    texts = [each for each in task.data.values() if isinstance(each, str)]
-    files = [*texts, task.file_upload or ""]
-    # Of a path or a URL, whose last part may be a query.
-    last = [re.split(r"[/\\=]", unquote(file))[-1] for file in files if _IS_TABLE(file)]
-    stems = [_SUFFIX.sub("", name) for name in last]
-    bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]  # without the prefix of an upload
-    return [*([given] if isinstance(given, str) else []), *bare, *stems]
 
 
 def _labels(results: Sequence[_Result], recording: Recording, where: str, annotator: str) -> Labels:
@@ -241,7 +273,7 @@ def _labels(results: Sequence[_Result], recording: Recording, where: str, annota
                 f"{', '.join(recording.modules)} expected"
             )
         try:
-            labels.setdefault(finger, []).append(_label(result, annotator))
+            labels.setdefault(finger, []).append(result.label(annotator))
         except ValueError as cause:
             raise RecordingError(f"{where}, {finger}: {cause}") from cause
     try:
@@ -251,36 +283,3 @@ def _labels(results: Sequence[_Result], recording: Recording, where: str, annota
     return {
         finger: validated.modules[finger].labels for finger in recording.modules if finger in labels
     }
-
-
-def _label(result: _Result, annotator: str) -> Label:
-    """Return the label of a region.
-
-    Raises:
-        ValueError: the region is no valid label.
-    """
-    try:
-        value = msgspec.convert(result.value, _Value)
-    except msgspec.ValidationError as cause:
-        raise ValueError(
-            f"start and end in seconds and one label expected ({cause}); a labelling config "
-            "with a timeFormat exports dates: leave it out"
-        ) from cause
-    if value.instant or value.start == value.end:
-        raise ValueError(f"an instant at {value.start:.15g} s given, an interval expected")
-    if len(value.timeserieslabels) != 1:
-        given = ", ".join(value.timeserieslabels) or "none"
-        raise ValueError(f"one label for an interval expected, given: {given}")
-    state, cause_of = state_of(value.timeserieslabels[0])
-    meta = result.meta if isinstance(result.meta, dict) else {}
-    # A region that a person has changed is no longer by its first author.
-    changed = result.origin == "prediction-changed"
-    return Label(
-        value.start,
-        value.end,
-        state,
-        cause_of,
-        evidence=str(meta.get("evidence", "")),
-        confidence=1.0 if result.score is None else result.score,
-        author=annotator if changed else str(meta.get("author", annotator)),
-    )

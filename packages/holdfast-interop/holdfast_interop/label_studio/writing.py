@@ -160,7 +160,8 @@ def signals_csv(recording: Recording, window: int = DEFAULT_WINDOW) -> str:
             for column in latest.T.tolist()
         ]
     text = StringIO()
-    text.write(csv_text([["time", *_column_names(recording.modules)]]))
+    names = [f"{finger}_{name}" for finger in recording.modules for name in SERIES]
+    text.write(csv_text([["time", *names]]))
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows(zip(*cells, strict=True))
     return text.getvalue()
@@ -185,9 +186,9 @@ def labelling_config(units: Mapping[str, str], extra: Iterable[str] = ()) -> str
     parts = []
     for finger, unit in units.items():
         channels = "\n".join(
-            f"    <Channel column={quoteattr(column)} legend={quoteattr(name)} "
-            f"units={quoteattr(unit)}/>"
-            for column, name in zip(map(text_cell, _column_names([finger])), SERIES, strict=True)
+            f"    <Channel column={quoteattr(text_cell(f'{finger}_{name}'))} "
+            f"legend={quoteattr(name)} units={quoteattr(unit)}/>"
+            for name in SERIES
         )
         series = quoteattr(f"{finger}-signals")
         parts.append(
@@ -199,7 +200,3 @@ def labelling_config(units: Mapping[str, str], extra: Iterable[str] = ()) -> str
         )
     body = "\n".join(parts)
     return f"<View>\n{body}\n</View>\n"
-
-
-def _column_names(fingers: Iterable[str]) -> list[str]:
-    return [f"{finger}_{name}" for finger in fingers for name in SERIES]

@@ -68,7 +68,7 @@ class SharedColumns:
         """
         header = header_of(recording, recording.name)
         specs = array_specs(header)
-        _check_names(recording.name, specs)
+        check_columns(recording.name, specs)
         span = FrameSpan.of(recording, self.fps)
         arrays = arrays_of(recording)
         for spec in specs:
@@ -155,7 +155,7 @@ class FrameSpan(NamedTuple):
         return frame_ends(times, self.start, self.fps, self.n_frames)
 
 
-def _check_names(recording: str, specs: Sequence[ArraySpec]) -> None:
+def check_columns(recording: str, specs: Sequence[ArraySpec]) -> None:
     """Check that no two arrays share a column."""
     names = [feature_name(spec) for spec in specs if spec.topic != TRUTH_TIME]
     tracks = list(dict.fromkeys(map(track_name, specs)))

@@ -104,7 +104,7 @@ def export(
     """
     if not 1 <= fps <= MAX_FPS:
         raise ValueError(f"--fps: a whole number from 1 to {MAX_FPS} expected, {fps} given")
-    with whole_folder(out, force=force, is_replaceable=_is_data_set) as folder:
+    with whole_folder(out, force=force, is_replaceable=is_data_set) as folder:
         layout = SharedColumns(fps)
         for recording in recordings:
             layout.add(recording)
@@ -114,7 +114,7 @@ def export(
         return writer.write_meta()
 
 
-def _is_data_set(folder: Path) -> bool:
+def is_data_set(folder: Path) -> bool:
     """Return whether a folder has the marker, and no file that this export does not write."""
     marker = folder / MARKER_PATH
     # A link could lead `--force` out of the folder.
@@ -150,7 +150,7 @@ class _Writer(ExitStack):
         header = header_of(recording, recording.name)
         file = self._file_for_next()
         frames = EpisodeFrames(recording, header, self._layout)
-        name = _task(recording)
+        name = task_name(recording)
         task = self._tasks.setdefault(name, len(self._tasks))
         # In parts: windows repeat samples, so that frames are larger than their recording.
         for start in range(0, frames.n, MAX_GROUP_FRAMES):
@@ -192,10 +192,7 @@ class _Writer(ExitStack):
         self._path = self._folder / DATA_PATH.format(chunk_index=chunk, file_index=number)
         self._path.parent.mkdir(parents=True, exist_ok=True)
         self._file = pq.ParquetWriter(
-            str(self._path),
-            self._schema,
-            compression="zstd",
-            use_dictionary=False,
+            str(self._path), self._schema, compression="zstd", use_dictionary=False
         )
         self._n_files += 1
         return self._file
@@ -211,7 +208,7 @@ class _Writer(ExitStack):
         table = pa.Table.from_pylist(self._episodes)
         # Small row groups: the importer reads headers of a few recordings at a time.
         pq.write_table(table, str(episodes), compression="zstd", row_group_size=64)
-        _write_tasks(self._folder / TASKS_PATH, self._tasks)
+        write_tasks(self._folder / TASKS_PATH, self._tasks)
         totals = {
             "episodes": len(self._episodes), "frames": self._n_frames, "tasks": len(self._tasks)
         }  # fmt: skip
@@ -231,15 +228,15 @@ class _Writer(ExitStack):
                 for name, spec in self._features.items()
             },
         }
-        _write_json(self._folder / INFO_PATH, info)
-        _write_json(self._folder / MARKER_PATH, {"writer": "holdfast"})
+        write_json(self._folder / INFO_PATH, info)
+        write_json(self._folder / MARKER_PATH, {"writer": "holdfast"})
         stats = {name: stats.result() for name, stats in self._stats.items()}
-        _write_json(self._folder / STATS_PATH, stats)
+        write_json(self._folder / STATS_PATH, stats)
         (self._folder / "README.md").write_text(_CARD.format(version=VERSION), "utf-8")
         return totals
 
 
-def _task(recording: Recording) -> str:
+def task_name(recording: Recording) -> str:
     """Return the task of an episode: `task` of the metadata, or its object."""
     task, item = recording.metadata.get("task"), recording.metadata.get("object")
     if isinstance(task, str) and task:
@@ -247,7 +244,7 @@ def _task(recording: Recording) -> str:
     return f"grasp {item}" if isinstance(item, str) and item else UNKNOWN_TASK
 
 
-def _write_tasks(path: Path, tasks: Mapping[str, int]) -> None:
+def write_tasks(path: Path, tasks: Mapping[str, int]) -> None:
     """Write the tasks with the metadata by which pandas takes them as the index of the table."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy_type,
@@ -267,7 +264,8 @@ def _write_tasks(path: Path, tasks: Mapping[str, int]) -> None:
     pq.write_table(table.replace_schema_metadata(metadata), str(path))
 
 
-def _write_json(path: Path, value: object) -> None:
+def write_json(path: Path, value: object) -> None:
+    """Write a value as JSON for people to read."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(msgspec.json.format(msgspec.json.encode(value)))
 

@@ -112,13 +112,13 @@ def read(
     """
     import pyarrow.parquet as pq
 
-    files = _episode_files(path)
+    files = episode_files(path)
     # Only what holdfast wrote has the headers of recordings; options name columns of any set.
     is_own = bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
     if sensors or columns or not is_own:
         yield from read_foreign_set(path, sensors or {}, columns, report)
         return
-    for episode in _episodes(path, _info(path)):
+    for episode in read_episodes(path):
         table = _EpisodeTable(episode)
         specs = array_specs(episode.header)
         arrays = {spec.topic: table.array(spec) for spec in specs if spec.topic != TRUTH_TIME}
@@ -135,7 +135,8 @@ def read(
         yield replace(recording, name=episode.header.name)
 
 
-def _episode_files(path: Path) -> list[Path]:
+def episode_files(path: Path) -> list[Path]:
+    """Return the files of the table of episodes."""
     pattern = EPISODES_PATH.replace("{chunk_index:03d}", "*").replace("{file_index:03d}", "*")
     files = sorted(path.glob(pattern))
     for file in files:
@@ -143,7 +144,10 @@ def _episode_files(path: Path) -> list[Path]:
     return files
 
 
-def _info(path: Path) -> _Info:
+def read_episodes(path: Path) -> Iterator[_Episode]:
+    """Yield the episodes that holdfast wrote."""
+    import pyarrow.parquet as pq
+
     try:
         info = msgspec.json.decode(read_input(path / INFO_PATH, MAX_INFO_SIZE), type=_Info)
     except msgspec.DecodeError as cause:
@@ -157,14 +161,8 @@ def _info(path: Path) -> _Info:
         raise RecordingError(
             f"{path / INFO_PATH}: data_path {info.data_path[:80]!r} given, {DATA_PATH!r} expected"
         )
-    return info
-
-
-def _episodes(path: Path, info: _Info) -> Iterator[_Episode]:
-    import pyarrow.parquet as pq
-
     n_episodes = 0
-    for file in _episode_files(path):
+    for file in episode_files(path):
         parquet = pq.ParquetFile(file)
         if missing := [name for name in _EPISODE_COLUMNS if name not in parquet.schema_arrow.names]:
             raise RecordingError(
@@ -229,26 +227,28 @@ class _EpisodeTable:
 
     def times(self, track: str) -> npt.NDArray[Any]:
         """Return the times of the samples of a track [s]."""
-        return self._joined(time_name(track), track, ())
+        return self.joined(time_name(track), track, ())
 
     def array(self, spec: ArraySpec) -> TimedArray:
         """Return times and values of an array, in its own number type."""
         track = track_name(spec)
         times = self.times(track)
         if not spec.n_components:
-            return times, np.empty((len(times), *spec.shape), _memory_type(spec))
-        values = self._joined(feature_name(spec), track, spec.shape)
+            kind = "U1" if spec.number == "str" else spec.number or "float64"
+            return times, np.empty((len(times), *spec.shape), kind)
+        values = self.joined(feature_name(spec), track, spec.shape)
         if spec.number == "str":
             return times, texts_of(self._episode.texts, spec.column, values)
         with np.errstate(invalid="ignore"):  # the digest finds what does not fit
-            return times, values.astype(_memory_type(spec))
+            return times, values.astype(spec.number or "float64")
 
-    def _joined(self, name: str, track: str, shape: tuple[int, ...]) -> npt.NDArray[Any]:
-        n_new = self._flat(count_name(track)).astype(np.int64)
-        values = self._flat(name).reshape(len(n_new), -1, *shape)
+    def joined(self, name: str, track: str, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+        """Return the values of a column at the samples of a track, each once."""
+        n_new = self.flat(count_name(track)).astype(np.int64)
+        values = self.flat(name).reshape(len(n_new), -1, *shape)
         return joined_windows(values, n_new)
 
-    def _flat(self, name: str) -> npt.NDArray[Any]:
+    def flat(self, name: str) -> npt.NDArray[Any]:
         """Return all values of a column, without the nesting of its lists.
 
         Raises:
@@ -265,10 +265,6 @@ class _EpisodeTable:
             raise ValueError(f"column {name!r} has missing values")
         values: npt.NDArray[Any] = array.to_numpy(zero_copy_only=False)
         return values
-
-
-def _memory_type(spec: ArraySpec) -> str:
-    return "U1" if spec.number == "str" else spec.number or "float64"
 
 
 MAX_INFO_SIZE = 1 << 24

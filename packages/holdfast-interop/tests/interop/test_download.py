@@ -172,7 +172,7 @@ def test_a_full_disk_leaves_nothing(server, tmp_path, monkeypatch):
     part.parent.mkdir(parents=True)
     part.touch()
     full = lambda path, continues: open("/dev/full", "ab")  # noqa: E731, PTH123, SIM115
-    monkeypatch.setattr("holdfast_interop.datasets.download._open_part", full)
+    monkeypatch.setattr("holdfast_interop.datasets.download.open_part", full)
     with pytest.raises(OutputError, match=r"cannot write .*a.bin: No space left on device$"):
         get(public_set(server), tmp_path / "got")
     assert list(part.parent.iterdir()) == []

@@ -91,7 +91,7 @@ def open_folder(path: Path, budget: ReadBudget) -> Iterator[FolderBag]:
         RecordingError: one of its files is sparse, or expands too much.
         ValueError: the metadata or a file are cut, damaged, or of a kind that is not supported.
     """
-    metadata = _metadata(path)
+    metadata = bag_metadata(path)
     # The name alone: a path could lead out of the folder.
     files = [path / PurePath(str(name)).name for name in metadata["relative_file_paths"]]
     # A file that is named often would be read as often, for the size of one.
@@ -119,7 +119,8 @@ def open_folder(path: Path, budget: ReadBudget) -> Iterator[FolderBag]:
         yield FolderBag(storages, topics, budget, packed=mode == "message")
 
 
-def _metadata(path: Path) -> Mapping[str, Any]:
+def bag_metadata(path: Path) -> Mapping[str, Any]:
+    """Return the metadata of a ROS 2 bag, of a version that is known."""
     from ruamel.yaml import YAML
 
     text = read_input(path / METADATA, MAX_METADATA_SIZE).decode()

@@ -69,7 +69,7 @@ class Ros1Bag:
                 self._budget.step()
                 head, place = self._part(place)
                 data, place = self._part(place)
-                fields = _fields(head)
+                fields = head_fields(head)
             if fields.get(b"op") != _MESSAGE:
                 raise ValueError("a record of another kind than a message in the index")
             seconds, nanoseconds = struct.unpack("<II", fields[b"time"])
@@ -120,7 +120,7 @@ def open_ros1(path: Path, budget: ReadBudget) -> Iterator[Ros1Bag]:
         yield Ros1Bag(reader, budget)
 
 
-def _fields(head: bytes) -> dict[bytes, bytes]:
+def head_fields(head: bytes) -> dict[bytes, bytes]:
     """Return the fields of the head of a record by name."""
     fields: dict[bytes, bytes] = {}
     place = 0

@@ -84,15 +84,15 @@ def _unpacked(data: bytes, compression: str, limit: int) -> bytes:
         except zstandard.ZstdError as cause:
             raise ValueError(str(cause)) from cause
     if compression == "bz2":
-        return _unpacked_parts(data, bz2.BZ2Decompressor, limit)
+        return parts_unpacked(data, bz2.BZ2Decompressor, limit)
     if compression == "lz4":
         import lz4.frame
 
-        return _unpacked_parts(data, lz4.frame.LZ4FrameDecompressor, limit)
+        return parts_unpacked(data, lz4.frame.LZ4FrameDecompressor, limit)
     raise ValueError(f"compression {compression[:20]!r} given; zstd, lz4 or bz2 expected")
 
 
-def _unpacked_parts(data: bytes, make: Callable[[], _Decompressor], limit: int) -> bytes:
+def parts_unpacked(data: bytes, make: Callable[[], _Decompressor], limit: int) -> bytes:
     """Unpack packed streams that follow each other."""
     found = bytearray()
     while data and len(found) <= limit:

@@ -20,20 +20,21 @@ ByFinger = Mapping[str, tuple[float, ...]]
 """Values of the four joints of each finger."""
 
 
-def _table(finger: tuple[float, ...], **others: tuple[float, ...]) -> ByFinger:
+def table_of(finger: tuple[float, ...], **others: tuple[float, ...]) -> ByFinger:
+    """Return the values of each finger; those of `finger` but for the others."""
     return {name: others.get(name, finger) for name in THUMB_FIRST}
 
 
-V4_MAX_TORQUE = _table((0.3125, 0.5625, 0.375, 0.2375), thumb=(0.4375, 0.3375, 0.225, 0.225))
+V4_MAX_TORQUE = table_of((0.3125, 0.5625, 0.375, 0.2375), thumb=(0.4375, 0.3375, 0.225, 0.225))
 """Torque at which the driver of V4 clamps each joint [N m]."""
-ROS1_STIFFNESS = _table((4000 / 1200,) * 4)
+ROS1_STIFFNESS = table_of((4000 / 1200,) * 4)
 """Proportional gain of the position control of V4 in ROS 1 (gains_pd.yaml) [N m/rad]."""
-ROS2_STIFFNESS = _table((0.4167, 0.6667, 0.75, 0.4167), thumb=(0.8333, 0.5833, 0.5, 0.5))
+ROS2_STIFFNESS = table_of((0.4167, 0.6667, 0.75, 0.4167), thumb=(0.8333, 0.5833, 0.5, 0.5))
 """Proportional gain of the position control of V4 in ROS 2 (pd_gains.yaml) [N m/rad]."""
-V4_LOWEST = _table((-0.47, -0.196, -0.174, -0.227), thumb=(0.263, -0.105, -0.189, -0.162))
-V4_HIGHEST = _table((0.47, 1.61, 1.709, 1.618), thumb=(1.396, 1.163, 1.644, 1.719))
+V4_LOWEST = table_of((-0.47, -0.196, -0.174, -0.227), thumb=(0.263, -0.105, -0.189, -0.162))
+V4_HIGHEST = table_of((0.47, 1.61, 1.709, 1.618), thumb=(1.396, 1.163, 1.644, 1.719))
 """Limits of the joints of V4 [rad]; those in the table of the twin."""
-WIDEST = _table((np.pi,) * 4)
+WIDEST = table_of((np.pi,) * 4)
 """Limits of joints whose limits are not known, to both sides of 0 [rad]: a reading that is wrong
 by a whole turn is always beyond them."""
 LIMIT_TOLERANCE = 0.1
@@ -41,7 +42,7 @@ LIMIT_TOLERANCE = 0.1
 eye, and their stops yield."""
 V4_HOME = {
     name: tuple(float(np.deg2rad(angle)) for angle in degrees)
-    for name, degrees in _table(
+    for name, degrees in table_of(
         (0, -10, 45, 45), ring=(5, -5, 50, 45), thumb=(60, 25, 15, 45)
     ).items()
 }

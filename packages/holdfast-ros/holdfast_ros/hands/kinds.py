@@ -21,13 +21,7 @@ from holdfast_ros.hands.joints import (
 from holdfast_ros.hands.parameters import Parameters
 from holdfast_ros.hands.scalar_hand import ScalarHand, ScalarSetup
 from holdfast_ros.link import Link
-from holdfast_ros.topic_messages import (
-    FLOAT32,
-    FLOAT64,
-    FLOAT_ARRAY,
-    GRIPPER_COMMAND,
-    JOINT_STATE,
-)
+from holdfast_ros.topic_messages import FLOAT32, FLOAT64, FLOAT_ARRAY, GRIPPER_COMMAND, JOINT_STATE
 
 COMMON = ("shared",)
 """Parameters of every kind, besides `domain` (ROS 2) or `master` (ROS 1)."""
@@ -89,7 +83,7 @@ class JointKind:
             torques = given.joints("effort", each=not largest)
         # Only the kinds of V4 have known torques.
         is_v4 = self.max_torque is not None
-        lowest, highest = _joint_limits(given, order, is_v4=is_v4)
+        lowest, highest = joint_limits(given, order, is_v4=is_v4)
         release = given.word("release", self.release)
         setup = JointSetup(
             output=self.output,
@@ -255,7 +249,7 @@ def ros_hand(uri: str) -> HandDevice:
     return kind.make(uri, Ros1Link(where), Parameters(address))
 
 
-def _joint_limits(given: Parameters, order: JointOrder, *, is_v4: bool) -> tuple[Array, Array]:
+def joint_limits(given: Parameters, order: JointOrder, *, is_v4: bool) -> tuple[Array, Array]:
     """Return the lower and upper limits of the joints (16,) [rad].
 
     Raises:

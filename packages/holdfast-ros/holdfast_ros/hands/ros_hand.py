@@ -50,13 +50,7 @@ class RosHand(HandDevice):
     """
 
     def __init__(
-        self,
-        name: str,
-        link: Link,
-        topics: Mapping[str, str],
-        states: str | None,
-        *,
-        shared: bool,
+        self, name: str, link: Link, topics: Mapping[str, str], states: str | None, *, shared: bool
     ) -> None:
         self.name = name
         self._link, self._topics = link, dict(topics)
@@ -101,7 +95,7 @@ class RosHand(HandDevice):
         """
         self.close()
         try:
-            with _hand_errors():
+            with hand_errors():
                 self._connect()
         except BaseException:
             self.close()  # else the next attempt finds the publishers of this one
@@ -203,13 +197,13 @@ class RosHand(HandDevice):
         """Open the hand."""
 
     def _publish(self, topic: str, message: Mapping[str, Any]) -> None:
-        with _hand_errors():
+        with hand_errors():
             self._publishers[topic].publish(message)
 
     def _poll(self) -> bool:
         """Read the new joint states; return whether there are enough for a grip to begin."""
         now = time.monotonic()
-        with _hand_errors():
+        with hand_errors():
             new = () if self._take_states is None else self._take_states()
         for states in new:
             try:
@@ -231,7 +225,7 @@ class RosHand(HandDevice):
 
 
 @contextmanager
-def _hand_errors() -> Iterator[None]:
+def hand_errors() -> Iterator[None]:
     """Turn an error of ROS into one of the hand.
 
     Raises:

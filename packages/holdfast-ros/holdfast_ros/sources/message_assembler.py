@@ -14,8 +14,8 @@ from holdfast.sensors.types import Unit
 from holdfast_ros.sensor_messages import PAPILLARRAY, DeviceSample, readings_of
 
 _STAMPS: tuple[Callable[[DeviceSample], float | None], ...] = (
-    lambda sample: _plausible(sample.time),
-    lambda sample: _plausible(sample.stamp),
+    lambda sample: plausible_time(sample.time),
+    lambda sample: plausible_time(sample.stamp),
 )
 """Stamps of a sample, the best one first: the device's own, and that in the header."""
 
@@ -66,7 +66,7 @@ class MessageAssembler:
         Raises:
             SourceError: they do not fit the arguments of the assembler.
         """
-        found = {_number(sample): sample for sample in samples if has_taxels(sample)}
+        found = {device_number(sample): sample for sample in samples if has_taxels(sample)}
         for number, one in found.items():
             if one.counts is not None and self._unit == "N" and not len(one.forces):
                 raise SourceError(no_calibration(number, one.model))
@@ -104,7 +104,7 @@ class MessageAssembler:
             # A lost message lacks all of its devices, and counts once.
             n_lost = [0]
             for sample, stamp in zip(new, stamps, strict=True):
-                number = _number(sample)
+                number = device_number(sample)
                 n_lost.append(self._assembler.n_missing(sample.sequence, number))
                 self._assembler.add(number, readings_of(sample, self._unit), stamp)
             self._assembler.n_lost += max(n_lost)
@@ -131,7 +131,7 @@ class MessageAssembler:
 
     def _is_new(self, sample: DeviceSample, received: float) -> bool:
         """Return whether it is a new sample of a known device with its number of taxels."""
-        number = _number(sample)
+        number = device_number(sample)
         if number not in self.devices and not has_taxels(sample):
             return False  # the server's entry for a sensor that is off
         stamp = sample.stamp if sample.time is None else sample.time
@@ -149,10 +149,11 @@ def has_taxels(sample: DeviceSample) -> bool:
     return len(sample.forces if sample.counts is None else sample.counts) > 0
 
 
-def _number(sample: DeviceSample) -> int:
+def device_number(sample: DeviceSample) -> int:
+    """Return the number of the device; 1 of a maker whose messages have none."""
     return 1 if sample.number is None else sample.number
 
 
-def _plausible(time: float | None) -> float | None:
+def plausible_time(time: float | None) -> float | None:
     """Return a time, or None instead of one that is thousands of years away."""
     return time if time is not None and is_plausible(time) else None

@@ -145,7 +145,7 @@ def test_a_rospy_for_another_python_is_not_imported(tmp_path, monkeypatch):
     (tmp_path / "rospy").mkdir()
     monkeypatch.setitem(sys.modules, "rospy", None)
     monkeypatch.setattr(rospy_node, "ROSPY_FOLDERS", (str(tmp_path),))
-    monkeypatch.setattr(rospy_node, "_system_pythons", lambda: ["python3.5", "python3.5-config"])
+    monkeypatch.setattr(rospy_node, "system_pythons", lambda: ["python3.5", "python3.5-config"])
     path = list(sys.path)
     with pytest.raises(SourceError, match="apt install python3-rospy"):
         rospy_module()
