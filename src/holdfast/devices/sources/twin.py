@@ -14,6 +14,7 @@ from holdfast.devices.uri import Address
 from holdfast.files import file_stem
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
+from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.profile import GRASP_ATTEMPTS, profile
 from holdfast.twin.simulation import GRASP_CASES, Grasp, simulate
 
@@ -169,7 +170,9 @@ def simulated(grasp: Grasp) -> Recording:
 
 def write(grasp: str, path: str) -> None:
     """Simulate a grasp, given as JSON, and save it. It runs in another process."""
-    save_recording(simulated(Grasp(**json.loads(grasp))), path)
+    fields = json.loads(grasp)
+    fields["faults"] = MagneticFaults(**fields["faults"])  # the one field that is no plain value
+    save_recording(simulated(Grasp(**fields)), path)
 
 
 def _integer(address: Address, name: str, default: int) -> int:
