@@ -8,7 +8,7 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
 from holdfast.metrics.slips import SlipMetrics
-from holdfast.training.verdict import LoadedTares, verdict
+from holdfast.training.verdict import Bounded, LoadedTares, verdict
 
 TIMES = np.arange(12_000) * 0.01
 LABELS = np.where(np.arange(12_000) % 1000 < 800, STABLE, UNSTABLE)
@@ -235,3 +235,15 @@ def test_the_sentence_about_slips():
     assert slip_sentence(slips(n=0, rate=0.0)) == (
         "none in these recordings, at most 0.3 false alarms a minute of held time."
     )
+
+
+@pytest.mark.parametrize(
+    ("value", "upper", "text"),
+    [
+        (156.0, 370.4, "156 (up to 370) false alarms a minute"),
+        (0.73, 1.46, "0.73 (up to 1.5) false alarms a minute"),
+        (0.0, 120.0, "at most 120 false alarms a minute"),
+    ],
+)
+def test_a_large_rate_has_no_exponent(value, upper, text):
+    assert Bounded(value, upper).alarms() == text

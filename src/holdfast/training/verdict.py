@@ -63,10 +63,14 @@ class Bounded(NamedTuple):
     def alarms(self) -> str:
         """Return the rate in words."""
         if not self.value:
-            return f"at most {self.upper:.2g} false alarms a minute"
-        upper = f" (up to {self.upper:.2g})" if self.upper > self.value else ""
-        value = f"{self.value:.0f}" if self.value >= 10 else f"{self.value:.2g}"
-        return f"{value}{upper} false alarms a minute"
+            return f"at most {_rate(self.upper)} false alarms a minute"
+        upper = f" (up to {_rate(self.upper)})" if self.upper > self.value else ""
+        return f"{_rate(self.value)}{upper} false alarms a minute"
+
+
+def _rate(value: float) -> str:
+    """Return a number a minute with two digits or more, and without an exponent."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
 
 
 class Support(NamedTuple):
