@@ -5,10 +5,11 @@ import pytest
 from holdfast import twin_recordings
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
-from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study import corpora
 from holdfast_lab.study.corpora import plan_study
+
+from .example_recordings import save_all
 
 pytestmark = pytest.mark.slow
 
@@ -23,14 +24,7 @@ def nowhere(monkeypatch, tmp_path):
 
 @pytest.fixture
 def data(tmp_path):
-    return written(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
-
-
-def written(folder, recordings):
-    folder.mkdir()
-    for recording in recordings:
-        save_recording(recording, folder / f"{recording.name}.parquet")
-    return folder
+    return save_all(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
 
 
 def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
@@ -40,7 +34,7 @@ def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
     assert (plan.real, left_out) == (plan.main, [])
     recordings = [synthetic_recording(f"grasp-{k}", k) for k in range(2)]
     twin = [replace(each, metadata={"source": "twin"}) for each in recordings]
-    plan, left_out = plan_study(written(tmp_path / "twin", twin), tmp_path / "out", **settings)
+    plan, left_out = plan_study(save_all(tmp_path / "twin", twin), tmp_path / "out", **settings)
     assert plan.real is None
     assert left_out[0].startswith(
         "real recordings, because none were found. Download them from github.com/"

@@ -6,7 +6,6 @@ import pytest
 from command_line import Verb
 from holdfast import cluster, twin_recordings
 from holdfast.contact import ContactState
-from holdfast.io import save_recording
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
@@ -14,6 +13,7 @@ from holdfast.twin.profile import profile
 from holdfast_lab.study import corpora
 from holdfast_lab.study import run as study_run
 from holdfast_lab.study.paper import experiments, paper_tables
+from study.example_recordings import save_all
 
 pytestmark = pytest.mark.slow
 
@@ -29,14 +29,7 @@ def nowhere(monkeypatch, tmp_path):
 
 @pytest.fixture
 def data(tmp_path):
-    return written(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
-
-
-def written(folder, recordings):
-    folder.mkdir()
-    for recording in recordings:
-        save_recording(recording, folder / f"{recording.name}.parquet")
-    return folder
+    return save_all(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
 
 
 VERB = Verb("study")
@@ -114,7 +107,7 @@ class TestBadInput:
             "single": ([one], "one recording with labels given (a); at least two are needed"),
         }
         for name, (recordings, message) in cases.items():
-            folder = written(tmp_path / name, recordings)
+            folder = save_all(tmp_path / name, recordings)
             assert message in refusal(capsys, folder, "--out", tmp_path / "out")
         assert not (tmp_path / "out").exists()
 

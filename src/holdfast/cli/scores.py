@@ -151,8 +151,7 @@ def print_slips(
     pooled = summary.pooled
     rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]
     rows.append(_finger_row("all", pooled))
-    shares = ["0" if pooled.n else "-"] * (len(SHARES_HEADER) - 2)  # two are rates of false alarms
-    rows.append(("never", *rows[-1][1:3], *shares, "0.00", "0.00", "0.500"))
+    rows.append(("never", *rows[-1][1:3], *never_cells(pooled), "0.500"))
     print_table(("", "slips", "over 1 mm", *SHARES_HEADER, "AUC"), rows)
     print_paragraph(SHARES_NOTE)
     support = f"{pooled.quiet_minutes:.1f} min quiet of {pooled.held_minutes:.1f} min held"
@@ -177,6 +176,12 @@ def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
         *(format_number(share, 0) for share in shares),
         *(format_number(rates[time], 2) for time in ("quiet", "held")),
     )
+
+
+def never_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
+    """Return the cells below `SHARES_HEADER` of a model that never reports one of these slips."""
+    shares = ["0" if metrics.n else "-"] * (len(SHARES_HEADER) - 2)  # two are rates of false alarms
+    return (*shares, "0.00", "0.00")
 
 
 def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:

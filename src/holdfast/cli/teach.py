@@ -14,7 +14,13 @@ from holdfast.cli.options import (
     SeedOption,
     StartOptions,
 )
-from holdfast.cli.scores import SHARES_HEADER, SHARES_NOTE, format_intervals, share_cells
+from holdfast.cli.scores import (
+    SHARES_HEADER,
+    SHARES_NOTE,
+    format_intervals,
+    never_cells,
+    share_cells,
+)
 from holdfast.cli.terminal.console import (
     print_json,
     print_line,
@@ -27,14 +33,6 @@ from holdfast.cli.terminal.progress import progress
 if TYPE_CHECKING:
     from holdfast.training.teaching import Taught
 
-FalseAlarmsOption = Annotated[
-    float,
-    typer.Option(
-        "--false-alarms",
-        help="False alarms of slip per minute of held time of a finger that are wanted at most.",
-    ),
-]
-
 
 def teach(
     out: ModelOutput,
@@ -46,7 +44,14 @@ def teach(
     model: Annotated[
         str, typer.Option("--model", help="Model whose other answers are kept.")
     ] = "builtin:any",
-    false_alarms: FalseAlarmsOption = 1.5,
+    false_alarms: Annotated[
+        float,
+        typer.Option(
+            "--false-alarms",
+            help="False alarms of slip per minute of held time of a finger that are wanted at "
+            "most.",
+        ),
+    ] = 1.5,
     parallel: EngineOptions,
     seed: Annotated[SeedOption, RARE] = 0,
     force: ForceOption = False,
@@ -98,7 +103,7 @@ def _print(taught: "Taught", base: str) -> None:
     rows = [("taught", *share_cells(pooled))]
     if taught.base is not None:
         rows.append((base, *share_cells(taught.base.pooled)))
-    rows.append(("never", *["0"] * (len(SHARES_HEADER) - 2), "0.00", "0.00"))
+    rows.append(("never", *never_cells(pooled)))
     print_table(("", *SHARES_HEADER), rows)
     print_paragraph(SHARES_NOTE)
     if taught.slips.intervals is not None:

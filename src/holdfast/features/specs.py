@@ -205,17 +205,18 @@ HOLDFAST_FEATURES = (
 """The project's own features, named `holdfast` in the study."""
 
 
+def _relative(family: Family, lags: Sequence[float]) -> tuple[FeatureSpec, ...]:
+    return tuple(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in kinds_of(family)
+        for seconds in lags
+    )
+
+
 ANY_LAGS = (0.017, 0.067, 0.133, 0.267, 0.533)
 """Lags of the features for any hand [s]."""
 
-ANY_FEATURES = (
-    *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in kinds_of("change")
-        for seconds in ANY_LAGS
-    ),
-    FeatureSpec("load_to_noise", transform="relative", seconds=ANY_LAGS[0]),
-)
+ANY_FEATURES = (*_relative("change", ANY_LAGS), *_relative("load", ANY_LAGS[:1]))
 """Features that carry over between hands, sensors, units and rates, named `any`."""
 
 
@@ -226,44 +227,21 @@ SLIP_LAGS = (0.0067, 0.0267, 0.107)
 
 SLIP_FEATURES = (
     *HOLDFAST_FEATURES,
-    *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in kinds_of("second")
-        for seconds in SLIP_SPACINGS
-    ),
-    *(
-        FeatureSpec(kind, transform="relative", seconds=SLIP_SPACINGS[0])
-        for kind in kinds_of("mean_second")
-    ),
-    *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in kinds_of("ratio")
-        for seconds in SLIP_LAGS
-    ),
+    *_relative("second", SLIP_SPACINGS),
+    *_relative("mean_second", SLIP_SPACINGS[:1]),
+    *_relative("ratio", SLIP_LAGS),
 )
 """Features of the slip rule of `builtin:twin`."""
 
 
-TAUGHT_LAGS = (0.0067, 0.0133, 0.0267, 0.0533)
+TAUGHT_SPACINGS = (0.0067, 0.0133, 0.0267, 0.0533)
 """Spacings of second differences of a taught head: one to eight samples at 150 Hz [s]."""
 
 TAUGHT_FEATURES = (
     *ANY_FEATURES,
-    *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in kinds_of("second")
-        for seconds in TAUGHT_LAGS
-    ),
-    *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in kinds_of("mean_second")
-        for seconds in TAUGHT_LAGS[:2]
-    ),
-    *(
-        FeatureSpec(kind, transform="relative", seconds=seconds)
-        for kind in kinds_of("ratio")
-        for seconds in SLIP_LAGS
-    ),
+    *_relative("second", TAUGHT_SPACINGS),
+    *_relative("mean_second", TAUGHT_SPACINGS[:2]),
+    *_relative("ratio", SLIP_LAGS),
 )
 """Features of a head that is taught by slips of the user's own hand: every family without a unit.
 The lags of `any` are among them, because the model that keeps its other heads computes those."""

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import TIME_TOLERANCE
+from holdfast.metrics.masks import Mask
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.slips import (
     FOUND_WITHIN,
@@ -157,8 +158,7 @@ def bounded_threshold(
     bound = MEASURED_RATE_BOUND if by_rule else RATE_BOUND
     fits = np.quantile(rate, bound, axis=0) <= false_alarms
     fits &= 100 * raised.sum(axis=0) <= MAX_RAISED_QUIET * 60 * quiet.sum()
-    # As in `_places`: what is left of the unbroken run of thresholds at the end that fit.
-    index = len(fits) - int(np.logical_and.accumulate(fits[::-1]).sum())
+    index = int(_lowest_fit(fits))
     return index if index < len(fits) else None
 
 
@@ -335,9 +335,22 @@ def _places(limited: "Sequence[_Sums]", choice: ThresholdChoice, draws: Array) -
         # Without held time the rate is not known, so no threshold fits; without quiet hold nothing
         # can be raised in it.
         fits.append((parts <= limit * wholes) & ((wholes > 0) | (name[0] == "raised_quiet")))
-    # The lowest threshold from which on all higher ones fit, too: its place is what is left of the
-    # unbroken run at the end, so a lucky low threshold below a bad one is not taken.
-    from_end = np.logical_and.accumulate(np.logical_and.reduce(fits)[..., ::-1], axis=-1)
+    return _lowest_fit(np.logical_and.reduce(fits))
+
+
+def _lowest_fit(fits: Mask) -> Integers:
+    """Return the place of the lowest threshold from which on all higher ones fit, too.
+
+    It is what is left of the unbroken run at the end, so that a lucky low threshold below a bad one
+    is not taken.
+
+    Args:
+        fits: (..., n_thresholds), lowest first.
+
+    Returns:
+        (...,) places; the number of thresholds where none fits.
+    """
+    from_end = np.logical_and.accumulate(fits[..., ::-1], axis=-1)
     return np.asarray(from_end.shape[-1] - from_end.sum(axis=-1))
 
 

@@ -357,7 +357,8 @@ def _score_fold(
     parts: Sequence[Sequence[Recording]],
 ) -> FoldScores:
     """Return the counts about each recording of a fold, of a head that was fitted without them."""
-    model = base.changed(lambda part: part.with_heads(_fitted(samples, fold)))
+    head = _fitted(samples, fold)
+    model = base.changed(lambda part: part.with_heads(head))
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])

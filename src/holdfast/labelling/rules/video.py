@@ -213,10 +213,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
     """
     step = float(times[1] - times[0])
     n = max(round(rule.window / step), 2)
-    moved, noise = _step_size(rest, n), 0.0
-    if held.any():
-        # Of a component: the median length of a normal pair is 1.18 standard deviations.
-        noise = float(np.median(moved[held])) / 1.18
+    moved, noise = _steps(rest, held, n)
     # A step is the difference of two means of n values: the noise of one value is larger.
     single = noise * np.sqrt(n / 2)
     least = max(1e3 * rule.step, 6 * noise)
@@ -258,9 +255,10 @@ def may_slide(rest: Array, held: Mask, rule: VideoRule, n: int) -> Mask:
         rule: thresholds.
         n: values on either side of a step.
     """
-    moved = np.where(held, _step_size(rest, n), 0.0)
-    noise = float(np.median(moved[held])) if held.any() else 0.0
-    return hysteresis(moved / max(1e3 * rule.step / 2, 2.5 * noise), 0.7, 1.0)
+    moved, noise = _steps(rest, held, n)
+    # Half of the least step of a slip, with half of its margin over the noise.
+    least = max(1e3 * rule.step / 2, 2.95 * noise)
+    return hysteresis(np.where(held, moved / least, 0.0), 0.7, 1.0)
 
 
 def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
@@ -373,6 +371,13 @@ def with_slips(
                 Label(start, part.end, ContactState.UNSTABLE, Cause.SLIP, text, sure, VIDEO_RULE)
             )
     return tuple(made)
+
+
+def _steps(rest: Array, held: Mask, n: int) -> tuple[Array, float]:
+    """Return the size of the step at each value, and the noise of a component of a step [mm]."""
+    moved = _step_size(rest, n)
+    # The median length of a normal pair is 1.18 standard deviations.
+    return moved, float(np.median(moved[held])) / 1.18 if held.any() else 0.0
 
 
 def _step_size(values: Array, n: int) -> Array:
