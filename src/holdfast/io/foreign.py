@@ -255,7 +255,12 @@ class _Child:
                 f"{timeout:.0f} s until the next recording, are allowed for a file of its size"
             )
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        raise RecordingError(f"{path} is damaged: it ended the process that read it ({name})")
+        # C++ libraries also abort where they get no memory; which of both it was cannot be told.
+        memory = f", or needs more than {megabytes(request.memory)} of memory; {WAY_OUT}"
+        raise RecordingError(
+            f"{path} is damaged: it ended the process that read it ({name})"
+            + (memory if name == "SIGABRT" else "")
+        )
 
     def value(self, budget: ReadBudget) -> tuple[bytes, Arrays]:
         """Return the document and the arrays that the child wrote, which count in a budget."""
