@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs signals and pi
 CRASHES = {
     "abort": (
         "os.abort()",
-        r"is damaged: it ended the process that read it \(SIGABRT\), or needs more than .* MB of memory",
+        r"it ended the process that read it \(SIGABRT\), or needs more than .* MB of memory",
     ),
     "exit": ("os._exit(3)", r"is damaged: it ended the process that read it \(exit code 3\)"),
     "hang": ("time.sleep(600)", r"takes too long to read: 1 s of the processor, and 3 s until"),
