@@ -20,6 +20,10 @@ FIRST_ACTION = 2.0
 """Time from the lock to the first action: a person sees first that it holds [s]."""
 AFTER_RELEASE = 6.0
 """Time with an open hand after the release, in which the skins creep back [s]."""
+MIN_REST = 0.6
+"""Shortest rest between two actions [s]: an onset needs a level before it."""
+SPREAD_START = 0.2
+"""Share of the time of an action by which its start is drawn."""
 LAST_ACTION = 1.0
 """Time from the end of the last action to the release [s]."""
 
@@ -68,7 +72,8 @@ def perform(grasp: Grasp, action: str, n_actions: int, seconds: float) -> Record
     Args:
         grasp: object, repeat and seed.
         action: one of `SCRIPTS`.
-        n_actions: largest number of pulls, pushes or movements; as many as the time allows.
+        n_actions: number of pulls, pushes or movements of the arm; each has its part of the time,
+            and ends with it.
         seconds: time for which the object is held, or the hand is open [s].
 
     Raises:
@@ -99,16 +104,18 @@ def _simulation(grasp: Grasp, script: Script | None, n_actions: int, seconds: fl
     disturbances: list[Disturbance] = []
     events: list[SlipEvent] = []
     loads: list[Load] = []
-    start = FIRST_ACTION
+    slot = (seconds - FIRST_ACTION - LAST_ACTION) / max(n_actions, 1)
     for k in range(n_actions):
-        end = start
+        start = FIRST_ACTION + slot * k + float(generator.uniform(0.0, SPREAD_START * slot))
+        room = FIRST_ACTION + slot * (k + 1) - start - MIN_REST
         if script.kinds and chosen.slips is not None:
             kind = script.kinds[k % len(script.kinds)]
-            events.append(draw_slip_event(generator, chosen.slips, kind, start, scale))
-            end = events[-1].end
+            event = draw_slip_event(generator, chosen.slips, kind, start, scale)
+            longest = room - event.recovery
+            events.append(event._replace(duration=min(event.duration, longest)))
         elif script.disturbed_as:
-            disturbances.append(_disturbance(generator, script, start, k, scale))
-            end += disturbances[-1].duration
+            drawn = _disturbance(generator, script, start, k, scale)
+            disturbances.append(drawn._replace(duration=min(drawn.duration, room)))
         elif script.carried:
             way = generator.normal(size=3)
             along = tuple((way / np.linalg.norm(way)).tolist())
@@ -116,13 +123,7 @@ def _simulation(grasp: Grasp, script: Script | None, n_actions: int, seconds: fl
                 float(generator.uniform(*span))
                 for span in (TRANSPORT_DURATION, TRANSPORT_ACCELERATION)
             )
-            loads.append(Load(LoadKind.TRANSPORT, start, duration, size, along))
-            end += duration
-        if end + LAST_ACTION > seconds:  # this one has no time any more
-            for drawn in (disturbances, events, loads):
-                del drawn[k:]
-            break
-        start = end + float(generator.uniform(*chosen.rest))
+            loads.append(Load(LoadKind.TRANSPORT, start, min(duration, room), size, along))
     plan = plan._replace(disturbances=disturbances, slip_events=events)
     return Simulation(grasp, plan=plan, loads=loads)
 

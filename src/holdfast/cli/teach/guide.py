@@ -151,7 +151,8 @@ class Guide:
         if self._source.ended and protocol.stage not in WAITING_STAGES:
             raise SourceError(f"{self._source.name} ended in step {protocol.step.name}")
         place = f"{len(self._folder.kept)} of {protocol.n_places} grasps"
-        screen.show(protocol.view(), place)
+        if protocol.stage is not Stage.OVER:
+            screen.show(protocol.view(), place)
 
     def _ask(self, twin: AskedTwin, screen: TeachScreen) -> None:
         """Ask the twin for the grasp that begins, or for another one if it has failed."""

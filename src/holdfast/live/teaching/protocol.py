@@ -72,7 +72,6 @@ STAGE_WORDS = {
     Stage.RELEASE: ("OPEN THE HAND", "Put the object down first."),
     Stage.CHECK: ("ONE MOMENT", "The recording is checked."),
     Stage.DECIDE: ("GOOD", ""),
-    Stage.OVER: ("DONE", ""),
 }
 """What a person does in each stage, and how; in ACT, the step has the words."""
 
