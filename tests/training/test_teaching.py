@@ -112,6 +112,14 @@ class TestFigures:
         few = teach_with_report(BASE, recordings[:2], false_alarms=20.0)
         assert few.warnings == ("2 recordings given: the figures out of fold are rough below 5",)
 
+    def test_held_time_that_is_too_short_for_the_rate_is_said(self, recordings):
+        short = teach_with_report(BASE, recordings[:2], false_alarms=0.3)
+        (warning,) = short.warnings[1:]
+        assert warning == (
+            f"{short.slips.pooled.held_minutes:.2g} min of held time given: whether it gives at "
+            "most 0.3 false alarms a minute cannot be known below 3.3 min"
+        )
+
 
 def _turned(recording):
     """Return the recording whose slips are labelled where it holds still."""
