@@ -24,10 +24,10 @@ from holdfast.features.tare import Tare
 from holdfast.metrics.slip_thresholds import (
     SLIP_THRESHOLDS,
     SlipSummary,
-    bounded_threshold,
     slip_curve,
     slip_intervals,
     slip_summary,
+    weighted_threshold,
 )
 from holdfast.metrics.slip_truth import SlipDecisions, slip_truth
 from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
@@ -203,7 +203,7 @@ def teach_with_report(
     curves, counts_of_base = [curves for curves, _ in scores], [counts for _, counts in scores]
     pooled = [SlipCurve.total(list(fingers.values())) for fingers in curves]
     total = SlipCurve.total(pooled)
-    index = bounded_threshold(pooled, false_alarms, seed=seed)
+    index = weighted_threshold(total, false_alarms)
     slips = None
     if index is not None:
         slips = slip_summary(
@@ -362,9 +362,7 @@ def _score_fold(
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])
-        curves = {
-            name: slip_curve(slips) for name, slips in _known_slips(model, recording).items()
-        }
+        curves = {name: slip_curve(slips) for name, slips in _known_slips(model, recording).items()}
         counts = {
             name: count_slips(slips) for name, slips in _known_slips(given, recording).items()
         }
