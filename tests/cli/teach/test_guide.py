@@ -146,7 +146,7 @@ def test_a_full_disk_is_an_error_and_loses_nothing(lead, monkeypatch, tmp_path):
     full.is_full = False
 
     def choose(protocol):
-        full.is_full = protocol.step is HOLD and protocol.stage is Stage.ACT
+        full.is_full |= protocol.step is HOLD and protocol.stage is Stage.ACT
         return goes_on(protocol)
 
     monkeypatch.setattr(RecordingWriter, "append", full)
@@ -177,7 +177,8 @@ def test_keys_throw_a_slide_away(lead, monkeypatch, capsys):
     assert [x.n_slides for x in folder.kept] == [2]
     lines = capsys.readouterr().err.splitlines()
     assert "slide 7 given; this grasp has 3" in lines
-    assert "step 1 of 1: pull: 2 slides seen" in lines
+    assert "step 1 of 1: pull: GOOD: 2 slides seen" in lines
+    assert "001-pull kept: 2 slides seen" in lines
     assert "  1  from 3.00 to 3.50 s: thumb" in lines
 
 

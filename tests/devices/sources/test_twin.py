@@ -12,7 +12,7 @@ import pytest
 
 from holdfast.devices.sources import open_source, replay
 from holdfast.devices.sources import twin as module
-from holdfast.devices.sources.twin import GRASP_ATTEMPTS, Twin, grasp_of, write
+from holdfast.devices.sources.twin import GRASP_ATTEMPTS, AskedTwin, Twin, grasp_of, write
 from holdfast.devices.uri import parse
 from holdfast.io import load_recording
 from holdfast.recordings import Recording, Tactile
@@ -242,3 +242,42 @@ def test_invalid_parameters(text, message):
 def test_an_invalid_speed(speed):
     with pytest.raises(ValueError, match="a speed of at least 0 expected"):
         open_source("twin:", speed=speed)
+
+
+def test_a_twin_does_what_it_is_asked_and_then_is_silent(monkeypatch, tmp_path):
+    asked = []
+
+    def perform(grasp, *action):
+        asked.append((grasp.object, grasp.repeat, *action))
+        return quick_recording(grasp.repeat)
+
+    def quick_recording(number):
+        times = np.arange(10) / 100
+        tactile = Tactile(sensor("uskin-4x4"), times, np.full((10, 16, 3), number, "u2"))
+        return Recording(f"grasp {number}", {"thumb": tactile})
+
+    filmed = []
+    monkeypatch.setattr(module, "perform", perform)
+    monkeypatch.setattr(
+        "holdfast.twin.webcam.film_stickers", lambda of, path: filmed.append(of.name)
+    )
+    with AskedTwin(parse("twin:?seed=2")[1], speed=0) as twin:
+
+        def samples():
+            return [x for x in iter(lambda: twin.read(0.0), None) if x.samples]
+
+        assert len(samples()) == 10
+        assert twin.is_idle
+        assert not twin.ended
+        twin.perform(8, "pull", 6, 30.0)
+        assert not twin.is_idle
+        arrivals = samples()
+        assert [x.samples["thumb"][0, 0] for x in arrivals] == [8] * 10
+        twin.film(tmp_path / "a.mp4")
+    first, pulled = asked
+    assert first[2:] == ("open", 0, module.OPEN_SECONDS)
+    assert pulled[1:] == (8, "pull", 6, 30.0)
+    assert filmed == ["grasp 8"]
+    assert pulled[0] != first[0]  # without an object in the address, each grasp has another one
+    twin = AskedTwin(parse("twin:?object=ball")[1])
+    assert twin._objects == ["ball"]

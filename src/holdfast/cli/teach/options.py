@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from holdfast.model import Model
 
 WITH_CAMERA = (
-    "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm on. Smaller\n"
-    "slips, and those of the other fingers, are not promised."
+    "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm\n"
+    "on. Smaller slips, and those of the other fingers, are not promised."
 )
 WITHOUT_CAMERA = (
-    "Without --camera no slip is measured: this ends with a calibration, and slips stay\n"
-    "those that the model finds on a hand that it was not trained on."
+    "Without --camera no slip is measured: this ends with a calibration, and the\n"
+    "slips stay those that the model finds on a hand it was not trained on."
 )
 """What the figures will rest on."""
 

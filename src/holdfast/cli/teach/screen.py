@@ -19,7 +19,8 @@ TEACH_KEYS = {
     **{digit: f"throw away {digit}" for digit in "123456789"},
 }
 """What each key does; `q` quits."""
-TEACH_KEY_HELP = "Enter goes on   r repeats   s skips the step   1-9 throws a slide away   q quits"
+TEACH_KEY_HELP = "Enter goes on   r repeats   s skips the step   1-9 throw a slide away   q quits"
+ACTIVE_KEY_HELP = "Enter goes on before the time   r begins again   s skips the step   q quits"
 SCREEN_WIDTH = 80
 """Width of the screen [characters]."""
 BAR_WIDTH = 60
@@ -46,10 +47,10 @@ def screen_lines(view: "View", place: str) -> list[str]:
     bar = "#" * done + "-" * (BAR_WIDTH - done) if view.share or view.left is not None else ""
     room = SCREEN_WIDTH - len(view.title)
     lines = [
-        f"{view.title}{place:>{room}}", "",
+        "", f"{view.title}{place:>{room}}", "",
         f"  {large:<{SCREEN_WIDTH - 10}}{left:>8}", f"  {bar}".rstrip(), "",
         f"  {view.hint}".rstrip(), f"  {visible(view.message)}".rstrip(), "",
-        TEACH_KEY_HELP,
+        TEACH_KEY_HELP if view.decides else ACTIVE_KEY_HELP,
     ]  # fmt: skip
     return [line[:SCREEN_WIDTH].rstrip() for line in lines]
 
@@ -93,7 +94,7 @@ class TeachScreen:
     def show(self, view: "View", place: str) -> None:
         """Show what a person sees now; elsewhere than on a terminal, what has changed."""
         if self._live is None:
-            text = f"{view.title}: {view.words}"
+            text = ": ".join(filter(None, (view.title, view.words, view.message * view.decides)))
             if text != self._shown:
                 print_message(text)
             self._shown = text
@@ -104,6 +105,6 @@ class TeachScreen:
             from rich.text import Text
 
             drawn = Text(text, no_wrap=True, overflow="ellipsis")
-            drawn.highlight_words([lines[2].strip()], "bold")
+            drawn.highlight_words([lines[3].strip()], "bold")
             self._live.update(drawn, refresh=True)
         self._shown = text
