@@ -38,11 +38,11 @@ def test_a_script_keeps_to_its_time():
 
 
 def test_an_arm_that_carries_changes_the_force():
-    held, carried = perform(CAN, "hold", 0, 5.0), perform(CAN, "carry", 3, 5.0)
+    held, carried = perform(CAN, "hold", 0, 8.0), perform(CAN, "carry", 2, 8.0)
     assert held.metadata["slip_events"] == carried.metadata["slip_events"] == []
     spread = []
     for recording in (held, carried):
-        start = round((recording.metadata["locked_at"] + 1.5) * recording.rate)
+        start = round((recording.metadata["locked_at"] + 2.5) * recording.rate)
         force = recording.truth.fingers["index"]["contact_force"][start : start + 400]
         spread.append(np.ptp(force, axis=0).max())
     assert spread[1] > 2 * spread[0]

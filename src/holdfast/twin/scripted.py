@@ -16,12 +16,14 @@ from holdfast.twin.steps import JERK, PUSH
 
 SCRIPT_PROFILE = "slips"
 """Profile of fingers and slip events of these grasps: its fingers are those of `reference`."""
-FIRST_ACTION = 2.0
-"""Time from the lock to the first action: a person sees first that it holds [s]."""
+FIRST_MOVE, FIRST_ACTION = 0.8, 3.0
+"""Times from the lock to the move to and fro before pulls, and to the first action [s]."""
 AFTER_RELEASE = 6.0
 """Time with an open hand after the release, in which the skins creep back [s]."""
 MIN_REST = 0.6
 """Shortest rest between two actions [s]: an onset needs a level before it."""
+MIN_ACTION = 0.1
+"""Shortest action, in a time with too many of them [s]."""
 SPREAD_START = 0.2
 """Share of the time of an action by which its start is drawn."""
 LAST_ACTION = 1.0
@@ -62,7 +64,7 @@ SCRIPTS = {
 model was taught by them."""
 TRANSPORT_ACCELERATION = (2.0, 5.0)
 """Range of the largest acceleration of an arm that carries [m/s^2]."""
-TRANSPORT_DURATION = (0.6, 1.5)
+TRANSPORT_DURATION = (1.2, 2.0)
 """Range of the duration of a movement of that arm [s]."""
 
 
@@ -104,14 +106,19 @@ def _simulation(grasp: Grasp, script: Script | None, n_actions: int, seconds: fl
     disturbances: list[Disturbance] = []
     events: list[SlipEvent] = []
     loads: list[Load] = []
+    if script.kinds:  # a person moves it to and fro first: so the clock of a camera is found
+        moving = msgspec.structs.replace(profile("gentle"), move_share=1.0)
+        moved = draw_disturbance(generator, moving, FIRST_MOVE, "left", scale)
+        longest = FIRST_ACTION - FIRST_MOVE - MIN_REST
+        disturbances.append(moved._replace(duration=min(moved.duration, longest)))
     slot = (seconds - FIRST_ACTION - LAST_ACTION) / max(n_actions, 1)
     for k in range(n_actions):
         start = FIRST_ACTION + slot * k + float(generator.uniform(0.0, SPREAD_START * slot))
-        room = FIRST_ACTION + slot * (k + 1) - start - MIN_REST
+        room = max(FIRST_ACTION + slot * (k + 1) - start - MIN_REST, MIN_ACTION)
         if script.kinds and chosen.slips is not None:
             kind = script.kinds[k % len(script.kinds)]
             event = draw_slip_event(generator, chosen.slips, kind, start, scale)
-            longest = room - event.recovery
+            longest = max(room - event.recovery, MIN_ACTION)
             events.append(event._replace(duration=min(event.duration, longest)))
         elif script.disturbed_as:
             drawn = _disturbance(generator, script, start, k, scale)

@@ -177,7 +177,7 @@ def pipe_of(monkeypatch, text):
     os.close(writing)
 
 
-SHORT = {"open": 1.0, "hold": 7.0, "carry": 7.0, "pull": 9.0, "tap": 6.0}
+SHORT = {"open": 1.0, "carry": 7.0, "pull": 9.0}
 
 
 def test_from_nothing_to_a_model_with_the_twin(capsys, tmp_path, monkeypatch):
@@ -198,7 +198,7 @@ def test_from_nothing_to_a_model_with_the_twin(capsys, tmp_path, monkeypatch):
     assert code == 0, err
     report = json.loads(printed)
     kept = [(x["name"], x["kept"]) for x in report["steps"] if x["kept"]]
-    assert kept == [(x, True) for x in ("open", "hold", "carry", "pull", "pull", "tap")]
+    assert kept == [(x, True) for x in ("open", "carry", "pull", "pull")]
     assert all(x["seconds"] > 2 for x in report["steps"])
     assert report["heads"]["slip"]["out_of_fold"]["onsets"] == "rule"
     assert report["verdict"]

@@ -15,6 +15,7 @@ from holdfast.devices.sources import twin as module
 from holdfast.devices.sources.twin import GRASP_ATTEMPTS, AskedTwin, Twin, grasp_of, write
 from holdfast.devices.uri import parse
 from holdfast.io import load_recording
+from holdfast.io.stickers import picture_stamps
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.twin.simulation import Grasp, simulate
@@ -257,10 +258,14 @@ def test_a_twin_does_what_it_is_asked_and_then_is_silent(monkeypatch, tmp_path):
         return Recording(f"grasp {number}", {"thumb": tactile})
 
     filmed = []
+
+    def film(recording, path):
+        filmed.append(recording.name)
+        path.write_bytes(b"film")
+        return np.array([0.0, 0.5])
+
     monkeypatch.setattr(module, "perform", perform)
-    monkeypatch.setattr(
-        "holdfast.twin.webcam.film_stickers", lambda of, path: filmed.append(of.name)
-    )
+    monkeypatch.setattr("holdfast.twin.webcam.film_stickers", film)
     with AskedTwin(parse("twin:?seed=2")[1], speed=0) as twin:
 
         def samples():
@@ -274,6 +279,9 @@ def test_a_twin_does_what_it_is_asked_and_then_is_silent(monkeypatch, tmp_path):
         arrivals = samples()
         assert [x.samples["thumb"][0, 0] for x in arrivals] == [8] * 10
         twin.film(tmp_path / "a.mp4")
+        stamps = picture_stamps(tmp_path / "a.mp4")
+        began = arrivals[0].time  # on the clock of the source, as the samples are
+        assert stamps.tolist() == pytest.approx([began + 0.04, began + 0.54])
     first, pulled = asked
     assert first[2:] == ("open", 0, module.OPEN_SECONDS)
     assert pulled[1:] == (8, "pull", 6, 30.0)

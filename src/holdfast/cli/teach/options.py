@@ -118,14 +118,14 @@ def is_twin(source: str) -> bool:
 
 
 def calibrated(model: "Model", folder: "TeachingFolder") -> "tuple[Model, bool]":
-    """Return the model with the own handling of the holds and carries; whether it has it.
+    """Return the model with the own handling of what was carried; whether it has it.
 
     A model that cannot be calibrated, or is not better for it, stays as it is.
     """
     from holdfast.io import load_recording
     from holdfast.training.calibration import calibrate_with_report
 
-    names = [x.recording for x in folder.kept if x.name in ("hold", "carry")]
+    names = [x.recording for x in folder.kept if x.name == "carry"]
     recordings = [load_recording(folder.path / f"{name}.mcap", labels=False) for name in names]
     try:
         result = calibrate_with_report(model, recordings)

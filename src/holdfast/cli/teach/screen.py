@@ -1,14 +1,11 @@
 """What the guided protocol of `holdfast teach` shows in a terminal, and its keys."""
 
-import sys
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from holdfast.cli.terminal.console import print_message, visible
+from holdfast.cli.terminal.progress import LiveDisplay
 
 if TYPE_CHECKING:
-    from rich.live import Live
-
     from holdfast.live.teaching.protocol import View
 
 TEACH_KEYS = {
@@ -55,41 +52,12 @@ def screen_lines(view: "View", place: str) -> list[str]:
     return [line[:SCREEN_WIDTH].rstrip() for line in lines]
 
 
-class TeachScreen:
+class TeachScreen(LiveDisplay):
     """Screen of the protocol: on a terminal one that is drawn again, elsewhere a line a change."""
 
     def __init__(self) -> None:
-        self._live: Live | None = None  # None where stderr is no terminal
+        super().__init__()
         self._shown = ""
-
-    def __enter__(self) -> Self:
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.live import Live
-
-            console = Console(stderr=True)
-            self._live = Live(
-                console=console, auto_refresh=False, transient=True, redirect_stdout=False
-            )
-            self._live.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._live:
-            self._live.stop()
-
-    def print(self, *texts: str) -> None:
-        """Print messages above the screen."""
-        for text in texts:
-            if self._live:
-                self._live.console.print(visible(text), markup=False, highlight=False)
-            else:
-                print_message(text)
 
     def show(self, view: "View", place: str) -> None:
         """Show what a person sees now; elsewhere than on a terminal, what has changed."""
