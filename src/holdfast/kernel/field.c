@@ -114,8 +114,7 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
 }
 
 /* Return the part of a common change that is along the normal: above 0, it presses. */
-static hf_real
-hf_normal_part(const hf_finger *f, const hf_common *common, const hf_real change[3])
+static hf_real hf_normal_part(const hf_finger *f, const hf_common *common, const hf_real change[3])
 {
     return common->is_turned ? hf_dot(change, f->finger->normal) : change[2];
 }
@@ -190,9 +189,9 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     if (moved <= least) {
         memcpy(s->still_field, s->field, sizeof s->field);
     }
-    /* Untouched: sum |h_i - mean|^2 <= 4 times that of noise, and the mean is the field's, or pulls,
-     * which no contact does. A drift of all taxels adds up in the force: what they have in common
-     * has the limit of the force. */
+    /* Untouched: sum |h_i - mean|^2 <= 4 times that of noise, and the mean is the field's, or
+     * pulls, which no contact does. A drift of all taxels adds up in the force: what they have in
+     * common has the limit of the force. */
     const hf_real of_noise = HF_FIELD_MARGIN * 3 * (s->noise * s->noise);
     const bool is_pull = hf_normal_part(f, common, change) < 0;
     s->is_untouched = (square <= least || is_pull) && common->differences <= of_noise;
