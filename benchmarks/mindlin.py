@@ -17,7 +17,7 @@ import numpy as np
 
 from holdfast.twin.contact import constants_of, new_contact
 from holdfast.twin.objects import object_named
-from holdfast.twin.skin import Skin
+from holdfast.twin.skin import COUPLED, COUPLED_PITCH, Skin
 from holdfast.twin.steps import touch
 from holdfast.twin.surface import NODE_PITCH, Surface
 
@@ -37,8 +37,8 @@ STEP_TIME = 1.0
 N_STEPS = 240
 """Steps from rest until all of the contact slides."""
 N_PLACEMENTS = 8
-SKINS = {"separate": Skin()}
-PITCHES = {"separate": NODE_PITCH}
+SKINS = {"separate": Skin(), "coupled": COUPLED}
+PITCHES = {"separate": NODE_PITCH, "coupled": COUPLED_PITCH}
 
 
 def ball(pitch, placement):
@@ -215,6 +215,8 @@ def errors(result, theory):
 
 def modulus_of(skin, results):
     """Return the modulus of a skin: with separate springs, that by which Hertz has its depth."""
+    if skin.shear_modulus:
+        return 2 * skin.shear_modulus / (1 - POISSON)
     depth = np.mean([result.depths[LOADS.index(LOAD)] for result in results])
     return np.sqrt(9 * LOAD**2 / (16 * RADIUS * depth**3))
 
@@ -222,9 +224,11 @@ def modulus_of(skin, results):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--pitch", type=float, help="Distance of the nodes [m].")
+    parser.add_argument("--skins", default=",".join(SKINS), help="Some of: %(default)s.")
     options = parser.parse_args()
     columns = {}
-    for name, skin in SKINS.items():
+    for name in options.skins.split(","):
+        skin = SKINS[name]
         pitch = options.pitch or PITCHES[name]
         results = [measure(skin, pitch, placement) for placement in range(N_PLACEMENTS)]
         theory = Theory(modulus_of(skin, results))
