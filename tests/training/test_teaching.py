@@ -216,6 +216,7 @@ class TestBoundedThreshold:
             SlipCurve(
                 silent, np.empty((n, 0)), np.empty((n, 0)), np.zeros((n, 2)),
                 false_quiet=q * falls, false_held=(q + d) * falls, raised_seconds=np.zeros(n),
+                false_impacts=np.zeros(n, dtype=np.int64),
             )
             for q, d in zip(quiet, disturbed, strict=True)
         ]  # fmt: skip
