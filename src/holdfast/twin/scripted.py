@@ -1,12 +1,14 @@
 """Grasps with a given course: the twin does what a step of `holdfast teach` asks of a person."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from holdfast.recordings import Recording
+from holdfast.twin.impacts import draw_impacts
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.operator import PUSH_DIRECTIONS, Disturbance, draw_disturbance
 from holdfast.twin.profile import GRASP_ATTEMPTS, Span, profile
@@ -39,6 +41,7 @@ class Script(NamedTuple):
         style: of the disturbances; None as drawn.
         duration: of the disturbances [s]; None as drawn.
         depth: factor of their depth.
+        struck_as: profile from which impacts are drawn; empty for none.
         carried: whether the arm moves the hand.
     """
 
@@ -47,6 +50,7 @@ class Script(NamedTuple):
     style: int | None = None
     duration: Span | None = None
     depth: float = 1.0
+    struck_as: str = ""
     carried: bool = False
 
 
@@ -57,7 +61,7 @@ SCRIPTS = {
     "pull": Script(kinds=(SlipKind.CREEP, SlipKind.TWIST, SlipKind.TURN)),
     "push": Script(disturbed_as="reference"),
     "tap": Script(disturbed_as="gentle", style=JERK, duration=(0.15, 0.3), depth=0.5),
-    "knock": Script(disturbed_as="reference", style=JERK, duration=(0.06, 0.1), depth=0.2),
+    "knock": Script(struck_as="coupled"),
     "nudge": Script(disturbed_as="gentle", style=PUSH, depth=0.5),
 }
 """Course of the grasp of each step, by its name; None is an open hand. Fixed before the first
@@ -111,10 +115,14 @@ def _simulation(grasp: Grasp, script: Script | None, n_actions: int, seconds: fl
         moved = draw_disturbance(generator, moving, FIRST_MOVE, "left", scale)
         longest = FIRST_ACTION - FIRST_MOVE - MIN_REST
         disturbances.append(moved._replace(duration=min(moved.duration, longest)))
-    slot = (seconds - FIRST_ACTION - LAST_ACTION) / max(n_actions, 1)
-    for k in range(n_actions):
-        start = FIRST_ACTION + slot * k + float(generator.uniform(0.0, SPREAD_START * slot))
-        room = max(FIRST_ACTION + slot * (k + 1) - start - MIN_REST, MIN_ACTION)
+    parts = np.linspace(FIRST_ACTION, seconds - LAST_ACTION, n_actions + 1).tolist()
+    if script.struck_as and (ranges := profile(script.struck_as).impacts) is not None:
+        always = msgspec.structs.replace(ranges, share=1.0)
+        impacts = draw_impacts(generator, always, list(pairwise(parts)))
+        return Simulation(grasp, plan=plan._replace(impacts=impacts))
+    for k, (begin, end) in enumerate(pairwise(parts)):
+        start = begin + SPREAD_START * (end - begin) * float(generator.random())
+        room = max(end - start - MIN_REST, MIN_ACTION)
         if script.kinds and chosen.slips is not None:
             kind = script.kinds[k % len(script.kinds)]
             event = draw_slip_event(generator, chosen.slips, kind, start, scale)
