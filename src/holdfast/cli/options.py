@@ -138,6 +138,14 @@ BrowserOption = Annotated[
         show_default="if a browser can be opened",
     ),
 ]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        "--camera",
+        help="Number of a camera (0 is the first), or a video file that stands for one; its "
+        "video is written beside the recording.",
+    ),
+]
 ModelOutput = Annotated[
     Path, typer.Option("--output", "-o", help="The model file to write (JSON).")
 ]

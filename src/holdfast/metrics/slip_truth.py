@@ -77,12 +77,14 @@ class SlipTruth:
         quiet: (n,) True where the finger holds still and nothing disturbs the object.
         slips: in order of time.
         onsets: where the slips come from.
+        impacts: begin and end of each impact on object or arm [s], if the truth has them.
     """
 
     codes: Codes
     quiet: Mask
     slips: tuple[Slip, ...]
     onsets: Onsets
+    impacts: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +168,15 @@ def finger_slips(truth: Truth, finger: str) -> tuple[Slip, ...]:
     return tuple(slips)
 
 
+def truth_impacts(truth: Truth) -> tuple[tuple[float, float], ...]:
+    """Return begin and end of each impact [s]: where `impact` of the hand names its kind."""
+    kinds = truth.hand.get("impact")
+    if kinds is None:
+        return ()
+    periods = runs(np.asarray(kinds != ""))
+    return tuple((float(truth.times[a]), float(truth.times[b - 1])) for a, b in periods)
+
+
 def label_slips(labels: Sequence[Label]) -> tuple[Slip, ...]:
     """Return the slips that labels name by their cause; labels that touch are one slip."""
     slips: list[Slip] = []
@@ -214,7 +225,8 @@ def slip_truth(
     if truth is not None and has_slip_truth(truth, finger):
         index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
         codes = _truth_codes(truth, finger)[index]  # they outrank the labels
-        return SlipTruth(codes, stable & (codes == STILL), finger_slips(truth, finger), "truth")
+        slips = finger_slips(truth, finger)
+        return SlipTruth(codes, stable & (codes == STILL), slips, "truth", truth_impacts(truth))
     if not labels:
         return None
     onsets: Onsets = "rule" if labels_by_rule(labels) else "labels"
