@@ -114,13 +114,13 @@ class SlipDecisions:
         Returns:
             (n_thresholds, n).
         """
-        times, probability = self.times, self.probability
+        times, probability, limits = self.times, self.probability, np.asarray(thresholds)[:, None]
         # The rule of `kernel/heads.c` for many thresholds at once: raised where the probability is
         # over the threshold, and for `hold` after it, unless a gap or a fault (NaN), or a finger
         # without contact (0), came between. Half a period allows for rounding of times.
         with np.errstate(invalid="ignore"):
             ended = ~(probability > 0)
-            over = probability >= np.asarray(thresholds)[:, None]
+            over = (probability >= limits) & (limits < 1)  # 1 is never reached
         end = np.maximum.accumulate(np.where(ended, times, -np.inf))
         last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
         period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0

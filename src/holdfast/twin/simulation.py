@@ -151,7 +151,7 @@ class Simulation:
         if rate is not None:
             chosen = msgspec.structs.replace(chosen, glitch_rate=rate)
         self.grasp, self._profile, self._loads = grasp, chosen, loads
-        self.plan = plan or _draw_plan(grasp, chosen)
+        self.plan = plan or draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
         if grasp.noise is not None:
@@ -364,7 +364,8 @@ def simulate(
     return simulation.recording()
 
 
-def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
+def draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
+    """Return the plan of a grasp, with numbers that are drawn from the ranges of a profile."""
     generator = grasp.generator("plan")
     scale = chosen.grip * np.exp(GRIP_SPREAD * generator.standard_normal())
     grips = scale * np.array([THUMB_SHARE * 3, 1.0, 1.0, 1.0])
