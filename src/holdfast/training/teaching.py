@@ -24,12 +24,12 @@ from holdfast.features.tare import Tare
 from holdfast.metrics.slip_thresholds import (
     SLIP_THRESHOLDS,
     SlipSummary,
-    bounded_threshold,
     slip_curve,
     slip_intervals,
     slip_summary,
+    weighted_threshold,
 )
-from holdfast.metrics.slip_truth import slip_truth
+from holdfast.metrics.slip_truth import SlipDecisions, slip_truth
 from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
 from holdfast.model import ANY_FINGER, Head, Model, Training
 from holdfast.parallel import Engine
@@ -203,7 +203,7 @@ def teach_with_report(
     curves, counts_of_base = [curves for curves, _ in scores], [counts for _, counts in scores]
     pooled = [SlipCurve.total(list(fingers.values())) for fingers in curves]
     total = SlipCurve.total(pooled)
-    index = bounded_threshold(pooled, false_alarms, seed=seed)
+    index = weighted_threshold(total, false_alarms)
     slips = None
     if index is not None:
         slips = slip_summary(
@@ -237,7 +237,7 @@ def teach_with_report(
         slip_summary(counts_of_base) if any(counts_of_base) else None,
         _hand_alarms(curves, index),
         len(parts),
-        tuple(_warnings(len(parts), len(total.silent.delays))),
+        tuple(_warnings(len(parts), total.silent, false_alarms)),
     )
 
 
@@ -362,17 +362,24 @@ def _score_fold(
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])
-        own, others = (
-            {
-                name: finger.slip
-                for name, finger in compute_decisions(scored, recording).fingers.items()
-                if finger.slip is not None and finger.slip.truth is not None
-            }
-            for scored in (model, given)
-        )
-        curves = {name: slip_curve(decisions) for name, decisions in own.items()}
-        scores.append((curves, {name: count_slips(slips) for name, slips in others.items()}))
+        curves = {name: slip_curve(slips) for name, slips in _known_slips(model, recording).items()}
+        counts = {
+            name: count_slips(slips) for name, slips in _known_slips(given, recording).items()
+        }
+        scores.append((curves, counts))
     return scores
+
+
+def _known_slips(model: Model, recording: Recording) -> dict[str, SlipDecisions]:
+    """Return the decisions about each finger whose slips are known; none without a slip rule."""
+    if all(part.slip is None for part in model.fingers.values()):
+        return {}
+    fingers = compute_decisions(model, recording).fingers
+    return {
+        name: finger.slip
+        for name, finger in fingers.items()
+        if finger.slip is not None and finger.slip.truth is not None
+    }
 
 
 def _hand_alarms(curves: Sequence[Mapping[str, SlipCurve]], index: int) -> float:
@@ -382,11 +389,17 @@ def _hand_alarms(curves: Sequence[Mapping[str, SlipCurve]], index: int) -> float
     return 60 * sum(c.false_held for own in counts for c in own) / seconds
 
 
-def _warnings(n_recordings: int, n_slips: int) -> Iterator[str]:
+def _warnings(n_recordings: int, counts: SlipCounts, false_alarms: float) -> Iterator[str]:
+    n_slips, minutes = len(counts.delays), counts.held_seconds / 60
     if n_slips < FEW_SLIPS:
         yield f"{n_slips} slips of fingers given; {FEW_SLIPS} or more, better 30, expected"
     if n_recordings < FEW_RECORDINGS:
         yield (
             f"{n_recordings} recordings given: the figures out of fold are rough below "
             f"{FEW_RECORDINGS}"
+        )
+    if minutes * false_alarms < 1:
+        yield (
+            f"{minutes:.2g} min of held time given: whether it gives at most {false_alarms:g} "
+            f"false alarms a minute cannot be known below {1 / false_alarms:.2g} min"
         )
