@@ -24,8 +24,9 @@ class LoopState(StrEnum):
 class GripReason(StrEnum):
     """Reason of a change of force, or of a fault.
 
-    RELEASED: the hand opened, and the grip is over. Of the faults, STALE: no sample in time. FROZEN: readings repeat exactly. BEHIND: the loop was
-    not stepped for too long. HAND: the hand sends nothing.
+    RELEASED: the hand opened, and the grip is over. Of the faults, STALE: no sample in time.
+    FROZEN: readings repeat exactly. BEHIND: the loop was not stepped for too long. HAND: the hand
+    sends nothing.
     """
 
     NONE = ""
@@ -107,7 +108,7 @@ def event_texts(events: Sequence[GripEvent], n_fingers: int) -> list[tuple[float
 
     Example:
         >>> rise = GripEvent(1.0, LoopState.REACT, "thumb", 1.5, GripReason.SLIP)
-        >>> state = GripEvent(1.0, LoopState.REACT, "", math.nan, GripReason.NONE)
+        >>> state = rise._replace(finger="")
         >>> event_texts([rise, rise._replace(finger="index", scale=1.8), state], 2)
         [(1.0, 'grip REACT: all fingers rise from 1.50 to 1.80 x the first force (slip)')]
     """

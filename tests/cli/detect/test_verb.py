@@ -344,9 +344,8 @@ class TestSlips:
         assert len(slips) == sum((end is not None) + 1 for s in want.values() for _, end, _ in s)
         assert all(len(row) <= 80 for row in slips)
         begin, end, probability = want["thumb"][0]
-        (last,) = [
-            row for row in slips if row.startswith(f"{end:9.3f} s  thumb           slip ends")
-        ]
+        begins_with = f"{end:9.3f} s  thumb           slip ends"
+        (last,) = [row for row in slips if row.startswith(begins_with)]
         lasted = f"{end - begin:.3f} s, largest P(slip) {100 * probability:.0f} %"
         assert last.endswith(lasted)
 
