@@ -23,6 +23,7 @@ from holdfast.recordings import shown_origin
 FINGER_HEIGHT = 1.5
 """Height of the axes of a finger [inch]."""
 STATE_ALPHA = 0.35
+STATES = tuple(ContactState)
 
 
 def plot_detection(detection: Detection, axes: Sequence[Axes] | None = None) -> list[Axes]:
@@ -61,7 +62,7 @@ def plot_detection(detection: Detection, axes: Sequence[Axes] | None = None) -> 
         add_labels(panel, y="force [unit of the readings]")
     add_labels(axes[-1], x="time [s]" if origin == 0 else f"time since {origin:.3f} s [s]")
     handles = [
-        Patch(facecolor=colour, alpha=STATE_ALPHA, label=ContactState(code))
+        Patch(facecolor=colour, alpha=STATE_ALPHA, label=STATES[code])
         for code, colour in STATE_COLOURS.items()
     ]
     axes[0].legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3,

@@ -2,13 +2,15 @@ import io
 import json
 import sys
 import time
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from holdfast.cli import app
+from holdfast.cli.terminal import console
 from holdfast.cli.terminal.console import (
     message_if_slow,
     print_error,
@@ -164,3 +166,39 @@ def test_a_message_if_slow(capsys, text, after, printed):
         while printed and time.monotonic() < deadline and not sys.stderr.getvalue():
             time.sleep(0.01)
     assert capsys.readouterr().err == printed
+
+
+class TestSilence:
+    @pytest.fixture(autouse=True)
+    def terminal(self, capsys, monkeypatch):
+        monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+
+    def test_a_command_that_prints_nothing_says_that_it_works(self, capsys, monkeypatch):
+        monkeypatch.setattr(console, "SILENCE", 0.0)
+        with console.break_silence("tune: working ..."):
+            console._silence.join()
+        assert capsys.readouterr().err == "tune: working ...\n"
+        assert console._silence is None
+
+    @pytest.mark.parametrize(
+        "shows", [console.print_line, console.print_message, console.print_json]
+    )
+    def test_the_first_line_ends_the_silence(self, capsys, monkeypatch, shows):
+        monkeypatch.setattr(console, "SILENCE", 60.0)
+        with console.break_silence("tune: working ..."):
+            waiting = console._silence
+            shows("done")
+            assert console._silence is None and waiting.finished.is_set()
+        out, err = capsys.readouterr()
+        assert "working" not in out + err
+
+    def test_a_pipe_gets_no_such_line(self, monkeypatch):
+        monkeypatch.setattr("sys.stderr.isatty", lambda: False, raising=False)
+        with console.break_silence("tune: working ..."):
+            assert console._silence is None
+
+    def test_every_verb_is_watched(self, monkeypatch):
+        seen = []
+        monkeypatch.setattr(app, "break_silence", lambda text: seen.append(text) or nullcontext())
+        assert app.main(["sensors"]) == 0
+        assert seen == ["sensors: working ..."]
