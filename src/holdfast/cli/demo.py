@@ -65,10 +65,10 @@ def demo(
     if seed < 0:
         raise ValueError(f"--seed: at least 0 expected, {seed} given")
     start = time.monotonic()
-    print_message("1/5  a real recording: a robot carries a box between two uSkin sensors")
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     refuse_overwrite(model, force=force)  # before minutes of simulation
+    print_message("1/5  a real recording: a robot carries a box between two uSkin sensors")
     real = show_real_recording(speed)
     # The core shows the recording; what comes now needs the extras, and takes long to import.
     require_extras("twin", "train", "parquet")

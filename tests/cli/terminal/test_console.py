@@ -168,32 +168,38 @@ def test_a_message_if_slow(capsys, text, after, printed):
     assert capsys.readouterr().err == printed
 
 
-class TestSilence:
-    @pytest.fixture(autouse=True)
-    def terminal(self, capsys, monkeypatch):
-        monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
-    def test_a_command_that_prints_nothing_says_that_it_works(self, capsys, monkeypatch):
-        monkeypatch.setattr(console, "SILENCE", 0.0)
+
+class TestSilence:
+    @staticmethod
+    def on_terminal(monkeypatch, silence):
+        monkeypatch.setattr(sys, "stderr", Terminal())  # here: pytest sets it before each phase
+        monkeypatch.setattr(console, "SILENCE", silence)
+        return sys.stderr
+
+    def test_a_command_that_prints_nothing_says_that_it_works(self, monkeypatch):
+        terminal = self.on_terminal(monkeypatch, 0.1)
         with console.break_silence("tune: working ..."):
-            console._silence.join()
-        assert capsys.readouterr().err == "tune: working ...\n"
+            waiting = console._silence
+            waiting.join()
+        assert terminal.getvalue() == "tune: working ...\n"
         assert console._silence is None
 
     @pytest.mark.parametrize(
         "shows", [console.print_line, console.print_message, console.print_json]
     )
-    def test_the_first_line_ends_the_silence(self, capsys, monkeypatch, shows):
-        monkeypatch.setattr(console, "SILENCE", 60.0)
+    def test_the_first_line_ends_the_silence(self, monkeypatch, shows):
+        terminal = self.on_terminal(monkeypatch, 60.0)
         with console.break_silence("tune: working ..."):
             waiting = console._silence
             shows("done")
             assert console._silence is None and waiting.finished.is_set()
-        out, err = capsys.readouterr()
-        assert "working" not in out + err
+        assert "working" not in terminal.getvalue()
 
-    def test_a_pipe_gets_no_such_line(self, monkeypatch):
-        monkeypatch.setattr("sys.stderr.isatty", lambda: False, raising=False)
+    def test_a_pipe_gets_no_such_line(self):
         with console.break_silence("tune: working ..."):
             assert console._silence is None
 
