@@ -673,7 +673,7 @@ class Finger:
         gain = 1 - math.exp(-self.period / head.smoothing) if head.smoothing else 1
         self.odds = odds if self.odds is None else self.odds + gain * (odds - self.odds)
         self.slip = 1 / (1 + math.exp(min(-self.odds, 700)))
-        if self.slip >= head.threshold:
+        if head.threshold < 1 and self.slip >= head.threshold:
             self.slid = time
         self.slides = time == self.slid or time - self.slid + self.period / 2 < head.hold
         speed = self.part.head("slip_speed")

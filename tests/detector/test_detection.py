@@ -237,6 +237,21 @@ class TestSlip:
             assert (trace.slip_speed is None) == (trace.slip_distance is None)
             assert (trace.slip_speed is None) == (name not in speeds)
 
+    @pytest.mark.parametrize(("threshold", "is_raised"), [(0.999, True), (1.0, False)])
+    def test_a_threshold_of_1_is_never_reached(self, threshold, is_raised):
+        """Also not by a probability that is rounded to 1."""
+        hand_model = model(slips=("thumb",), own=TAXELS)
+        head = hand_model.fingers["thumb"].slip
+        sure = replace(head, rule=replace(head.rule, intercepts=(1e4,)), threshold=threshold)
+        hand_model = hand_model.changed(lambda part: part.with_heads(sure) if part.slip else part)
+        trace = detect(hand_model, recording(**CLOCKS["one clock"])).fingers["thumb"]
+        assert (trace.slip_probability == 1).any()
+        assert (trace.cause == SLIP_CODE).any() == is_raised == hand_model.reports_slips
+        decisions = SlipDecisions(
+            trace.times, trace.slip_probability, trace.cause == SLIP_CODE, head.hold, None
+        )
+        assert (decisions.raised_at(np.array([threshold]))[0] == decisions.raised).all()
+
     def test_a_speed_changes_nothing_else(self):
         made, slips = recording(**CLOCKS["one clock"]), ("thumb", "index")
         plain = detect(model(slips=slips, own=TAXELS), made)

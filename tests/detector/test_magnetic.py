@@ -46,6 +46,9 @@ TURNS = {
     "of a sensor without a known unit": {
         "field": (200, -150, 90), "name": "uskin-4x4", "press": 900, "noise": 4.0,
     },
+    "that pulls a patch of unknown unit": {
+        "field": (60, 30, -350), "name": "uskin-4x6", "press": 900, "noise": 4.0,
+    },
     "that pulls before it is found": {
         "field": (-300, 40, 20), "name": "uskin-curved", "press": 900, "noise": 4.0,
         "in_frame": True, "seconds": 5.0,

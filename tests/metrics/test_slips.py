@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -26,8 +27,10 @@ from holdfast.metrics.slip_truth import (
     Slip,
     SlipDecisions,
     SlipTruth,
+    truth_impacts,
 )
 from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
+from holdfast.recordings import Truth
 
 RATE = 100.0
 
@@ -182,6 +185,56 @@ intervals_of_time = st.lists(
     ),
     max_size=6,
 )
+
+
+class TestImpacts:
+    """A blow at 3.0 to 3.1 s, far from the only slip at 5 s, if nothing else is said."""
+
+    @pytest.mark.parametrize(
+        ("raised", "blows", "expected"),
+        [
+            ((), [(3.0, 3.1)], (1, 0.0)),
+            ([(3.05, 3.2)], [(3.0, 3.1)], (1, 1.0)),
+            ([(3.05, 3.06), (3.1, 3.11)], [(3.0, 3.1)], (1, 1.0)),  # two alarms for one blow
+            ([(3.34, 3.4)], [(3.0, 3.1)], (1, 1.0)),
+            ([(3.37, 3.4)], [(3.0, 3.1)], (1, 0.0)),  # over 0.25 s after its end
+            ([(2.9, 3.2)], [(3.0, 3.1)], (1, 1.0)),  # a raised flag gains nothing
+            ([(3.05, 3.1)], [(1.0, 1.0), (2.0, 2.2), (3.0, 3.1), (8.0, 8.1)], (4, 0.25)),
+            ([(4.7, 4.8)], [(4.6, 4.7)], None),  # it comes near a slip
+            ([(4.3, 4.4)], [(4.2, 4.3)], None),  # so do the alarms that are its own
+            ((), [], None),
+        ],
+    )
+    def test_alarms_for_a_blow(self, raised, blows, expected):
+        given = decisions(raised, [slip()])
+        given = replace(given, truth=replace(given.truth, impacts=tuple(blows)))
+        metrics = slip_metrics(count_slips(given)).impacts
+        assert (metrics and (metrics.n, metrics.false_alarms_per_impact)) == expected
+
+    def test_a_finger_that_does_not_hold_feels_none(self):
+        codes = np.full(1000, STILL, dtype=np.int8)
+        codes[305:] = NOT_HELD
+        given = decisions([(3.0, 3.02)], codes=codes)
+        truth = replace(given.truth, impacts=((3.0, 3.1), (1.0, 1.1)))
+        assert slip_metrics(count_slips(replace(given, truth=truth))).impacts.n == 1
+
+    def test_at_many_thresholds_and_in_sums(self):
+        given = decisions([(3.05, 3.2)], [slip()])
+        given = replace(given, truth=replace(given.truth, impacts=((3.0, 3.1),)))
+        curve = SlipCurve.total([slip_curve(given)] * 2)
+        assert curve.false_impacts[0] == curve.false_impacts[100] == curve[0].false_impacts == 2
+        assert curve.false_impacts[-1] == 0
+        assert SlipCounts.total([curve[0], curve[-1]]).n_impacts == 4
+
+    def test_only_truths_with_impacts_show_them(self):
+        found = msgspec.to_builtins(slip_metrics(count_slips(decisions([(3.0, 3.1)], [slip()]))))
+        assert "impacts" not in found
+
+    def test_of_a_recording(self):
+        kinds = np.array(["", "", "tap", "tap", "", "bump"])
+        truth = Truth(np.arange(6) / 10, {"impact": kinds}, {})
+        assert truth_impacts(truth) == ((0.2, pytest.approx(0.3)), (0.5, 0.5))
+        assert truth_impacts(Truth(np.arange(6) / 10, {}, {})) == ()
 
 
 @given(raised=intervals_of_time, starts=st.lists(st.integers(50, 900), max_size=3, unique=True))

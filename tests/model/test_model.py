@@ -449,3 +449,16 @@ def test_the_ranges_of_an_older_model_are_called_limits(tmp_path):
     (tmp_path / "older.json").write_bytes(text)
     older = Model.load(tmp_path / "older.json")
     assert older.sensors == Model.load("builtin:twin").sensors
+
+
+def test_a_model_that_reports_no_slip_says_what_to_do():
+    reporting = model(slips=("thumb",), own=TAXELS, name="mine")
+    assert reporting.reports_slips
+    silent = reporting.with_threshold("slip", 1.0)
+    assert not silent.reports_slips
+    assert silent.has_slip_rule
+    assert silent.slip_advice == (
+        "mine reports no slip until it is taught on this hand (holdfast teach): slip_probability "
+        "is a ranking, and UNSTABLE the sign to grip harder in advance"
+    )
+    assert reporting.slip_advice == model().slip_advice == ""

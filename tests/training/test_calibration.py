@@ -83,6 +83,11 @@ def test_the_summary_says_what_was_seen(model, calibrated):
     assert handling_of(calibrated.model).thresholds == after
 
 
+def test_a_model_that_reports_no_slip_reports_none_after_it(model):
+    silent = model.with_threshold("slip", 1.0)
+    assert not calibrate(silent, DATA).finger("thumb", PAD).slip.threshold < 1
+
+
 def test_once_more_gives_the_same_model(calibrated):
     again = calibrate_with_report(calibrated.model, DATA)
     assert again.model.digest == calibrated.model.digest

@@ -224,7 +224,7 @@ class TestWeightedThreshold:
         return SlipCurve(
             silent, np.empty((n, 0)), np.empty((n, 0)), np.zeros((n, 2)),
             false_quiet=quiet * falls, false_held=(quiet + disturbed) * falls,
-            raised_seconds=np.zeros(n),
+            raised_seconds=np.zeros(n), false_impacts=np.zeros(n, dtype=np.int64),
         )  # fmt: skip
 
     def test_disturbed_time_counts_with_its_own_share_below_that_of_use(self):

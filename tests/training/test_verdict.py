@@ -225,6 +225,13 @@ def test_what_slips_are_good_for(pooled, intervals, use):
     assert slip_sentence(pooled, **intervals).split("; ")[1].startswith(use)
 
 
+def test_a_model_that_reports_no_slip_ranks():
+    found = verdict(with_slips(slips(found=0.0, rate=0.0)), reports_slips=False)
+    assert found.endswith(
+        ". Slips: none is reported until it is taught (holdfast teach); P(slip) has an AUC of 0.90."
+    )
+
+
 def test_the_sentence_about_slips():
     assert slip_sentence(slips(found=35.0), rate=(0.5, 1.4)) == (
         "35 % of 40 slips of fingers found within 0.1 s, 1 (up to 1.4) false alarms a minute of "

@@ -7,7 +7,7 @@ from holdfast.twin.profile import Profile, profile, profiles
 def test_the_profiles_and_those_of_the_old_protocol():
     new = ("gentle", "reference", "vigorous")
     old = [f"finger-{name}" for name in new]
-    assert profiles() == tuple(sorted([*new, *old, "slips", "long-hold"]))
+    assert profiles() == tuple(sorted([*new, *old, "slips", "long-hold", "coupled"]))
 
 
 @pytest.mark.parametrize("name", profiles())
@@ -39,6 +39,13 @@ def test_slips_has_the_disturbances_of_the_reference():
     assert differ == {"name", "hold", "slips"}
 
 
+def test_coupled_is_the_reference_with_coupled_nodes_and_impacts():
+    coupled, reference = asdict(profile("coupled")), asdict(profile("reference"))
+    differ = {name for name in reference if coupled[name] != reference[name]}
+    assert differ == {"name", "coupled", "impacts", "drawn_as"}
+    assert coupled["drawn_as"] == "reference"  # so the disturbances of a seed are the same
+
+
 def test_profiles_disturb_in_their_order():
     gentle, reference, vigorous = (profile(name) for name in ("gentle", "reference", "vigorous"))
     assert gentle.tremor < reference.tremor < vigorous.tremor
@@ -48,7 +55,7 @@ def test_profiles_disturb_in_their_order():
 @pytest.mark.parametrize("name", ["", "Reference", "../profile", "reference.toml"])
 def test_an_unknown_one_is_refused(name):
     with pytest.raises(
-        ValueError, match=r"unknown profile .*; there are finger-gentle, finger-ref"
+        ValueError, match=r"unknown profile .*; there are coupled, finger-gentle, finger-ref"
     ):
         profile(name)
 

@@ -14,14 +14,15 @@ from holdfast.cli.options import (
     JsonOption,
     ModelArgument,
     SecondsOption,
-    SourceArgument,
     SpeedOption,
     StartOptions,
     check_seconds,
+    complete_source,
 )
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast_grip.options import (
+    TWIN,
     GripSettings,
     check_armed,
     connect_hand,
@@ -32,9 +33,16 @@ from holdfast_grip.options import (
 
 def hold(
     model: ModelArgument,
-    source: SourceArgument,
-    settings: GripSettings,
+    source: Annotated[
+        str | None,
+        typer.Argument(
+            help="Path of a recording, URI of a source (see above), or hand (of holdfast.toml). "
+            "Without MODEL: twin:..., which builtin:twin was trained on.",
+            callback=complete_source,
+        ),
+    ] = None,
     *,
+    settings: GripSettings,
     record: Annotated[
         Path | None, typer.Option("--record", help="Record samples and the log to NAME.mcap.")
     ] = None,
@@ -56,15 +64,18 @@ def hold(
     hand; the loop takes over when the grip begins.
     docs/hands.md has their topics and parameters. With --json, each new command is a line of JSON.
 
+    MODEL is one that was taught on this hand (holdfast teach). builtin:any reports no slip until
+    then, so the force rises by instability alone.
+
     No command was ever tried on a real hand: read docs/grip.md first.
 
     Example:
-      holdfast hold builtin:twin twin:?object=can --hand twin: --armed --speed 0
-      holdfast hold builtin:any xela://auto --hand log:commands.jsonl
-      holdfast hold model.json xela://auto --hand call:my_gripper:set_force \
+      holdfast hold twin:?object=can --hand twin: --armed --speed 0
+      holdfast hold taught.json xela://auto --hand log:commands.jsonl
+      holdfast hold taught.json xela://auto --hand call:my_gripper:set_force \
         --armed --confirm call:my_gripper:set_force \
         --max-scale 1.2 --on-fault open
-      holdfast hold builtin:any xela://auto \
+      holdfast hold taught.json xela://auto \
         --hand "ros2:plexus?effort=0.1&max_effort=0.3"
     """
     from holdfast.live.session import Session
@@ -73,6 +84,13 @@ def hold(
 
     settings.check()
     check_seconds(seconds)
+    if source is None:
+        if not model.startswith(TWIN):
+            raise ValueError(
+                f"{model} given; MODEL SOURCE expected, with a model that was taught on this hand "
+                "(holdfast teach), or twin:... alone"
+            )
+        model, source = "builtin:twin", model
     options = DetectorOptions(ignore=ignore)
     loaded = options.load_model(model)
     opened, commanded = find_source_and_hand(source, settings.hand, speed=speed)

@@ -188,6 +188,8 @@ def open_loop(
 
     limits = settings.limits()
     hand.check(limits, stream.fingers)
+    if advice := stream.model.slip_advice:
+        print_message(f"{advice}; take a taught model, or builtin:twin with the twin")
     # Check that the fingers of the hand which the source has also have estimates.
     missing = [
         finger

@@ -51,13 +51,15 @@ ModelArgument = Annotated[
 ]
 
 
-def complete_source(context: typer.Context, source: str) -> str:
+def complete_source(context: typer.Context, source: str | None) -> str | None:
     """Return a source with the parameters of the configuration file that it does not have.
+
+    None, of a verb whose source may be left out, stays None.
 
     Raises:
         ValueError: the source is `hand`, and there is no configuration file.
     """
-    if context.obj is not None:
+    if source is not None and context.obj is not None:
         completed: str = context.obj.complete(source)
         return completed
     if source == "hand" and not Path(source).exists():
@@ -134,6 +136,14 @@ BrowserOption = Annotated[
         "--browser/--no-browser",
         help="Open the page in a browser.",
         show_default="if a browser can be opened",
+    ),
+]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        "--camera",
+        help="Number of a camera (0 is the first), or a video file that stands for one; its "
+        "video is written beside the recording.",
     ),
 ]
 ModelOutput = Annotated[
@@ -399,7 +409,9 @@ def report_blind_features(model: "Model", sensors: Mapping[str, "Sensor"]) -> No
 
 
 def report_missing_slip_rules(model: "Model") -> None:
-    """Print that the slip probability of a model, or of some of its fingers, is always null."""
+    """Print that a model, or some of its fingers, has no slip rule, or never reports a slip."""
+    if model.slip_advice:
+        print_message(model.slip_advice)
     without = [name for name, part in model.fingers.items() if part.slip is None]
     if not without:
         return

@@ -7,6 +7,7 @@ import typer
 
 from holdfast.cli.options import (
     RARE,
+    CameraOption,
     ForceOption,
     JsonOption,
     SecondsOption,
@@ -43,13 +44,7 @@ def record(
         ),
         RARE,
     ] = False,
-    camera: Annotated[
-        str | None,
-        typer.Option(
-            help="Number of a camera (0 is the first), or a video file that stands for one; its "
-            "video is written beside the recording."
-        ),
-    ] = None,
+    camera: CameraOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -158,6 +158,12 @@ def print_slips(
     if pooled.raised_quiet is not None:
         support += f"; a slip is reported in {pooled.raised_quiet:.2f} % of quiet hold"
     print_paragraph(f"Of one finger: {support}.{NEVER_NOTE}")
+    if (impacts := pooled.impacts) is not None:
+        print_paragraph(
+            "Knocks, taps and bumps without a slip: "
+            f"{impacts.false_alarms_per_impact:.2f} false alarms for each, of one finger "
+            f"({impacts.n})."
+        )
     if summary.intervals is not None:
         print_line()
         print_paragraph(format_intervals(summary.intervals, chosen=summary.threshold_chosen))

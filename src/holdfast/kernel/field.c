@@ -113,10 +113,16 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
     return common;
 }
 
+/* Return the part of a common change that is along the normal: above 0, it presses. */
+static hf_real hf_normal_part(const hf_finger *f, const hf_common *common, const hf_real change[3])
+{
+    return common->is_turned ? hf_dot(change, f->finger->normal) : change[2];
+}
+
 /* Return whether a common change is along the normal, as that of a press. */
 static bool hf_is_press(const hf_finger *f, const hf_common *common, const hf_real change[3])
 {
-    const hf_real along = common->is_turned ? hf_dot(change, f->finger->normal) : change[2];
+    const hf_real along = hf_normal_part(f, common, change);
     /* Where the unit is not known, a press of the tare that goes, too. */
     return (along > 0 || isinf(f->finger->max_field)) &&
            along * along >= HF_PRESSED_SHARE * HF_PRESSED_SHARE * hf_square(change);
@@ -183,10 +189,12 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     if (moved <= least) {
         memcpy(s->still_field, s->field, sizeof s->field);
     }
-    /* Untouched: sum |h_i - mean|^2 <= 4 times that of noise, and the mean is the field's. A drift
-     * of all taxels adds up in the force: what they have in common has the limit of the force. */
+    /* Untouched: sum |h_i - mean|^2 <= 4 times that of noise, and the mean is the field's, or
+     * pulls, which no contact does. A drift of all taxels adds up in the force: what they have in
+     * common has the limit of the force. */
     const hf_real of_noise = HF_FIELD_MARGIN * 3 * (s->noise * s->noise);
-    s->is_untouched = square <= least && common->differences <= of_noise;
+    const bool is_pull = hf_normal_part(f, common, change) < 0;
+    s->is_untouched = (square <= least || is_pull) && common->differences <= of_noise;
     /* Alike: sum |h_i - mean|^2 <= n (0.1 max(|mean|, |change|))^2 + 4 times that of noise. */
     const hf_real squares = common->n * hf_max(hf_square(mean), square);
     const hf_real limit = HF_FIELD_TOLERANCE * HF_FIELD_TOLERANCE * squares + of_noise;

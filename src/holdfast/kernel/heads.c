@@ -75,8 +75,9 @@ static void hf_decide_slip(
     d->slip_log_odds =
         isnan(d->slip_log_odds) ? z : d->slip_log_odds + head->gain * (z - d->slip_log_odds);
     d->slip_probability = hf_probability(d->slip_log_odds);
-    /* It slides while p >= threshold, and until t - t_last reaches the hold time. */
-    d->slips = d->slip_probability >= head->threshold;
+    /* It slides while p >= threshold, and until t - t_last reaches the hold time. A threshold of 1
+     * is never reached, also not by a p that is rounded to 1. */
+    d->slips = head->threshold < 1 && d->slip_probability >= head->threshold;
     if (d->slips) {
         d->last_slip = time;
     } else {

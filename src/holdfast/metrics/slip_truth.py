@@ -77,12 +77,14 @@ class SlipTruth:
         quiet: (n,) True where the finger holds still and nothing disturbs the object.
         slips: in order of time.
         onsets: where the slips come from.
+        impacts: begin and end of each impact on object or arm [s], if the truth has them.
     """
 
     codes: Codes
     quiet: Mask
     slips: tuple[Slip, ...]
     onsets: Onsets
+    impacts: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +114,13 @@ class SlipDecisions:
         Returns:
             (n_thresholds, n).
         """
-        times, probability = self.times, self.probability
+        times, probability, limits = self.times, self.probability, np.asarray(thresholds)[:, None]
         # The rule of `kernel/heads.c` for many thresholds at once: raised where the probability is
         # over the threshold, and for `hold` after it, unless a gap or a fault (NaN), or a finger
         # without contact (0), came between. Half a period allows for rounding of times.
         with np.errstate(invalid="ignore"):
             ended = ~(probability > 0)
-            over = probability >= np.asarray(thresholds)[:, None]
+            over = (probability >= limits) & (limits < 1)  # 1 is never reached
         end = np.maximum.accumulate(np.where(ended, times, -np.inf))
         last = np.maximum.accumulate(np.where(over, times, -np.inf), axis=1)
         period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
@@ -164,6 +166,15 @@ def finger_slips(truth: Truth, finger: str) -> tuple[Slip, ...]:
         if is_long or slip.distance >= MIN_SLIP_DISTANCE:
             slips.append(slip)
     return tuple(slips)
+
+
+def truth_impacts(truth: Truth) -> tuple[tuple[float, float], ...]:
+    """Return begin and end of each impact [s]: where `impact` of the hand names its kind."""
+    kinds = truth.hand.get("impact")
+    if kinds is None:
+        return ()
+    periods = runs(np.asarray(kinds != ""))
+    return tuple((float(truth.times[a]), float(truth.times[b - 1])) for a, b in periods)
 
 
 def label_slips(labels: Sequence[Label]) -> tuple[Slip, ...]:
@@ -214,7 +225,8 @@ def slip_truth(
     if truth is not None and has_slip_truth(truth, finger):
         index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
         codes = _truth_codes(truth, finger)[index]  # they outrank the labels
-        return SlipTruth(codes, stable & (codes == STILL), finger_slips(truth, finger), "truth")
+        slips = finger_slips(truth, finger)
+        return SlipTruth(codes, stable & (codes == STILL), slips, "truth", truth_impacts(truth))
     if not labels:
         return None
     onsets: Onsets = "rule" if labels_by_rule(labels) else "labels"

@@ -14,6 +14,7 @@ from holdfast.metrics.masks import Mask
 from holdfast.metrics.samples import N_BINS, bins_of
 from holdfast.metrics.slip_truth import (
     DISTANCES,
+    NOT_HELD,
     SLIDING,
     STILL,
     SlipDecisions,
@@ -52,6 +53,9 @@ class SlipCounts:
         raised_seconds: duration of quiet hold in which the decision is raised [s].
         scores: (2, N_BINS) histograms of the probabilities of STILL and SLIDING samples.
         onsets: where the slips come from.
+        n_impacts: impacts on object or arm in which the finger holds the object and is away from
+            its slips.
+        false_impacts: those in which the decision is raised, until 0.25 s after their end.
     """
 
     delays: Array
@@ -66,6 +70,8 @@ class SlipCounts:
     raised_seconds: float
     scores: Integers
     onsets: frozenset[Onsets]
+    n_impacts: int = 0
+    false_impacts: int = 0
 
     @classmethod
     def total(cls, parts: Iterable[Self]) -> Self:
@@ -85,6 +91,8 @@ class SlipCounts:
             sum(part.raised_seconds for part in every),
             sum((part.scores for part in every), np.zeros((2, N_BINS), dtype=np.int64)),
             frozenset[Onsets]().union(*(part.onsets for part in every)),
+            sum(part.n_impacts for part in every),
+            sum(part.false_impacts for part in every),
         )
 
     @property
@@ -105,6 +113,7 @@ class SlipCurve:
         false_quiet: (n_thresholds,).
         false_held: (n_thresholds,).
         raised_seconds: (n_thresholds,) [s].
+        false_impacts: (n_thresholds,).
     """
 
     silent: SlipCounts
@@ -114,6 +123,7 @@ class SlipCurve:
     false_quiet: Integers
     false_held: Integers
     raised_seconds: Array
+    false_impacts: Integers
 
     @classmethod
     def of_one(cls, counts: SlipCounts) -> Self:
@@ -140,6 +150,7 @@ class SlipCurve:
             np.sum([curve.false_quiet for curve in curves], axis=0),
             np.sum([curve.false_held for curve in curves], axis=0),
             np.sum([curve.raised_seconds for curve in curves], axis=0),
+            np.sum([curve.false_impacts for curve in curves], axis=0),
         )
 
     def __len__(self) -> int:
@@ -155,6 +166,7 @@ class SlipCurve:
             false_quiet=int(self.false_quiet[index]),
             false_held=int(self.false_held[index]),
             raised_seconds=float(self.raised_seconds[index]),
+            false_impacts=int(self.false_impacts[index]),
         )
 
 
@@ -195,6 +207,8 @@ class SlipCounter:
             gross onset [s]; the last NaN if it never becomes gross.
         away: (n,) True outside the time of the slips and their alarms.
         reached: (n_slips, n_distances) times at which each of `DISTANCES` was slid [s].
+        impacts: (n_impacts, 2) first sample of the alarms by each impact that counts, and of what
+            follows them.
         quiet: (n + 1,) duration of quiet hold outside the slips before each sample [s].
         outside: (n + 1,) the same of all held time outside the slips.
         silent: counts without an alarm.
@@ -204,6 +218,7 @@ class SlipCounter:
     slips: Array
     away: Mask
     reached: Array
+    impacts: Integers
     quiet: Array
     outside: Array
     silent: SlipCounts
@@ -233,6 +248,13 @@ class SlipCounter:
         def elapsed(mask: Mask) -> Array:
             return np.concatenate([[0.0], np.cumsum(np.where(mask, steps, 0.0))])
 
+        # An impact that makes the finger slide, or comes near a slip, counts as that slip.
+        wrong = np.concatenate([[0], np.cumsum(~away | (truth.codes == NOT_HELD))])
+        spans = np.array(truth.impacts).reshape(-1, 2) + np.array([-TIME_TOLERANCE, late])
+        impacts = np.searchsorted(times, spans)
+        first, last = impacts.T
+        impacts = impacts[(wrong[last] == wrong[first]) & (last > first)]
+
         known = ~np.isnan(decisions.probability)
         histograms = [
             np.bincount(
@@ -253,8 +275,10 @@ class SlipCounter:
             raised_seconds=0.0,
             scores=np.array(histograms),
             onsets=frozenset({truth.onsets}),
+            n_impacts=len(impacts),
         )
-        return cls(times, windows, away, reached, elapsed(quiet), elapsed(counted), silent)
+        spent = elapsed(quiet), elapsed(counted)
+        return cls(times, windows, away, reached, impacts, *spent, silent)
 
     def count(self, raised: Mask) -> SlipCurve:
         """Return the counts at several thresholds.
@@ -280,6 +304,9 @@ class SlipCounter:
             begun = np.ceil(seconds / FALSE_ALARM_DURATION - TIME_TOLERANCE).clip(min=0)
             return by_row(begun).astype(np.int64)
 
+        n_alarmed = np.zeros(len(raised), dtype=np.int64)
+        for begin, end in self.impacts:
+            n_alarmed += raised[:, begin:end].any(axis=1)
         return SlipCurve(
             self.silent,
             delays=first - onset,
@@ -288,6 +315,7 @@ class SlipCounter:
             false_quiet=n_false(quiet),
             false_held=n_false(outside),
             raised_seconds=by_row(quiet),
+            false_impacts=n_alarmed,
         )
 
 
@@ -298,7 +326,19 @@ def _runs_of_rows(masks: Mask) -> tuple[Integers, Integers, Integers]:
     return rows[::2], samples[::2], samples[1::2]
 
 
-class SlipMetrics(msgspec.Struct, frozen=True):
+class ImpactMetrics(msgspec.Struct, frozen=True):
+    """Slip alarms by knocks, taps and bumps that make no finger slide.
+
+    Attributes:
+        n: number of impacts of a finger: one that three fingers feel counts three times.
+        false_alarms_per_impact: share of them with a slip alarm of that finger.
+    """
+
+    n: int
+    false_alarms_per_impact: float
+
+
+class SlipMetrics(msgspec.Struct, frozen=True, omit_defaults=True):
     """Metrics of the detection of slips.
 
     Attributes:
@@ -317,6 +357,7 @@ class SlipMetrics(msgspec.Struct, frozen=True):
         quiet_minutes: quiet among it [min].
         held_minutes: of one finger, without creep, slips and the time of their alarms [min].
         onsets: `truth`, `labels`, `rule` (labels by a rule), or `mixed`.
+        impacts: None if the truth has no impacts.
     """
 
     n: int
@@ -333,6 +374,7 @@ class SlipMetrics(msgspec.Struct, frozen=True):
     quiet_minutes: float
     held_minutes: float
     onsets: Onsets
+    impacts: ImpactMetrics | None = None
 
 
 def slip_metrics(counts: SlipCounts) -> SlipMetrics:
@@ -364,6 +406,9 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
         quiet_minutes=quiet,
         held_minutes=held,
         onsets=common_onsets(counts.onsets),
+        impacts=ImpactMetrics(counts.n_impacts, counts.false_impacts / counts.n_impacts)
+        if counts.n_impacts
+        else None,
     )
 
 

@@ -83,7 +83,8 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         link: `logit`, `square` or `softmax`.
         features: input of the rule, in its order.
         rule: maps features to z; an ONNX file to p.
-        threshold: of the probability, for the link `logit`.
+        threshold: of the probability, for the link `logit`. One of 1 never reports a slip: the
+            probability is only a ranking then.
         smoothing: time constant of z [s]; 0 for none.
         hold: time for which a slip is still reported [s].
         classes: causes of the outputs of the rule, for the link `softmax`.

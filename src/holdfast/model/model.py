@@ -133,6 +133,22 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Whether the model decides of any finger whether it slides."""
         return any(part.slip is not None for part in self.fingers.values())
 
+    @property
+    def reports_slips(self) -> bool:
+        """Whether the model ever reports a slip: a threshold of 1 leaves it to `teach`."""
+        heads = [part.slip for part in self.fingers.values()]
+        return any(head is not None and head.threshold < 1 for head in heads)
+
+    @property
+    def slip_advice(self) -> str:
+        """What its slip rule is good for if it reports no slip; empty without such a rule."""
+        if self.reports_slips or not self.has_slip_rule:
+            return ""
+        return (
+            f"{self.name or 'the model'} reports no slip until it is taught on this hand (holdfast "
+            "teach): slip_probability is a ranking, and UNSTABLE the sign to grip harder in advance"
+        )
+
     def changed(self, change: Callable[[FingerModel], FingerModel]) -> Self:
         """Return the model with each of its fingers changed by a function."""
         fingers = {name: change(part) for name, part in self.fingers.items()}

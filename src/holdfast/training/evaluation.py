@@ -125,6 +125,7 @@ class Evaluation:
         copies: of each recording whose readings are those of an earlier one: its name, and that
             of the other.
         in_sample: whether a threshold of the model was chosen on one that is unseen.
+        reports_slips: whether the model ever reports a slip.
         tares: recordings whose tare was taken under load, of those that are unseen.
         decisions: about each recording, if they are kept.
     """
@@ -134,6 +135,7 @@ class Evaluation:
     trained_on: list[str]
     copies: list[tuple[str, str]]
     in_sample: bool
+    reports_slips: bool
     tares: LoadedTares
     decisions: list[Decisions]
 
@@ -143,7 +145,9 @@ class Evaluation:
         n, n_unseen = len(self.metrics.recordings), len(self.unseen.recordings)
         if self.trained_on and self.unseen.pooled.n + self.unseen.pooled.n_undecided == 0:
             return None
-        sentence = verdict(self.unseen, self.tares, in_sample=self.in_sample)
+        sentence = verdict(
+            self.unseen, self.tares, in_sample=self.in_sample, reports_slips=self.reports_slips
+        )
         others = ["the model was trained on the others"] * bool(self.trained_on)
         others += ["copies count once"] * bool(self.copies)
         note = f" From {n_unseen} of {n} recordings: {', '.join(others)}." if others else ""
@@ -228,6 +232,7 @@ def evaluate_recordings(
         trained_on,
         copies,
         in_sample,
+        model.reports_slips,
         LoadedTares(sum(tares), len(tares)),
         kept,
     )

@@ -98,13 +98,20 @@ class Support(NamedTuple):
         return ", ".join(f"{n:g} of {least:g} {name}" for n, least, name in parts if n < least)
 
 
-def verdict(metrics: Metrics, tares: LoadedTares | None = None, *, in_sample: bool = False) -> str:
+def verdict(
+    metrics: Metrics,
+    tares: LoadedTares | None = None,
+    *,
+    in_sample: bool = False,
+    reports_slips: bool = True,
+) -> str:
     """Return what a model is good for: a sentence, and another about slips if they are scored.
 
     Args:
         metrics: of the model on labelled recordings, without copies.
         tares: recordings whose tare was taken under load; None if that is not known.
         in_sample: a threshold of the model was chosen on some of the recordings.
+        reports_slips: the model has a threshold of slips that is ever reached.
     """
     n = sum(
         any(finger.n + finger.n_undecided for finger in recording.fingers.values())
@@ -114,7 +121,12 @@ def verdict(metrics: Metrics, tares: LoadedTares | None = None, *, in_sample: bo
     sentence = _unusable(metrics.pooled) or _by_events(metrics, n, in_sample=in_sample)
     ending = f"; {tares}: see --tare." if tares is not None and tares.loaded else "."
     slips = metrics.slips
-    return sentence + ending + (f" {_by_slips(slips, n, in_sample=in_sample)}" if slips else "")
+    if slips is None:
+        return sentence + ending
+    if reports_slips:
+        return f"{sentence}{ending} {_by_slips(slips, n, in_sample=in_sample)}"
+    auc = "" if slips.pooled.auc is None else f"; P(slip) has an AUC of {slips.pooled.auc:.2f}"
+    return f"{sentence}{ending} Slips: none is reported until it is taught (holdfast teach){auc}."
 
 
 def no_verdict(n_seen: int, n_recordings: int, model: str = "the model") -> str:

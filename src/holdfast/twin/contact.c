@@ -1,7 +1,8 @@
 /* Contact of soft fingertips with an object: forces and slip.
  *
- * Every node of a fingertip's skin inside the object presses and sticks on its own (skin.c). The
- * computation is in the frame of the object, where its shape is known. */
+ * Every node of a fingertip's skin inside the object presses and sticks on its own (skin.c), or
+ * all of them are coupled through an elastic body (coupled.c). The computation is in the frame of
+ * the object, where its shape is known. */
 #include "steps.h"
 
 /* Pose and motion of a fingertip relative to the object, in the object's frame. */
@@ -39,7 +40,7 @@ static bool is_far(const constants *c, const relative *r)
 /* Clear the state of a node that touches nothing. */
 static void clear_node(bristle *b, vec *force)
 {
-    *b = (bristle){{0.0, 0.0, 0.0}, 0.0};
+    *b = (bristle){{0.0, 0.0, 0.0}, 0.0, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0};
     *force = (vec){0.0, 0.0, 0.0};
 }
 
@@ -100,6 +101,8 @@ static wrench sum_nodes(
     return sum;
 }
 
+#include "coupled.c"
+
 /* Compute one step of the contact: forces at these poses and velocities, new bristles.
  *
  * Forces on fingertips and object act at the same points in opposite directions, so momentum and
@@ -115,15 +118,17 @@ static void touch(const contact *state, const constants *c, const body *bodies, 
         vec *const forces = &state->node_forces[i * c->n_nodes];
         const relative r = relative_to(object, &bodies[i]);
         if (is_far(c, &r)) {
-            if (out->load != 0.0) {
+            if (out->load != 0.0 || out->travel != 0.0) {
                 for (size_t k = 0; k < c->n_nodes; ++k) {
                     clear_node(&bristles[k], &forces[k]);
                 }
-                *out = (tip){{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}}, 0.0, 0.0, 0.0};
+                *out = (tip){{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}}, 0.0, 0.0, 0.0, 0.0};
             }
             continue;
         }
-        const wrench sum = sum_nodes(c, &r, dt, bristles, forces, out);
+        const wrench sum = c->skin->shear_modulus > 0.0
+                               ? sum_coupled_nodes(c, &r, dt, bristles, forces, out)
+                               : sum_nodes(c, &r, dt, bristles, forces, out);
         force = add(force, sum.force);
         torque = add(torque, sum.torque);
         const vec about_tip = subtract(sum.torque, cross(r.offset, sum.force));

@@ -22,21 +22,23 @@ class Constants(NamedTuple):
             each [N/m], and length of the path from the first node to it through all nodes
             between them [m].
         solid: the object, as `objects.solid` packs it.
-        skin: (13,) the numbers of `Skin`, then centre and radius of a ball that contains all
+        skin: (14,) the numbers of `Skin`, then centre and radius of a ball that contains all
             nodes [m].
+        nearness: `nearness_of` the nodes if they are coupled, else (1, 1).
     """
 
     nodes: Array
     solid: Array
     skin: Array
+    nearness: Array
 
 
 class Contact(NamedTuple):
     """State of the contact and results of the last `touch`, which writes them in place.
 
     Attributes:
-        bristles: (n_tips, n_nodes, 4) stretch of every node in the fingertip frame [m] and its
-            slip speed [m/s]. This is the whole state.
+        bristles: (n_tips, n_nodes, 7) stretch of every node in the fingertip frame [m], its slip
+            speed [m/s], and its force if it is coupled [N]. This is the whole state.
         node_forces: (n_tips, n_nodes, 3) forces on the nodes in the fingertip frame [N].
         tips: (n_tips, 9) force [N] and torque about the frame's origin [N m] on every fingertip
             in the world frame; slip speed [m/s], slipping share of the load, load [N].
@@ -104,4 +106,18 @@ def constants_of(surface: Surface, item: GraspObject, skin: Skin | None = None) 
         np.column_stack([nodes, skin.stiffness * surface.areas, path_lengths]),
         solid(item),
         np.array([*skin, *centre, radius]),
+        nearness_of(surface) if skin.shear_modulus else np.zeros((1, 1)),
     )
+
+
+LATTICE_SELF = 3.9002649
+"""Nearness of a node to itself, times the side of its element: with it, the sum of 1/r over all
+points of a square lattice is the integral of 1/r, so that an even pressure gives exact depths."""
+
+
+def nearness_of(surface: Surface) -> Array:
+    """Return the inverse distances of all nodes from each other, (n_nodes, n_nodes) [1/m]."""
+    apart = np.linalg.norm(surface.nodes[:, None] - surface.nodes, axis=2)
+    np.fill_diagonal(apart, np.sqrt(surface.areas) / LATTICE_SELF)
+    nearness: Array = 1 / apart
+    return nearness

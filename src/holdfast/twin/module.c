@@ -242,6 +242,11 @@ static const char *wrong_numbers(const call *c, const function *f, const argumen
             return "first, grid: joints of the hand and two points of a path expected";
         }
     }
+    const constants *const k = &a->physics.constants;
+    if (k->skin != NULL && k->skin->shear_modulus > 0.0 &&
+        (k->n_coupled != k->n_nodes || k->n_nodes > MAX_COUPLED)) {
+        return "nearness: a row for each node expected, and at most 1024 coupled nodes";
+    }
     if (a->tick < 0 || a->tick > most || a->step < 0 || a->step > most ||
         (f->run == run_tremor_at && a->step > 2) ||
         (a->physics.bodies != NULL && (s->n < 0 || s->n > most || s->per_control < 1))) {
@@ -320,7 +325,7 @@ static const struct {const char *name; long value;} whole_numbers[] = {
     {"SIDE_UP", COLUMN(solid, side_up)}, {"SIDE_LENGTH", COLUMN(solid, side_length)},
     {"EXTENSION", COLUMN(solid, extension)}, {"CENTRE", COLUMN(solid, centre)},
     {"TEXTURE_AMPLITUDE", COLUMN(solid, texture_amplitude)}, {"AROUND_2", COLUMN(solid, around_2)},
-    {"MU_STATIC", COLUMN(solid, mu_static)}, {"MU_KINETIC", COLUMN(solid, mu_kinetic)},
+    {"MAX_COUPLED", MAX_COUPLED}, {"MU_STATIC", COLUMN(solid, mu_static)}, {"MU_KINETIC", COLUMN(solid, mu_kinetic)},
     {"N_OBJECT_NUMBERS", N_NUMBERS(solid)}, {"N_BRISTLE", N_NUMBERS(bristle)},
     {"TIP_SLIP", COLUMN(tip, slip)}, {"TIP_SLIPPING_SHARE", COLUMN(tip, slipping_share)},
     {"TIP_LOAD", COLUMN(tip, load)}, {"N_TIP", N_NUMBERS(tip)},

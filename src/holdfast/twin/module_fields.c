@@ -5,9 +5,10 @@
 
 /* Names of axes that are not of a fixed length; the others are positive. */
 enum {
-    N_TIPS = -16,
+    N_TIPS = -17,
     N_BODIES, /* of the contact: fingertips and the object */
     N_NODES,
+    N_COUPLED, /* N_NODES if nodes are coupled, else 1 */
     N_MODEL, /* bodies in MuJoCo */
     N_QPOS,
     N_DOF,
@@ -53,7 +54,8 @@ typedef struct field {
 
 static field constants_fields[] = {
     IN(constants, nodes, N_NODES, N_NUMBERS(node)), IN(constants, solid, N_NUMBERS(solid)),
-    IN(constants, skin, N_NUMBERS(skin)), LENGTH(constants, n_nodes, N_NODES), {0},
+    IN(constants, skin, N_NUMBERS(skin)), IN(constants, nearness, N_COUPLED, N_COUPLED),
+    LENGTH(constants, n_nodes, N_NODES), LENGTH(constants, n_coupled, N_COUPLED), {0},
 };
 
 static field contact_fields[] = {

@@ -4,14 +4,17 @@
 a finger disturbs it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
 of holdfast 0.1, in which only a finger disturbs; they repeat its recordings and labels exactly.
 In `slips` the object also slides by other things than pushes. `long-hold` is a calm hold of
-minutes, for rates of false alarms.
+minutes, for rates of false alarms. In `coupled`
+the nodes of the skin are coupled, and the rests of `reference` have impacts.
 """
 
+import math
 import tomllib
 from importlib import resources
 from typing import Any
 
 import msgspec
+import numpy as np
 
 GRASP_ATTEMPTS = 4
 """Maximum number of attempts of a grasp; later ones are disturbed less."""
@@ -61,6 +64,30 @@ class SlipRanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     pull_rate: Span
 
 
+class ImpactRanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Numbers that describe impacts; see `impacts.ImpactKind`.
+
+    Attributes:
+        share: share of the rests between two disturbances that have one.
+        momentum: momentum of a knock or tap (log-uniform) [N s].
+        knock_time: duration of the blow of a knock (log-uniform) [s].
+        tap_time: duration of that of a tap (log-uniform) [s].
+        bump_speed: speed that the hand gets by a bump (log-uniform) [m/s].
+        bump_time: time in which it gets it (log-uniform) [s].
+        ring_rate: rate at which the arm rings then [Hz].
+        ring_decay: time constant with which that stops [s].
+    """
+
+    share: float
+    momentum: Span
+    knock_time: Span
+    tap_time: Span
+    bump_speed: Span
+    bump_time: Span
+    ring_rate: Span
+    ring_decay: Span
+
+
 class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Numbers that describe a grasp and its disturbances.
 
@@ -87,6 +114,8 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         label_glitches: whether glitches are labelled, as unstable with the cause glitch.
         arm_tremor: rms acceleration of the hand by the tremor of its arm [m/s^2].
         slips: ranges of slips that no push causes; None: there are none.
+        impacts: ranges of the impacts in case 2; None: there are none.
+        coupled: whether the nodes of the skin are coupled (`skin.COUPLED`).
         drawn_as: name under which random numbers are drawn; by default that of the profile.
     """
 
@@ -111,6 +140,8 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     label_glitches: bool = True
     arm_tremor: float = 0.0
     slips: SlipRanges | None = None
+    impacts: ImpactRanges | None = None
+    coupled: bool = False
     drawn_as: str = ""
 
 
@@ -135,3 +166,9 @@ def profile(name: str) -> Profile:
     path = resources.files("holdfast.twin").joinpath("profiles", f"{name}.toml")
     fields: dict[str, Any] = tomllib.loads(path.read_text("utf-8"))
     return msgspec.convert({**fields, "name": name}, Profile)
+
+
+def log_uniform(generator: np.random.Generator, span: Span) -> float:
+    """Draw a number whose logarithm is uniform."""
+    low, high = span
+    return low * math.exp(math.log(high / low) * float(generator.random()))

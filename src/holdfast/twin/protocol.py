@@ -12,6 +12,7 @@ import numpy as np
 
 from holdfast.contact import Phase
 from holdfast.sensors.types import Array
+from holdfast.twin.impacts import Impact
 from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import Profile
 from holdfast.twin.slip_events import SlipEvent
@@ -53,6 +54,7 @@ class Plan(NamedTuple):
         after: time after the release until the end [s].
         disturbances: disturbances in order of time.
         slip_events: events that let the object slide, in order of time.
+        impacts: impacts in order of time.
     """
 
     profile: Profile
@@ -62,6 +64,7 @@ class Plan(NamedTuple):
     after: float
     disturbances: Sequence[Disturbance]
     slip_events: Sequence[SlipEvent] = ()
+    impacts: Sequence[Impact] = ()
 
 
 class Command(NamedTuple):

@@ -17,6 +17,7 @@ from holdfast.sensors.types import Array
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
+from holdfast.twin.impacts import NO_IMPACT, Impact, ImpactState, draw_impacts, impact_state
 from holdfast.twin.loads import Load, LoadState, load_state
 from holdfast.twin.magnetic_faults import WITHOUT_FAULTS, MagneticFaults
 from holdfast.twin.objects import GraspObject, object_named
@@ -33,10 +34,9 @@ from holdfast.twin.protocol import (
 )
 from holdfast.twin.slip_events import NO_SLIP, SlipEvents, SlipState, draw_course
 from holdfast.twin.steps import tremor_at
-from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_readout import Counts, Readout, UskinParameters
-from holdfast.twin.world import TruthLog, World
+from holdfast.twin.world import TruthLog, World, fingertip_of
 
 RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
@@ -151,12 +151,12 @@ class Simulation:
         if rate is not None:
             chosen = msgspec.structs.replace(chosen, glitch_rate=rate)
         self.grasp, self._profile, self._loads = grasp, chosen, loads
-        self.plan = plan or _draw_plan(grasp, chosen)
+        self.plan = plan or draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
         if grasp.noise is not None:
             skin = replace(skin, noise_counts=grasp.noise)
-        self.uskins = {finger: _skin(grasp.seed, finger, skin) for finger in FINGERS}
+        self.uskins = {f: _skin(grasp.seed, f, skin, chosen.coupled) for f in FINGERS}
         self.protocol = Protocol(self.plan, 1 / RATE)
         self.command: Command | None = None
         self.n_samples = 0
@@ -201,12 +201,14 @@ class Simulation:
         if protocol.locked_at is not None and not was_locked:
             joints = world.hand.data.qpos[:N_JOINTS]
             self._pressing = Pressing(world.path, command.depths, joints)
-        slipping, events = NO_SLIP, self.plan.slip_events
+        slipping, events, impact = NO_SLIP, self.plan.slip_events, NO_IMPACT
         if was_locked and events and protocol.lost_at is None:
             slipping = self._slip_events.step(self.held_for, world.slip, world.bodies[-1])
-        if was_locked and (self._loads or events or self._profile.arm_tremor):
-            world.set_load(self._load(slipping))
-        if slipping.touching:
+        if was_locked and protocol.lost_at is None:
+            impact = impact_state(self.plan.impacts, self.held_for, 1 / RATE)
+        if was_locked and (self._loads or events or self.plan.impacts or self._profile.arm_tremor):
+            world.set_load(self._load(slipping, impact))
+        if slipping.touching or impact.kind:
             command = command._replace(phase=touched_phase(world.slip))
         if slipping.grip_scale < 1.0:
             scales = slipping.grip_scale * (np.ones(len(FINGERS)) if scales is None else scales)
@@ -214,9 +216,12 @@ class Simulation:
         if scales is not None and self._pressing is not None and not released:
             moved = self._pressing.displacement(self.followed(scales))
         world.advance(command, self.plan, protocol.anchor, moved)
-        slip_truth: dict[str, Array | float] = {}  # of what only slip events change
+        # Of what only slip events or impacts change.
+        slip_truth: dict[str, Array | float | str] = {}
+        if self._profile.impacts is not None:
+            slip_truth["impact"] = impact.kind
         if self._profile.slips is not None:
-            slip_truth = {
+            slip_truth |= {
                 "outside_torque": world.outside[3:],
                 "added_mass": slipping.load.added_mass,
                 "grip_scale": slipping.grip_scale,
@@ -237,14 +242,15 @@ class Simulation:
         self.command = command
         self.n_samples += 1
 
-    def _load(self, slipping: SlipState) -> LoadState:
-        """Return the sum of loads, slip events and tremor of the arm."""
+    def _load(self, slipping: SlipState, impact: ImpactState) -> LoadState:
+        """Return the sum of loads, slip events, an impact and tremor of the arm."""
         load, state = slipping.load, load_state(self._loads, self.held_for)
         rms = self._profile.arm_tremor
         shaken = [rms * tremor_at(self._arm_tremor, self.time, axis)[0] for axis in range(3)]
         return load._replace(
-            force=state.force,
-            acceleration=state.acceleration + shaken,
+            force=state.force + impact.force,
+            torque=load.torque + impact.torque,
+            acceleration=state.acceleration + shaken + impact.acceleration,
             friction=load.friction * state.friction,
         )
 
@@ -319,6 +325,8 @@ class Simulation:
         push = np.linalg.norm(truth.hand["outside_force"], axis=1)  # the only other contact then
         if "outside_torque" in truth.hand:
             push += np.linalg.norm(truth.hand["outside_torque"], axis=1) / TOUCH_LEVER
+        if "impact" in truth.hand:  # a bump touches the arm only
+            push[truth.hand["impact"] != ""] = math.inf
         phase = phases_from_touch(truth.hand["phase"], push, MIN_TOUCH_LOAD)
         fingers = {}
         for place, finger in enumerate(FINGERS):
@@ -356,7 +364,8 @@ def simulate(
     return simulation.recording()
 
 
-def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
+def draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
+    """Return the plan of a grasp, with numbers that are drawn from the ranges of a profile."""
     generator = grasp.generator("plan")
     scale = chosen.grip * np.exp(GRIP_SPREAD * generator.standard_normal())
     grips = scale * np.array([THUMB_SHARE * 3, 1.0, 1.0, 1.0])
@@ -371,10 +380,15 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
     if grasp.case != 2:
         return plan
     factor = RETRY_DEPTH_FACTOR**grasp.attempt
-    if chosen.slips is None:
-        return plan._replace(disturbances=draw_disturbances(generator, chosen, factor))
-    disturbances, events = draw_course(generator, chosen, chosen.slips, factor)
-    return plan._replace(disturbances=disturbances, slip_events=events)
+    if chosen.slips is not None:
+        disturbances, events = draw_course(generator, chosen, chosen.slips, factor)
+        return plan._replace(disturbances=disturbances, slip_events=events)
+    disturbances, impacts = draw_disturbances(generator, chosen, factor), list[Impact]()
+    if chosen.impacts is not None:
+        ends = [0.0, *(push.start + push.duration for push in disturbances)]
+        rests = list(zip(ends, [*(push.start for push in disturbances), chosen.hold], strict=True))
+        impacts = draw_impacts(grasp.generator("impacts"), chosen.impacts, rests)
+    return plan._replace(disturbances=disturbances, impacts=impacts)
 
 
 def _world(grasp: Grasp, chosen: Profile) -> World:
@@ -391,13 +405,14 @@ def _world(grasp: Grasp, chosen: Profile) -> World:
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     hand = HandModel.build(item, plant.joint_friction)
-    return World(hand, item, _path(grasp.object, grasp.table), controller, tremors, start)
+    path = _path(grasp.object, grasp.table)
+    return World(hand, item, path, controller, tremors, start, chosen.coupled)
 
 
 @cache
-def _skin(seed: int, finger: str, parameters: UskinParameters) -> Uskin:
+def _skin(seed: int, finger: str, parameters: UskinParameters, coupled: bool) -> Uskin:
     """Return the skin of a finger: one seed is one hand, with the same gains in all its grasps."""
-    nodes = curved_fingertip().nodes
+    nodes = fingertip_of(coupled).nodes
     return Uskin(parameters, sensor("uskin-curved"), nodes, generator_of(seed, f"skin/{finger}"))
 
 

@@ -1,4 +1,4 @@
-"""Material of the soft skin of a fingertip; skin.c has its contact law."""
+"""Material of the soft skin of a fingertip; skin.c and coupled.c have its contact laws."""
 
 from typing import NamedTuple
 
@@ -25,6 +25,8 @@ class Skin(NamedTuple):
             of the order measured on rubber (1 to 10 mm/s).
         memory: time constant that smooths a node's slip speed [s]. Own choice, below a sample.
         slipping: slip speed above which a node counts as slipping [m/s]. Own choice.
+        shear_modulus: of an elastic body through which all nodes are coupled (coupled.c) [Pa];
+            `stiffness` and `hardening` are not used then. 0: every node is a separate spring.
     """
 
     stiffness: float = 1e7
@@ -36,3 +38,13 @@ class Skin(NamedTuple):
     stribeck: float = 4e-3
     memory: float = 4e-3
     slipping: float = 1e-4
+    shear_modulus: float = 0.0
+
+
+COUPLED = Skin(shear_modulus=50e3)
+"""Skin whose nodes are coupled. Silicone of 150 kPa (like Dragon Skin 10): a half-space of it is
+indented by a fingertip about as far as `Skin()`, whose softer silicone lies on a hard core: 1.0 mm
+at 1 N, 2.6 mm at 4 N."""
+COUPLED_PITCH = 0.00165
+"""Distance of neighbouring nodes of that skin [m]: half of `NODE_PITCH`, because its contact is
+smaller, and sticks on a part of it."""

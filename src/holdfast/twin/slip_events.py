@@ -24,7 +24,7 @@ from holdfast.twin.operator import (
     Disturbance,
     draw_disturbance,
 )
-from holdfast.twin.profile import Profile, SlipRanges, Span
+from holdfast.twin.profile import Profile, SlipRanges, log_uniform
 from holdfast.twin.steps import GUIDE_STIFFNESS
 
 GRASP_LINE = np.array([math.cos(GRASP_DIRECTION), -math.sin(GRASP_DIRECTION), 0.0])
@@ -194,7 +194,7 @@ def draw_slip_event(
         scale: factor of the sliding distance.
     """
     # The order of the draws is part of the seed: every kind draws all numbers, used or not.
-    rate = _log_uniform(generator, getattr(ranges, RATE_FIELDS[kind]))
+    rate = log_uniform(generator, getattr(ranges, RATE_FIELDS[kind]))
     spans = {
         SlipKind.FRICTION: ranges.friction_factor,
         SlipKind.CREEP: (0.0, 2 * math.pi),
@@ -205,13 +205,13 @@ def draw_slip_event(
         kind,
         start,
         duration=0.0,
-        distance=scale * _log_uniform(generator, ranges.distance),
+        distance=scale * log_uniform(generator, ranges.distance),
         rate=rate,
         size=size,
         sign=float(generator.choice([-1.0, 1.0])),
         recovery=float(generator.uniform(*ranges.recovery)),
-        stiffness=_log_uniform(generator, ranges.hand_stiffness),
-        pull_rate=_log_uniform(generator, ranges.pull_rate),
+        stiffness=log_uniform(generator, ranges.hand_stiffness),
+        pull_rate=log_uniform(generator, ranges.pull_rate),
         tremor=ranges.hand_tremor,
     )
     # The time after which an event has no further effect [s].
@@ -225,11 +225,6 @@ def draw_slip_event(
         SlipKind.ROLL: RECLOSING_TIME + 2 * size / rate,
     }
     return event._replace(duration=min(durations[kind], ranges.longest))
-
-
-def _log_uniform(generator: np.random.Generator, span: Span) -> float:
-    low, high = span
-    return low * math.exp(math.log(high / low) * float(generator.random()))
 
 
 class SlipEvents:

@@ -4,7 +4,7 @@
 #include "shapes.c"
 #include "skin.c"
 
-#include "contact.c"
+#include "contact.c" /* and coupled.c */
 #include "hand.c"
 
 #include "control.c"

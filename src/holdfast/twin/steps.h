@@ -55,6 +55,7 @@ typedef struct {
 /* The material of a skin (the fields of `Skin`, which explains them), and a ball around it. */
 typedef struct {
     double stiffness, hardening, damping, shear, engagement, shear_time, stribeck, memory, slipping;
+    double shear_modulus; /* [Pa]; 0: each node is a separate spring */
     vec ball_centre;
     double ball_radius; /* of a ball that contains all nodes [m] */
 } skin;
@@ -70,6 +71,10 @@ typedef struct {
 typedef struct {
     vec stretch; /* along the surface, in the fingertip frame [m] */
     double slip; /* plastic slip speed, low-pass filtered [m/s] */
+    /* Of a coupled node, in the fingertip frame: */
+    vec force;   /* without damping [N] */
+    vec moved;   /* displacement by all others [m] */
+    double wake; /* `travel` of the fingertip up to which it can touch nothing [m] */
 } bristle;
 
 typedef struct {
@@ -82,6 +87,7 @@ typedef struct {
     double slip;           /* mean slip speed of the nodes, weighted by their load [m/s] */
     double slipping_share; /* of the load */
     double load;           /* sum of the normal forces [N] */
+    double travel;         /* of coupled nodes: how far one may have come closer, at most [m] */
 } tip;
 
 /* Pose and motion of a fingertip frame, or of the object about its centre of mass, in the world. */
@@ -134,7 +140,8 @@ typedef struct {
     const node *nodes;
     const solid *solid;
     const skin *skin;
-    size_t n_nodes;
+    const double *nearness; /* (n_coupled, n_coupled), see `nearness_of`; n_nodes if coupled */
+    size_t n_nodes, n_coupled;
 } constants;
 
 /* State and results of a contact. */

@@ -42,6 +42,7 @@ def relief(solid: Array, x: float, y: float, z: float, /) -> float:
     """Return the depth of the texture at a point in the object's frame [m]."""
 
 N_BRISTLE: int
+MAX_COUPLED: int
 TIP_SLIP: int
 TIP_SLIPPING_SHARE: int
 TIP_LOAD: int

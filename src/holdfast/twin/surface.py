@@ -47,12 +47,14 @@ class Surface(NamedTuple):
 
 
 @cache
-def curved_fingertip() -> Surface:
-    """Compute the skin of a `uskin-curved` fingertip, with elements of about 10 mm^2.
+def curved_fingertip(pitch: float = NODE_PITCH) -> Surface:
+    """Compute the skin of a `uskin-curved` fingertip, with elements of pitch x pitch.
 
-    Rows of elements follow each other along the finger and over the tip. Every row is divided
-    into elements of about NODE_PITCH x NODE_PITCH. Nodes are rounded to a nanometre, so that they
-    are the same bits on every machine.
+    Rows of elements follow each other along the finger and over the tip. Nodes are rounded to a
+    nanometre, so that they are the same bits on every machine.
+
+    Args:
+        pitch: distance of neighbouring nodes, of which a row has a whole number [m].
 
     Returns:
         The quadrature, with read-only arrays.
@@ -72,9 +74,9 @@ def curved_fingertip() -> Surface:
     radius = RBFInterpolator(unit / _RADIUS, distances, kernel="thin_plate_spline")
     # Rows begin and end at lengths along the skin, from the base to the pole [m].
     straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
-    parts = round((straight + bent) / NODE_PITCH)
+    parts = round((straight + bent) / pitch)
     edges = np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()
-    rows = [_row(radius, begin, end) for begin, end in pairwise(edges)]
+    rows = [_row(radius, begin, end, pitch) for begin, end in pairwise(edges)]
     nodes, vectors = (np.concatenate(arrays) for arrays in zip(*rows, strict=True))
     areas = np.linalg.norm(vectors, axis=1)
     surface = Surface(
@@ -87,11 +89,11 @@ def curved_fingertip() -> Surface:
     return surface
 
 
-def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Array]:
+def _row(radius: RBFInterpolator, begin: float, end: float, pitch: float) -> tuple[Array, Array]:
     """Return nodes and area vectors of the elements between two lengths along the skin."""
     angle = np.pi / 2 + EDGE_MARGIN / _RADIUS
     elevation = max((begin + end) / 2 - SHOULDER, 0.0) / _RADIUS
-    n = max(round(2 * angle * _RADIUS * np.cos(elevation) / NODE_PITCH), 2)
+    n = max(round(2 * angle * _RADIUS * np.cos(elevation) / pitch), 2)
     lengths = np.linspace(begin, end, N_ELEMENT_PARTS + 1)
     angles = np.linspace(-angle, angle, n * N_ELEMENT_PARTS + 1)
     # Corners of the parts, by length along the skin [m] and angle about its axis [rad].

@@ -24,7 +24,7 @@ from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import NO_GUIDE
 from holdfast.twin.physics import Action, Physics, Steps, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
-from holdfast.twin.skin import Skin
+from holdfast.twin.skin import COUPLED, COUPLED_PITCH, Skin
 from holdfast.twin.steps import (
     MU_KINETIC,
     MU_STATIC,
@@ -32,10 +32,15 @@ from holdfast.twin.steps import (
     TIP_SLIPPING_SHARE,
     fill_bodies,
 )
-from holdfast.twin.surface import Surface, curved_fingertip
+from holdfast.twin.surface import NODE_PITCH, Surface, curved_fingertip
 
 MIN_HEIGHT = -0.3
 """Height below which a lost object is out of the picture and is kept in place [m]."""
+
+
+def fingertip_of(coupled: bool) -> Surface:
+    """Return the surface of a fingertip whose nodes are coupled, or not."""
+    return curved_fingertip(COUPLED_PITCH if coupled else NODE_PITCH)
 
 
 class ContactWorld:
@@ -107,6 +112,7 @@ class World(ContactWorld):
         tremors: (2, 3, n, 3) tremor of the hand that holds, and of the hand or finger that
             disturbs.
         start: (4,) offset of the object's position [m] and turn [rad] at the start.
+        coupled: whether the nodes of the skin are coupled.
     """
 
     def __init__(
@@ -117,8 +123,9 @@ class World(ContactWorld):
         controller: Controller,
         tremors: Array,
         start: Array,
+        coupled: bool = False,
     ) -> None:
-        super().__init__(hand, item, curved_fingertip())
+        super().__init__(hand, item, fingertip_of(coupled), COUPLED if coupled else Skin())
         self.path, self.controller, self.tremors = path, controller, tremors
         self._advance = advance_of(hand)
         steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
@@ -220,7 +227,7 @@ class TruthLog:
     def __len__(self) -> int:
         return len(self._phase)
 
-    def add(self, phase: Phase, contact: Contact, **rows: Array | float) -> None:
+    def add(self, phase: Phase, contact: Contact, **rows: Array | float | str) -> None:
         """Add the state after a sample: phase, contact and other rows of the truth by name."""
         self._phase.append(phase)
         self._tips.append(contact.tips.copy())

@@ -209,7 +209,7 @@ def test_metadata_are_plain(monkeypatch):
         ("twin:?object=brick", "twin:?object=brick: no object 'brick'; there are ball, "),
         (
             "twin:?profile=wild",
-            "twin:?profile=wild: unknown profile 'wild'; there are finger-gentle, "
+            "twin:?profile=wild: unknown profile 'wild'; there are coupled, finger-gentle, "
             "finger-reference, finger-vigorous, gentle, long-hold, reference, slips, vigorous",
         ),
         (

@@ -10,6 +10,7 @@ from holdfast.cli import main
 from holdfast.cli.app import spread_groups
 from holdfast.cli.serve import serve
 from holdfast.io import load_recording, save_recording
+from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast_grip import GripCommand, Limits
 from holdfast_grip.hold import hold
@@ -33,7 +34,8 @@ def grasp(tmp_path_factory):
 @pytest.mark.usefixtures("short_grasps")
 def test_the_twin_is_source_and_hand(tmp_path, capsys):
     out = tmp_path / "held.mcap"
-    words = ["hold", "builtin:twin", TWIN, "--hand", "twin:", "--armed", "--speed", "0"]
+    # Without MODEL: builtin:twin.
+    words = ["hold", TWIN, "--hand", "twin:", "--armed", "--speed", "0"]
     assert main([*words, "--record", str(out)]) == 0
     captured = capsys.readouterr()
     assert "grip HOLD" in captured.out
@@ -54,6 +56,25 @@ def test_a_dry_run_sends_nothing(tmp_path, grasp, capsys):
     assert main(["hold", "builtin:twin", str(grasp), "--hand", hand, "--speed", "0"]) == 0
     assert not (tmp_path / "hand").exists()
     assert "dry run: nothing was sent" in capsys.readouterr().err
+
+
+def test_a_model_that_reports_no_slip_is_warned_of(tmp_path, grasp, capsys):
+    path = tmp_path / "silent.json"
+    Model.load("builtin:any").with_threshold("slip", 1.0).save(path)
+    hand = f"log:{tmp_path / 'hand'}"
+    assert main(["hold", str(path), str(grasp), "--hand", hand, "--speed", "0"]) == 0
+    err = capsys.readouterr().err
+    assert "until it is taught on this hand (holdfast teach)" in err
+    assert "; take a taught model, or builtin:twin with the twin\n" in err
+
+
+@pytest.mark.parametrize("word", ["xela://auto", "builtin:any", "mine.json"])
+def test_a_source_alone_is_the_twin(word, capsys):
+    assert main(["hold", word, "--hand", "log:h"]) == 2
+    assert capsys.readouterr().err == (
+        f"holdfast: {word} given; MODEL SOURCE expected, with a model that was taught on this hand "
+        "(holdfast teach), or twin:... alone\n"
+    )
 
 
 def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monkeypatch):

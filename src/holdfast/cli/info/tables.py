@@ -181,7 +181,7 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
     """
     name, texts = head["name"], [head["rule"]]
     if "threshold" in head and not is_own:
-        texts.append(f"{ANSWERS[name]} from a probability of {head['threshold']:.3g} on")
+        texts.append(_answer(name, "a probability of ", head["threshold"]))
     if name == "slip":
         texts.append(f"smoothing {head['smoothing']:g} s, hold {head['hold']:g} s")
     if head["highest"] is not None:
@@ -206,6 +206,13 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
     )
 
 
+def _answer(name: str, what: str, threshold: float) -> str:
+    """Return from which threshold on a head answers yes."""
+    if name == "slip" and threshold == 1:
+        return "reports no slip until it is taught (holdfast teach)"
+    return f"{ANSWERS[name]} from {what}{threshold:.3g} on"
+
+
 def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
     """Yield the own handling of a finger on each sensor."""
     if part["normalised"] and not part["handling"]:
@@ -213,7 +220,7 @@ def _handling_lines(part: dict[str, Any]) -> Iterator[str]:
     for sensor, handling in part["handling"].items():
         names = handling["recordings"]
         texts = [
-            f"; {ANSWERS[name]} from {handling['thresholds'].get(name, head['threshold']):.3g} on"
+            f"; {_answer(name, '', handling['thresholds'].get(name, head['threshold']))}"
             for name, head in part["heads"].items()
             if "threshold" in head
         ]

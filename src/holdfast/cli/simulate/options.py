@@ -34,7 +34,7 @@ class GraspOptions:
         str,
         typer.Option(
             help="Profile of grip and disturbances: gentle, reference, vigorous, slips, "
-            "long-hold, finger-gentle, ..."
+            "long-hold, coupled, finger-gentle, ..."
         ),
     ] = "reference"
     seed: SeedOption = 0

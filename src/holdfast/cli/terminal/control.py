@@ -8,7 +8,7 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType, TracebackType
@@ -35,12 +35,16 @@ class MarkerKeys:
     A terminal is switched to single keys, and restored at the end. If this process is in the
     background, or stdin is closed, there are no markers.
 
+    Args:
+        keys: marker text of each key.
+
     Attributes:
         interactive: True if stdin is a terminal whose keys can be read.
         stop_pressed: True after the stop key.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, keys: Mapping[str, str] = MARKER_KEYS) -> None:
+        self._keys = keys
         self.interactive = self.stop_pressed = False
         self._stdin: int | None = None  # None if nothing can be read, also after the end of a pipe
         # Sets the terminal back; None if it was not switched.
@@ -64,6 +68,11 @@ class MarkerKeys:
             self._restore()
         self._stdin = self._restore = None
 
+    @property
+    def ended(self) -> bool:
+        """Whether nothing can be read, or no more."""
+        return self._stdin is None
+
     def poll(self) -> list[str]:
         """Return the markers since the last call."""
         data = self._read()
@@ -76,7 +85,7 @@ class MarkerKeys:
             return [text for text in texts if text]
         keys = data.decode(errors="replace").lower()  # also with caps lock
         self.stop_pressed |= STOP_KEY in keys
-        return [MARKER_KEYS[key] for key in keys if key in MARKER_KEYS]
+        return [self._keys[key] for key in keys if key in self._keys]
 
     def _open_terminal(self, stdin: int) -> None:
         """Switch the terminal to single keys; this would stop a process in the background."""

@@ -14,7 +14,7 @@ from holdfast.cli.options import (
     StartOptions,
 )
 from holdfast.cli.scores import KEPT_RULE, print_metrics, print_slips, print_verdict
-from holdfast.cli.teach import teach
+from holdfast.cli.teach.verb import teach
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast.cli.train.options import TrainingOptions
@@ -76,8 +76,8 @@ def train(
         if options != TrainingOptions() or resume:
             raise ValueError("--for slip has no search and its own features: leave the others out")
         teach(
-            model, data, model=init or "builtin:any", parallel=parallel, force=force, start=start,
-            as_json=as_json,
+            out=model, data=data, model=init or "builtin:any", parallel=parallel, force=force,
+            start=start, as_json=as_json,
         )  # fmt: skip
         return
     require_extras("train")

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -11,13 +12,20 @@ from tempfile import TemporaryDirectory
 from holdfast.children import python_command
 from holdfast.devices.sources.replay import Player
 from holdfast.devices.uri import Address
-from holdfast.files import file_stem
+from holdfast.files import file_stem, whole_file
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
 from holdfast.twin.magnetic_faults import MagneticFaults
+from holdfast.twin.objects import load_objects
 from holdfast.twin.profile import GRASP_ATTEMPTS, profile
+from holdfast.twin.scripted import perform
 from holdfast.twin.simulation import GRASP_CASES, Grasp, simulate
 
+OPEN_SECONDS = 3.0
+"""Time with an open hand with which a twin that is taught begins [s]: room for the tare."""
+MAX_IDLE = 0.02
+"""Longest pause of a read while nothing is asked for [s]; a protocol that does not wait for a
+person asks soon."""
 SIMULATION_CODE = "from holdfast.devices.sources.twin import write; write(*sys.argv[1:])"
 """Program of the process that simulates the next grasp."""
 
@@ -77,6 +85,61 @@ class Twin(Player):
     def is_ready(self, number: int, timeout: float) -> bool:
         """Return whether a grasp is simulated within `timeout` [s]."""
         return self._simulator is None or self._simulator.is_ready(timeout)
+
+
+class AskedTwin(Twin):
+    """Twin that does what a step of `holdfast teach` asks for, and is filmed by its own webcam.
+
+    It begins with an open hand, and is silent until `perform` is called. Without `object` in the
+    address, it takes another object in each grasp.
+
+    Args:
+        address: as of `Twin`; case, repeat and profile do not apply.
+        speed: as of `Twin`.
+    """
+
+    def __init__(self, address: Address, *, speed: float = 1.0) -> None:
+        super().__init__(address, speed=speed, loop=True)
+        self._objects = [self._grasp.object] if "object" in address.parameters else []
+        self._objects = self._objects or list(load_objects(None))
+        self._asked: tuple[str, int, float] | None = ("open", 0, OPEN_SECONDS)
+        self._repeat = 1
+
+    def perform(self, number: int, action: str, n_actions: int, seconds: float) -> None:
+        """Begin a grasp, as `holdfast.twin.scripted.perform` says.
+
+        Args:
+            number: of the grasp; each has random numbers of its own.
+            action: of the script.
+            n_actions: as of the script.
+            seconds: as of the script [s].
+        """
+        self._repeat, self._asked = number, (action, n_actions, seconds)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether the grasp is over, and no other was asked for."""
+        return self._asked is None and self._peek() is None
+
+    def film(self, path: Path) -> None:
+        """Write the video of the newest grasp."""
+        from holdfast.twin.webcam import film_stickers
+
+        with whole_file(path, force=True) as part:
+            film_stickers(self._current[0], part)
+
+    def chunks_of(self, number: int) -> Iterable[Recording]:
+        """Return the grasp that was asked for."""
+        asked, self._asked = self._asked or ("open", 0, OPEN_SECONDS), None
+        name = self._objects[self._repeat % len(self._objects)]
+        self._current = [perform(replace(self._grasp, object=name, repeat=self._repeat), *asked)]
+        return self._current
+
+    def is_ready(self, number: int, timeout: float) -> bool:
+        """Return whether a grasp was asked for."""
+        if self._asked is None:
+            time.sleep(min(timeout, MAX_IDLE))
+        return self._asked is not None
 
 
 class _Simulator:

@@ -1,0 +1,1 @@
+"""`holdfast teach`, in several files."""

@@ -1,0 +1,1 @@
+"""The guided protocol of `holdfast teach`: its steps, their course and the folder of grasps."""

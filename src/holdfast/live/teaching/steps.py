@@ -1,0 +1,78 @@
+"""Steps of the guided protocol of `holdfast teach`, as a table."""
+
+from enum import StrEnum
+from typing import NamedTuple
+
+
+class Check(StrEnum):
+    """Check of a step, as soon as it is over.
+
+    HEALTH: nothing touches the open hand, and its taxels are healthy. STILL: the object was held
+    and rested. CARRIED: it was held, and the force changed. FELT: it was held, and movements were
+    felt. SLID: a camera saw slips.
+    """
+
+    HEALTH = "health"
+    STILL = "still"
+    CARRIED = "carried"
+    FELT = "felt"
+    SLID = "slid"
+
+
+class Step(NamedTuple):
+    """One step: what a person, or a robot that pulls for itself, does.
+
+    Attributes:
+        name: of the step; the twin has a script of the same name.
+        words: what the person does, in a few words.
+        hint: how, in one sentence.
+        check: of each grasp.
+        seconds: time for it, from the first contact on [s].
+        n_actions: number of pulls, pushes, taps or movements of the arm in that time.
+        n_grasps: number of grasps, each a recording.
+        in_view: whether the camera sees object and fingertips; an arm that carries leaves it.
+    """
+
+    name: str
+    words: str
+    hint: str
+    check: Check
+    seconds: float
+    n_actions: int = 0
+    n_grasps: int = 1
+    in_view: bool = True
+
+    @property
+    def slides(self) -> bool:
+        """Whether the object is to slide."""
+        return self.check is Check.SLID
+
+
+STEPS = (
+    Step(
+        "open", "OPEN THE HAND", "Nothing may touch it; the arm may turn.",
+        Check.HEALTH, 10.0, in_view=False,
+    ),
+    Step(
+        "hold", "GRASP, AND HOLD STILL", "Nobody touches hand or object.",
+        Check.STILL, 20.0, in_view=False,
+    ),
+    Step(
+        "carry", "CARRY AND TURN IT", "Move as in your task, as fast as in it. Nothing may slide.",
+        Check.CARRIED, 20.0, n_actions=8, in_view=False,
+    ),
+    Step(
+        "pull", "PULL UNTIL IT SLIDES", "Let it rest, then pull or turn it in another direction.",
+        Check.SLID, 30.0, n_actions=6, n_grasps=3,
+    ),
+    Step(
+        "push", "PUSH UNTIL IT SLIDES", "Let it rest, then push it from another side.",
+        Check.SLID, 24.0, n_actions=6, n_grasps=3,
+    ),
+    Step("tap", "TAP IT", "With a finger, so that it does not slide.", Check.FELT, 20.0, 8),
+    Step("knock", "KNOCK WITH A TOOL", "On it and the hand; nothing slides.", Check.FELT, 20.0, 8),
+    Step("nudge", "PUSH SOFTLY", "Stop before it slides.", Check.FELT, 20.0, 6),
+)  # fmt: skip
+"""The protocol: some seven minutes of samples, and 36 pulls and pushes of the whole hand. Open hand
+first, whose noise and dead taxels decide about all that follows; what slides before what does not,
+so that nobody stops before the slips."""

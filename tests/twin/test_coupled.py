@@ -1,0 +1,193 @@
+"""A skin whose nodes are coupled, against Hertz, Cattaneo and Mindlin, and its own equations."""
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from holdfast.sensors.types import Array
+from holdfast.twin.contact import constants_of, nearness_of, new_contact
+from holdfast.twin.objects import object_named
+from holdfast.twin.skin import COUPLED, COUPLED_PITCH
+from holdfast.twin.steps import MAX_COUPLED, probe, relief, touch
+from holdfast.twin.world import fingertip_of
+
+from .grip import GRAVITY, Grip
+
+pytestmark = pytest.mark.slow
+
+SURFACE = fingertip_of(coupled=True)
+PLACEMENTS = 6
+
+
+@pytest.fixture(scope="module")
+def mindlin() -> ModuleType:
+    path = Path(__file__).parents[2] / "benchmarks" / "mindlin.py"
+    spec = importlib.util.spec_from_file_location("mindlin", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def errors(mindlin: ModuleType) -> dict[str, Array]:
+    """Errors by name, of several placements of the nodes [%]."""
+    theory = mindlin.Theory(mindlin.modulus_of(COUPLED, []))
+    rows = [
+        mindlin.errors(mindlin.measure(COUPLED, COUPLED_PITCH, placement), theory)
+        for placement in range(PLACEMENTS)
+    ]
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def test_the_theory_has_its_limits(mindlin: ModuleType) -> None:
+    """All slides: 3 mu P (2 - nu) / (16 G a); a small force: that of bodies that stick."""
+    theory = mindlin.Theory(200e3)
+    unit = 3 * 0.6 * 2.0 * 1.5 / (16 * 50e3 * theory.radius)
+    assert theory.way(1.0) == pytest.approx(unit)
+    stiffness = 8 * 50e3 * theory.radius / 1.5  # 8 G a / (2 - nu), on one body
+    assert theory.way(1e-4) == pytest.approx(1e-4 * 0.6 * 2.0 / stiffness, rel=1e-3)
+    assert theory.back(0.9, 0.9) == theory.way(0.9)
+    assert theory.back(-0.9, 0.9) == pytest.approx(-theory.way(0.9))
+    assert mindlin.stuck(0.875) == 0.5
+
+
+def test_hertz(errors: dict[str, Array]) -> None:
+    for name, values in errors.items():
+        limits = {"contact radius": 8.0, "peak pressure": 3.0}
+        if name.startswith("indentation") or name in limits:
+            assert np.abs(values).max() < limits.get(name, 2.5), name
+
+
+def test_cattaneo_and_mindlin_there_and_back(errors: dict[str, Array]) -> None:
+    """Of a lattice of some tens of nodes, a stick radius is known to half a node."""
+    n_compared = 0
+    for name, values in errors.items():
+        if "stick radius" in name:
+            assert abs(values.mean()) < 10, name
+            assert np.abs(values).max() < 20, name
+        elif "displacement" in name:
+            assert abs(values.mean()) < 3, name
+        n_compared += "stick radius" in name
+    assert n_compared == 8
+
+
+def coupled_grip(name: str, depth: float = 2e-3, dt: float = 1 / 1050) -> Grip:
+    item = object_named(name)
+    grip = Grip(item, depth, dt, surface=SURFACE)
+    grip.constants = constants_of(SURFACE, item, COUPLED)
+    return grip
+
+
+@pytest.mark.parametrize("name", ["can", "box"])
+def test_forces_solve_the_equations(name: str) -> None:
+    """With a dense matrix: what presses is at the surface, what does not is beyond it."""
+    grip = coupled_grip(name)
+    for _ in range(300):
+        touch(grip.state, grip.constants, grip.bodies, grip.dt)
+    apart = SURFACE.nodes[:, None] - SURFACE.nodes
+    distance = np.linalg.norm(apart, axis=2)
+    np.fill_diagonal(distance, 1.0)
+    unit = apart / distance[..., None]
+    near = np.where(np.eye(len(SURFACE.nodes)) > 0, 0.0, 1 / distance)
+    force = grip.state.node_forces[0]
+    along = np.einsum("ijk,jk->ij", unit, force)
+    others = near @ force + np.einsum("ij,ij,ijk->ik", near, along, unit)
+    rotation = grip.bodies[0, 3:12].reshape(3, 3)
+    points = SURFACE.nodes @ rotation.T + grip.bodies[0, :3]
+    found = np.array([probe(grip.constants.solid, *point) for point in points])
+    depth = -found[:, 0] - [relief(grip.constants.solid, *point) for point in points]
+    normal = found[:, 1:] @ rotation
+    pressed = (force * normal).sum(axis=1)
+    own = np.diag(nearness_of(SURFACE))
+    pushed = ((others * normal).sum(axis=1) + own * pressed) / (4 * np.pi * 50e3)
+    touching = pressed > 0
+    assert 20 < touching.sum() < (depth > 0).sum() < 200
+    np.testing.assert_allclose(pushed[touching], depth[touching], atol=1e-7)
+    assert (pushed[~touching] >= depth[~touching] - 1e-7).all()
+
+
+def test_momentum_is_kept_and_coulomb_is_never_passed() -> None:
+    grip, rng = coupled_grip("can"), np.random.default_rng(4)
+    mu = object_named("can").mu_static
+    for _ in range(200):
+        for tip in range(2):
+            grip.bodies[tip, 12:15] = rng.normal(0, 0.05, 3)
+            grip.bodies[tip, :3] += grip.bodies[tip, 12:15] * grip.dt
+        touch(grip.state, grip.constants, grip.bodies, grip.dt)
+        state = grip.state
+        np.testing.assert_allclose(state.contact_force.sum(axis=0), state.wrench[:3], atol=1e-9)
+        for tip in range(2):
+            forces = state.node_forces[tip] @ grip.bodies[tip, 3:12].reshape(3, 3).T
+            np.testing.assert_allclose(forces.sum(axis=0), state.tip_force[tip], atol=1e-9)
+            points = SURFACE.nodes @ grip.bodies[tip, 3:12].reshape(3, 3).T + grip.bodies[tip, :3]
+            normals = np.array([probe(grip.constants.solid, *point)[1:] for point in points])
+            pressed = (forces * normals).sum(axis=1)
+            friction = np.linalg.norm(forces - pressed[:, None] * normals, axis=1)
+            assert pressed.min() >= -1e-12
+            assert (friction <= mu * pressed * (1 + 1e-9) + 1e-12).all()
+    assert grip.state.slip_speed.max() > 1e-5
+
+
+def test_held_at_rest_without_creep() -> None:
+    grip = coupled_grip("can", 2.5e-3)
+    grip.settle(2.0)
+    before = grip.object_body[:3].copy()
+    grip.settle(1.0)
+    assert grip.state.slip_speed.max() < 1e-6
+    assert np.linalg.norm(grip.object_body[:3] - before) < 1e-6
+    weight = [0.0, 0.0, GRAVITY * grip.mass]
+    np.testing.assert_allclose(grip.state.wrench[:3], weight, atol=1e-3)
+
+
+def test_half_the_step_gives_the_same() -> None:
+    """One sweep in a step is enough: forces in a fast push, of which the edge slips."""
+    runs = []
+    for dt in (1e-3, 0.5e-3):
+        grip, forces = coupled_grip("can", 2.5e-3, dt), []
+        for _ in range(round(0.4 / dt)):
+            grip.step(spin=False)
+        for k in range(round(0.3 / dt)):
+            time = (k + 0.5) * dt
+            push = 2.5 * np.sin(np.pi * time / 0.15) if time < 0.15 else 0.0
+            grip.step((0.0, push, 0.0), spin=False)
+            if (k + 1) % round(0.01 / dt) == 0:
+                forces.append(grip.state.contact_force.ravel())
+        runs.append(np.array(forces))
+    assert np.abs(runs[0] - runs[1]).max() < 0.02 * np.abs(runs[1]).max()
+
+
+def test_a_fingertip_that_leaves_has_no_state_and_comes_back() -> None:
+    grip = coupled_grip("can")
+    touch(grip.state, grip.constants, grip.bodies, grip.dt)
+    home, first = grip.bodies[0, :3].copy(), grip.state.load[0]
+    for away in (0.003, 0.2):
+        grip.bodies[0, 0] += away
+        grip.bodies[0, 12] = away / grip.dt
+        touch(grip.state, grip.constants, grip.bodies, grip.dt)
+        assert not grip.state.node_forces[0].any()
+        assert not grip.state.bristles[0, :, :9].any()
+        grip.bodies[0, :3], grip.bodies[0, 12] = home, 0.0
+    touch(grip.state, grip.constants, grip.bodies, grip.dt)
+    assert grip.state.load[0] == pytest.approx(first, rel=0.3)
+
+
+def test_a_matrix_of_other_nodes_is_refused() -> None:
+    grip = coupled_grip("can")
+    fine = fingertip_of(coupled=True).nodes[: MAX_COUPLED // 2]
+    for nearness in (np.zeros((1, 1)), np.ones((len(fine), len(fine)))):
+        with pytest.raises(ValueError, match="nearness: a row for each node expected, and at most"):
+            touch(grip.state, grip.constants._replace(nearness=nearness), grip.bodies, grip.dt)
+
+
+def test_the_skins_of_old_profiles_are_not_coupled() -> None:
+    item = replace(object_named("can"), texture_amplitude=0.0)
+    constants = constants_of(fingertip_of(coupled=False), item)
+    assert constants.nearness.shape == (1, 1)
+    assert constants.skin[9] == 0.0
+    assert new_contact(fingertip_of(coupled=False), 1).node_forces.shape == (1, 158, 3)

@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from holdfast.contact import Phase
+from holdfast.metrics.slip_truth import slip_truth
+from holdfast.twin import scripted
+from holdfast.twin.scripted import perform
+from holdfast.twin.simulation import Grasp
+
+CAN = Grasp("can", 2, 1, seed=5)
+
+
+def n_slips(recording):
+    truths = [slip_truth(recording, name, x.times) for name, x in recording.modules.items()]
+    return sum(len(truth.slips) for truth in truths)
+
+
+def test_an_open_hand_touches_nothing():
+    recording = perform(CAN, "open", 0, 2.0)
+    assert recording.duration == pytest.approx(2.0, abs=0.02)
+    assert {*recording.truth.hand["phase"]} == {Phase.FREE}
+
+
+def test_a_pull_slides_and_a_nudge_slides_less():
+    pulled, nudged = perform(CAN, "pull", 2, 12.0), perform(CAN, "nudge", 2, 8.0)
+    assert [x["kind"] for x in pulled.metadata["slip_events"]] == ["creep", "twist"]
+    assert n_slips(pulled) > n_slips(nudged)
+    assert Phase.DISTURBED in nudged.truth.hand["phase"]
+
+
+def test_a_script_keeps_to_its_time():
+    recording = perform(CAN, "pull", 3, 9.0)
+    assert len(recording.metadata["slip_events"]) == 3
+    last = max(x["end"] for x in recording.metadata["slip_events"])
+    assert last <= recording.metadata["locked_at"] + 9.0 - scripted.LAST_ACTION + 0.01
+    open_at_end = recording.truth.hand["phase"][-round(4 * recording.rate) :]
+    assert {*open_at_end} == {Phase.FREE}
+
+
+def test_an_arm_that_carries_changes_the_force():
+    held, carried = perform(CAN, "hold", 0, 5.0), perform(CAN, "carry", 3, 5.0)
+    assert held.metadata["slip_events"] == carried.metadata["slip_events"] == []
+    spread = []
+    for recording in (held, carried):
+        start = round((recording.metadata["locked_at"] + 1.5) * recording.rate)
+        force = recording.truth.fingers["index"]["contact_force"][start : start + 400]
+        spread.append(np.ptp(force, axis=0).max())
+    assert spread[1] > 2 * spread[0]
+
+
+def test_an_unknown_action_is_refused():
+    with pytest.raises(ValueError) as failure:
+        perform(CAN, "juggle", 1, 5.0)
+    assert str(failure.value) == (
+        "unknown action 'juggle'; there are open, hold, carry, pull, push, tap, knock, nudge"
+    )
