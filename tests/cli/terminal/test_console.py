@@ -183,8 +183,9 @@ class TestSilence:
     def test_a_command_that_prints_nothing_says_that_it_works(self, monkeypatch):
         terminal = self.on_terminal(monkeypatch, 0.1)
         with console.break_silence("tune: working ..."):
-            waiting = console._silence
-            waiting.join()
+            deadline = time.monotonic() + 20
+            while time.monotonic() < deadline and not terminal.getvalue():
+                time.sleep(0.01)
         assert terminal.getvalue() == "tune: working ...\n"
         assert console._silence is None
 
