@@ -40,7 +40,7 @@ def detect(
 
     On a terminal, print one line for each change of state that lasted 0.1 s, and one when a slip
     begins and when it ends. In a pipe or file, or with --json, print one line of JSON per finger
-    and sample, in the order of time: time [s], finger, state, reason (why the state is UNKNOWN),
+    and sample, in the order of time: time [s], finger, state, reason (of UNKNOWN, UNSTABLE),
     stable_probability, instability (sigma) and force (both in the unit of the readings), faults,
     faulty_taxels, cause (slip while the finger slides), slip_probability, slip_speed [mm/s] and
     slip_distance [mm]. Values that are not known are null. The memory does not grow with the
