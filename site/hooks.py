@@ -133,7 +133,8 @@ def _gallery() -> str:
         parts.append(
             f"## {path.name}\n```python\n{code}\n```\n\nprints\n\n```text\n{_output_of(path)}\n```"
         )
-    parts += _notebook(ROOT / "examples" / "first_look.ipynb")
+    for path in sorted((ROOT / "examples").glob("*.ipynb")):
+        parts += _notebook(path)
     return "\n\n".join(parts) + "\n"
 
 

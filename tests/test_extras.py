@@ -58,8 +58,10 @@ CORE = [
 ]
 """Commands that work without any extra."""
 
+DEMO = ["demo", "--speed", "0"]
+"""Shows a real recording by the core alone, and names the extras of the rest."""
+
 MISSING = {
-    "twin,train,parquet": [["demo"]],
     "twin,parquet": [
         ["simulate", "twin"],
         ["detect", "builtin:any", "twin:"],
@@ -111,7 +113,7 @@ def outcomes(tmp_path_factory):
         [np.arange(300) / 100, np.random.default_rng(0).normal(size=(300, 15))]
     )
     np.savetxt(folder / "log.csv", numbers, "%.6f", ",", header=",".join(columns), comments="")
-    commands = [*CORE, *(words for group in MISSING.values() for words in group)]
+    commands = [*CORE, DEMO, *(words for group in MISSING.values() for words in group)]
     done = subprocess.run(
         [sys.executable, "-c", BLOCK], input=json.dumps(commands), capture_output=True,
         text=True, check=False, cwd=folder, timeout=200,
@@ -130,6 +132,16 @@ def test_the_core_needs_no_extra(words, outcomes):
     out, err, code = outcomes[tuple(words)]
     assert code == 0, err
     assert out or words[0] == "record" or "--hand" in words
+
+
+def test_the_demo_shows_a_real_recording_before_it_needs_extras(outcomes):
+    out, err, code = outcomes[tuple(DEMO)]
+    *shown, last = err.splitlines()
+    assert (out, code) == ("", 2)
+    assert any("finger1, hand   UNSTABLE" in line for line in shown)
+    assert "the authors of the recording label: slip at " in shown[-1]
+    expected = str(MissingExtra("mujoco", "twin,train,parquet"))
+    assert last == f"holdfast: {expected}"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import holdfast
 import holdfast.sensors
 
 PUBLIC = [
-    *("FEATURE_NAMES", "fingertip_force", "haar_features"),
+    *("FEATURE_NAMES", "features_frame", "fingertip_force", "haar_features"),
     *("Hand", "Sensor", "sensor", "Label", "Recording", "Tactile", "Truth"),
     *("load_dataset", "load_recording", "save_recording"),
     *("Model", "Detector", "StreamDetector", "detect", "export"),

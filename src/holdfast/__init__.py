@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from holdfast.errors import TrainingError as TrainingError
     from holdfast.exporters import export as export
     from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
+    from holdfast.features import features_frame as features_frame
     from holdfast.features import fingertip_force as fingertip_force
     from holdfast.features import haar_features as haar_features
     from holdfast.io import load_dataset as load_dataset
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
     from holdfast.training import train as train
 
 _NAMES = {
-    "features": ("FEATURE_NAMES", "fingertip_force", "haar_features"),
+    "features": ("FEATURE_NAMES", "features_frame", "fingertip_force", "haar_features"),
     "sensors": ("Hand", "Sensor", "sensor"),
     "recordings": ("Label", "Recording", "Tactile", "Truth"),
     "exporters": ("export",),

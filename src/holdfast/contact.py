@@ -56,13 +56,20 @@ UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = range(len(_STATES))
 
 
 class Reason(_Coded):
-    """Reason why a state is UNKNOWN. The code of a reason is its position in this list."""
+    """Reason why a state is UNKNOWN, or UNSTABLE whatever the probability of stability.
+
+    LOAD: a large share of the load comes or goes. HOLD: the finger was unstable within the hold
+    time of the model, or STABLE has not lasted yet. The code of a reason is its position in this
+    list.
+    """
 
     NONE = ""
     TARE = "tare"
     WARM_UP = "warm_up"
     GAP = "gap"
     FAULT = "fault"
+    LOAD = "load"
+    HOLD = "hold"
 
 
 class Fault(_Coded):
@@ -150,7 +157,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     Attributes:
         time: time of the sample, on the clock of the source [s].
         state: UNKNOWN, NO_CONTACT, UNSTABLE or STABLE.
-        reason: why the state is UNKNOWN; empty otherwise.
+        reason: why the state is UNKNOWN, or UNSTABLE whatever the probability; else empty.
         stable_probability: probability that the contact is stable; NaN while UNKNOWN.
         instability: sigma, the standard deviation of the Haar details [unit of the readings];
             NaN without a full window.

@@ -20,6 +20,7 @@ from importlib.util import find_spec
 
 EXTRA_MODULES = {
     "parquet": ("pyarrow",),
+    "pandas": ("pandas",),
     "train": ("sklearn", "scipy", "optuna", "joblib", "threadpoolctl"),
     "twin": ("mujoco", "scipy", "PIL", "joblib"),
     "plot": ("matplotlib",),
@@ -35,6 +36,7 @@ EXTRA_MODULES = {
 EXTRA_PURPOSES = {
     "all": "all of the others but deep",
     "parquet": "recordings as Parquet files",
+    "pandas": "estimates and features as a DataFrame",
     "train": "holdfast train, evaluate and tune",
     "twin": "holdfast simulate and the source twin:",
     "plot": "figures, --plot",

@@ -700,6 +700,14 @@ class Finger:
         if self.state == "UNKNOWN" or lasted >= min_duration:
             self.state = state
 
+    def reason(self):
+        """Why the state is as it is, if the probability does not say it."""
+        if self.status == "" and self.state == "UNSTABLE":
+            if self.leaving:
+                return "load"
+            return "hold" if self.probability >= self.part.stable.threshold else ""
+        return self.status
+
     def is_empty(self, time):
         """Whether nothing touches; with hysteresis, and a share of the peak once it is still."""
         touching = self.candidate in ("STABLE", "UNSTABLE")
@@ -787,7 +795,7 @@ class Hand:
     @staticmethod
     def row(finger):
         last = NAN if finger.last is None else finger.last
-        names = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
+        names = (finger.state, finger.reason(), finger.faults, finger.faulty_taxels)
         head = finger.part.slip
         speed = (None, None)
         if finger.part.head("slip_speed"):

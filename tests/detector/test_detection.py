@@ -8,13 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from holdfast.contact import SLIP_CODE, ContactState
+from holdfast.contact import SLIP_CODE, ContactState, Reason
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import fingertip_force
+from holdfast.io import load_recording
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.model import ANY_FINGER, Debounce, Model
+from holdfast.recorded import BOX_SLIPS
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 
@@ -420,3 +422,23 @@ class TestRefusals:
         assert str(raised.value) == (
             "time 1.1 s given after 1.19 s; finite, increasing times expected"
         )
+
+
+def test_unstable_beside_a_high_probability_says_why():
+    """Of a real recording: the load comes or goes, or the hold time has not passed."""
+    box = load_recording(BOX_SLIPS)
+    made = Model.load("builtin:any")
+    made = replace(made, debounce=replace(made.debounce, hold=1.0))
+    reasons = set()
+    for finger, trace in detect(made, box).fingers.items():
+        threshold = made.finger(finger, box.modules[finger].sensor).stable.threshold
+        for estimate in trace.estimates():
+            unstable = estimate.state is ContactState.UNSTABLE
+            if unstable and estimate.stable_probability >= threshold:
+                assert estimate.reason in (Reason.LOAD, Reason.HOLD)
+            if estimate.reason in (Reason.LOAD, Reason.HOLD):
+                assert unstable
+                reasons.add(estimate.reason)
+            if estimate.reason is Reason.HOLD:
+                assert estimate.stable_probability >= threshold
+    assert reasons == {Reason.LOAD, Reason.HOLD}

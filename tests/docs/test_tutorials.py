@@ -46,6 +46,16 @@ def test_from_python(folder, monkeypatch, capsys):
     assert "{'window': " in out
 
 
+def test_from_pandas(folder, capsys):
+    from matplotlib import pyplot as plt
+
+    plt.switch_backend("agg")
+    assert blocks.run_page(DOCS / "tutorials" / "from-pandas.md") == 4
+    plt.close("all")
+    assert (folder / "states.png").exists()
+    assert re.search(r"^finger1 +1\.103$", capsys.readouterr().out, re.M)
+
+
 def test_your_own_sensor(folder, capsys):
     assert blocks.run_page(DOCS / "tutorials" / "own-sensor.md") == 7
     out = capsys.readouterr().out  # its lines are compared with those of the page

@@ -1,6 +1,6 @@
 """Commands of a grip controller: values without behaviour."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -24,8 +24,9 @@ class LoopState(StrEnum):
 class GripReason(StrEnum):
     """Reason of a change of force, or of a fault.
 
-    Of the faults, STALE: no sample in time. FROZEN: readings repeat exactly. BEHIND: the loop was
-    not stepped for too long. HAND: the hand sends nothing.
+    RELEASED: the hand opened, and the grip is over. Of the faults, STALE: no sample in time.
+    FROZEN: readings repeat exactly. BEHIND: the loop was not stepped for too long. HAND: the hand
+    sends nothing.
     """
 
     NONE = ""
@@ -42,6 +43,7 @@ class GripReason(StrEnum):
     CLOCK = "clock"
     FINGER_FAULT = "finger_fault"
     LOST = "lost"
+    RELEASED = "released"
     OVERLOAD = "overload"
     LIMIT = "limit"
     WATCHDOG = "watchdog"
@@ -96,9 +98,34 @@ class GripEvent(NamedTuple):
     scale: float
     reason: GripReason
 
-    def __str__(self) -> str:
-        """Return the text of the marker in a recording."""
-        why = f" ({self.reason})" if self.reason else ""
-        if not self.finger:
-            return f"grip {self.state}{why}"
-        return f"grip {self.state}: {self.finger} rises from {self.scale:.3f}{why}"
+
+def event_texts(events: Sequence[GripEvent], n_fingers: int) -> list[tuple[float, str]]:
+    """Return the time [s] and the text of each event; a reaction of several fingers is one.
+
+    Args:
+        events: of the same update.
+        n_fingers: number of fingers of the grip.
+
+    Example:
+        >>> rise = GripEvent(1.0, LoopState.REACT, "thumb", 1.5, GripReason.SLIP)
+        >>> state = rise._replace(finger="")
+        >>> event_texts([rise, rise._replace(finger="index", scale=1.8), state], 2)
+        [(1.0, 'grip REACT: all fingers rise from 1.50 to 1.80 x the first force (slip)')]
+    """
+    texts = []
+    rises: dict[GripReason, list[GripEvent]] = {}
+    for event in events:
+        if event.finger:
+            rises.setdefault(event.reason, []).append(event)
+        elif event.state is not LoopState.REACT or not rises:
+            why = f" ({event.reason})" if event.reason else ""
+            texts.append((event.time, f"grip {event.state}{why}"))
+    for reason, rising in rises.items():
+        names = [event.finger for event in rising]
+        who = "all fingers" if 1 < n_fingers == len(names) else ", ".join(names)
+        low, high = (f"{f(event.scale for event in rising):.2f}" for f in (min, max))
+        scales = low if low == high else f"{low} to {high}"
+        verb = "rises" if len(names) == 1 else "rise"
+        text = f"grip REACT: {who} {verb} from {scales} x the first force ({reason})"
+        texts.append((rising[0].time, text))
+    return texts

@@ -32,6 +32,10 @@ MIN_FINGERS = 2
 """Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
 LASTING_FAULTS = (GripReason.LOST, GripReason.STOPPED)
 """Faults that only a reset ends; they replace the reason of one that ends by itself."""
+MIN_OPENING = 0.1
+"""Share of the way that the joints closed, by which they went back when the object is let go."""
+MIN_CLOSING = 0.05
+"""Length of that way from which its direction is known [rad]."""
 KEEP = FingerCommand(1.0)
 
 _NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
@@ -125,6 +129,10 @@ class GripController:
         # Set by `observe`, cleared when the law has got it.
         self._jerked = False
         self._jerks.reset()
+        # Joint angles: the first ones, those when the grip began, and the newest; None without.
+        self._open_angles: Array | None = None
+        self._grip_angles: Array | None = None
+        self._angles: Array | None = None
         # When each finger, and last the whole grip, became bad; infinite while good.
         self._bad_since: list[float] = []
         # Highest scale of each finger, from its force when the grip began.
@@ -204,13 +212,18 @@ class GripController:
         """Process the joint angles that the hand's driver reports, before the next `update`.
 
         A hand whose own controller jerks shakes its contacts. A law may wait with its reaction
-        then, see `Touch.jerked`. Without this call no jerk is known, and nothing else changes.
+        then, see `Touch.jerked`. A grip whose joints opened when the object was let go ended as
+        planned: the loop waits for the next one. Without this call no jerk and no release is
+        known, and nothing else changes.
 
         Args:
             angles: (n_joints,) measured angle of each joint, in any order that stays [rad].
         """
         self._jerks.update(angles)
         self._jerked |= self._jerks.jerked
+        self._angles = angles
+        if self._open_angles is None:
+            self._open_angles = angles
 
     def update(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Process an estimate, or the passing of time if the estimate is the last one again.
@@ -248,6 +261,12 @@ class GripController:
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
+        if problem is GripReason.LOST and self._fault is _NONE and self._has_opened():
+            events = self._events
+            self.reset()
+            self._events = events
+            self._change(LoopState.IDLE, time, GripReason.RELEASED)
+            return self._idle(estimate, time)
         # After a jump of the clock no age and no duration is right, so it comes first.
         if problem is not GripReason.CLOCK:
             problem = fault or problem
@@ -308,6 +327,7 @@ class GripController:
         if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
             return
         self._touches, self._time, self._jerked = touches, time, False
+        self._grip_angles = self._angles
         for touch in touches:
             touch.start()
         self._highest = [self.limits.highest_scale(touch.start_normal) for touch in touches]
@@ -351,6 +371,20 @@ class GripController:
             return _NONE
         # A contact may be missed for a moment; an object that is lost stays lost.
         return GripReason.LOST if self._lasts(-1, time) else _NONE
+
+    def _has_opened(self) -> bool:
+        """Return whether the joints went back since the grip began, as a hand that lets go does.
+
+        The fingers of a hand that lost its object close further.
+        """
+        before, grip, now = self._open_angles, self._grip_angles, self._angles
+        if before is None or grip is None or now is None:
+            return False
+        if not before.shape == grip.shape == now.shape:
+            return False
+        closing, moved = grip - before, now - grip
+        way = float(closing @ closing)
+        return way >= MIN_CLOSING**2 and float(moved @ closing) <= -MIN_OPENING * way
 
     def _lasts(self, k: int, time: float) -> bool:
         """Return whether what is bad now has been bad for `fault_after`."""

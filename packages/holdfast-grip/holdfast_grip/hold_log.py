@@ -1,5 +1,6 @@
 """Log of `holdfast hold`: lines on the terminal, and the recording of samples and events."""
 
+import math
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
@@ -16,6 +17,8 @@ from holdfast_grip.command import GripCommand
 class HoldLog:
     """Log of the loop: lines on the terminal, and markers of the recording.
 
+    Times of lines are since the first sample.
+
     Args:
         recorder: records samples and events; None for no recording.
         as_json: print commands as JSON, and no events.
@@ -25,6 +28,8 @@ class HoldLog:
         self._recorder = recorder
         self._as_json = as_json
         self._last: GripCommand | None = None  # the newest that was printed, or is equal to it
+        self._state = ""  # of the newest event
+        self._origin: float | None = None  # time of the first sample, printed as 0 [s]
 
     @classmethod
     def open(cls, stack: ExitStack, record: Path | None, source: Source, *, as_json: bool) -> Self:
@@ -45,13 +50,18 @@ class HoldLog:
         """Log an event of the loop."""
         if self._recorder is not None:
             self._recorder.add_marker(text, at)
-        if not self._as_json:
-            print_line(f"{at:10.3f} s  {text}")
+        # A reaction is one line: that the force then stays, and relaxes, follows from it.
+        follows = text in ("grip HOLD", "grip RELAX") and self._state in ("HOLD", "REACT", "RELAX")
+        self._state = text.split()[1].rstrip(":")
+        if not self._as_json and not follows:
+            print_line(f"{at - (self._origin or 0.0):9.3f} s  {text}")
 
     def update(self, update: StreamUpdate, *, wait: bool = False) -> None:
         """Record the samples, and print the notices of the source; a listener of a session."""
         if update.arrival is None:
             return
+        if self._origin is None and math.isfinite(update.arrival.time):
+            self._origin = update.arrival.time
         for notice in update.arrival.notices:
             print_message(notice)
         if self._recorder is not None:

@@ -22,7 +22,7 @@ from typer.main import get_command
 
 from holdfast.cli.extensions import PluginOptions
 from holdfast.cli.options import RARE, SourceArgument
-from holdfast.cli.terminal.console import print_error, print_line
+from holdfast.cli.terminal.console import break_silence, print_error, print_line
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
 from holdfast.plugins import PluginGroup
 
@@ -114,7 +114,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        code = _run(words)
+        # Imports alone take seconds on a slow disk, before a verb can print anything.
+        with break_silence(f"{words[0]}: working ..."):
+            code = _run(words)
         sys.stdout.flush()  # a closed pipe fails here, inside the `try`
     except BrokenPipeError:
         # The reader has closed the pipe, as `| head` does, which is no error. Python flushes

@@ -66,27 +66,15 @@ def serve(
     """
     from holdfast.devices.sources import open_source
     from holdfast.live.session import Session, publishing
-    from holdfast.live.web.serving import run_page
-    from holdfast.web.guard import Guard
-    from holdfast.web.server import page_url
 
     openers = [
         plugin.panel(chosen, source, speed=speed, loop=not once)
         for _, plugin, chosen in panels.chosen()
     ]
     token = access.find_token()  # a wrong token is refused before anything is loaded
-    guard = Guard(access.host, token)
     check_speed(source, speed)
     with message_if_slow(f"loading the detector for {source}" if awaited(source) else ""):
         loaded = options.load_model(model)
-
-    def announce(url: str) -> None:
-        report_missing_slip_rules(loaded)
-        page = page_url(url, token)
-        if as_json:
-            print_json({"url": page, "model": loaded.name, "source": source})
-            sys.stdout.flush()  # a program that reads the pipe waits for the address
-        print_message(f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it")
 
     # A panel may make the source, as the twin whose hand it commands.
     made = [opener.source() for opener in openers]
@@ -97,6 +85,23 @@ def serve(
             opener.connect(stack)  # before the source is open: its samples wait for nothing
         with message_if_slow(awaited(unopened.name)):
             stack.enter_context(unopened)
+        # The server takes longest to import: a source that is not there is refused before it.
+        from holdfast.live.web.serving import run_page
+        from holdfast.web.guard import Guard
+        from holdfast.web.server import page_url
+
+        guard = Guard(access.host, token)
+
+        def announce(url: str) -> None:
+            report_missing_slip_rules(loaded)
+            page = page_url(url, token)
+            if as_json:
+                print_json({"url": page, "model": loaded.name, "source": source})
+                sys.stdout.flush()  # a program that reads the pipe waits for the address
+            print_message(
+                f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it"
+            )
+
         session = stack.enter_context(Session(options.create_stream(loaded, unopened, start)))
         panel_list = [stack.enter_context(opener.open(session)) for opener in openers]
         shown = {panel.name: panel for panel in panel_list}

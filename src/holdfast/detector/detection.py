@@ -1,9 +1,11 @@
 """Estimates of a whole recording, as arrays."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from itertools import repeat
-from typing import Any, NamedTuple
+from math import nan
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +20,15 @@ from holdfast.contact import (
     faults_of,
     taxels_of,
 )
+from holdfast.errors import require_extras
 from holdfast.kernel import _extension
 from holdfast.model import FingerModel
 from holdfast.recordings import Recording
+from holdfast.sensors import taxel_numbers
 from holdfast.sensors.types import Array, Flags, Integers
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 STATE_BY_CODE = tuple(ContactState)
 REASON_BY_CODE = tuple(Reason)
@@ -130,6 +137,53 @@ class Detection:
     fingers: Mapping[str, FingerTrace]
     times: Array
     hand: npt.NDArray[np.int8]
+
+    def to_frame(self) -> "DataFrame":
+        """Return the estimates as a pandas DataFrame: a row for each finger and sample.
+
+        Rows are in the order of time, then of the fingers. The columns are those of `holdfast
+        detect --json`, with `force_x`, `force_y` and `force_z` for the force, and `hand`, the
+        state of the hand at that time. States, reasons, causes and faults are words; several
+        faults, or numbers of faulty taxels (from 1), are one text with commas. What is not known,
+        and what the model does not estimate, is missing (NaN).
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        require_extras("pandas")
+        import pandas as pd
+
+        def words(codes: npt.NDArray[Any], kind: type[StrEnum]) -> Any:  # noqa: ANN401 (of pandas)
+            return pd.Categorical.from_codes(codes, [word.value for word in kind])
+
+        def texts(masks: npt.NDArray[Any], names: Callable[[int], Iterable[object]]) -> list[str]:
+            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks.tolist())}
+            return [known[mask] for mask in masks.tolist()]
+
+        parts = []
+        for finger, trace in self.fingers.items():
+            # A fault of the whole finger names no taxel, as in `ContactEstimate`.
+            taxels = np.where(trace.faults, trace.faulty_taxels, 0)
+            slips = {
+                name: nan if getattr(trace, name) is None else getattr(trace, name)
+                for name in ("slip_probability", "slip_speed", "slip_distance")
+            }
+            columns = {
+                "time": trace.times,
+                "finger": finger,
+                "state": words(trace.state, ContactState),
+                "reason": words(trace.reason, Reason),
+                "stable_probability": trace.stable_probability,
+                "instability": trace.instability,
+                **{f"force_{axis}": trace.force[:, k] for k, axis in enumerate("xyz")},
+                "faults": texts(trace.faults, faults_of),
+                "faulty_taxels": texts(taxels, lambda mask: taxel_numbers(taxels_of(mask))),
+                "cause": words(trace.cause - 1, Cause),  # -1, which is no cause, is missing
+                **slips,
+                "hand": words(self.hand[np.searchsorted(self.times, trace.times)], ContactState),
+            }
+            parts.append(pd.DataFrame(columns))
+        return pd.concat(parts).sort_values("time", kind="stable", ignore_index=True)
 
 
 class Chunk(NamedTuple):

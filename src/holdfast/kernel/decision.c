@@ -107,14 +107,14 @@ static void hf_decide_unready(
 /* Return the state of a finger in contact, before the minimum duration, from its probability. */
 static int32_t hf_decide_contact(
     const holdfast_model *model, const hf_finger *f, const holdfast_rule *rule,
-    holdfast_decision *d, const hf_real *phi, bool is_unsteady, double time)
+    holdfast_decision *d, const hf_real *phi, double time)
 {
     const hf_real threshold = rule->heads[HOLDFAST_HEAD_STABLE].threshold;
     if (model->has_filter) {
         d->probability = hf_filter(d, d->probability, threshold, model->switching, time);
     }
     int32_t state = hf_classify(d->probability, threshold, model->hysteresis, d->state);
-    if (is_unsteady) {
+    if (d->is_unsteady) {
         /* The force decides the state alone; the probability stays that of the features. A
          * probability of 0 put samples that hold below those that slip, and the filter kept it. */
         state = HOLDFAST_UNSTABLE;
@@ -138,6 +138,7 @@ static void hf_decide(
     const bool unloaded = contact == HF_WITHOUT_CONTACT;
     const hf_real period = f->hand->period;
     int32_t state = HOLDFAST_NO_CONTACT;
+    d->is_unsteady = contact == HF_UNSTEADY;
     d->probability = 0;
     /* By the load, the probability stays that of the features, also without contact. */
     if (by_load || !unloaded) {
@@ -151,7 +152,7 @@ static void hf_decide(
             hf_follow(f, d);
         }
     } else {
-        state = hf_decide_contact(model, f, rule, d, phi, contact == HF_UNSTEADY, time);
+        state = hf_decide_contact(model, f, rule, d, phi, time);
     }
     if (state != HOLDFAST_UNSTABLE) {
         hf_forget_cause(d);

@@ -22,12 +22,26 @@ static int32_t hf_hand_state(const holdfast_model *model, const holdfast_detecto
     return n_stable >= (model->n_model_fingers > 1 ? 2 : 1) ? HOLDFAST_STABLE : HOLDFAST_NO_CONTACT;
 }
 
+/* Return why the finger has its state, if its probability does not say it. */
+static int32_t hf_reason(const hf_finger *f, const holdfast_rule *rule, const holdfast_decision *d)
+{
+    if (f->values->reason != HOLDFAST_READY || d->state != HOLDFAST_UNSTABLE) {
+        return f->values->reason;
+    }
+    if (d->is_unsteady) {
+        return HOLDFAST_LOAD;
+    }
+    const hf_real threshold = rule->heads[HOLDFAST_HEAD_STABLE].threshold;
+    return d->probability >= threshold ? HOLDFAST_HOLD : HOLDFAST_READY;
+}
+
 static void hf_fill_estimate(
-    const hf_finger *f, const holdfast_decision *d, holdfast_finger_estimate *out)
+    const hf_finger *f, const holdfast_rule *rule, const holdfast_decision *d,
+    holdfast_finger_estimate *out)
 {
     out->time = f->state->last_time;
     out->state = d->state;
-    out->reason = f->values->reason;
+    out->reason = hf_reason(f, rule, d);
     out->cause = d->state == HOLDFAST_UNSTABLE ? d->cause : HOLDFAST_NO_CAUSE;
     if (d->slips) { /* a slip is reported before the state becomes UNSTABLE */
         out->cause = HOLDFAST_CAUSE_SLIP;
@@ -63,7 +77,7 @@ HF_API int32_t holdfast_detect(
             const hf_real *const phi = d->memory.features + i * HF_N_FEATURES(hand);
             hf_decide(model, &f, rule, decision, phi, contact, time);
         }
-        hf_fill_estimate(&f, decision, &estimates[i]);
+        hf_fill_estimate(&f, rule, decision, &estimates[i]);
     }
     d->state = hf_hand_state(model, d);
     return d->state;
@@ -84,7 +98,7 @@ HF_API void holdfast_estimates(
 {
     for (size_t i = 0; i < HF_N_FINGERS(model->hand); ++i) {
         const hf_finger f = hf_finger_of(model->hand, &d->memory, i);
-        hf_fill_estimate(&f, &d->decisions[i], &estimates[i]);
+        hf_fill_estimate(&f, &model->rules[i], &d->decisions[i], &estimates[i]);
     }
 }
 

@@ -116,6 +116,7 @@ typedef struct {
     int32_t excess;           /* how the load came over the threshold of contact, see contact.c */
     int32_t cause;            /* while unstable */
     bool slips;               /* the finger is decided to slide */
+    bool is_unsteady;         /* the load came or went at the last sample, see contact.c */
     hf_real probability;      /* of stability; NaN without an estimate */
     double candidate_since;   /* [s] */
     double last_unstable;     /* last sample that was unstable before the hold time [s] */
@@ -144,11 +145,17 @@ typedef struct {
     int32_t state; /* of the hand */
 } holdfast_detector_memory;
 
+/* Why a finger is UNSTABLE whatever its probability. They follow HOLDFAST_FAULT of kernel.h. */
+enum {
+    HOLDFAST_LOAD = 5, /* a large share of the load comes or goes */
+    HOLDFAST_HOLD = 6  /* it was unstable within the hold time, or STABLE has not lasted yet */
+};
+
 /* Estimate of a finger. Numbers that the model does not give are NaN. */
 typedef struct {
     double time;                /* of its last sample [s] */
     int32_t state;              /* HOLDFAST_UNKNOWN, ... */
-    int32_t reason;             /* HOLDFAST_TARE, ...: why it is UNKNOWN */
+    int32_t reason;             /* HOLDFAST_TARE, ...: why it is UNKNOWN; HOLDFAST_LOAD, ... */
     int32_t cause;              /* HOLDFAST_CAUSE_CLOSING, ... */
     uint32_t faults;            /* HOLDFAST_NOT_FINITE, ... */
     uint64_t faulty_taxels;     /* bit i: taxel i of the finger is faulty by itself */

@@ -28,8 +28,12 @@ REASON_WORDS = {
     Reason.WARM_UP: "too few samples yet",
     Reason.GAP: "gap in the samples",
     Reason.FAULT: "fault",
+    Reason.LOAD: "load changes",
+    Reason.HOLD: "hold time",
 }
-"""Words for the reason of UNKNOWN."""
+"""Words for the reason of UNKNOWN, and of UNSTABLE whatever the probability."""
+CHANGES_HEADER = f"{'time':>9}    {'finger':14}  {'state':11}  why"
+"""Header of the lines of `ChangeLines`, which fit into 80 columns."""
 
 
 class EstimateChunk(NamedTuple):
@@ -155,17 +159,21 @@ class _StateCounts:
 class ChangeLines:
     """Find the changes of each finger and of the hand that lasted, and slips, as lines of text.
 
+    A change of the hand to the state that a finger gets at the same instant is in its line.
+
     Args:
         from_first: give times relative to the first sample. Without it, only times since 1970
             are given like that.
+        hand_only: leave out slips, and changes that leave the hand as it is.
 
     Attributes:
         origin: time that is printed as 0 [s]; NaN before the first chunk.
     """
 
-    def __init__(self, *, from_first: bool) -> None:
+    def __init__(self, *, from_first: bool, hand_only: bool = False) -> None:
         self.origin = nan
         self._from_first = from_first
+        self._hand_only = hand_only
         self._changes: dict[str, StateChanges] = {}
         # State of each finger, and why it began.
         self._why: dict[str, tuple[ContactState, str]] = {}
@@ -176,27 +184,35 @@ class ChangeLines:
         if isnan(self.origin) and chunk.hand:
             first = chunk.hand[0][0]
             self.origin = first if self._from_first else shown_origin(first)
+        # Names and reasons of each change: the hand last, beside the fingers that changed it.
+        changes: dict[tuple[float, ContactState], list[tuple[str, str]]] = {}
         lines: list[tuple[float, str]] = []
         for finger, estimates in chunk.fingers.items():
             for estimate in estimates:
                 # The reason at the change, not that of the sample at which it has lasted.
                 if self._why.get(finger, (None,))[0] is not estimate.state:
                     self._why[finger] = estimate.state, why(estimate)
-                events = self._lasting(finger, estimate.state, estimate.time)
-                lines += [self._line(event, self._why[finger][1]) for event in events]
-            lines += map(self._slip_line, self._watch.update(finger, estimates))
+                for event in self._lasting(finger, estimate.state, estimate.time):
+                    named = finger, self._why[finger][1]
+                    changes.setdefault((event.time, event.state), []).append(named)
+            slips = self._watch.update(finger, estimates)
+            lines += map(self._slip_line, () if self._hand_only else slips)
         for time, state in chunk.hand:
-            lines += [self._line(event, "") for event in self._lasting(HAND, state, time)]
+            for event in self._lasting(HAND, state, time):
+                fingers = changes.setdefault((event.time, event.state), [])
+                first_finger, reason = fingers[0] if fingers else ("", "")
+                name = f"{first_finger}, {HAND}" if fingers else HAND
+                fingers[:1] = [(name, reason)]
+        for (time, state), named_changes in changes.items():
+            for name, reason in named_changes:
+                if not self._hand_only or name.endswith(HAND):
+                    lines.append((time, self._text(time, name, state, reason)))
         lines.sort(key=itemgetter(0))
         return [line for _, line in lines]
 
     def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
         changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))
         return changes.update([state], time)
-
-    def _line(self, event: ContactEvent, reason: str) -> tuple[float, str]:
-        change = f"{event.previous:10} -> {event.state:10}"
-        return event.time, self._text(event.time, event.finger, change, reason)
 
     def _slip_line(self, slip: DetectedSlip) -> tuple[float, str]:
         """Return the time and the line of a slip that has just begun or ended."""
@@ -210,21 +226,21 @@ class ChangeLines:
         return slip.end, self._text(slip.end, slip.finger, "slip ends", text)
 
     def _text(self, time: float, finger: str, change: str, reason: str) -> str:
-        return f"{time - self.origin:9.3f} s  {finger:8}  {change:24}  {reason}".rstrip()
+        return f"{time - self.origin:9.3f} s  {finger:14}  {change:11}  {reason}".rstrip()
 
 
 def why(estimate: ContactEstimate) -> str:
     """Return why a finger has its state, in a few words.
 
     Example:
-        >>> why(ContactEstimate(1.0, ContactState.UNSTABLE, Reason.NONE, 0.08, 178.0, (1, 0, 0)))
-        'P(stable) 8 %, sigma 178'
+        >>> why(ContactEstimate(1.0, ContactState.UNSTABLE, Reason.LOAD, 0.78, 178.0, (1, 0, 0)))
+        'stable 78 %, load changes'
     """
+    faults = ", ".join(FAULT_TEXTS[fault].words for fault in estimate.faults)
     if estimate.state is ContactState.UNKNOWN:
-        faults = ", ".join(FAULT_TEXTS[fault].words for fault in estimate.faults)
         return faults or REASON_WORDS[estimate.reason]
     if estimate.state is ContactState.NO_CONTACT:
-        return ""
-    percent = 100 * estimate.stable_probability
-    cause = f"{estimate.cause}, " if estimate.cause else ""
-    return f"{cause}P(stable) {percent:.0f} %, sigma {estimate.instability:.4g}"
+        return faults
+    stable = f"stable {100 * estimate.stable_probability:.0f} %"
+    parts = (estimate.cause or "", stable, REASON_WORDS[estimate.reason], faults)
+    return ", ".join(filter(None, parts))

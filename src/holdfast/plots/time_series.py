@@ -13,10 +13,11 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from holdfast.contact import Phase
-from holdfast.features import DEFAULT_WINDOW, FEATURE_NAMES, Tare, haar_features
+from holdfast.features import DEFAULT_WINDOW, FEATURE_NAMES, Tare
 from holdfast.features.force import tared_force
+from holdfast.features.frame import stretch_features
 from holdfast.plots.style import COMPONENT_COLOURS, FONT_SIZE, INK, PHASE_COLOURS
-from holdfast.recordings import GAP_PERIODS, Recording
+from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 
 StateCodes = npt.NDArray[np.integer[Any]]
@@ -90,10 +91,7 @@ def finger_series(
         phases = np.asarray(truth.hand["phase"])[np.clip(latest, 0, None)].astype(str)
     if truth is not None and "slip_speed" in truth.fingers.get(finger, {}):
         slip = truth.times, truth.fingers[finger]["slip_speed"]
-    # A window across a gap has no sigma: a sample of NaN stands in the gap, and is taken out again.
-    gaps = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
-    features = haar_features(np.insert(force, gaps, np.nan, axis=0), window)
-    features = np.delete(features, gaps + np.arange(len(gaps)), axis=0)
+    features, gaps = stretch_features(module, force, window)
     return FingerSeries(
         name=finger,
         times=module.times,

@@ -3,9 +3,10 @@ import tracemalloc
 import pytest
 
 from holdfast.cli.detect.output import json_lines, print_tables
-from holdfast.contact import ContactState
+from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.detector import Detector, detect
 from holdfast.live.estimate_chunks import (
+    ChangeLines,
     DetectionSummary,
     EstimateChunk,
     chunk_from_detection,
@@ -82,3 +83,61 @@ def test_lines_do_not_leak_memory(model, recording):
     left, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert left < 100_000
+
+
+def chunk(*states, hand=None, **fields):
+    """Return a chunk of two fingers at 100 Hz; each state is one of both, for half a second."""
+    rows = [(k, state) for k, state in enumerate(state for state in states for _ in range(50))]
+
+    def finger(pick):
+        return [
+            ContactEstimate(k / 100, pick(state), fields.get("reason", Reason.NONE), 0.75,
+                            float("nan"), (1, 0, 0), fields.get("faults", ()))
+            for k, state in rows
+        ]  # fmt: skip
+
+    fingers = {"index": finger(lambda pair: pair[0]), "thumb": finger(lambda pair: pair[1])}
+    least = min if hand is None else hand
+    return EstimateChunk("made", fingers, [(k / 100, least(pair)) for k, pair in rows])
+
+
+def lines(*states, hand_only=False, **fields):
+    return ChangeLines(from_first=False, hand_only=hand_only).add(chunk(*states, **fields))
+
+
+UNSTABLE, STABLE = ContactState.UNSTABLE, ContactState.STABLE
+
+
+def worse(pair):
+    return UNSTABLE if UNSTABLE in pair else STABLE
+
+
+def test_a_change_of_the_hand_is_in_the_line_of_the_finger_that_changed_it():
+    states = (STABLE, STABLE), (STABLE, UNSTABLE), (UNSTABLE, UNSTABLE), (STABLE, STABLE)
+    assert lines(*states, hand=worse) == [
+        "    0.000 s  index, hand     STABLE       stable 75 %",
+        "    0.000 s  thumb           STABLE       stable 75 %",
+        "    0.500 s  thumb, hand     UNSTABLE     stable 75 %",
+        "    1.000 s  index           UNSTABLE     stable 75 %",
+        "    1.500 s  index, hand     STABLE       stable 75 %",
+        "    1.500 s  thumb           STABLE       stable 75 %",
+    ]
+    assert [line.split()[2:4] for line in lines(*states, hand=worse, hand_only=True)] == [
+        ["index,", "hand"], ["thumb,", "hand"], ["index,", "hand"]
+    ]  # fmt: skip
+    alone = lines(*states[:2], hand=lambda pair: ContactState.NO_CONTACT)
+    assert alone[-2] == "    0.000 s  hand            NO_CONTACT"
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"reason": Reason.LOAD}, "stable 75 %, load changes"),
+        ({"reason": Reason.HOLD}, "stable 75 %, hold time"),
+        ({"faults": (Fault.STUCK,)}, "stable 75 %, stuck"),
+    ],
+)
+def test_unstable_beside_a_high_probability_says_why(fields, reason):
+    (line, _) = lines((UNSTABLE, UNSTABLE), hand=worse, **fields)
+    assert line.split("UNSTABLE")[1].strip() == reason
+    assert len(line) <= 80

@@ -282,6 +282,21 @@ class TestSlips:
             assert (line["slip_probability"] is None) == (line["state"] == "UNKNOWN")
             assert (line["cause"] == "slip") == ((line["slip_probability"] or 0) >= 0.5)
 
+    def test_a_threshold_of_1_is_said_where_a_slip_would_be_shown(
+        self, capsys, sliding, grasp, tmp_path
+    ):
+        path = tmp_path / "silent.json"
+        silent = Model.load(sliding).with_threshold("slip", 1.0)
+        silent.save(path)
+        assert summary(capsys, path, grasp)["slips"] == []
+        assert main(["detect", str(path), str(grasp), "--summary"]) == 0
+        out, err = capsys.readouterr()
+        assert "no slips\n" in out
+        assert f"{path} reports no slip until it is taught on this hand (holdfast teach)" in err
+        got, err = lines(capsys, path, grasp)
+        assert err == ""
+        assert any(x["slip_probability"] for x in got)
+
     def test_the_summary_has_begin_end_and_probability(self, capsys, sliding, grasp, want):
         slips = summary(capsys, sliding, grasp)["slips"]
         assert [slip["begin"] for slip in slips] == sorted(slip["begin"] for slip in slips)
@@ -344,7 +359,8 @@ class TestSlips:
         assert len(slips) == sum((end is not None) + 1 for s in want.values() for _, end, _ in s)
         assert all(len(row) <= 80 for row in slips)
         begin, end, probability = want["thumb"][0]
-        (last,) = [row for row in slips if row.startswith(f"{end:9.3f} s  thumb     slip ends")]
+        begins_with = f"{end:9.3f} s  thumb           slip ends"
+        (last,) = [row for row in slips if row.startswith(begins_with)]
         lasted = f"{end - begin:.3f} s, largest P(slip) {100 * probability:.0f} %"
         assert last.endswith(lasted)
 
@@ -574,13 +590,18 @@ def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
     header, *rows = capsys.readouterr().out.splitlines()
-    assert header.split() == ["time", "finger", "from", "to", "why"]
+    assert header.split() == ["time", "finger", "state", "why"]
     times = [float(row.split()[0]) for row in rows]
     assert times == sorted(times)
-    assert {row.split()[2] for row in rows} == {"thumb", "index", "hand"}
+    assert {row.split()[2].rstrip(",") for row in rows} >= {"thumb", "index"}
+    changes = [(row.split()[0], row[31:42].strip()) for row in rows if "hand" in row]
+    assert changes
+    # A change of the hand has no line of its own beside that of the finger.
+    assert len(changes) == len(set(changes))
+    assert all(", hand " in row for row in rows if "hand" in row)
     assert 3 <= len(rows) < 100  # of 3450 estimates
     assert all(len(row) <= 80 for row in rows)
-    assert any("-> UNSTABLE    P(stable) " in row for row in rows)
+    assert any("UNSTABLE     stable " in row for row in rows)
     assert main(["detect", NOISE_FLOOR, str(grasp), "--json"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 import pytest
 
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.recordings import Recording, Tactile
 from holdfast.synthetic import synthetic_recording
 
 from .helpers import FINGERS, refusal, run, run_json, save_manual_labels
@@ -41,6 +42,26 @@ def test_the_table_of_a_rule(capsys, folder):
         "2 of 2 recordings came with labels; the label files outrank them in train and evaluate: "
         "delete NAME.labels.json to use them again\n"
     )
+
+
+def test_the_five_least_certain_labels_are_lines_of_80_columns(capsys, folder):
+    """Times are relative where the clock of the recording counts from 1970."""
+    recording = load_recording(folder / "one.parquet")
+    modules = {
+        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
+        for name, m in recording.modules.items()
+    }
+    path = folder / "late.mcap"
+    save_recording(Recording("late", modules), path)
+    code, out, _ = run(capsys, "--auto", "signal", path, "--dry-run")
+    assert code == 0
+    lines = out.splitlines()
+    place = next(k for k, line in enumerate(lines) if line.startswith("check these first, the"))
+    assert "(--json has all):" in lines[place]
+    rows = lines[place + 3 :]
+    assert len(rows) == 5
+    assert all(len(line) <= 80 for line in rows)
+    assert all(0 <= float(row.split()[1]) < 30 for row in rows)
 
 
 def test_hidden_labels_are_reported_before_anything_is_written(capsys, folder):

@@ -2,13 +2,15 @@ import io
 import json
 import sys
 import time
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from holdfast.cli import app
+from holdfast.cli.terminal import console
 from holdfast.cli.terminal.console import (
     message_if_slow,
     print_error,
@@ -164,3 +166,46 @@ def test_a_message_if_slow(capsys, text, after, printed):
         while printed and time.monotonic() < deadline and not sys.stderr.getvalue():
             time.sleep(0.01)
     assert capsys.readouterr().err == printed
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+class TestSilence:
+    @staticmethod
+    def on_terminal(monkeypatch, silence):
+        monkeypatch.setattr(sys, "stderr", Terminal())  # here: pytest sets it before each phase
+        monkeypatch.setattr(console, "SILENCE", silence)
+        return sys.stderr
+
+    def test_a_command_that_prints_nothing_says_that_it_works(self, monkeypatch):
+        terminal = self.on_terminal(monkeypatch, 0.1)
+        with console.break_silence("tune: working ..."):
+            deadline = time.monotonic() + 20
+            while time.monotonic() < deadline and not terminal.getvalue():
+                time.sleep(0.01)
+        assert terminal.getvalue() == "tune: working ...\n"
+        assert console._silence is None
+
+    @pytest.mark.parametrize(
+        "shows", [console.print_line, console.print_message, console.print_json]
+    )
+    def test_the_first_line_ends_the_silence(self, monkeypatch, shows):
+        terminal = self.on_terminal(monkeypatch, 60.0)
+        with console.break_silence("tune: working ..."):
+            waiting = console._silence
+            shows("done")
+            assert console._silence is None and waiting.finished.is_set()
+        assert "working" not in terminal.getvalue()
+
+    def test_a_pipe_gets_no_such_line(self):
+        with console.break_silence("tune: working ..."):
+            assert console._silence is None
+
+    def test_every_verb_is_watched(self, monkeypatch):
+        seen = []
+        monkeypatch.setattr(app, "break_silence", lambda text: seen.append(text) or nullcontext())
+        assert app.main(["sensors"]) == 0
+        assert seen == ["sensors: working ..."]

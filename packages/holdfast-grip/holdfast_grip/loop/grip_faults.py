@@ -28,7 +28,7 @@ class FaultMeaning(NamedTuple):
 GRIP_FAULTS: Mapping[str, FaultMeaning] = {
     "lost": FaultMeaning(
         "All fingers of the grip lost contact.",
-        "The object slipped out, was released or was taken away.",
+        "The object slipped out or was taken away, or a hand that reports no joints let go.",
         lasts=True,
     ),
     "stale": FaultMeaning(

@@ -9,7 +9,7 @@ from typing import Self
 from msgspec import structs
 
 from holdfast.contact import HandEstimate
-from holdfast_grip.command import GripCommand, GripReason, LoopState
+from holdfast_grip.command import GripCommand, GripReason, LoopState, event_texts
 from holdfast_grip.controller import GripController
 from holdfast_grip.errors import HandError
 from holdfast_grip.guard import CommandGuard, safe_command
@@ -173,8 +173,9 @@ class GripLoop:
         if self.stopped:
             self.controller.stop()
         command = self.controller.update(estimate, self._advance(time))
-        for event in self.controller.events():
-            self._log(str(event), self._finite(event.time))
+        n_fingers = len(self.controller.loaded_fingers)
+        for at, text in event_texts(self.controller.events(), n_fingers):
+            self._log(text, self._finite(at))
         if not math.isfinite(command.time):  # JSON and the messages of hands have no NaN
             command = structs.replace(command, time=self._finite(command.time))
         return command

@@ -1,6 +1,7 @@
 import math
 
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,6 +10,7 @@ from grip.build import FINGERS, NORMAL, RATE, finger, hand, holding, run, scales
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.sensors import flat_sensor, sensor
 from holdfast_grip import LAWS, GripController, GripReason, Limits, LoopState
+from holdfast_grip.command import event_texts
 from holdfast_grip.laws import Fixed
 
 SLIPPING = {name: {"probability": 0.05, "state": ContactState.UNSTABLE} for name in FINGERS}
@@ -266,7 +268,37 @@ class TestFaults:
     def test_faults_are_logged(self):
         controller, time = holding()
         controller.update(hand(time), time + 0.2)
-        assert [str(event) for event in controller.events()] == ["grip FAULT (stale)"]
+        texts = [text for _, text in event_texts(controller.events(), 4)]
+        assert texts == ["grip FAULT (stale)"]
+
+    @pytest.mark.parametrize(
+        ("moved", "state", "reason"),
+        [
+            (-0.2, LoopState.IDLE, GripReason.RELEASED),  # the hand let go
+            (0.2, LoopState.FAULT, GripReason.LOST),  # the fingers close on nothing
+            (-0.01, LoopState.FAULT, GripReason.LOST),
+            (None, LoopState.FAULT, GripReason.LOST),  # a hand that reports no joints
+        ],
+    )
+    def test_a_hand_that_opens_has_let_go(self, moved, state, reason):
+        controller, closed = GripController(Limits(), newtons_per_unit=1e-3), np.full(4, 0.5)
+        if moved is not None:
+            controller.observe(np.zeros(4))
+            controller.observe(closed)
+        _, time = run(controller, 0.0, 0.5)
+        assert controller.state is LoopState.HOLD
+        controller.events()
+        if moved is not None:
+            controller.observe(closed + moved)
+        gone = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
+        _, time = run(controller, time, 0.5, **gone)
+        event = next(e for e in controller.events() if e.reason in (reason, GripReason.LOST))
+        assert (event.state, event.reason, controller.state) == (state, reason, state)
+        assert (controller.loaded_fingers == ()) is (state is LoopState.IDLE)
+        if state is LoopState.IDLE:  # it waits for the next grip
+            controller.observe(closed)
+            run(controller, time, 0.5)
+            assert controller.state is LoopState.HOLD
 
 
 class TestSilence:

@@ -20,6 +20,7 @@ from holdfast.detector import HAND
 from holdfast.devices.sources import open_source
 from holdfast.live.documents import estimate_line
 from holdfast.live.estimate_chunks import (
+    CHANGES_HEADER,
     ChangeLines,
     DetectionSummary,
     EstimateChunk,
@@ -29,7 +30,6 @@ from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.recordings import shown_origin
 
-HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
 LINES_PER_BLOCK = 8192
 """Number of lines that are encoded at a time: some 3 MB of text, of a chunk of all fingers."""
 MAX_EVENTS_SHOWN = 40
@@ -71,7 +71,7 @@ def print_tables(document: Mapping[str, Any], start: float) -> None:
         for name, x in document["fingers"].items()
     }
     print_table(
-        ("finger", "reasons for UNKNOWN", "faults"),
+        ("finger", "reasons", "faults"),
         [(name, *(text or "-" for text in texts)) for name, texts in counts.items()],
     )
     origin = shown_origin(start)
@@ -127,7 +127,7 @@ def print_changes(chunks: Iterator[EstimateChunk], *, live: bool) -> None:
     changes = ChangeLines(from_first=live)
     if live:
         print_message("times since the first sample; --json prints every estimate; Ctrl-C stops")
-        print_line(HEADER)
+        print_line(CHANGES_HEADER)
         for chunk in chunks:
             for line in changes.add(chunk):
                 print_line(line)
@@ -136,7 +136,7 @@ def print_changes(chunks: Iterator[EstimateChunk], *, live: bool) -> None:
     lines = [line for chunk in chunks for line in changes.add(chunk)]
     if changes.origin:
         print_message(f"times since the first sample, at {changes.origin:.3f} s")
-    for line in (HEADER, *lines):
+    for line in (CHANGES_HEADER, *lines):
         print_line(line)
 
 
@@ -158,17 +158,18 @@ def watch(model: str, path: Path, speed: float, *, fingers: bool = True) -> dict
         model: name of the model.
         path: of the recording.
         speed: 1 is real time, 0 as fast as possible.
-        fingers: print the lines of the fingers as well, not only those of the hand.
+        fingers: print the changes of each finger, not only those of the hand.
 
     Returns:
         The summary, as JSON values.
     """
-    lines, summary = ChangeLines(from_first=True), DetectionSummary()
+    lines = ChangeLines(from_first=True, hand_only=not fingers)
+    summary = DetectionSummary()
     with open_source(str(path), speed=speed) as source:
         stream = StreamDetector(Model.load(model), source)
         while not source.ended:
             chunk = chunk_from_stream(path.stem, stream.read().estimates)
             summary.add(chunk)
-            for line in lines.add(chunk if fingers else chunk._replace(fingers={})):
+            for line in lines.add(chunk):
                 print_message(line)
     return summary.to_dict()

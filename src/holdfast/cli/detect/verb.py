@@ -16,6 +16,7 @@ from holdfast.cli.options import (
     StartOptions,
     check_seconds,
 )
+from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
 
 
@@ -39,7 +40,7 @@ def detect(
 
     On a terminal, print one line for each change of state that lasted 0.1 s, and one when a slip
     begins and when it ends. In a pipe or file, or with --json, print one line of JSON per finger
-    and sample, in the order of time: time [s], finger, state, reason (why the state is UNKNOWN),
+    and sample, in the order of time: time [s], finger, state, reason (of UNKNOWN, UNSTABLE),
     stable_probability, instability (sigma) and force (both in the unit of the readings), faults,
     faulty_taxels, cause (slip while the finger slides), slip_probability, slip_speed [mm/s] and
     slip_distance [mm]. Values that are not known are null. The memory does not grow with the
@@ -77,10 +78,12 @@ def detect(
         chunks = detect_recording(loaded, Path(source), options, start, recording)
         if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
             chunks = progress(chunks, "detecting")
+    shows_changes = sys.stdout.isatty() and not as_json
+    if loaded.slip_advice and (summary or shows_changes):  # where a slip would be shown
+        print_message(loaded.slip_advice)
     if summary:
         print_summary(chunks, model, as_json=as_json)
-        return
-    if sys.stdout.isatty() and not as_json:
+    elif shows_changes:
         print_changes(chunks, live=live)
     else:
         print_estimates(chunks, live=live)

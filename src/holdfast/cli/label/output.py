@@ -13,11 +13,12 @@ from holdfast.cli.terminal.console import (
     print_table,
 )
 from holdfast.cli.terminal.progress import progress
+from holdfast.recordings import shown_origin
 
 if TYPE_CHECKING:
     from holdfast.labelling.labelled_files import LabelsOf
 
-MAX_DOUBTFUL_SHOWN = 20
+MAX_DOUBTFUL_SHOWN = 5
 """Maximum number of doubtful labels in the table; JSON has all of them."""
 
 
@@ -101,15 +102,26 @@ def print_seconds(documents: Sequence[dict[str, Any]]) -> None:
     if not doubtful:
         return
     doubtful.sort(key=lambda item: item[1]["confidence"])
+    origins = {
+        document["name"]: shown_origin(
+            min(label["start"] for labels in document["labels"].values() for label in labels)
+        )
+        for document in good
+        if document["doubtful"]
+    }
     print_line()
-    print_line("labels of low confidence, check these first:")
+    shown = doubtful[:MAX_DOUBTFUL_SHOWN]
+    print_line(f"check these first, the least certain of {len(doubtful)} (--json has all):")
+    # Without the name of a single recording, each label is one line of 80 columns.
+    several = len(good) > 1
+    header = ("finger", "start [s]", "end [s]", "state", "sure [%]", "evidence")
+    rows = [
+        (x["finger"], f"{x['start'] - origins[name]:.2f}", f"{x['end'] - origins[name]:.2f}",
+         x["state"], f"{100 * x['confidence']:.0f}", x["evidence"])
+        for name, x in shown
+    ]  # fmt: skip
+    names = [(name,) * several for name, _ in shown]
     print_table(
-        ("recording", "finger", "start [s]", "end [s]", "state", "confidence", "evidence"),
-        [
-            (name, x["finger"], f"{x['start']:.2f}", f"{x['end']:.2f}", x["state"],
-             f"{x['confidence']:.2f}", x["evidence"])
-            for name, x in doubtful[:MAX_DOUBTFUL_SHOWN]
-        ],
-    )  # fmt: skip
-    if len(doubtful) > MAX_DOUBTFUL_SHOWN:
-        print_line(f"and {len(doubtful) - MAX_DOUBTFUL_SHOWN} more: --json prints all")
+        ("recording",) * several + header,
+        [name + row for name, row in zip(names, rows, strict=True)],
+    )

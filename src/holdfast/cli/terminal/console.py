@@ -14,6 +14,8 @@ from threading import Timer
 
 MAX_ERROR_LENGTH = 2000
 """Number of characters of an error message that are printed."""
+SILENCE = 0.6
+"""Time after which a command that has printed nothing says that it works [s]."""
 SLOW_AFTER = 0.3
 """Time that a wait may last before a message says what for [s]."""
 MIN_TEXT_WIDTH = 12
@@ -49,8 +51,35 @@ def _json_escape(character: str) -> str:
     return "".join(f"\\u{units[place : place + 4]}" for place in range(0, len(units), 4))
 
 
+_silence: Timer | None = None
+"""Running while the command of this process has printed nothing; see `break_silence`."""
+
+
+@contextmanager
+def break_silence(text: str) -> Iterator[None]:
+    """Print a message on a terminal if the body has printed nothing for `SILENCE`."""
+    global _silence  # noqa: PLW0603 (one command runs in a process)
+    if sys.stderr.isatty():
+        _silence = Timer(SILENCE, print_message, (text,))
+        _silence.daemon = True
+        _silence.start()
+    try:
+        yield
+    finally:
+        end_silence()
+
+
+def end_silence() -> None:
+    """Note that the command prints something now."""
+    global _silence  # noqa: PLW0603
+    if _silence is not None:
+        _silence.cancel()
+        _silence = None
+
+
 def print_message(text: str) -> None:
     """Print a message for a person on stderr, in one line."""
+    end_silence()
     sys.stderr.write(f"{visible(text)}\n")
 
 
@@ -78,6 +107,7 @@ def print_error(text: str) -> None:
 
 def print_line(text: str = "") -> None:
     """Print a line of a result on stdout."""
+    end_silence()
     sys.stdout.write(f"{visible(text)}\n")
 
 
@@ -99,6 +129,7 @@ def print_json(value: object) -> None:
     from msgspec import json
 
     text = json.encode(value, enc_hook=_to_json_value).decode()
+    end_silence()
     sys.stdout.write(f"{visible_json(text)}\n")
 
 

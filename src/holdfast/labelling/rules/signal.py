@@ -218,10 +218,10 @@ class _GraspLabeller:
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
     times = f"{ratio:.3g} times"
     if state is ContactState.NO_CONTACT:
-        return "force dropped for good" if cause else f"force {times} under the contact threshold"
+        return "force dropped for good" if cause else f"force {times} under contact"
     if state is ContactState.STABLE:
-        return f"force settled: its change {times} under the limit"
+        return f"settled, {times} under its limit"
     if cause is Cause.CLOSING:
-        return f"force not settled yet, {times} the contact threshold"
-    what = "falls to its end" if cause in (Cause.RELEASED, Cause.LOST) else "changes"
-    return f"force {what}: {times} the limit of a settled one"
+        return f"not settled, force {times} contact"
+    what = "ends" if cause in (Cause.RELEASED, Cause.LOST) else "changes"
+    return f"force {what}, {times} the settled limit"

@@ -7,8 +7,8 @@ import pytest
 from holdfast_grip import GripReason, Limits
 from holdfast_grip.loop.grip_faults import ENDED, GRIP_FAULTS, explain_fault
 
-RISES = {"", "unstable", "slip", "load", "margin", "balance", "relax"}
-"""Reasons of a change of force, which are no faults."""
+RISES = {"", "unstable", "slip", "load", "margin", "balance", "relax", "released"}
+"""Reasons of a change of force, or of the end of a grip, which are no faults."""
 GUIDE = Path(__file__).parents[5] / "docs" / "grip.md"
 
 

@@ -13,6 +13,8 @@ const REASONS = {
   warm_up: "warming up",
   gap: "gap in samples",
   fault: "faulty",
+  load: "load changes",
+  hold: "hold time",
 };
 
 /** Return the key of a state in class names, shapes and colours: "no-contact". */
@@ -44,8 +46,8 @@ export function share(fraction) {
  * Return why the state of a finger differs from what its probability says, in few words and in
  * more; null if it does not differ.
  */
-export function debounceNote({ state, stable_probability: probability }, threshold, debounce) {
-  if (!debounce || !Number.isFinite(probability)) return null;
+export function debounceNote({ state, reason, stable_probability: probability }, threshold, debounce) {
+  if (!debounce || !Number.isFinite(probability) || reason === "load") return null;
   const { hold, hysteresis, min_duration: duration } = debounce, above = probability >= threshold;
   if (state === "UNSTABLE" && above) {
     if (probability < threshold + hysteresis) return note(`from ${share(threshold + hysteresis)}`, `stable from ${share(threshold + hysteresis)}`);
