@@ -221,18 +221,45 @@ def modulus_of(skin, results):
     return np.sqrt(9 * LOAD**2 / (16 * RADIUS * depth**3))
 
 
+def draw(path, found):
+    """Draw forces against ways of a placement of each skin, and the mean of the stick radii."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+    colours = dict(zip(SKINS, ("#c0392b", "#1f6fb2"), strict=True))
+    there, back = np.linspace(0, SHARES[-1], 100), np.linspace(SHARES[-1], -SHARES[-1], 200)
+    for name, (results, theory) in found.items():
+        # Each by its own theory, so that skins of another modulus are in one picture.
+        unit = theory.way(1.0)
+        for rows in (results[0].slips, results[0].back):
+            axes[0].plot(rows[:, 2] / unit, rows[:, 0], color=colours[name], lw=2)
+        radii = [np.interp(there, *r.slips.T[:2]) / r.radius for r in results]
+        axes[1].plot(there, np.mean(radii, 0), color=colours[name], lw=2, label=f"{name} nodes")
+    axes[0].plot(theory.way(there) / unit, there, "k--", lw=1.2)
+    axes[0].plot([theory.back(q, SHARES[-1]) / unit for q in back], back, "k--", lw=1.2)
+    axes[1].plot(there, stuck(there), "k--", lw=1.2, label="Cattaneo and Mindlin")
+    axes[0].set(xlabel="way / way at which all slides", ylabel="tangential force / friction limit")
+    axes[1].set(xlabel="tangential force / friction limit", ylabel="stick radius / contact radius")
+    axes[1].legend()
+    for ax in axes:
+        ax.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--pitch", type=float, help="Distance of the nodes [m].")
+    parser.add_argument("--plot", help="File of a picture of the curves.")
     parser.add_argument("--skins", default=",".join(SKINS), help="Some of: %(default)s.")
     options = parser.parse_args()
-    columns = {}
+    columns, found = {}, {}
     for name in options.skins.split(","):
         skin = SKINS[name]
         pitch = options.pitch or PITCHES[name]
         results = [measure(skin, pitch, placement) for placement in range(N_PLACEMENTS)]
         theory = Theory(modulus_of(skin, results))
         columns[name] = [errors(result, theory) for result in results]
+        found[name] = results, theory
         print(f"{name}: E* {theory.modulus / 1e3:.0f} kPa, pitch {1e3 * pitch:g} mm")
     print("| error [%] |", " | ".join(columns), "|")
     for row in next(iter(columns.values()))[0]:
@@ -241,6 +268,8 @@ def main():
             values = np.array([placement[row] for placement in placements])
             cells.append(f"{values.mean():+.1f} ({values[np.abs(values).argmax()]:+.1f})")
         print("|", row, "|", " | ".join(cells), "|")
+    if options.plot:
+        draw(options.plot, found)
 
 
 if __name__ == "__main__":

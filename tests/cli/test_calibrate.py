@@ -103,13 +103,15 @@ def test_info_shows_own_handling(capsys, folder, tmp_path, monkeypatch):
     assert "own handling of pad: 39." in text
     assert "s held in 2 recordings (handling-0, handling-1); STABLE from" in text
     handling = Model.load(out).fingers["*"].handling["pad"]
-    assert f"STABLE from {handling.thresholds['stable']:.3g} on; slides from " in text
-    assert text.count("STABLE from") == text.count("slides from") == 1
+    silent = "reports no slip until it is taught (holdfast teach)"
+    assert f"STABLE from {handling.thresholds['stable']:.3g} on; {silent}" in text
+    assert text.count("STABLE from") == text.count(silent) == 1
     part = Model.load(out).fingers["*"].without_thresholds("stable")
     tuned = msgspec.structs.replace(Model.load(out), fingers={"*": part})
     tuned.save(tmp_path / "tuned.json")
     _, printed, _ = run(capsys, "info", tmp_path / "tuned.json")
-    assert f"; STABLE from {part.stable.threshold:.3g} on; slides" in " ".join(printed.split())
+    shown = f"; STABLE from {part.stable.threshold:.3g} on; {silent}"
+    assert shown in " ".join(printed.split())
     document = json.loads(run(capsys, "info", out, "--json")[1])["fingers"]["*"]
     assert document["normalised"] is True
     assert document["handling"]["pad"]["recordings"] == ["handling-0", "handling-1"]

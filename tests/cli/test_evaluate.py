@@ -2,11 +2,12 @@ import json
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from command_line import Verb
 from holdfast.cli import main
-from holdfast.io import load_dataset, save_recording
+from holdfast.io import load_dataset, load_recording, save_recording
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, evaluate, train
@@ -252,3 +253,18 @@ def test_the_model_of_the_twin_detects_in_a_grasp_of_the_twin(capsys, twin_grasp
     for finger in found["fingers"].values():
         assert finger["states"]["NO_CONTACT"] > 0.05
         assert finger["states"]["STABLE"] > 0.05
+
+
+def test_a_truth_with_impacts_has_a_line_of_its_own(capsys, twin_grasp, tmp_path):
+    _, out, _ = run(capsys, "builtin:twin", twin_grasp)
+    assert "Knocks" not in out
+    grasp = load_recording(twin_grasp)
+    truth, lock = grasp.truth, grasp.metadata["locked_at"]
+    kinds = np.where(np.abs(truth.times - lock - 0.2) < 0.02, "knock", "")
+    hit = replace(grasp, truth=replace(truth, hand={**truth.hand, "impact": kinds}))
+    save_recording(hit, tmp_path / "hit.parquet")
+    _, out, _ = run(capsys, "builtin:twin", tmp_path / "hit.parquet")
+    line = "Knocks, taps and bumps without a slip: 0.00 false alarms for each, of one finger (4)."
+    assert line in " ".join(out.split())
+    report = json.loads(run(capsys, "builtin:twin", tmp_path / "hit.parquet", "--json")[1])
+    assert report["slips"]["pooled"]["impacts"] == {"n": 4, "false_alarms_per_impact": 0.0}

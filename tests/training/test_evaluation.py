@@ -11,9 +11,9 @@ from holdfast.metrics import hand_decisions
 from holdfast.model import Model
 from holdfast.recordings import Truth
 from holdfast.training import Setting, compute_decisions, evaluate, train
-from holdfast.training.evaluation import combine_decisions
+from holdfast.training.evaluation import combine_decisions, evaluate_recordings
 
-from .build import tiny_recording
+from .build import sliding_recording, tiny_recording
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +112,9 @@ def test_each_decision_is_that_of_the_model_of_the_unit(grasps):
             )
     np.testing.assert_array_equal(found.hand.states, hand_decisions(found.fingers, 2).states)
     assert (found.hand.states[:50] == UNKNOWN).all()
+
+
+def test_a_model_that_reports_no_slip_is_judged_by_its_ranking():
+    silent = Model.load("builtin:any").with_threshold("slip", 1.0)
+    verdict = evaluate_recordings(silent, [sliding_recording(0)]).verdict
+    assert "Slips: none is reported until it is taught (holdfast teach); P(slip) has" in verdict

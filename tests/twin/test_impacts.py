@@ -80,7 +80,7 @@ def recording():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulation, "profile", lambda _: SHORT)
         grasp = Grasp("can", 1, 1, profile="coupled", seed=2, glitch_rate=0.0)
-        plan = simulation._draw_plan(grasp, SHORT)._replace(impacts=blows)
+        plan = simulation.draw_plan(grasp, SHORT)._replace(impacts=blows)
         run = Simulation(grasp, plan=plan)
         while not run.is_over:
             run.step()

@@ -44,6 +44,8 @@ def test_coupled_is_the_reference_with_coupled_nodes_and_impacts():
     differ = {name for name in reference if coupled[name] != reference[name]}
     assert differ == {"name", "coupled", "impacts", "drawn_as"}
     assert coupled["drawn_as"] == "reference"  # so the disturbances of a seed are the same
+    others = [profile(name) for name in profiles() if name != "coupled"]
+    assert not any(other.coupled or other.impacts for other in others)
 
 
 def test_profiles_disturb_in_their_order():

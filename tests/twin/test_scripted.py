@@ -5,7 +5,7 @@ from holdfast.contact import Phase
 from holdfast.metrics.slip_truth import slip_truth
 from holdfast.twin import scripted
 from holdfast.twin.scripted import perform
-from holdfast.twin.simulation import Grasp
+from holdfast.twin.simulation import Grasp, Simulation
 
 CAN = Grasp("can", 2, 1, seed=5)
 
@@ -38,14 +38,29 @@ def test_a_script_keeps_to_its_time():
 
 
 def test_an_arm_that_carries_changes_the_force():
-    held, carried = perform(CAN, "hold", 0, 5.0), perform(CAN, "carry", 3, 5.0)
+    held, carried = perform(CAN, "hold", 0, 8.0), perform(CAN, "carry", 2, 8.0)
     assert held.metadata["slip_events"] == carried.metadata["slip_events"] == []
     spread = []
     for recording in (held, carried):
-        start = round((recording.metadata["locked_at"] + 1.5) * recording.rate)
+        start = round((recording.metadata["locked_at"] + 2.5) * recording.rate)
         force = recording.truth.fingers["index"]["contact_force"][start : start + 400]
         spread.append(np.ptp(force, axis=0).max())
     assert spread[1] > 2 * spread[0]
+
+
+def test_a_tool_knocks_once_in_each_part_of_the_time(monkeypatch):
+    plans = []
+
+    class Watched(Simulation):
+        def __init__(self, grasp, *, plan, loads=()):
+            plans.append(plan)
+            super().__init__(grasp, plan=plan, loads=loads)
+
+    monkeypatch.setattr(scripted, "Simulation", Watched)
+    recording = perform(CAN, "knock", 3, 10.0)
+    assert recording.metadata["case"] == "1"
+    starts = [impact.start for impact in plans[-1].impacts]
+    assert [int((start - scripted.FIRST_ACTION) / 2.0) for start in starts] == [0, 1, 2]
 
 
 def test_an_unknown_action_is_refused():

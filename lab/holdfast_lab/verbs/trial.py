@@ -26,7 +26,14 @@ def trial(
         str,
         typer.Option("--laws", help="Laws or reference rows, separated by commas; all by default."),
     ] = "",
-    model: Annotated[str, typer.Option("--model", help="Model of the detector.")] = "builtin:any",
+    model: Annotated[
+        str,
+        typer.Option(
+            "--model",
+            help="Model of the detector: builtin:any, as builtin:twin calls the light grips of "
+            "the trials unstable, or one that was taught.",
+        ),
+    ] = "builtin:any",
     quick: QuickOption = False,
     n: Annotated[
         int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS))

@@ -409,9 +409,7 @@ def report_blind_features(model: "Model", sensors: Mapping[str, "Sensor"]) -> No
 
 
 def report_missing_slip_rules(model: "Model") -> None:
-    """Print that a model, or some of its fingers, has no slip rule, or never reports a slip."""
-    if model.slip_advice:
-        print_message(model.slip_advice)
+    """Print that the slip probability of a model, or of some of its fingers, is always null."""
     without = [name for name, part in model.fingers.items() if part.slip is None]
     if not without:
         return

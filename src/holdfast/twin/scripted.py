@@ -1,12 +1,14 @@
 """Grasps with a given course: the twin does what a step of `holdfast teach` asks of a person."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from holdfast.recordings import Recording
+from holdfast.twin.impacts import draw_impacts
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.operator import PUSH_DIRECTIONS, Disturbance, draw_disturbance
 from holdfast.twin.profile import GRASP_ATTEMPTS, Span, profile
@@ -16,12 +18,14 @@ from holdfast.twin.steps import JERK, PUSH
 
 SCRIPT_PROFILE = "slips"
 """Profile of fingers and slip events of these grasps: its fingers are those of `reference`."""
-FIRST_ACTION = 2.0
-"""Time from the lock to the first action: a person sees first that it holds [s]."""
+FIRST_MOVE, FIRST_ACTION = 0.8, 3.0
+"""Times from the lock to the move to and fro before pulls, and to the first action [s]."""
 AFTER_RELEASE = 6.0
 """Time with an open hand after the release, in which the skins creep back [s]."""
 MIN_REST = 0.6
 """Shortest rest between two actions [s]: an onset needs a level before it."""
+MIN_ACTION = 0.1
+"""Shortest action, in a time with too many of them [s]."""
 SPREAD_START = 0.2
 """Share of the time of an action by which its start is drawn."""
 LAST_ACTION = 1.0
@@ -37,6 +41,7 @@ class Script(NamedTuple):
         style: of the disturbances; None as drawn.
         duration: of the disturbances [s]; None as drawn.
         depth: factor of their depth.
+        struck_as: profile from which impacts are drawn; empty for none.
         carried: whether the arm moves the hand.
     """
 
@@ -45,6 +50,7 @@ class Script(NamedTuple):
     style: int | None = None
     duration: Span | None = None
     depth: float = 1.0
+    struck_as: str = ""
     carried: bool = False
 
 
@@ -55,14 +61,14 @@ SCRIPTS = {
     "pull": Script(kinds=(SlipKind.CREEP, SlipKind.TWIST, SlipKind.TURN)),
     "push": Script(disturbed_as="reference"),
     "tap": Script(disturbed_as="gentle", style=JERK, duration=(0.15, 0.3), depth=0.5),
-    "knock": Script(disturbed_as="reference", style=JERK, duration=(0.06, 0.1), depth=0.2),
+    "knock": Script(struck_as="coupled"),
     "nudge": Script(disturbed_as="gentle", style=PUSH, depth=0.5),
 }
 """Course of the grasp of each step, by its name; None is an open hand. Fixed before the first
 model was taught by them."""
 TRANSPORT_ACCELERATION = (2.0, 5.0)
 """Range of the largest acceleration of an arm that carries [m/s^2]."""
-TRANSPORT_DURATION = (0.6, 1.5)
+TRANSPORT_DURATION = (1.2, 2.0)
 """Range of the duration of a movement of that arm [s]."""
 
 
@@ -104,14 +110,23 @@ def _simulation(grasp: Grasp, script: Script | None, n_actions: int, seconds: fl
     disturbances: list[Disturbance] = []
     events: list[SlipEvent] = []
     loads: list[Load] = []
-    slot = (seconds - FIRST_ACTION - LAST_ACTION) / max(n_actions, 1)
-    for k in range(n_actions):
-        start = FIRST_ACTION + slot * k + float(generator.uniform(0.0, SPREAD_START * slot))
-        room = FIRST_ACTION + slot * (k + 1) - start - MIN_REST
+    if script.kinds:  # a person moves it to and fro first: so the clock of a camera is found
+        moving = msgspec.structs.replace(profile("gentle"), move_share=1.0)
+        moved = draw_disturbance(generator, moving, FIRST_MOVE, "left", scale)
+        longest = FIRST_ACTION - FIRST_MOVE - MIN_REST
+        disturbances.append(moved._replace(duration=min(moved.duration, longest)))
+    parts = np.linspace(FIRST_ACTION, seconds - LAST_ACTION, n_actions + 1).tolist()
+    if script.struck_as and (ranges := profile(script.struck_as).impacts) is not None:
+        always = msgspec.structs.replace(ranges, share=1.0)
+        impacts = draw_impacts(generator, always, list(pairwise(parts)))
+        return Simulation(grasp, plan=plan._replace(impacts=impacts))
+    for k, (begin, end) in enumerate(pairwise(parts)):
+        start = begin + SPREAD_START * (end - begin) * float(generator.random())
+        room = max(end - start - MIN_REST, MIN_ACTION)
         if script.kinds and chosen.slips is not None:
             kind = script.kinds[k % len(script.kinds)]
             event = draw_slip_event(generator, chosen.slips, kind, start, scale)
-            longest = room - event.recovery
+            longest = max(room - event.recovery, MIN_ACTION)
             events.append(event._replace(duration=min(event.duration, longest)))
         elif script.disturbed_as:
             drawn = _disturbance(generator, script, start, k, scale)

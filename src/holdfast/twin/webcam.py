@@ -100,13 +100,16 @@ def clock_shift(recording: Recording) -> float:
     return float(generator_of(0, f"camera {recording.name}").uniform(-0.4, 0.4))
 
 
-def film_stickers(recording: Recording, path: Path, camera: Webcam = Webcam()) -> None:  # noqa: B008 (immutable)
+def film_stickers(recording: Recording, path: Path, camera: Webcam = Webcam()) -> Array:  # noqa: B008 (immutable)
     """Write the .mp4 of a recording of the twin; it begins `clock_shift` before the samples.
 
     Args:
         recording: with the poses of object and fingertips in its truth.
         path: path of the film.
         camera: the webcam.
+
+    Returns:
+        (n_pictures,) times at which the pictures are taken, on the clock of the samples [s].
 
     Raises:
         RecordingError: the recording has no poses.
@@ -131,7 +134,8 @@ def film_stickers(recording: Recording, path: Path, camera: Webcam = Webcam()) -
     low, high = drawn.min(axis=0).clip(20) - 20, drawn.max(axis=0).clip(20) + 20
     busy = slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))  # the wall is smooth
     n_pictures = int((times[-1] - times[0]) * camera.fps)
-    for time in times[0] + shift + np.arange(n_pictures) / camera.fps:
+    taken = times[0] + shift + np.arange(n_pictures) / camera.fps
+    for time in taken:
         picture = wall.copy()
         for grey, half_width, line in outlines:
             ends = [(round(x), round(y)) for x, y in _at(time, times, line)]
@@ -144,6 +148,7 @@ def film_stickers(recording: Recording, path: Path, camera: Webcam = Webcam()) -
         picture += noise[row : row + camera.height, column : column + camera.width]
         film.write(cv2.cvtColor(picture.clip(0, 255).astype(np.uint8), cv2.COLOR_GRAY2BGR))
     film.release()
+    return np.asarray(taken)
 
 
 def _in_picture(

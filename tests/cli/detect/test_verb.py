@@ -282,6 +282,21 @@ class TestSlips:
             assert (line["slip_probability"] is None) == (line["state"] == "UNKNOWN")
             assert (line["cause"] == "slip") == ((line["slip_probability"] or 0) >= 0.5)
 
+    def test_a_threshold_of_1_is_said_where_a_slip_would_be_shown(
+        self, capsys, sliding, grasp, tmp_path
+    ):
+        path = tmp_path / "silent.json"
+        silent = Model.load(sliding).with_threshold("slip", 1.0)
+        silent.save(path)
+        assert summary(capsys, path, grasp)["slips"] == []
+        assert main(["detect", str(path), str(grasp), "--summary"]) == 0
+        out, err = capsys.readouterr()
+        assert "no slips\n" in out
+        assert f"{path} reports no slip until it is taught on this hand (holdfast teach)" in err
+        got, err = lines(capsys, path, grasp)
+        assert err == ""
+        assert any(x["slip_probability"] for x in got)
+
     def test_the_summary_has_begin_end_and_probability(self, capsys, sliding, grasp, want):
         slips = summary(capsys, sliding, grasp)["slips"]
         assert [slip["begin"] for slip in slips] == sorted(slip["begin"] for slip in slips)

@@ -48,12 +48,12 @@ def grasp(tmp_path_factory):
 def lead(grasp, tmp_path):
     """Run the protocol on a hand that grasps again and again, and return the folder."""
 
-    def run(choose, *steps, resume=False, loop=True, unattended=False):
+    def run(choose, *steps, resume=False, loop=True, **options):
         folder = TeachingFolder(tmp_path / "grasps", resume=resume)
         with ReplaySource(grasp, speed=0, loop=loop) as source:
             keys = Keys(choose)
             model = Model.load("builtin:any")
-            keys.guide = Guide(source, model, folder, steps, unattended=unattended)
+            keys.guide = Guide(source, model, folder, steps, **options)
             keys.guide.run(StopRequest(), keys)
         return folder
 
@@ -146,7 +146,7 @@ def test_a_full_disk_is_an_error_and_loses_nothing(lead, monkeypatch, tmp_path):
     full.is_full = False
 
     def choose(protocol):
-        full.is_full = protocol.step is HOLD and protocol.stage is Stage.ACT
+        full.is_full |= protocol.step is HOLD and protocol.stage is Stage.ACT
         return goes_on(protocol)
 
     monkeypatch.setattr(RecordingWriter, "append", full)
@@ -177,8 +177,30 @@ def test_keys_throw_a_slide_away(lead, monkeypatch, capsys):
     assert [x.n_slides for x in folder.kept] == [2]
     lines = capsys.readouterr().err.splitlines()
     assert "slide 7 given; this grasp has 3" in lines
-    assert "step 1 of 1: pull: 2 slides seen" in lines
+    assert "step 1 of 1: pull: GOOD: 2 slides seen" in lines
+    assert "001-pull kept: 2 slides seen" in lines
     assert "  1  from 3.00 to 3.50 s: thumb" in lines
+
+
+def test_a_camera_films_the_steps_that_it_sees(lead, monkeypatch):
+    filmed = []
+
+    class Camera:
+        def __init__(self, camera, path):
+            filmed.append((camera, path.name))
+
+        def start(self, recorder, say):
+            filmed.append(recorder.path.name)
+
+        def close(self):
+            filmed.append("closed")
+
+    monkeypatch.setattr(module, "CameraRecorder", Camera)
+    monkeypatch.setattr(module, "label_grasp", lambda path, step: (None, f"{path.stem}: no video"))
+    seen = HOLD._replace(in_view=True)
+    folder = lead(goes_on, seen, TAP, camera="0")
+    assert filmed == [("0", "001-hold.mp4"), "001-hold.mcap", "closed"]
+    assert folder.kept[0].text.startswith("held for 3 s")
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,15 @@
 import json
+import os
+from contextlib import contextmanager
+from functools import partial
 
 import pytest
 
 from command_line import Verb
 from holdfast.io import save_recording
+from holdfast.live.teaching.steps import STEPS
 from holdfast.model import Model
+from holdfast.twin import webcam
 from training.build import sliding_recording
 
 pytestmark = pytest.mark.slow
@@ -96,3 +101,106 @@ def test_a_model_is_never_overwritten(capsys, grasps, tmp_path):
     code, _, err = run(capsys, "teach", "--from", grasps, "-o", out)
     assert (code, out.read_text()) == (2, "mine")
     assert err.startswith(f"holdfast: {out} ")
+
+
+GUIDED = {
+    "neither": (
+        ["teach", "-o", "new.json"],
+        "holdfast: a SOURCE, or recordings with --from, expected; neither given",
+    ),
+    "both": (
+        ["teach", "twin:", "--from", "grasps", "-o", "new.json"],
+        "holdfast: a SOURCE, or recordings with --from, expected; twin: and --from grasps given",
+    ),
+    "a folder of --from": (
+        ["teach", "--from", "grasps", "-o", "new.json", "--resume"],
+        "holdfast: --camera, --to, --resume and --unattended need a SOURCE",
+    ),
+    "a camera of the twin": (
+        ["teach", "twin:", "-o", "new.json", "--camera", "0"],
+        "holdfast: twin: has its own camera: leave out --camera",
+    ),
+    "a device without a person": (
+        ["teach", "xela://127.0.0.1:1", "-o", "new.json", "--unattended"],
+        "holdfast: --unattended is for twin:; a robot sends the lines next, repeat, skip or quit "
+        "on stdin",
+    ),
+    "a camera": (
+        ["teach", "xela://127.0.0.1:1", "-o", "new.json", "--camera", "none.mp4"],
+        "holdfast: no camera none.mp4: the number of a camera (0 is the first), or a video file "
+        "or stream expected",
+    ),
+    "a folder of something else": (
+        ["teach", "twin:", "-o", "new.json", "--to", "grasps", "--unattended"],
+        "holdfast: grasps has no teach.json and is not empty: another folder expected",
+    ),
+    "a protocol that never began": (
+        ["teach", "twin:", "-o", "new.json", "--resume", "--unattended"],
+        "holdfast: new-grasps has no teach.json: there is nothing to resume",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", GUIDED)
+def test_a_wrong_protocol_is_one_line(capsys, grasps, tmp_path, monkeypatch, case):
+    (tmp_path / "grasps").symlink_to(grasps)
+    monkeypatch.chdir(tmp_path)
+    words, message = GUIDED[case]
+    code, printed, err = run(capsys, *words)
+    assert (code, printed) == (2, "")
+    assert err.strip() == message
+    assert not (tmp_path / "new.json").exists()
+
+
+def test_no_hand_at_the_source_is_one_line(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pipe_of(monkeypatch, "next\n"):
+        code, _, err = run(capsys, "teach", "xela://127.0.0.1:1", "-o", "new.json")
+    assert code == 2
+    *lines, last = err.splitlines()
+    assert last.startswith("holdfast: no server listens at 127.0.0.1:1; ")
+    assert any(line.startswith("Without --camera no slip is measured") for line in lines)
+    # Nothing is in the way of the next attempt.
+    with pipe_of(monkeypatch, "quit\n"):
+        code, _, err = run(capsys, "teach", "xela://127.0.0.1:1", "-o", "new.json")
+    assert err.splitlines()[-1] == "holdfast: not confirmed: nothing was recorded"
+
+
+@contextmanager
+def pipe_of(monkeypatch, text):
+    """Let stdin be a pipe with these lines, which stays open."""
+    reading, writing = os.pipe()
+    os.write(writing, text.encode())
+    with os.fdopen(reading) as pipe:
+        monkeypatch.setattr("sys.stdin", pipe)
+        yield
+    os.close(writing)
+
+
+SHORT = {"open": 1.0, "carry": 7.0, "pull": 9.0}
+
+
+def test_from_nothing_to_a_model_with_the_twin(capsys, tmp_path, monkeypatch):
+    """The whole path, with fewer and shorter grasps, and a webcam of half the rate."""
+    steps = [
+        step._replace(seconds=SHORT[step.name], n_actions=min(step.n_actions, 3), n_grasps=1)
+        for step in STEPS
+        if step.name in SHORT
+    ]
+    index = [step.name for step in steps].index("pull")
+    steps[index] = steps[index]._replace(n_grasps=2)
+    monkeypatch.setattr("holdfast.live.teaching.steps.STEPS", tuple(steps))
+    film = partial(webcam.film_stickers, camera=webcam.Webcam(fps=30.0))
+    monkeypatch.setattr(webcam, "film_stickers", film)
+    monkeypatch.chdir(tmp_path)
+    words = ("teach", "twin:?object=can&seed=3", "-o", "mine.json", "--unattended", "--json")
+    code, printed, err = run(capsys, *words, "--false-alarms", "60")
+    assert code == 0, err
+    report = json.loads(printed)
+    kept = [(x["name"], x["kept"]) for x in report["steps"] if x["kept"]]
+    assert kept == [(x, True) for x in ("open", "carry", "pull", "pull")]
+    assert all(x["seconds"] > 2 for x in report["steps"])
+    assert report["heads"]["slip"]["out_of_fold"]["onsets"] == "rule"
+    assert report["verdict"]
+    assert Model.load("mine.json").finger("index").slip.choice.n >= 3
+    assert "<svg" in (tmp_path / "mine-grasps" / "pulls.html").read_text()

@@ -12,9 +12,10 @@ import pytest
 
 from holdfast.devices.sources import open_source, replay
 from holdfast.devices.sources import twin as module
-from holdfast.devices.sources.twin import GRASP_ATTEMPTS, Twin, grasp_of, write
+from holdfast.devices.sources.twin import GRASP_ATTEMPTS, AskedTwin, Twin, grasp_of, write
 from holdfast.devices.uri import parse
 from holdfast.io import load_recording
+from holdfast.io.stickers import picture_stamps
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.twin.simulation import Grasp, simulate
@@ -242,3 +243,49 @@ def test_invalid_parameters(text, message):
 def test_an_invalid_speed(speed):
     with pytest.raises(ValueError, match="a speed of at least 0 expected"):
         open_source("twin:", speed=speed)
+
+
+def test_a_twin_does_what_it_is_asked_and_then_is_silent(monkeypatch, tmp_path):
+    asked = []
+
+    def perform(grasp, *action):
+        asked.append((grasp.object, grasp.repeat, *action))
+        return quick_recording(grasp.repeat)
+
+    def quick_recording(number):
+        times = np.arange(10) / 100
+        tactile = Tactile(sensor("uskin-4x4"), times, np.full((10, 16, 3), number, "u2"))
+        return Recording(f"grasp {number}", {"thumb": tactile})
+
+    filmed = []
+
+    def film(recording, path):
+        filmed.append(recording.name)
+        path.write_bytes(b"film")
+        return np.array([0.0, 0.5])
+
+    monkeypatch.setattr(module, "perform", perform)
+    monkeypatch.setattr("holdfast.twin.webcam.film_stickers", film)
+    with AskedTwin(parse("twin:?seed=2")[1], speed=0) as twin:
+
+        def samples():
+            return [x for x in iter(lambda: twin.read(0.0), None) if x.samples]
+
+        assert len(samples()) == 10
+        assert twin.is_idle
+        assert not twin.ended
+        twin.perform(8, "pull", 6, 30.0)
+        assert not twin.is_idle
+        arrivals = samples()
+        assert [x.samples["thumb"][0, 0] for x in arrivals] == [8] * 10
+        twin.film(tmp_path / "a.mp4")
+        stamps = picture_stamps(tmp_path / "a.mp4")
+        began = arrivals[0].time  # on the clock of the source, as the samples are
+        assert stamps.tolist() == pytest.approx([began + 0.04, began + 0.54])
+    first, pulled = asked
+    assert first[2:] == ("open", 0, module.OPEN_SECONDS)
+    assert pulled[1:] == (8, "pull", 6, 30.0)
+    assert filmed == ["grasp 8"]
+    assert pulled[0] != first[0]  # without an object in the address, each grasp has another one
+    twin = AskedTwin(parse("twin:?object=ball")[1])
+    assert twin._objects == ["ball"]

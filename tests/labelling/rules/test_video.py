@@ -254,6 +254,16 @@ def test_the_stamps_of_a_recorded_camera_count(film, tmp_path):
     assert float(found[0].evidence.split("later by ")[1].split()[0]) == pytest.approx(0, abs=0.008)
 
 
+def test_the_stamps_give_the_clock_where_motion_does_not(film, tmp_path, monkeypatch):
+    path = stamped(tmp_path, film, "")
+    monkeypatch.setattr(video_clock, "_coarse_offset", lambda *_: (9.0, 1.2))
+    found = slips_of(propose("tracking", recording(), video=path)["index"])
+    assert float(found[0].evidence.split("later by ")[1].split()[0]) == pytest.approx(0, abs=0.008)
+    (tmp_path / "run.times").unlink()
+    with pytest.raises(RecordingError, match="its motion is not that of recording"):
+        propose("tracking", recording(), video=path)
+
+
 @pytest.mark.parametrize("lines", ["no time\n", "3.0\n", "nan\n", "40.0\n" + 20_000 * " "])
 def test_stamps_that_are_none(film, tmp_path, monkeypatch, lines):
     monkeypatch.setattr(stickers, "MAX_STAMPS", 40_000)

@@ -200,6 +200,14 @@ def test_keys_repeat_go_on_and_skip():
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("n_slides", [0, 3])
+def test_a_grasp_that_has_passed_is_kept_when_the_protocol_is_stopped(n_slides):
+    protocol = _grasped(PULL, moved(4))
+    protocol.checked("001-pull", 9.0, n_slides)
+    protocol.press("quit")
+    assert [(x.recording, x.kept) for x in protocol.results] == [("001-pull", n_slides == 3)]
+
+
 def test_a_robot_begins_and_ends_a_step_by_its_markers():
     hand = Feeder(HOLD)
     hand.until(Stage.GRASP)

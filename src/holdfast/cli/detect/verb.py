@@ -16,6 +16,7 @@ from holdfast.cli.options import (
     StartOptions,
     check_seconds,
 )
+from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
 
 
@@ -77,10 +78,12 @@ def detect(
         chunks = detect_recording(loaded, Path(source), options, start, recording)
         if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
             chunks = progress(chunks, "detecting")
+    shows_changes = sys.stdout.isatty() and not as_json
+    if loaded.slip_advice and (summary or shows_changes):  # where a slip would be shown
+        print_message(loaded.slip_advice)
     if summary:
         print_summary(chunks, model, as_json=as_json)
-        return
-    if sys.stdout.isatty() and not as_json:
+    elif shows_changes:
         print_changes(chunks, live=live)
     else:
         print_estimates(chunks, live=live)

@@ -184,6 +184,9 @@ class Guide:
             self._follow(protocol.press(text), screen)
             if len(protocol.results) != n_results:
                 self._folder.save(protocol.results)
+                for result in filter(lambda x: x.recording, protocol.results[n_results:]):
+                    kept = "kept" if result.kept else "left out"
+                    screen.print(f"{result.recording} {kept}: {result.text}")
         elif self._recorder is not None and not thrown:
             self._recorder.add_marker(text)
 
@@ -240,7 +243,6 @@ class Guide:
         protocol, slides = self.protocol, self._slides
         n_slides = None if slides is None else len(slides)
         protocol.checked(self._path.stem, self._seconds, n_slides, note)
-        screen.print(f"{protocol.view().title}: {protocol.message}")
         for k, slide in enumerate(slides or ()):
             fingers = ", ".join(slide.slips)
             screen.print(f"  {k + 1}  from {slide.start:.2f} to {slide.end:.2f} s: {fingers}")

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from holdfast.model import Model
 
 WITH_CAMERA = (
-    "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm on. Smaller\n"
-    "slips, and those of the other fingers, are not promised."
+    "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm\n"
+    "on. Smaller slips, and those of the other fingers, are not promised."
 )
 WITHOUT_CAMERA = (
-    "Without --camera no slip is measured: this ends with a calibration, and slips stay\n"
-    "those that the model finds on a hand that it was not trained on."
+    "Without --camera no slip is measured: this ends with a calibration, and the\n"
+    "slips stay those that the model finds on a hand it was not trained on."
 )
 """What the figures will rest on."""
 
@@ -118,14 +118,14 @@ def is_twin(source: str) -> bool:
 
 
 def calibrated(model: "Model", folder: "TeachingFolder") -> "tuple[Model, bool]":
-    """Return the model with the own handling of the holds and carries; whether it has it.
+    """Return the model with the own handling of what was carried; whether it has it.
 
     A model that cannot be calibrated, or is not better for it, stays as it is.
     """
     from holdfast.io import load_recording
     from holdfast.training.calibration import calibrate_with_report
 
-    names = [x.recording for x in folder.kept if x.name in ("hold", "carry")]
+    names = [x.recording for x in folder.kept if x.name == "carry"]
     recordings = [load_recording(folder.path / f"{name}.mcap", labels=False) for name in names]
     try:
         result = calibrate_with_report(model, recordings)

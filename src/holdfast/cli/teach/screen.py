@@ -1,14 +1,11 @@
 """What the guided protocol of `holdfast teach` shows in a terminal, and its keys."""
 
-import sys
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from holdfast.cli.terminal.console import print_message, visible
+from holdfast.cli.terminal.progress import LiveDisplay
 
 if TYPE_CHECKING:
-    from rich.live import Live
-
     from holdfast.live.teaching.protocol import View
 
 TEACH_KEYS = {
@@ -19,7 +16,8 @@ TEACH_KEYS = {
     **{digit: f"throw away {digit}" for digit in "123456789"},
 }
 """What each key does; `q` quits."""
-TEACH_KEY_HELP = "Enter goes on   r repeats   s skips the step   1-9 throws a slide away   q quits"
+TEACH_KEY_HELP = "Enter goes on   r repeats   s skips the step   1-9 throw a slide away   q quits"
+ACTIVE_KEY_HELP = "Enter goes on before the time   r begins again   s skips the step   q quits"
 SCREEN_WIDTH = 80
 """Width of the screen [characters]."""
 BAR_WIDTH = 60
@@ -46,54 +44,25 @@ def screen_lines(view: "View", place: str) -> list[str]:
     bar = "#" * done + "-" * (BAR_WIDTH - done) if view.share or view.left is not None else ""
     room = SCREEN_WIDTH - len(view.title)
     lines = [
-        f"{view.title}{place:>{room}}", "",
+        "", f"{view.title}{place:>{room}}", "",
         f"  {large:<{SCREEN_WIDTH - 10}}{left:>8}", f"  {bar}".rstrip(), "",
         f"  {view.hint}".rstrip(), f"  {visible(view.message)}".rstrip(), "",
-        TEACH_KEY_HELP,
+        TEACH_KEY_HELP if view.decides else ACTIVE_KEY_HELP,
     ]  # fmt: skip
     return [line[:SCREEN_WIDTH].rstrip() for line in lines]
 
 
-class TeachScreen:
+class TeachScreen(LiveDisplay):
     """Screen of the protocol: on a terminal one that is drawn again, elsewhere a line a change."""
 
     def __init__(self) -> None:
-        self._live: Live | None = None  # None where stderr is no terminal
+        super().__init__()
         self._shown = ""
-
-    def __enter__(self) -> Self:
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.live import Live
-
-            console = Console(stderr=True)
-            self._live = Live(
-                console=console, auto_refresh=False, transient=True, redirect_stdout=False
-            )
-            self._live.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._live:
-            self._live.stop()
-
-    def print(self, *texts: str) -> None:
-        """Print messages above the screen."""
-        for text in texts:
-            if self._live:
-                self._live.console.print(visible(text), markup=False, highlight=False)
-            else:
-                print_message(text)
 
     def show(self, view: "View", place: str) -> None:
         """Show what a person sees now; elsewhere than on a terminal, what has changed."""
         if self._live is None:
-            text = f"{view.title}: {view.words}"
+            text = ": ".join(filter(None, (view.title, view.words, view.message * view.decides)))
             if text != self._shown:
                 print_message(text)
             self._shown = text
@@ -104,6 +73,6 @@ class TeachScreen:
             from rich.text import Text
 
             drawn = Text(text, no_wrap=True, overflow="ellipsis")
-            drawn.highlight_words([lines[2].strip()], "bold")
+            drawn.highlight_words([lines[3].strip()], "bold")
             self._live.update(drawn, refresh=True)
         self._shown = text

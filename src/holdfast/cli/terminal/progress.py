@@ -165,20 +165,13 @@ def _format_time(seconds: float) -> str:
     return "-:--:--" if math.isnan(seconds) else str(timedelta(seconds=max(0, round(seconds))))
 
 
-class StatusLine:
-    """Status of a recorder: on a terminal one updated line, elsewhere one line every 10 s.
+class LiveDisplay:
+    """Lines on stderr that are drawn again, where it is a terminal."""
 
-    Args:
-        recorder: a recorder that is open.
-    """
-
-    def __init__(self, recorder: "Recorder") -> None:
-        self._recorder = recorder
+    def __init__(self) -> None:
         self._live: Live | None = None  # None where stderr is no terminal
-        self._next_update = 0.0  # [s, monotonic]
 
     def __enter__(self) -> Self:
-        self._next_update = time.monotonic()
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.live import Live
@@ -190,8 +183,6 @@ class StatusLine:
                 redirect_stdout=False,
             )
             self._live.start()
-        else:
-            self._next_update += STATUS_INTERVAL
         return self
 
     def __exit__(
@@ -204,12 +195,30 @@ class StatusLine:
             self._live.stop()
 
     def print(self, *texts: str) -> None:
-        """Print messages above the line."""
+        """Print messages above the lines."""
         for text in texts:
             if self._live:
                 self._live.console.print(visible(text), markup=False, highlight=False)
             else:
                 print_message(text)
+
+
+class StatusLine(LiveDisplay):
+    """Status of a recorder: on a terminal one updated line, elsewhere one line every 10 s.
+
+    Args:
+        recorder: a recorder that is open.
+    """
+
+    def __init__(self, recorder: "Recorder") -> None:
+        super().__init__()
+        self._recorder = recorder
+        self._next_update = 0.0  # [s, monotonic]
+
+    def __enter__(self) -> Self:
+        super().__enter__()
+        self._next_update = time.monotonic() + (0.0 if self._live else STATUS_INTERVAL)
+        return self
 
     def update(self) -> None:
         """Print the status if the time for the next update has come."""

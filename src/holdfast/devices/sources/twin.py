@@ -12,8 +12,9 @@ from tempfile import TemporaryDirectory
 from holdfast.children import python_command
 from holdfast.devices.sources.replay import Player
 from holdfast.devices.uri import Address
-from holdfast.files import file_stem, whole_file
+from holdfast.files import file_stem, whole_file, write_whole
 from holdfast.io import read_chunks, save_recording
+from holdfast.io.stickers import stamps_path
 from holdfast.recordings import Recording
 from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.objects import load_objects
@@ -23,6 +24,8 @@ from holdfast.twin.simulation import GRASP_CASES, Grasp, simulate
 
 OPEN_SECONDS = 3.0
 """Time with an open hand with which a twin that is taught begins [s]: room for the tare."""
+CAMERA_DELAY = 0.04
+"""Time from a picture to its stamp, as of a webcam [s]."""
 MAX_IDLE = 0.02
 """Longest pause of a read while nothing is asked for [s]; a protocol that does not wait for a
 person asks soon."""
@@ -122,11 +125,14 @@ class AskedTwin(Twin):
         return self._asked is None and self._peek() is None
 
     def film(self, path: Path) -> None:
-        """Write the video of the newest grasp."""
+        """Write the video of the newest grasp, and the times of its pictures beside it."""
         from holdfast.twin.webcam import film_stickers
 
         with whole_file(path, force=True) as part:
-            film_stickers(self._current[0], part)
+            taken = film_stickers(self._current[0], part)
+        stamps = taken + self._shift + CAMERA_DELAY
+        lines = "".join(f"{stamp:.6f}\n" for stamp in stamps.tolist())
+        write_whole(stamps_path(path), lines.encode(), force=True)
 
     def chunks_of(self, number: int) -> Iterable[Recording]:
         """Return the grasp that was asked for."""

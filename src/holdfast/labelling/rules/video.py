@@ -23,12 +23,12 @@ from holdfast.contact import Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io.foreign import read_stickers
-from holdfast.io.stickers import picture_stamps
+from holdfast.io.stickers import picture_stamps, stamps_path
 from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.base import evidence_ratio, label_confidence
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import OBJECT
-from holdfast.labelling.rules.video_clock import VideoClock, flash_offset, video_clock
+from holdfast.labelling.rules.video_clock import USUAL_DELAY, VideoClock, flash_offset, video_clock
 from holdfast.labelling.rules.video_motion import (
     TipMotion,
     VideoRule,
@@ -104,7 +104,7 @@ def propose(
     """
     rule = rule or VideoRule()
     how = fitting_tare(recording, tare)
-    flash = None
+    flash = expected = None
     if motion is not None:
         source, kind = Path(motion), "motion"
         grid, moved = measured_motion(source, column)
@@ -112,13 +112,15 @@ def propose(
     elif video is not None:
         source, kind = Path(video), "video"
         times, levels, places = _filmed(source, fps)
+        if fps is None and stamps_path(source).exists():
+            expected = -USUAL_DELAY  # the stamps are on the clock of the samples
         flash = flash_offset(recording, times, levels)
         tips = tip_motions(times, places, stickers_of(recording, bodies), rule, source)
         grid = regular_grid(times)
     else:
         raise ValueError("neither a video nor a motion given")
     clock = (
-        video_clock(recording, tips, grid, how, source, flash)
+        video_clock(recording, tips, grid, how, source, flash, expected)
         if offset is None
         else VideoClock(offset, 0.0)
     )

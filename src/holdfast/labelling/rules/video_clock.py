@@ -31,6 +31,9 @@ FAST_SHARE = 0.05
 slow motion lags behind the force, because skins creep and objects roll."""
 MIN_FITTED = 100
 """Least number of pictures of a loaded finger."""
+USUAL_DELAY = 0.05
+"""Time from a picture to its stamp by `record --camera`: exposure and transfer take 10 to 100 ms,
+which is within `FINE_REACH` of it [s]."""
 N_CLOCK_PARTS = 8
 """Parts of the recording that are left out in turn for the error of the offset (jackknife)."""
 FITTED_SHARE = 0.2
@@ -78,6 +81,7 @@ def video_clock(
     tare: Tare,
     video: Path,
     coarse: float | None = None,
+    expected: float | None = None,
 ) -> VideoClock:
     """Return the offset of the clock of a video, by what the camera sees and the fingers feel.
 
@@ -88,6 +92,7 @@ def video_clock(
         tare: of the forces.
         video: for messages.
         coarse: offset that is known to `FINE_REACH` [s]; by default it is searched.
+        expected: the coarse offset where the search finds none that is clear [s].
 
     Raises:
         RecordingError: nothing moves alike, or the error is too large.
@@ -96,7 +101,9 @@ def video_clock(
     clear = CLEAR_PEAK
     if coarse is None:
         coarse, clear = _coarse_offset(recording, tips, grid, tare)
-    if clear < CLEAR_PEAK:
+    if clear < CLEAR_PEAK and expected is not None:
+        coarse = expected
+    elif clear < CLEAR_PEAK:
         raise RecordingError(
             f"{video}: its motion is not that of recording {recording.name!r} at any offset (the "
             f"best is {clear:.1f} times as likely as another, {CLEAR_PEAK:g} times expected): "

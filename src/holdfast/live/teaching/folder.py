@@ -40,7 +40,7 @@ class TeachingFolder:
         self.results: list[GraspResult] = []
         if self._journal.exists():
             self.results = self._read()
-            if not resume:
+            if self.results and not resume:
                 raise OutputError(
                     f"{path} has {len(self.results)} grasps of a protocol: --resume goes on with "
                     "it, --to FOLDER begins another"

@@ -113,6 +113,7 @@ class View(NamedTuple):
         left: time left [s]; None without an end.
         share: share of the time that is over.
         message: result of the check, or what is missing.
+        decides: whether a person decides now what becomes of the grasp.
     """
 
     title: str
@@ -121,6 +122,7 @@ class View(NamedTuple):
     left: float | None = None
     share: float = 0.0
     message: str = ""
+    decides: bool = False
 
 
 class GuidedProtocol:
@@ -198,6 +200,8 @@ class GuidedProtocol:
             key: `next`, `repeat`, `skip` (the whole step) or `quit`.
         """
         if key == "quit":
+            if self._recording:  # one that has passed is not recorded again
+                self._keep(self.passed)
             self.stopped, self.stage = True, Stage.OVER
         elif self.stage in (Stage.CHECK, Stage.OVER):
             return []
@@ -258,7 +262,7 @@ class GuidedProtocol:
             message = f"in contact: {', '.join(self._touching)}"
         elif stage is Stage.DECIDE and not self.passed:
             words = "NOT YET"
-        return View(title, words, hint, left, share, message)
+        return View(title, words, hint, left, share, message, stage is Stage.DECIDE)
 
     def _begin(self) -> None:
         """Begin the next grasp, or the same one again."""

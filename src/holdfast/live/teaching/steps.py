@@ -59,14 +59,14 @@ STEPS = (
     ),
     Step(
         "carry", "CARRY AND TURN IT", "Move as in your task, as fast as in it. Nothing may slide.",
-        Check.CARRIED, 20.0, n_actions=8, in_view=False,
+        Check.CARRIED, 30.0, n_actions=12, in_view=False,
     ),
     Step(
-        "pull", "PULL UNTIL IT SLIDES", "Let it rest, then pull or turn it in another direction.",
+        "pull", "PULL UNTIL IT SLIDES", "Move it to and fro first. Then pull or turn it, and rest.",
         Check.SLID, 30.0, n_actions=6, n_grasps=3,
     ),
     Step(
-        "push", "PUSH UNTIL IT SLIDES", "Let it rest, then push it from another side.",
+        "push", "PUSH UNTIL IT SLIDES", "From all sides; let it rest between two pushes.",
         Check.SLID, 24.0, n_actions=6, n_grasps=3,
     ),
     Step("tap", "TAP IT", "With a finger, so that it does not slide.", Check.FELT, 20.0, 8),

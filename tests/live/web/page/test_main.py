@@ -246,10 +246,14 @@ def test_the_probability_of_a_slip_has_a_curve_and_its_threshold(visit, service)
     }"""
     page.keyboard.press("k")
     with_line = page.evaluate(row)
-    page.evaluate(
-        "() => Object.values(holdfast.plots.fingers).forEach((f) => { f.slip_threshold = null; })"
-    )
+    change_all = "(x) => Object.values(holdfast.plots.fingers).forEach((f) => "
+    change_all += "{ f.slip_threshold = x; })"
+    page.evaluate(change_all, 1)  # of a model that reports no slip until it is taught
+    at_1 = row.replace("0.6", "1")
+    without_line = page.evaluate(at_1)
+    page.evaluate(change_all, None)
     assert page.evaluate(row) != with_line
+    assert page.evaluate(at_1) == without_line
     page.keyboard.press("2")
     assert plot_keys(page) == ["force", "sigma", "probability"]  # of a finger without a rule
 
