@@ -119,6 +119,19 @@ def test_a_grasp_is_repeated_and_a_step_skipped(lead):
     assert [path.name for path in folder.path.glob("*.mcap")] == ["002-open.mcap"]
 
 
+def test_keys_while_a_grasp_is_checked_wait(lead):
+    pressed = []
+
+    def choose(protocol):
+        if protocol.stage is Stage.CHECK and not pressed:
+            pressed.append("repeat")
+            return ["repeat"]
+        return goes_on(protocol)
+
+    folder = lead(choose, HOLD)
+    assert (pressed, [x.kept for x in folder.results]) == (["repeat"], [True])
+
+
 def test_without_a_person_a_grasp_that_fails_is_repeated_once(lead):
     still = HOLD._replace(check=Check.FELT, name="tap", n_actions=99)
     folder = lead(lambda _: [], still, unattended=True)

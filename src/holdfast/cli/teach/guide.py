@@ -177,8 +177,6 @@ class Guide:
                 screen.print(str(refusal))
             self._judge("", screen)
         elif text in ("next", "repeat", "skip", "quit"):
-            if text == "repeat" or protocol.stage is Stage.DECIDE:
-                self._checking = None
             n_results = len(protocol.results)
             self._follow(protocol.press(text), screen)
             if len(protocol.results) != n_results:
