@@ -119,6 +119,14 @@ def test_a_grasp_is_repeated_and_a_step_skipped(lead):
     assert [path.name for path in folder.path.glob("*.mcap")] == ["002-open.mcap"]
 
 
+def test_a_robot_whose_lines_end_stops_the_protocol(lead, monkeypatch):
+    monkeypatch.setattr(Keys, "ended", True)
+    with pytest.raises(TrainingError, match="stopped in step open; 1 of 2 grasps are in "):
+        lead(lambda _: [], OPEN, HOLD)
+    monkeypatch.undo()
+    assert [x.name for x in lead(goes_on, OPEN, HOLD, resume=True).kept] == ["open", "hold"]
+
+
 def test_keys_while_a_grasp_is_checked_wait(lead):
     pressed = []
 

@@ -253,3 +253,14 @@ def test_what_was_carried_calibrates(tmp_path, capsys, name):
         "recordings that begin with an open hand",
     }
     assert capsys.readouterr().err == f"not calibrated: {why[name]}\n"
+
+
+def test_a_protocol_that_is_complete_needs_no_hand(capsys, tmp_path, monkeypatch):
+    """Only the fit was stopped: --resume goes on with it."""
+    folder = TeachingFolder(tmp_path / "new-grasps", resume=False)
+    names = [step.name for step in STEPS if not step.in_view]
+    folder.save([GraspResult(name, 1, 9.0, True, f"00{k}-{name}") for k, name in enumerate(names)])
+    monkeypatch.setattr(verb, "calibrated", lambda model, folder: (model, True))
+    monkeypatch.chdir(tmp_path)
+    code, printed, _ = run(capsys, "teach", "xela://127.0.0.1:1", "-o", "new.json", "--resume")
+    assert (code, printed.split(":")[0]) == (0, "new.json")
