@@ -44,6 +44,9 @@ from holdfast.training.tune import N_SHOWN, CurvePoint
 
 WANTED_FALSE_ALARMS = 1.5
 """False alarms per minute of held time of a finger for which the threshold is set by default."""
+TAUGHT_C = 0.1
+"""C of the fit, a tenth of that of a model of many recordings: 140 weights have some tens of slips.
+docs/teach.md has what it is worth."""
 MIN_SLIPS, FEW_SLIPS = 3, 10
 """Slips of fingers below which nothing is fitted, and below which the user is warned."""
 MIN_SLIDING = 20
@@ -225,7 +228,7 @@ def teach_with_report(
     record = Training(
         recordings={part.name: part.digest for part in parts.values()},
         split="recording",
-        parameters={ANY_FINGER: dict(LogisticRegression().reference)},
+        parameters={ANY_FINGER: {**LogisticRegression().reference, "C": TAUGHT_C}},
         seed=seed,
         versions={name: version(name) for name in ("holdfast", "numpy")},
         sliding_samples={ANY_FINGER: samples.n_positive},
@@ -336,7 +339,9 @@ def _fitted(samples: TargetSamples, left_out: Collection[int]) -> Head:
     Raises:
         TrainingError: nothing that slides, or nothing that holds still, is left.
     """
-    head = fit_slip(samples, left_out, TAUGHT_FEATURES, is_any=False, squares=True, n_min=1)
+    head = fit_slip(
+        samples, left_out, TAUGHT_FEATURES, is_any=False, squares=True, n_min=1, c=TAUGHT_C
+    )
     if head is None:
         raise TrainingError(
             "without one of the recordings no slip is left; slips in at least three of them "

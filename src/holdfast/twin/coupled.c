@@ -147,7 +147,10 @@ static vec finish_node(
     return add(scaled(k->normal, k->pressed * damped), friction);
 }
 
-/* Add the nodes of a fingertip that may be inside the object to an empty patch. */
+/* Fill an empty patch with the nodes of a fingertip that are inside the object.
+ *
+ * A node that presses nothing sleeps until the fingertip may have come as much closer as it lacks:
+ * `travel` adds up all approach and all displacement, and `wake` is its value then. */
 static void fill_patch(
     patch *p, const constants *c, const relative *r, double dt, bristle *bristles, vec *forces,
     double travel)
@@ -156,7 +159,7 @@ static void fill_patch(
     struct {
         size_t node;
         vec force;
-    } gone[MAX_COUPLED];
+    } gone[MAX_COUPLED]; /* nodes that pressed in the last step and are outside now */
     size_t n_gone = 0;
     for (size_t i = 0; i < c->n_nodes; ++i) {
         bristle *const b = &bristles[i];
@@ -206,7 +209,7 @@ static void fill_patch(
     }
 }
 
-/* As `sum_nodes`, of nodes that are coupled. */
+/* Return force and torque about the object of all nodes of a fingertip, which are coupled. */
 static wrench sum_coupled_nodes(
     const constants *c, const relative *r, double dt, bristle *bristles, vec *forces, tip *out)
 {
