@@ -40,8 +40,10 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path, monkeyp
     assert (code, err) == (0, "")
     lines = printed.splitlines()
     assert lines[0].startswith("48 slips in 6 grasps: of those that it was not taught, ")
-    assert [line.split()[0] for line in lines if "0.00" in line][-1] == "never"
-    assert any(line.startswith("builtin:any ") for line in lines)
+    first = [line.split()[0] for line in lines if line.strip()]
+    assert first.index("taught") < first.index("builtin:any") < first.index("never")
+    rates = lines.index(next(line for line in lines if line.startswith("--false-alarms")))
+    assert [line.split()[0] for line in lines[rates + 1 : rates + 6]] == "0.5 1 1.5 3 6".split()
     assert lines[-1] == f"{out}: taught by 6 recordings"
     assert all(len(line) <= 80 for line in lines[:-1])
     assert Model.load(out).finger("thumb").slip.choice.n == 48
@@ -55,7 +57,8 @@ def test_json(capsys, grasps, tmp_path):
     report = json.loads(printed)
     assert code == 0
     assert set(report) == {
-        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "warnings", "verdict"
+        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "warnings",
+        "verdict",
     }  # fmt: skip
     slip = report["heads"]["slip"]
     assert (slip["n"], slip["grasps"], slip["out_of_fold"]["n"]) == (48, 6, 48)
