@@ -15,7 +15,7 @@ import re
 import runpy
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -43,24 +43,28 @@ GLOBAL_OPTIONS = {"--config", "--version", "--help", "--install-completion", "--
 GRIP_NAMES = [name for name in holdfast_grip.__all__ if name != "LAWS"]
 """Public names of holdfast-grip with a docstring."""
 ASIDE = ("study", "decisions")
-"""Folders of `docs/` whose pages enter the navigation by themselves."""
+"""Folders of `docs/` of whose pages the navigation has a list only."""
 
 
 def on_config(config: MkDocsConfig) -> None:
-    """Add the generated pages and the folders of pages to the navigation."""
+    """Add the generated pages and lists of pages to the navigation."""
     sections = {title: pages for section in config.nav or [] for title, pages in section.items()}
-    sections["Reference"] += [
-        {"Verbs": [f"reference/{verb}.md" for verb in VERBS]},
-        {"Python": [f"reference/python/{package}.md" for package in _packages()]},
-    ]
-    sections["Study"] += _pages_of("study")
-    sections["Explanation"] += [{"Decisions": _pages_of("decisions")}]
+    # One page leads to the many that are looked up, so that the navigation stays short.
+    sections["Reference"] += ["reference/verbs.md", "reference/python.md"]
+    sections["Study"] += ["study/pages.md"]
+    sections["Background"] += ["decisions/pages.md"]
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> None:
     """Add the pages that are made from the program."""
     pages = {f"reference/{verb}.md": _verb_page(verb) for verb in VERBS}
     pages |= {f"reference/python/{name}.md": _package_page(name) for name in _packages()}
+    pages["reference/verbs.md"] = _list("Verbs", {verb: f"{verb}.md" for verb in VERBS})
+    python = {f"holdfast.{name}": f"python/{name}.md" for name in _packages()}
+    pages["reference/python.md"] = _list("Python", python)
+    for folder in ASIDE:
+        names = {_title(path): path.name for path in sorted((DOCS / folder).glob("*.md"))}
+        pages[f"{folder}/pages.md"] = _list(folder.capitalize(), names)
     pages["gallery.md"] = _gallery()
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text("utf-8")
     for path, text in pages.items():
@@ -92,8 +96,14 @@ def _packages() -> list[str]:
     return [*holdfast._NAMES, "holdfast_grip"]
 
 
-def _pages_of(folder: str) -> list[str]:
-    return [f"{folder}/{path.name}" for path in sorted((DOCS / folder).glob("*.md"))]
+def _title(path: Path) -> str:
+    return path.read_text("utf-8").partition("\n")[0].lstrip("# ")
+
+
+def _list(title: str, pages: Mapping[str, str]) -> str:
+    """Return a page that links to others."""
+    links = "\n".join(f"- [{name}]({page})" for name, page in pages.items())
+    return f"# {title}\n\n{links}\n"
 
 
 def _printed(*words: str) -> str:

@@ -88,3 +88,14 @@ def test_the_front_page_installs_what_there_is():
     page = (hooks.DOCS / "index.md").read_text("utf-8")
     assert "uv run holdfast demo" in page
     assert not re.search(r"pip install [^-.]", page)
+
+
+def test_the_navigation_is_short_and_its_user_pages_too():
+    """A person finds a page by eye: at most 45 pages; what is looked up stands aside."""
+    text = (hooks.ROOT / "mkdocs.yml").read_text("utf-8").partition("\nnav:\n")[2]
+    nav = re.findall(r"[\w/-]+\.md", text)
+    assert len(nav) + 4 <= 45  # the hooks add lists of verbs, names, decisions and the study
+    aside = {"gallery.md", "changelog.md", "json.md", "formats.md", "metrics.md", "c-header.md"}
+    users = re.findall(r"[\w/-]+\.md", text.partition("  - Background:")[0])
+    pages = [hooks.DOCS / page for page in users if page not in aside]
+    assert sum(len(page.read_text("utf-8").split()) for page in pages) <= 18_000

@@ -100,7 +100,7 @@ def test_other_estimates_where_the_rate_changes_which_the_documents_state():
     """A repair of this difference changes these documents too."""
     mine, other = both_of("builtin:noise-floor", bursts)
     assert np.mean([a.state != b.state for a, b in zip(mine, other, strict=True)]) > 0.01
-    for page in ("live.md", "decisions/0003-one-kernel-live-and-offline.md"):
+    for page in ("details/live.md", "decisions/0003-one-kernel-live-and-offline.md"):
         text = (DOCS / page).read_text("utf-8")
         for where in ("rate changes", "bursts", "dropped", "constant rate with exact stamps"):
             assert where in text, (page, where)

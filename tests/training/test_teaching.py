@@ -16,7 +16,7 @@ from holdfast.metrics.slips import SlipCounts, SlipCurve
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label
-from holdfast.training import evaluate, teach_with_report
+from holdfast.training import evaluate, teach_with_report, teaching
 from holdfast.training.teaching import taught_recording
 
 from .build import sliding_recording, tiny_recording
@@ -104,6 +104,15 @@ class TestFigures:
             f"finger, {taught.hand_alarms:.2g} of the hand."
         )
         assert taught.hand_alarms >= pooled.false_alarms_per_minute["held"]
+
+    def test_the_curve_has_the_threshold_of_each_rate_and_that_of_the_model(self, taught):
+        assert [point.wanted for point in taught.curve] == sorted([0.5, 1.0, 1.5, 3.0, 6.0])
+        thresholds = [point.threshold for point in taught.curve]
+        assert thresholds == sorted(thresholds, reverse=True)
+        chosen = taught.curve[3]  # 3.0 were wanted
+        assert chosen.threshold == taught.model.finger("index").slip.threshold
+        assert chosen.found == taught.slips.pooled.incipient["0.1"]
+        assert chosen.hand_false_alarms == taught.hand_alarms
 
     def test_the_base_is_scored_on_the_same_slips(self, taught):
         assert taught.base.pooled.n == taught.slips.pooled.n == 48
@@ -200,9 +209,10 @@ def test_a_rate_that_is_not_above_0_is_refused(rate, recordings):
         teach(BASE, recordings, false_alarms=rate)
 
 
-def test_no_threshold_is_quiet_enough(recordings):
+def test_no_threshold_is_quiet_enough(recordings, monkeypatch):
+    monkeypatch.setattr(teaching, "weighted_threshold", lambda curve, false_alarms: None)
     with pytest.raises(TrainingError) as failure:
-        teach(BASE, [_turned(r) for r in recordings[:3]] + recordings[3:], false_alarms=0.01)
+        teach(BASE, recordings, false_alarms=0.01)
     assert str(failure.value).startswith(
         "no threshold gives at most 0.01 false alarms a minute in "
     )

@@ -261,7 +261,7 @@ class GripController:
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
-        if problem is GripReason.LOST and self._fault is _NONE and self._has_opened():
+        if problem is GripReason.LOST and not self._latched and self._has_opened():
             events = self._events
             self.reset()
             self._events = events

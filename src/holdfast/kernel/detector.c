@@ -31,8 +31,10 @@ static int32_t hf_reason(const hf_finger *f, const holdfast_rule *rule, const ho
     if (d->is_unsteady) {
         return HOLDFAST_LOAD;
     }
-    const hf_real threshold = rule->heads[HOLDFAST_HEAD_STABLE].threshold;
-    return d->probability >= threshold ? HOLDFAST_HOLD : HOLDFAST_READY;
+    if (d->probability >= rule->heads[HOLDFAST_HEAD_STABLE].threshold) {
+        return HOLDFAST_HOLD;
+    }
+    return HOLDFAST_READY;
 }
 
 static void hf_fill_estimate(

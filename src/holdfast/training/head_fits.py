@@ -45,6 +45,7 @@ def fit_slip(
     is_any: bool,
     squares: bool = False,
     n_min: int = MIN_SLIDING_SAMPLES,
+    c: float | None = None,
 ) -> Head | None:
     """Fit the head `slip` to the samples that are in no unit that is left out.
 
@@ -58,6 +59,7 @@ def fit_slip(
         is_any: whether the model is for any hand.
         squares: whether the head has squares of the features.
         n_min: number of sliding samples from which a head is fitted.
+        c: weight of a sample against the penalty on the weights; by default that of the recipe.
 
     Returns:
         The head, with a threshold of 0.5; None with too few samples that slide, or none that hold
@@ -70,6 +72,8 @@ def fit_slip(
     classes = Samples(samples.features[kept], slides, samples.units[kept])
     recipe = LogisticRegression()
     parameters = {**recipe.reference, "class_weight": "balanced" if is_any else None}
+    if c is not None:
+        parameters["C"] = c
     if squares:
         # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
         mean, scale, standard = standardise(classes.features)

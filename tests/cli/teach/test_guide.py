@@ -2,6 +2,7 @@ import pytest
 
 from holdfast.cli.teach import guide as module
 from holdfast.cli.teach.guide import Guide, confirm_safety
+from holdfast.cli.teach.screen import TeachScreen
 from holdfast.cli.terminal.control import StopRequest
 from holdfast.devices.sources.replay import ReplaySource
 from holdfast.errors import OutputError, SourceError, TrainingError
@@ -54,7 +55,7 @@ def lead(grasp, tmp_path):
             keys = Keys(choose)
             model = Model.load("builtin:any")
             keys.guide = Guide(source, model, folder, steps, **options)
-            keys.guide.run(StopRequest(), keys)
+            keys.guide.run(StopRequest(), keys, TeachScreen())
         return folder
 
     return run
@@ -116,6 +117,27 @@ def test_a_grasp_is_repeated_and_a_step_skipped(lead):
         ("open", False), ("open", True), ("hold", False), ("hold", False)
     ]  # fmt: skip
     assert [path.name for path in folder.path.glob("*.mcap")] == ["002-open.mcap"]
+
+
+def test_a_robot_whose_lines_end_stops_the_protocol(lead, monkeypatch):
+    monkeypatch.setattr(Keys, "ended", True)
+    with pytest.raises(TrainingError, match="stopped in step open; 1 of 2 grasps are in "):
+        lead(lambda _: [], OPEN, HOLD)
+    monkeypatch.undo()
+    assert [x.name for x in lead(goes_on, OPEN, HOLD, resume=True).kept] == ["open", "hold"]
+
+
+def test_keys_while_a_grasp_is_checked_wait(lead):
+    pressed = []
+
+    def choose(protocol):
+        if protocol.stage is Stage.CHECK and not pressed:
+            pressed.append("repeat")
+            return ["repeat"]
+        return goes_on(protocol)
+
+    folder = lead(choose, HOLD)
+    assert (pressed, [x.kept for x in folder.results]) == (["repeat"], [True])
 
 
 def test_without_a_person_a_grasp_that_fails_is_repeated_once(lead):
@@ -199,7 +221,7 @@ def test_a_camera_films_the_steps_that_it_sees(lead, monkeypatch):
     monkeypatch.setattr(module, "label_grasp", lambda path, step: (None, f"{path.stem}: no video"))
     seen = HOLD._replace(in_view=True)
     folder = lead(goes_on, seen, TAP, camera="0")
-    assert filmed == [("0", "001-hold.mp4"), "001-hold.mcap", "closed"]
+    assert filmed[-3:] == [("0", "001-hold.mp4"), "001-hold.mcap", "closed"]
     assert folder.kept[0].text.startswith("held for 3 s")
 
 
@@ -210,7 +232,7 @@ def test_a_camera_films_the_steps_that_it_sees(lead, monkeypatch):
 def test_safety_is_confirmed_first(answers, ended, confirmed, capsys):
     keys = Keys()
     keys.poll, keys.ended = lambda: answers, ended
-    assert confirm_safety("No camera.", StopRequest(), keys) is confirmed
+    assert confirm_safety("No camera.", StopRequest(), keys, TeachScreen()) is confirmed
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "holdfast sends nothing to any hand. Before you go on:"
     assert lines[-2:] == ["No camera.", "Enter: all of this holds   q: quit"]

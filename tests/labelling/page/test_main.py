@@ -334,6 +334,17 @@ def test_a_label_is_corrected_as_the_audit_expects(visit, service, suspect, expe
     shows(page, "#review-items", "^$")
 
 
+def test_labels_inside_a_recording_count_as_labelled(visit):
+    one, two = Recording("one"), Recording("two")
+    held = {"start": 1.0, "end": 2.0, "state": "stable", "cause": None, "evidence": "",
+            "confidence": 1.0, "author": "ann"}  # fmt: skip
+    one.file = {**one.file, "labels": {**one.file["labels"], "thumb": [held]}}
+    with FakeService(one, two) as service:
+        page = visit(service.url)
+        ready(page)
+        shows(page, "#progress", "^1 of 2 labelled, 1 as imported$")
+
+
 def test_the_next_recording(visit):
     with FakeService(Recording("one"), Recording("two", fingers=("left", "right"))) as service:
         page = visit(service.url)

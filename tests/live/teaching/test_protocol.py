@@ -159,7 +159,7 @@ def test_an_open_hand_is_checked_by_its_health():
     assert hand.markers == ["teach: open begins", "teach: open ends"]
     hand.protocol.checked("001-open", 4.0)
     assert hand.protocol.passed
-    assert hand.protocol.message == "2 modules, anyskin (5 taxels, 100 Hz): is that your sensor?"
+    assert hand.protocol.message == "is this your hand: 2 modules, anyskin (5 taxels, 100 Hz)?"
 
 
 def test_dead_taxels_are_named_and_a_short_check_fails():
@@ -168,7 +168,7 @@ def test_dead_taxels_are_named_and_a_short_check_fails():
     hand.until(Stage.CHECK, noise=0.0)
     hand.protocol.checked("x", 4.0)
     assert hand.protocol.passed
-    assert "; taxel 5 of index is dead" in hand.protocol.message
+    assert "taxel 4 of index is dead; taxel 5 of index is dead" in hand.protocol.message
     hand = Feeder(step(Check.HEALTH, "open", seconds=0.1))
     hand.until(Stage.CHECK)
     hand.protocol.checked("x", 4.0)

@@ -9,7 +9,6 @@ from pathlib import Path
 from threading import Thread
 
 from holdfast.cli.teach.screen import SAFETY, TeachScreen
-from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.control import MarkerKeys, StopRequest
 from holdfast.devices.sources import Source
 from holdfast.devices.sources.twin import AskedTwin
@@ -41,16 +40,16 @@ Checked = tuple[list[Slide] | None, str]
 """Slides of a grasp, or None; and why there are none."""
 
 
-def confirm_safety(camera: str, stop: StopRequest, keys: MarkerKeys) -> bool:
+def confirm_safety(camera: str, stop: StopRequest, keys: MarkerKeys, screen: TeachScreen) -> bool:
     """Ask what a person must have seen to before a hand holds anything; whether it is so.
 
     Args:
         camera: what a camera measures, or what cannot be promised without one.
         stop: of the signals.
-        keys: of the terminal or pipe.
+        keys: of the terminal, a pipe or the page.
+        screen: that shows the questions.
     """
-    for line in (*SAFETY, *camera.splitlines(), "Enter: all of this holds   q: quit"):
-        print_message(line)
+    screen.ask([*SAFETY, *camera.splitlines(), "Enter: all of this holds   q: quit"])
     while not (stop.requested or keys.stop_pressed):
         answers = keys.poll()
         if "next" in answers:
@@ -102,7 +101,7 @@ class Guide:
         self._n_asked = self._n_attempts = 0
         self._n_before = len(folder.results)
 
-    def run(self, stop: StopRequest, keys: MarkerKeys) -> None:
+    def run(self, stop: StopRequest, keys: MarkerKeys, screen: TeachScreen) -> None:
         """Go through the protocol.
 
         Raises:
@@ -113,11 +112,13 @@ class Guide:
         protocol = self.protocol
         try:
             with ExitStack() as stack:
-                screen = stack.enter_context(TeachScreen())
+                stack.enter_context(screen)
                 stack.callback(self._close)
                 while protocol.stage is not Stage.OVER:
                     self._step(screen, keys)
-                    if stop.requested or keys.stop_pressed:
+                    # A robot whose lines have ended decides nothing any more.
+                    undecided = protocol.stage is Stage.DECIDE and not self._unattended
+                    if stop.requested or keys.stop_pressed or (undecided and keys.ended):
                         self._press("quit", screen)
             if protocol.stopped:
                 raise TrainingError(f"stopped in step {protocol.step.name}")
@@ -178,8 +179,6 @@ class Guide:
                 screen.print(str(refusal))
             self._judge("", screen)
         elif text in ("next", "repeat", "skip", "quit"):
-            if text == "repeat" or protocol.stage is Stage.DECIDE:
-                self._checking = None
             n_results = len(protocol.results)
             self._follow(protocol.press(text), screen)
             if len(protocol.results) != n_results:

@@ -1,21 +1,26 @@
 """Options of the guided protocol of `holdfast teach`, and the protocol with them."""
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import CameraOption, awaited, check_speed
-from holdfast.cli.teach.screen import TEACH_KEYS
+from holdfast.cli.options import LOCALHOST, CameraOption, ServerOptions, awaited, check_speed
+from holdfast.cli.teach.screen import TeachKeys, TeachScreen
 from holdfast.cli.terminal.console import message_if_slow, print_message
-from holdfast.cli.terminal.control import MarkerKeys, handle_stop_signals
+from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.errors import HoldfastError, TrainingError, require_extras
 
 if TYPE_CHECKING:
     from holdfast.live.teaching.folder import TeachingFolder
+    from holdfast.live.teaching.service import TeachService
     from holdfast.model import Model
 
+TEACH_ADDRESS = ServerOptions(LOCALHOST, port=8082)
+"""Default address of the page."""
 WITH_CAMERA = (
     "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm\n"
     "on. Smaller slips, and those of the other fingers, are not promised."
@@ -43,6 +48,14 @@ class GuideOptions:
         bool, typer.Option("--unattended", help="With twin: only: no keys, faster than real time.")
     ] = False
 
+    page: Annotated[
+        bool,
+        typer.Option(
+            "--page",
+            help="Show it on a page as well, for a phone: --host 0.0.0.0 --token-file FILE.",
+        ),
+    ] = False
+
     def check(self, source: str, data: Path | None, speed: float) -> None:
         """Check that the options fit each other.
 
@@ -54,8 +67,8 @@ class GuideOptions:
             given = f"{source} and --from {data}" if source else "neither"
             raise ValueError(f"a SOURCE, or recordings with --from, expected; {given} given")
         if data is not None:
-            if self.camera or self.folder or self.resume or self.unattended:
-                raise ValueError("--camera, --to, --resume and --unattended need a SOURCE")
+            if self != WITHOUT_PROTOCOL:
+                raise ValueError("--camera, --to, --resume, --unattended and --page need a SOURCE")
             return
         check_speed(source, speed)
         if is_twin(source):
@@ -69,7 +82,9 @@ class GuideOptions:
             )
         require_extras("label", *(("video",) if self.camera else ()))
 
-    def run(self, source: str, model: "Model", out: Path, speed: float) -> "TeachingFolder":
+    def run(
+        self, source: str, model: "Model", out: Path, speed: float, access: ServerOptions
+    ) -> "TeachingFolder":
         """Lead through the protocol, and return the folder of its grasps.
 
         Raises:
@@ -80,6 +95,7 @@ class GuideOptions:
         from holdfast.cli.teach.guide import Guide, confirm_safety, open_taught
         from holdfast.live.camera import CameraRecorder
         from holdfast.live.teaching.folder import TeachingFolder
+        from holdfast.live.teaching.protocol import GuidedProtocol, Stage
         from holdfast.live.teaching.steps import STEPS
 
         path = self.folder or out.with_name(f"{out.stem}-grasps")
@@ -87,12 +103,16 @@ class GuideOptions:
         # Without a camera, what slides teaches nothing.
         steps = STEPS if is_filmed else tuple(step for step in STEPS if not step.in_view)
         folder = TeachingFolder(path, resume=self.resume)
+        if GuidedProtocol({}, folder.results, steps).stage is Stage.OVER:
+            return folder  # only the fit was stopped
         if self.camera:  # a wrong one is reported before somebody stands at the robot
             CameraRecorder(self.camera, path / "camera.mp4").close()
-        with handle_stop_signals() as stop, MarkerKeys(TEACH_KEYS) as keys:
+        with handle_stop_signals() as stop, ExitStack() as stack:
+            page = stack.enter_context(_page(access)) if self.page else None
+            keys, screen = stack.enter_context(TeachKeys(page)), TeachScreen(page)
             stop.graceful = True
             promise = WITH_CAMERA if is_filmed else WITHOUT_CAMERA
-            if not (self.unattended or confirm_safety(promise, stop, keys)):
+            if not (self.unattended or confirm_safety(promise, stop, keys, screen)):
                 raise TrainingError("not confirmed: nothing was recorded")
             stop.graceful = False  # Ctrl-C ends the wait for the source
             with (
@@ -104,12 +124,26 @@ class GuideOptions:
                 guide = Guide(
                     opened, model, folder, steps, camera=self.camera, unattended=self.unattended
                 )
-                guide.run(stop, keys)
+                guide.run(stop, keys, screen)
         return folder
 
 
 WITHOUT_PROTOCOL = GuideOptions()
 """Options of `--from`, which records nothing."""
+
+
+@contextmanager
+def _page(access: ServerOptions) -> "Iterator[TeachService]":
+    """Serve the page of the protocol, and print its address."""
+    from holdfast.live.teaching.service import TeachService, serving
+    from holdfast.web.guard import Guard
+    from holdfast.web.server import page_url
+
+    token = access.find_token()
+    service = TeachService(Guard(access.host, token))
+    with serving(service, access.host, access.port) as url:
+        print_message(f"{page_url(url, token)} shows the protocol")
+        yield service
 
 
 def is_twin(source: str) -> bool:

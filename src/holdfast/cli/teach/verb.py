@@ -12,12 +12,13 @@ from holdfast.cli.options import (
     JsonOption,
     ModelOutput,
     SeedOption,
+    ServerOptions,
     SpeedOption,
     StartOptions,
     complete_source,
 )
-from holdfast.cli.teach.options import WITHOUT_PROTOCOL, GuideOptions, calibrated
-from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.teach.options import TEACH_ADDRESS, WITHOUT_PROTOCOL, GuideOptions, calibrated
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_paragraph
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import TrainingError
 
@@ -52,6 +53,7 @@ def teach(
         ),
     ] = 1.5,
     speed: Annotated[SpeedOption, RARE] = 1.0,
+    access: Annotated[ServerOptions, RARE] = TEACH_ADDRESS,
     parallel: EngineOptions,
     seed: Annotated[SeedOption, RARE] = 0,
     force: ForceOption = False,
@@ -87,17 +89,17 @@ def teach(
     given, engine = Model.load(model), parallel.start()
     base, steps, path = given, [], data
     if path is None:
-        folder = guide.run(source, given, out, speed)
+        folder = guide.run(source, given, out, speed, access)
         base, is_calibrated = calibrated(given, folder)
         steps, path = folder.results, folder.path
         if not any(result.n_slides for result in folder.kept):
             if not is_calibrated:
                 raise TrainingError(f"nothing was learned from {path}: no slip was measured")
             base.save(out, force=force)
-            print_message(f"{out}: {NO_SLIPS}")
             if as_json:
-                document = {"model": out, "heads": {}, "verdict": NO_SLIPS}
-                print_json({**document, "steps": steps})
+                print_json({"model": out, "steps": steps, "heads": {}, "verdict": NO_SLIPS})
+            else:
+                print_paragraph(f"{out}: {NO_SLIPS}")
             return
     taught = teach_with_report(
         base, start.load_dataset(engine.path(path)),

@@ -64,8 +64,9 @@ export class RecordingList {
   }
 
   showProgress() {
-    const n = this.all.filter(({ labelled }) => labelled).length;
-    setText(byId("progress"), `${n} of ${this.all.length} labelled`);
+    const kinds = this.all.map(progressOf), inside = kinds.filter((kind) => kind === "inside").length;
+    const n = inside + kinds.filter((kind) => kind === "saved").length;
+    setText(byId("progress"), `${n} of ${this.all.length} labelled${inside ? `, ${inside} as imported` : ""}`);
     byId("progress-bar").style.transform = `scaleX(${this.all.length ? n / this.all.length : 0})`;
   }
 

@@ -421,7 +421,7 @@ class GuidedProtocol:
             for name, x in modules.items()
         }
         n = len(modules)
-        text = f"{n} module{'s' * (n > 1)}, {', '.join(kinds)}: is that your sensor?"
+        text = f"is this your hand: {n} module{'s' * (n > 1)}, {', '.join(kinds)}?"
         findings = changes_since(HealthCheck("", 0, modules), None)
         # Dead taxels are left out by every model: they are named, and the protocol goes on.
-        return True, "; ".join([text, *findings])
+        return True, " ".join([text, "; ".join(findings)]).rstrip()

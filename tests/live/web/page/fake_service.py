@@ -118,6 +118,7 @@ class Tape:
         self.slip_threshold = None  # without a slip rule
         self.slips_now = []  # slips of the next message
         self.model = "builtin:twin"
+        self.source = "twin:?object=can&seed=1"
         self.advice = []  # about the model on these fingers
 
     def hello(self):
@@ -137,7 +138,7 @@ class Tape:
         }
         return {
             "schema": "holdfast.live/1", "type": "hello", "model": self.model,
-            "source": "twin:?object=can&seed=1", "fingers": fingers,
+            "source": self.source, "fingers": fingers,
             "modules": {name: track.layout.n_taxels for name, track in self.tracks.items()},
             "rate": 150.0, "started": time.time(), "can_record": True,
             "faults": {fault: text._asdict() for fault, text in FAULT_TEXTS.items()},

@@ -521,7 +521,34 @@ def test_the_end_of_the_source_is_shown(visit, service):
     shows(page, "#health", "^source ended")
 
 
+def test_the_twin_between_two_grasps_is_no_silent_source(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    service.patch = {"health": {"rate": None, "n_packets": 12, "n_lost": 0, "n_refused": 0,
+                                "n_dropped": 0, "silent": True, "delay": 0.0,
+                                "latency": {"p50": None, "p99": None, "max": None}}}  # fmt: skip
+    shows(page, "#hand-word", "NEXT GRASP")
+    assert page.locator("#alert").is_hidden()
+
+
+def test_a_load_that_changes_is_no_hold_time(visit, service):
+    change(service, state="UNSTABLE", reason="load", stable_probability=0.98)
+    page = visit(service.url)
+    shows(page, '[aria-label="thumb"] .head', "load changes")
+
+
+@pytest.mark.parametrize("width", [1180, 1440])
+def test_a_long_reason_leaves_the_name_of_its_finger(visit, service, width):
+    change(service, state="UNSTABLE", stable_probability=0.98)
+    page = visit(service.url)
+    page.set_viewport_size({"width": width, "height": 900})
+    shows(page, '[aria-label="thumb"] .head', "held")
+    cut = "(e) => e.scrollWidth > e.clientWidth"
+    assert not any(page.locator(".name span").nth(k).evaluate(cut) for k in range(2))
+
+
 def test_a_silent_source_is_shown(visit, service):
+    service.tape.source = "xela://192.168.1.10:5000"
     page = visit(service.url)
     wait_for_samples(page)
     health = {"rate": None, "n_packets": 12, "n_lost": 3, "n_refused": 1, "n_dropped": 0,

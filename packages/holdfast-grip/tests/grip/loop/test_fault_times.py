@@ -49,8 +49,8 @@ TIMES = [
 
 
 def rows():
-    text = (Path(__file__).parents[5] / "docs" / "grip.md").read_text("utf-8")
-    table = text.split("### Times of faults")[1].split("\n\n")[1]
+    text = (Path(__file__).parents[5] / "docs" / "details" / "grip.md").read_text("utf-8")
+    table = text.split("## Times of faults")[1].split("\n\n")[1]
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
 
 

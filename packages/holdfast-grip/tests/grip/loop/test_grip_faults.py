@@ -9,7 +9,7 @@ from holdfast_grip.loop.grip_faults import ENDED, GRIP_FAULTS, explain_fault
 
 RISES = {"", "unstable", "slip", "load", "margin", "balance", "relax", "released"}
 """Reasons of a change of force, or of the end of a grip, which are no faults."""
-GUIDE = Path(__file__).parents[5] / "docs" / "grip.md"
+GUIDE = Path(__file__).parents[5] / "docs" / "details" / "grip.md"
 
 
 def limits(**fields):
@@ -30,7 +30,7 @@ def test_every_reason_of_a_fault_has_an_explanation():
 
 
 def test_the_guide_has_each_reason_and_what_ends_it():
-    table = GUIDE.read_text("utf-8").split("### Times of faults")[1].split("\n\n")[1]
+    table = GUIDE.read_text("utf-8").split("## Times of faults")[1].split("\n\n")[1]
     rows = [line.split(" | ") for line in table.splitlines()[2:]]
     ends = {
         reason: "a reset" if row[3].strip(" |") != "itself" else "itself"

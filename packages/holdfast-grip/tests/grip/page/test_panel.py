@@ -318,3 +318,21 @@ def test_every_fault_is_explained(visit, holding):
         holding.grip = gripping(state="FAULT", reason=reason, released=True, failure=failure)
         shows(page, "#fault-happened", re.escape(text.happened))
         assert flaws(page, (1280, 720)) == [], reason
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), [(390, 844), (768, 1024), (1280, 720), (1366, 768), (1440, 900)]
+)
+def test_a_finger_and_the_plots_are_whole_beside_the_panel(visit, holding, width, height):
+    """On a phone the hand, the stop and a finger are seen at once; elsewhere all plots."""
+    page = visit(holding.url)
+    page.set_viewport_size({"width": width, "height": height})
+    shows(page, "#grip-word", "REACT")
+    bottom = "(e) => e.getBoundingClientRect().bottom"
+    first = page.locator(".card").first.evaluate(bottom)
+    assert first <= height
+    assert page.locator("#hand-word").evaluate(bottom) <= height
+    if width > 700:
+        assert page.locator(".plot.last").evaluate(bottom) <= height
+        low = page.locator(".card .total").first.evaluate(bottom)
+        assert low <= first

@@ -65,7 +65,7 @@ def test_an_armed_hand_is_confirmed_by_its_uri(grasp, capsys):
 
 
 def test_the_table_of_fault_times_has_those_of_the_code():
-    page = (Path(__file__).parents[5] / "docs" / "grip.md").read_text("utf-8")
+    page = (Path(__file__).parents[5] / "docs" / "details" / "grip.md").read_text("utf-8")
     silence = f"{1000 * ros_hand.SILENCE_TIME:.0f} ms, or {ros_hand.SILENCE_PERIODS:g} of their"
     assert f"| {silence} periods |" in page
     assert f"| {1000 * ros_hand.STATE_TIMEOUT:.0f} ms |" in page

@@ -65,6 +65,7 @@ class Page {
     if (this.frozen) this.togglePause();
     const names = Object.keys(hello.fingers);
     this.store = new SampleStore(names, capacityFor(hello.rate));
+    this.restarts = hello.source.startsWith("twin:"); // it pauses between two grasps
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
     for (const part of [this.banner, this.cards, this.controls, this.threshold, this.calibration, ...this.panels.values()]) part.start(hello);
@@ -109,7 +110,8 @@ class Page {
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
     const { ended, silent } = this.status;
     // An old STABLE must not look like a current one.
-    if (ended || silent) this.banner.showState("UNKNOWN", ended ? "SOURCE ENDED" : "NO SAMPLES");
+    const pause = this.restarts ? "NEXT GRASP" : "NO SAMPLES";
+    if (ended || silent) this.banner.showState("UNKNOWN", ended ? "SOURCE ENDED" : pause);
     else this.banner.showState(message.hand);
     this.cards.setOutdated(ended || silent);
     this.cards.update(message);
@@ -144,7 +146,7 @@ class Page {
       link === "refused" && `Not connected: ${reason}`,
       link === "lost" && "Connection lost, trying again …",
       open && ended && "Source ended: these are its last values",
-      open && silent && "No samples from the source",
+      open && silent && !this.restarts && "No samples from the source",
       open && problem,
     );
     const words = { connecting: "connecting", open: ended ? "source ended" : "connected", lost: "connection lost", refused: "not connected" };
