@@ -43,7 +43,9 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path, monkeyp
     first = [line.split()[0] for line in lines if line.strip()]
     assert first.index("taught") < first.index("builtin:any") < first.index("never")
     rates = lines.index(next(line for line in lines if line.startswith("--false-alarms")))
-    assert [line.split()[0] for line in lines[rates + 1 : rates + 6]] == "0.5 1 1.5 3 6".split()
+    assert [line.split()[0] for line in lines[rates + 1 : rates + 6]] == [
+        *("0.5", "1", "1.5", "3", "6")
+    ]
     assert lines[-1] == f"{out}: taught by 6 recordings"
     assert all(len(line) <= 80 for line in lines[:-1])
     assert Model.load(out).finger("thumb").slip.choice.n == 48
