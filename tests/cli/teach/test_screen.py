@@ -54,3 +54,10 @@ def test_without_a_terminal_each_change_is_a_line(capsys):
         "one",
         "two",
     ]
+
+
+def test_what_nobody_reads_is_not_printed(capsys):
+    with TeachScreen(is_read=False) as screen:
+        screen.show(PULL, "")
+        screen.print("004-pull kept: 5 slides seen")
+    assert capsys.readouterr().err == "004-pull kept: 5 slides seen\n"

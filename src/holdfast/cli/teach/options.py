@@ -109,7 +109,8 @@ class GuideOptions:
             CameraRecorder(self.camera, path / "camera.mp4").close()
         with handle_stop_signals() as stop, ExitStack() as stack:
             page = stack.enter_context(_page(access)) if self.page else None
-            keys, screen = stack.enter_context(TeachKeys(page)), TeachScreen(page)
+            keys = stack.enter_context(TeachKeys(page))
+            screen = TeachScreen(page, is_read=not self.unattended)
             stop.graceful = True
             promise = WITH_CAMERA if is_filmed else WITHOUT_CAMERA
             if not (self.unattended or confirm_safety(promise, stop, keys, screen)):

@@ -81,11 +81,12 @@ class TeachScreen(LiveDisplay):
 
     Args:
         page: that shows the same; None without one.
+        is_read: whether a person or a robot follows each change.
     """
 
-    def __init__(self, page: "TeachService | None" = None) -> None:
+    def __init__(self, page: "TeachService | None" = None, *, is_read: bool = True) -> None:
         super().__init__()
-        self._page, self._shown = page, ""
+        self._page, self._shown, self._is_read = page, "", is_read
 
     def ask(self, lines: Sequence[str]) -> None:
         """Ask whether the protocol can begin."""
@@ -101,7 +102,7 @@ class TeachScreen(LiveDisplay):
             self._page.show(view, place)
         if self._live is None:
             text = ": ".join(filter(None, (view.title, view.words, view.message * view.decides)))
-            if text != self._shown:
+            if text != self._shown and self._is_read:
                 print_message(text)
             self._shown = text
             return
