@@ -1,5 +1,6 @@
-"""What makes `.ci/run` fail: a check of a lane, a race in a test, a program that is missing."""
+"""What makes `.ci/run` fail: a check of a lane, races in tests, a program that is missing."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -50,7 +51,6 @@ def test_all_checks_pass(clone):
 @pytest.mark.parametrize(
     ("fails", "last"),
     [
-        ("uv run pytest", "what failed passes alone: it has a race"),
         ("uv run mypy", "a check failed: see above"),
         ("kernel.sh 20", "a check failed: see above"),
         ("wheel ", "a check failed: see above"),
@@ -59,6 +59,15 @@ def test_all_checks_pass(clone):
 def test_one_failure_fails_the_run(clone, fails, last):
     code, out = run(clone, fails)
     assert (code, out.splitlines()[-1]) == (1, last)
+
+
+@pytest.mark.parametrize(("n_failed", "code"), [(1, 0), (2, 1)])
+def test_one_test_that_passes_alone_is_said_and_two_fail_the_run(clone, n_failed, code):
+    failed = {f"tests/test_a.py::test_{k}": True for k in range(n_failed)}
+    (clone / ".pytest_cache/v/cache/lastfailed").write_text(json.dumps(failed))
+    got, out = run(clone, "uv run pytest")
+    assert got == code
+    assert "what failed passes alone: it has a race, to be mended next" in out.splitlines()
 
 
 def test_a_program_that_is_missing_fails_the_run(clone, tmp_path):

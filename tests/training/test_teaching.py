@@ -105,6 +105,15 @@ class TestFigures:
         )
         assert taught.hand_alarms >= pooled.false_alarms_per_minute["held"]
 
+    def test_the_curve_has_the_threshold_of_each_rate_and_that_of_the_model(self, taught):
+        assert [point.wanted for point in taught.curve] == sorted([0.5, 1.0, 1.5, 3.0, 6.0])
+        thresholds = [point.threshold for point in taught.curve]
+        assert thresholds == sorted(thresholds, reverse=True)
+        chosen = taught.curve[3]  # 3.0 were wanted
+        assert chosen.threshold == taught.model.finger("index").slip.threshold
+        assert chosen.found == taught.slips.pooled.incipient["0.1"]
+        assert chosen.hand_false_alarms == taught.hand_alarms
+
     def test_the_base_is_scored_on_the_same_slips(self, taught):
         assert taught.base.pooled.n == taught.slips.pooled.n == 48
 

@@ -14,7 +14,7 @@ from holdfast.files import write_whole
 from holdfast.io import load_recording
 from holdfast.io.label_files import save_labels
 from holdfast.labelling.rules import propose
-from holdfast.labelling.rules.forces import hand_force
+from holdfast.labelling.rules.forces import HandForce, hand_force
 from holdfast.live.teaching.steps import Step
 from holdfast.recordings import Label, Recording
 
@@ -29,8 +29,8 @@ PICTURE_WIDTH, PICTURE_HEIGHT = 300, 110
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Colours of the fingers, which people with a colour vision deficiency tell apart."""
 STYLE = (
-    "body{font:16px sans-serif;margin:1em}figure{display:inline-block;margin:.5em;width:300px}"
-    "svg{background:#f6f6f6}figcaption{font-size:13px}"
+    "body{font:16px sans-serif;margin:1em}svg{background:#f6f6f6}figcaption{font-size:13px}"
+    "figure{display:inline-block;margin:.5em;width:300px;vertical-align:top}"
 )
 
 
@@ -127,7 +127,7 @@ def throw_away(path: Path, number: int) -> list[Slide]:
 
 
 def write_pictures(folder: Path, names: Sequence[str]) -> Path:
-    """Write a page with a picture of each slide: force of the fingers, onsets, how they are known.
+    """Write a page with a picture of each slide: how the force changes, onsets, how they are known.
 
     Args:
         folder: of the recordings.
@@ -140,25 +140,27 @@ def write_pictures(folder: Path, names: Sequence[str]) -> Path:
     for name in names:
         recording = load_recording(folder / f"{name}.mcap")
         labels = {finger: module.labels for finger, module in recording.modules.items()}
-        slides = slides_of(labels)
-        figures += [_figure(recording, slide, k + 1) for k, slide in enumerate(slides)]
-    text = "".join(figures) or "<p>No slide was seen.</p>"
+        hand = hand_force(recording)
+        for k, slide in enumerate(slides_of(labels)):
+            figures.append(_figure(hand, slide, f"{name}, slide {k + 1}"))
     page = f"<!doctype html><meta charset=utf-8><title>Slides</title><style>{STYLE}</style>"
-    page += "<h1>Slides, with their onsets</h1><p>Force of each finger over time; a line is the "
-    page += f"onset of its slip. A key of <code>holdfast teach</code> throws one away.</p>{text}\n"
+    page += "<p>How the force of each finger changes; a line is the onset of its slip.</p>"
+    page += "".join(figures) or "<p>No slide was seen.</p>"
     write_whole(folder / PICTURES, page.encode(), force=True)
     return folder / PICTURES
 
 
-def _figure(recording: Recording, slide: Slide, number: int) -> str:
-    hand = hand_force(recording)
+def _figure(hand: HandForce, slide: Slide, title: str) -> str:
     start, end = slide.start - SHOWN_MARGIN, slide.end + SHOWN_MARGIN
     rows = slice(*np.searchsorted(hand.times, (start, end)).tolist())
-    largest = max(float(finger.amplitude[rows].max()) for finger in hand.fingers.values()) or 1.0
+    changes = {}
+    for name, finger in hand.fingers.items():
+        changes[name] = np.linalg.norm(finger.force[rows] - finger.force[rows.start], axis=1)
+    largest = max(float(change.max()) for change in changes.values()) or 1.0
     drawn, lines = [], []
-    for (name, finger), colour in zip(hand.fingers.items(), COLOURS, strict=False):
+    for (name, change), colour in zip(changes.items(), COLOURS, strict=False):
         x = PICTURE_WIDTH * (hand.times[rows] - start) / (end - start)
-        y = PICTURE_HEIGHT * (1 - 0.95 * finger.amplitude[rows] / largest)
+        y = PICTURE_HEIGHT * (1 - 0.95 * change / largest)
         points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
         drawn.append(f"<polyline fill=none stroke='{colour}' points='{points}'/>")
         label = slide.slips.get(name)
@@ -171,7 +173,7 @@ def _figure(recording: Recording, slide: Slide, number: int) -> str:
             f"<br><b style='color:{colour}'>{escape(name)}</b> {label.start:.2f} s: {known}"
         )
     size = f"width={PICTURE_WIDTH} height={PICTURE_HEIGHT}"
-    text = f"{escape(recording.name)}, slide {number}{''.join(lines)}"
+    text = f"{escape(title)}{''.join(lines)}"
     return f"<figure><svg {size}>{''.join(drawn)}</svg><figcaption>{text}</figcaption></figure>"
 
 

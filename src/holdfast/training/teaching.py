@@ -63,6 +63,32 @@ MAX_TAUGHT_FOLDS = 10
 together."""
 
 
+SHOWN_FALSE_ALARMS = (0.5, 1.0, 1.5, 3.0, 6.0)
+"""Wanted false alarms per minute of a finger, beside that of the model, whose thresholds are shown:
+the user moves along them by the option `--false-alarms`."""
+
+
+class TaughtPoint(msgspec.Struct, frozen=True):
+    """What another threshold gives out of fold.
+
+    Attributes:
+        wanted: false alarms per minute of a finger for which it is the threshold.
+        threshold: of the probability.
+        found: share of the slips found within 0.1 s [%].
+        before_1mm: share of the slips over 1 mm that are found before 1 mm [%]; None if the
+            distances are not known.
+        false_alarms: of a finger, per minute of held time.
+        hand_false_alarms: of all fingers, per minute in which the hand holds.
+    """
+
+    wanted: float
+    threshold: float
+    found: float | None
+    before_1mm: float | None
+    false_alarms: float | None
+    hand_false_alarms: float
+
+
 @dataclass(frozen=True)
 class Taught:
     """A taught model, and what it gave on grasps that its head was not fitted to.
@@ -72,6 +98,7 @@ class Taught:
         slips: metrics out of fold, at the threshold of the model.
         base: metrics of the model that was given, on the same grasps; None without a slip rule.
         hand_alarms: false alarms of all fingers per minute in which the hand holds.
+        curve: what other thresholds give.
         n_recordings: number of recordings with known slips.
         warnings: for the user.
     """
@@ -80,6 +107,7 @@ class Taught:
     slips: SlipSummary
     base: SlipSummary | None
     hand_alarms: float
+    curve: tuple[TaughtPoint, ...]
     n_recordings: int
     warnings: tuple[str, ...]
 
@@ -114,6 +142,7 @@ class Taught:
             "heads": {"slip": slip},
             "base": None if self.base is None else self.base.pooled,
             "hand_false_alarms_per_minute": self.hand_alarms,
+            "curve": self.curve,
             "warnings": self.warnings,
             "verdict": self.verdict,
         }
@@ -239,6 +268,7 @@ def teach_with_report(
         slips,
         slip_summary(counts_of_base) if any(counts_of_base) else None,
         _hand_alarms(curves, index),
+        tuple(_curve_points(curves, total, {*SHOWN_FALSE_ALARMS, false_alarms})),
         len(parts),
         tuple(_warnings(len(parts), total.silent, false_alarms)),
     )
@@ -392,6 +422,20 @@ def _hand_alarms(curves: Sequence[Mapping[str, SlipCurve]], index: int) -> float
     counts = [[curve[index] for curve in fingers.values()] for fingers in curves]
     seconds = sum(max((c.held_seconds for c in own), default=0.0) for own in counts)
     return 60 * sum(c.false_held for own in counts for c in own) / seconds
+
+
+def _curve_points(
+    curves: Sequence[Mapping[str, SlipCurve]], total: SlipCurve, wanted: Collection[float]
+) -> Iterator[TaughtPoint]:
+    """Yield what the thresholds for the wanted rates give, where one fits."""
+    for rate in sorted(wanted):
+        index = weighted_threshold(total, rate)
+        if index is not None:
+            metrics = slip_metrics(total[index])
+            yield TaughtPoint(
+                rate, float(SLIP_THRESHOLDS[index]), metrics.incipient["0.1"], metrics.before_1mm,
+                metrics.false_alarms_per_minute["held"], _hand_alarms(curves, index),
+            )  # fmt: skip
 
 
 def _warnings(n_recordings: int, counts: SlipCounts, false_alarms: float) -> Iterator[str]:

@@ -119,6 +119,27 @@ def test_a_grasp_is_repeated_and_a_step_skipped(lead):
     assert [path.name for path in folder.path.glob("*.mcap")] == ["002-open.mcap"]
 
 
+def test_a_robot_whose_lines_end_stops_the_protocol(lead, monkeypatch):
+    monkeypatch.setattr(Keys, "ended", True)
+    with pytest.raises(TrainingError, match="stopped in step open; 1 of 2 grasps are in "):
+        lead(lambda _: [], OPEN, HOLD)
+    monkeypatch.undo()
+    assert [x.name for x in lead(goes_on, OPEN, HOLD, resume=True).kept] == ["open", "hold"]
+
+
+def test_keys_while_a_grasp_is_checked_wait(lead):
+    pressed = []
+
+    def choose(protocol):
+        if protocol.stage is Stage.CHECK and not pressed:
+            pressed.append("repeat")
+            return ["repeat"]
+        return goes_on(protocol)
+
+    folder = lead(choose, HOLD)
+    assert (pressed, [x.kept for x in folder.results]) == (["repeat"], [True])
+
+
 def test_without_a_person_a_grasp_that_fails_is_repeated_once(lead):
     still = HOLD._replace(check=Check.FELT, name="tap", n_actions=99)
     folder = lead(lambda _: [], still, unattended=True)

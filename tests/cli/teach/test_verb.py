@@ -6,9 +6,15 @@ from functools import partial
 import pytest
 
 from command_line import Verb
+from holdfast.cli.teach import verb
+from holdfast.cli.teach.options import GuideOptions
+from holdfast.cli.teach.report import NO_SLIPS
 from holdfast.io import save_recording
+from holdfast.live.teaching.folder import TeachingFolder
+from holdfast.live.teaching.protocol import GraspResult
 from holdfast.live.teaching.steps import STEPS
 from holdfast.model import Model
+from holdfast.synthetic import synthetic_recording
 from holdfast.twin import webcam
 from training.build import sliding_recording
 
@@ -34,8 +40,12 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path, monkeyp
     assert (code, err) == (0, "")
     lines = printed.splitlines()
     assert lines[0].startswith("48 slips in 6 grasps: of those that it was not taught, ")
-    assert [line.split()[0] for line in lines if "0.00" in line][-1] == "never"
-    assert any(line.startswith("builtin:any ") for line in lines)
+    first = [line.split()[0] for line in lines if line.strip()]
+    assert first.index("taught") < first.index("builtin:any") < first.index("never")
+    rates = lines.index(next(line for line in lines if line.startswith("--false-alarms")))
+    assert [line.split()[0] for line in lines[rates + 1 : rates + 6]] == [
+        *("0.5", "1", "1.5", "3", "6")
+    ]
     assert lines[-1] == f"{out}: taught by 6 recordings"
     assert all(len(line) <= 80 for line in lines[:-1])
     assert Model.load(out).finger("thumb").slip.choice.n == 48
@@ -49,7 +59,8 @@ def test_json(capsys, grasps, tmp_path):
     report = json.loads(printed)
     assert code == 0
     assert set(report) == {
-        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "warnings", "verdict"
+        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "warnings",
+        "verdict",
     }  # fmt: skip
     slip = report["heads"]["slip"]
     assert (slip["n"], slip["grasps"], slip["out_of_fold"]["n"]) == (48, 6, 48)
@@ -204,3 +215,57 @@ def test_from_nothing_to_a_model_with_the_twin(capsys, tmp_path, monkeypatch):
     assert report["verdict"]
     assert Model.load("mine.json").finger("index").slip.choice.n >= 3
     assert "<svg" in (tmp_path / "mine-grasps" / "pulls.html").read_text()
+
+
+@pytest.mark.parametrize("is_calibrated", [True, False])
+def test_without_a_measured_slip_there_is_a_calibration_or_nothing(
+    capsys, tmp_path, monkeypatch, is_calibrated
+):
+    def lead(*_):
+        folder = TeachingFolder(tmp_path / "grasps", resume=(tmp_path / "grasps").exists())
+        folder.save([GraspResult("carry", 1, 30.0, True, "001-carry", "held for 30 s")])
+        return folder
+
+    monkeypatch.setattr(GuideOptions, "run", lead)
+    monkeypatch.setattr(verb, "calibrated", lambda model, folder: (model, is_calibrated))
+    out = tmp_path / "mine.json"
+    code, printed, err = run(capsys, "teach", "twin:", "-o", out, "--json")
+    if not is_calibrated:
+        assert (code, printed, out.exists()) == (2, "", False)
+        assert err.strip() == (
+            f"holdfast: nothing was learned from {tmp_path / 'grasps'}: no slip was measured"
+        )
+        return
+    assert code == 0
+    report = json.loads(printed)
+    assert (report["model"], report["heads"], report["verdict"]) == (str(out), {}, NO_SLIPS)
+    assert [(x["name"], x["seconds"], x["kept"]) for x in report["steps"]] == [("carry", 30, True)]
+    _, printed, _ = run(capsys, "teach", "twin:", "-o", out, "--force")
+    assert "no slip was measured, so its slips stay" in " ".join(printed.split())
+
+
+@pytest.mark.parametrize("name", ["carry", "hold"])
+def test_what_was_carried_calibrates(tmp_path, capsys, name):
+    """The arm of a synthetic hand hardly moves: the model stays as it is, and says why."""
+    folder = TeachingFolder(tmp_path / "grasps", resume=False)
+    save_recording(synthetic_recording("hand", 1), folder.path / "001-carry.mcap")
+    folder.save([GraspResult(name, 1, 30.0, True, "001-carry")])
+    model = Model.load("builtin:any")
+    assert verb.calibrated(model, folder) == (model, False)
+    why = {
+        "carry": "uskin-curved: the arm hardly moved; move the arm as it will move later",
+        "hold": "nothing is held in 0 recordings; at least 5 s of ordinary handling expected, in "
+        "recordings that begin with an open hand",
+    }
+    assert capsys.readouterr().err == f"not calibrated: {why[name]}\n"
+
+
+def test_a_protocol_that_is_complete_needs_no_hand(capsys, tmp_path, monkeypatch):
+    """Only the fit was stopped: --resume goes on with it."""
+    folder = TeachingFolder(tmp_path / "new-grasps", resume=False)
+    names = [step.name for step in STEPS if not step.in_view]
+    folder.save([GraspResult(name, 1, 9.0, True, f"00{k}-{name}") for k, name in enumerate(names)])
+    monkeypatch.setattr(verb, "calibrated", lambda model, folder: (model, True))
+    monkeypatch.chdir(tmp_path)
+    code, printed, _ = run(capsys, "teach", "xela://127.0.0.1:1", "-o", "new.json", "--resume")
+    assert (code, printed.split(":")[0]) == (0, "new.json")

@@ -116,7 +116,9 @@ class Guide:
                 stack.callback(self._close)
                 while protocol.stage is not Stage.OVER:
                     self._step(screen, keys)
-                    if stop.requested or keys.stop_pressed:
+                    # A robot whose lines have ended decides nothing any more.
+                    undecided = protocol.stage is Stage.DECIDE and not self._unattended
+                    if stop.requested or keys.stop_pressed or (undecided and keys.ended):
                         self._press("quit", screen)
             if protocol.stopped:
                 raise TrainingError(f"stopped in step {protocol.step.name}")
@@ -177,8 +179,6 @@ class Guide:
                 screen.print(str(refusal))
             self._judge("", screen)
         elif text in ("next", "repeat", "skip", "quit"):
-            if text == "repeat" or protocol.stage is Stage.DECIDE:
-                self._checking = None
             n_results = len(protocol.results)
             self._follow(protocol.press(text), screen)
             if len(protocol.results) != n_results:

@@ -95,6 +95,7 @@ class GuideOptions:
         from holdfast.cli.teach.guide import Guide, confirm_safety, open_taught
         from holdfast.live.camera import CameraRecorder
         from holdfast.live.teaching.folder import TeachingFolder
+        from holdfast.live.teaching.protocol import GuidedProtocol, Stage
         from holdfast.live.teaching.steps import STEPS
 
         path = self.folder or out.with_name(f"{out.stem}-grasps")
@@ -102,6 +103,8 @@ class GuideOptions:
         # Without a camera, what slides teaches nothing.
         steps = STEPS if is_filmed else tuple(step for step in STEPS if not step.in_view)
         folder = TeachingFolder(path, resume=self.resume)
+        if GuidedProtocol({}, folder.results, steps).stage is Stage.OVER:
+            return folder  # only the fit was stopped
         if self.camera:  # a wrong one is reported before somebody stands at the robot
             CameraRecorder(self.camera, path / "camera.mp4").close()
         with handle_stop_signals() as stop, ExitStack() as stack:

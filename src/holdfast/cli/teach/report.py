@@ -9,11 +9,21 @@ from holdfast.cli.scores import (
     never_cells,
     share_cells,
 )
-from holdfast.cli.terminal.console import print_line, print_paragraph, print_table
+from holdfast.cli.terminal.console import (
+    format_number,
+    print_line,
+    print_paragraph,
+    print_table,
+)
 
 if TYPE_CHECKING:
     from holdfast.training.teaching import Taught
 
+CURVE_HEADER = ("--false-alarms", "threshold", "0.1", "before 1 mm", "finger", "hand")
+CURVE_NOTE = (
+    "Other thresholds, out of fold: found within 0.1 s and before 1 mm [%], and false alarms a "
+    "minute of a finger and of the hand. Teach again with the option to move along them."
+)
 NO_SLIPS = (
     "calibrated by your handling; no slip was measured, so its slips stay those of another hand "
     "(--camera 0 and stickers: holdfast label markers)"
@@ -34,3 +44,14 @@ def print_taught(taught: "Taught", base: str) -> None:
     print_paragraph(SHARES_NOTE)
     if taught.slips.intervals is not None:
         print_paragraph(format_intervals(taught.slips.intervals, chosen=False))
+    print_line()
+    points = [
+        (
+            f"{point.wanted:g}", f"{point.threshold:.3f}", format_number(point.found, 0),
+            format_number(point.before_1mm, 0), format_number(point.false_alarms, 2),
+            f"{point.hand_false_alarms:.2f}",
+        )
+        for point in taught.curve
+    ]  # fmt: skip
+    print_table(CURVE_HEADER, points)
+    print_paragraph(CURVE_NOTE)

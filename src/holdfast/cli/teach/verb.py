@@ -18,7 +18,7 @@ from holdfast.cli.options import (
     complete_source,
 )
 from holdfast.cli.teach.options import TEACH_ADDRESS, WITHOUT_PROTOCOL, GuideOptions, calibrated
-from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_paragraph
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import TrainingError
 
@@ -96,10 +96,10 @@ def teach(
             if not is_calibrated:
                 raise TrainingError(f"nothing was learned from {path}: no slip was measured")
             base.save(out, force=force)
-            print_message(f"{out}: {NO_SLIPS}")
             if as_json:
-                document = {"model": out, "heads": {}, "verdict": NO_SLIPS}
-                print_json({**document, "steps": steps})
+                print_json({"model": out, "steps": steps, "heads": {}, "verdict": NO_SLIPS})
+            else:
+                print_paragraph(f"{out}: {NO_SLIPS}")
             return
     taught = teach_with_report(
         base, start.load_dataset(engine.path(path)),

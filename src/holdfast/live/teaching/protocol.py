@@ -161,7 +161,7 @@ class GuidedProtocol:
         self._now = self._began = math.nan  # of the newest estimate, and of the stage
         self._since = math.nan  # since when what the stage waits for lasts
         self._touching: tuple[str, ...] = ()
-        self._grips: dict[str, float] = {}  # mean force of each finger in the grasps so far
+        self._grips: dict[str, float] = {}  # mean force of each finger when it held last
         self._recording, self._seconds, self._n_slides = "", 0.0, 0
         self.step, self.number = places[-1]
         self.stage = Stage.OVER
@@ -279,11 +279,10 @@ class GuidedProtocol:
         self._forces: list[dict[str, tuple[float, float, float]]] = []
 
     def _keep(self, kept: bool) -> None:
-        text = self.message
-        result = GraspResult(
-            self.step.name, self.number, self._seconds, kept, self._recording, text, self._n_slides
-        )
-        self.results.append(result)
+        self.results.append(GraspResult(
+            self.step.name, self.number, self._seconds, kept, self._recording, self.message,
+            self._n_slides,
+        ))  # fmt: skip
         self._recording = ""
 
     def _enter(self, stage: Stage) -> str:
@@ -292,8 +291,8 @@ class GuidedProtocol:
         if was is Stage.ACT:
             for name in self._sensors:
                 sizes = [math.hypot(*forces[name]) for forces in self._forces if name in forces]
-                mean = math.fsum(sizes) / max(len(sizes), 1)
-                self._grips[name] = max(self._grips.get(name, 0.0), mean)
+                if sizes:
+                    self._grips[name] = math.fsum(sizes) / len(sizes)
         self._began, self._since = self._now, math.nan
         if Stage.ACT not in (was, stage):
             return ""
