@@ -1,4 +1,9 @@
 import json
+import os
+import re
+import signal
+import subprocess
+import sys
 import threading
 import urllib.request
 
@@ -119,3 +124,25 @@ def test_the_objects_are_not_those_of_the_training():
     names = "mug", "carton"
     assert set(names) <= set(load_objects(OTHER_OBJECTS))
     assert not any(name in seen for name in names for seen in model.training.recordings)
+
+
+def test_an_interrupt_leaves_no_process_and_no_warning(tmp_path):
+    """While it replays: an interrupt could be lost while modules are imported."""
+    program = "import sys; from holdfast.cli import main; sys.exit(main())"
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "demo", str(tmp_path / "demo"), "--no-browser"],
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    try:
+        assert any(" UNSTABLE " in line for line in process.stderr)
+        os.killpg(process.pid, signal.SIGINT)
+        _, rest = process.communicate(timeout=60)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    assert process.returncode == 130
+    assert rest.splitlines()[-1] == "holdfast: interrupted"
+    assert not re.search(r"Traceback|[Ww]arning|leaked", rest)
+    with pytest.raises(ProcessLookupError):  # the group of its children is empty
+        os.killpg(process.pid, 0)
