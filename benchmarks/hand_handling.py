@@ -23,6 +23,8 @@ MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
 NORMALISED_BY = "others", "itself", "default"
 """What the features of a grasp may be normalised by."""
+ONSET_DURATION = 0.2
+"""Time after a stable sample in which an unstable one shows the onset of instability [s]."""
 MIN_SAMPLES = 100
 """Fewer samples of handling are no own handling: 5 s."""
 
@@ -39,6 +41,7 @@ class HandGrasp(NamedTuple):
         features: (n, n_features).
         held: (n,) in contact by the load, as a user's own handling is found.
         stable: (n,) labelled stable.
+        onset: (n,) labelled unstable, and stable shortly before.
         slides: (n,) over 1 mm/s by the truth.
         still: (n,) under 0.3 mm/s by the truth.
     """
@@ -48,6 +51,7 @@ class HandGrasp(NamedTuple):
     features: np.ndarray
     held: np.ndarray
     stable: np.ndarray
+    onset: np.ndarray
     slides: np.ndarray
     still: np.ndarray
 
@@ -88,11 +92,13 @@ def read_grasp(
         kept = np.isfinite(finger.features).all(axis=1)
         kept &= np.arange(len(kept)) % step == 1 % step
         stable = module.label_states == STABLE
+        last = np.maximum.accumulate(np.where(stable, module.times, -np.inf))
+        onset = ~stable & (module.times - last <= ONSET_DURATION)
         held = grasped_samples(module.times, traces[name].state)
         features = changed(finger.features, module) if changed else finger.features
-        parts = features, held, stable, truth.codes == SLIDING, truth.codes == STILL
+        parts = features, held, stable, onset, truth.codes == SLIDING, truth.codes == STILL
         columns.append(tuple(part[kept] for part in parts))
-    empty = (np.empty((0, len(model.finger("*").features))), *(np.empty(0, bool),) * 4)
+    empty = (np.empty((0, len(model.finger("*").features))), *(np.empty(0, bool),) * 5)
     metadata = recording.metadata
     return HandGrasp(
         str(metadata.get("hand", recording.name)),
