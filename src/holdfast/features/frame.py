@@ -57,7 +57,7 @@ def features_frame(
         >>> from holdfast.synthetic import synthetic_recording
         >>> frame = features_frame(synthetic_recording("made", seed=0))
         >>> list(frame.columns), len(frame)
-        (['time', 'finger', 'F_a', 'F_x', 'F_y', 'F_z', 'm', 'sigma'], 6900)
+        (['time', 'finger', 'F_a', 'F_x', 'F_y', 'F_z', 'm', 'sigma'], 5175)
     """
     require_extras("pandas")
     import pandas as pd

@@ -205,7 +205,7 @@ class TestFailures:
     [
         (("--objects", "cup"), "no object 'cup'; there are ball, box, can"),
         (("--objects", "can,"), "no object ''; there are"),
-        (("--profile", "rough"), "unknown profile 'rough'; there are finger-gentle"),
+        (("--profile", "rough"), "unknown profile 'rough'; there are coupled, finger-gentle"),
         (("--cases", "3"), "--cases 1, 2 or 1,2 expected, '3' given"),
         (("--cases", ""), "--cases 1, 2 or 1,2 expected, '' given"),
         (("--repeats", "0"), "repeats of at least 1"),
