@@ -27,9 +27,9 @@ from holdfast.io.importers import import_recordings
 from holdfast.live.health import module_health
 from holdfast.live.module_checks import HoldDrift, ModuleComparison
 from holdfast.model import Model
+from holdfast.plots import COLOURS
 from holdfast.plots.sensors import plot_noise
 from holdfast.plots.style import (
-    COLOURS,
     FONT_SIZE,
     STATE_COLOURS,
     add_labels,

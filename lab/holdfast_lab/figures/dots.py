@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from holdfast.plots import COLOURS
 from holdfast.plots.style import (
-    COLOURS,
     FAINT,
     INK,
     PAPER,

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
+from holdfast.plots import COLOURS
 from holdfast.plots.style import (
-    COLOURS,
     FAINT,
     FONT_SIZE,
     GREY,

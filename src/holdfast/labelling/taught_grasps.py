@@ -16,6 +16,7 @@ from holdfast.io.label_files import save_labels
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.forces import HandForce, hand_force
 from holdfast.live.teaching.steps import Step
+from holdfast.plots import COLOURS
 from holdfast.recordings import Label, Recording
 
 TEACH_AUTHOR = "rule:teach"
@@ -26,8 +27,6 @@ SHOWN_MARGIN = 0.6
 """Time before and after a slide that its picture shows [s]."""
 PICTURE_WIDTH, PICTURE_HEIGHT = 300, 110
 """Size of a picture [pixels]."""
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-"""Colours of the fingers, which people with a colour vision deficiency tell apart."""
 STYLE = (
     "body{font:16px sans-serif;margin:1em}svg{background:#f6f6f6}figcaption{font-size:13px}"
     "figure{display:inline-block;margin:.5em;width:300px;vertical-align:top}"
@@ -49,14 +48,14 @@ class Slide(NamedTuple):
 
 
 def label_grasp(path: Path, step: Step) -> tuple[list[Slide] | None, str]:
-    """Label a grasp by its video, or by what its step asked for, and save the labels.
+    """Label a grasp by its video, or by the rule of its step, and save the labels.
 
     A step in which nothing slides needs no video: its held samples teach what is no slip. Slips
     come from a camera only.
 
     Args:
         path: of the recording; its video is beside it.
-        step: that was asked for.
+        step: of the protocol.
 
     Returns:
         The slides, or None and why no slip could be seen.
@@ -184,7 +183,7 @@ def _is_slip(label: Label) -> bool:
 def _by_step(label: Label, step: Step) -> Label:
     """Return a label of the force alone, for a step in which nothing slides.
 
-    Movements that the step asks for are no slips. What is not asked for may be one.
+    Movements that are part of the step are no slips. Another movement may be one.
     """
     cause = label.cause
     if label.state is ContactState.UNSTABLE and cause is Cause.DISTURBANCE and not step.n_actions:

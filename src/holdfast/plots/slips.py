@@ -14,8 +14,8 @@ from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_thresholds import SlipSummary
 from holdfast.metrics.slips import FOUND_WITHIN, SlipCounts, SlipMetrics, count_slips
 from holdfast.model import Model
+from holdfast.plots import COLOURS
 from holdfast.plots.style import (
-    COLOURS,
     FAINT,
     FONT_SIZE,
     GREY,

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Phase
+from holdfast.plots import COLOURS
 
 PAGE_WIDTH = 7.2
 """Width of a figure [inch]: the text width of a page with two columns."""
@@ -21,8 +22,6 @@ INK = "#333333"
 GREY = "#999999"
 FAINT = "#e6e6e6"
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-"""Colours of series, distinct for colour-blind readers too (Okabe and Ito)."""
 MARKERS = "osD^vP"
 COMPONENT_COLOURS = {"F_x": "#0072B2", "F_y": "#E69F00", "F_z": "#CC79A7", "F_a": "#000000"}
 STATE_COLOURS = {STABLE: "#009e73", UNSTABLE: "#e08a3c", NO_CONTACT: "#c8c8c8"}

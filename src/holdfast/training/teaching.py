@@ -407,7 +407,7 @@ def _score_fold(
 
 def _known_slips(model: Model, recording: Recording) -> dict[str, SlipDecisions]:
     """Return the decisions about each finger whose slips are known; none without a slip rule."""
-    if all(part.slip is None for part in model.fingers.values()):
+    if not model.has_slip_rule:
         return {}
     fingers = compute_decisions(model, recording).fingers
     return {

@@ -1,4 +1,4 @@
-"""Grasps with a given course: the twin does what a step of `holdfast teach` asks of a person."""
+"""Grasps with a given course: the twin performs a step of `holdfast teach`."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -73,7 +73,7 @@ TRANSPORT_DURATION = (1.2, 2.0)
 
 
 def perform(grasp: Grasp, action: str, n_actions: int, seconds: float) -> Recording:
-    """Simulate what a step asks for, with exact truth; a grasp that fails is tried again.
+    """Simulate a step, with exact truth; a grasp that fails is tried again.
 
     Args:
         grasp: object, repeat and seed.

@@ -61,7 +61,7 @@ def confirm_safety(camera: str, stop: StopRequest, keys: MarkerKeys, screen: Tea
 
 
 def open_taught(source: str, speed: float) -> Source:
-    """Return the source; the twin does what it is asked."""
+    """Return the source; the twin performs each step of the protocol."""
     if is_uri(source) and parse(source)[0] == "twin":
         return AskedTwin(parse(source)[1], speed=speed)
     return open_source(source, speed=speed)
@@ -76,7 +76,7 @@ class Guide:
         folder: for the recordings.
         steps: of the protocol.
         camera: of `record --camera`; None for none, and for the twin.
-        unattended: nobody presses a key: what passes is kept, what does not is repeated once.
+        unattended: without keys: what passes is kept, what does not is repeated once.
     """
 
     def __init__(

@@ -27,8 +27,8 @@ OPEN_SECONDS = 3.0
 CAMERA_DELAY = 0.04
 """Time from a picture to its stamp, as of a webcam [s]."""
 MAX_IDLE = 0.02
-"""Longest pause of a read while nothing is asked for [s]; a protocol that does not wait for a
-person asks soon."""
+"""Longest pause of a read while no grasp is requested [s]; a protocol that does not wait for a
+person requests one soon."""
 SIMULATION_CODE = "from holdfast.devices.sources.twin import write; write(*sys.argv[1:])"
 """Program of the process that simulates the next grasp."""
 
@@ -91,7 +91,7 @@ class Twin(Player):
 
 
 class AskedTwin(Twin):
-    """Twin that does what a step of `holdfast teach` asks for, and is filmed by its own webcam.
+    """Twin that performs each step of `holdfast teach`, and is filmed by its own webcam.
 
     It begins with an open hand, and is silent until `perform` is called. Without `object` in the
     address, it takes another object in each grasp.
@@ -121,7 +121,7 @@ class AskedTwin(Twin):
 
     @property
     def is_idle(self) -> bool:
-        """Whether the grasp is over, and no other was asked for."""
+        """Whether the grasp is over, and no other is requested."""
         return self._asked is None and self._peek() is None
 
     def film(self, path: Path) -> None:
@@ -135,14 +135,14 @@ class AskedTwin(Twin):
         write_whole(stamps_path(path), lines.encode(), force=True)
 
     def chunks_of(self, number: int) -> Iterable[Recording]:
-        """Return the grasp that was asked for."""
+        """Return the requested grasp."""
         asked, self._asked = self._asked or ("open", 0, OPEN_SECONDS), None
         name = self._objects[self._repeat % len(self._objects)]
         self._current = [perform(replace(self._grasp, object=name, repeat=self._repeat), *asked)]
         return self._current
 
     def is_ready(self, number: int, timeout: float) -> bool:
-        """Return whether a grasp was asked for."""
+        """Return whether a grasp is requested."""
         if self._asked is None:
             time.sleep(min(timeout, MAX_IDLE))
         return self._asked is not None

@@ -2,7 +2,7 @@
 
 Each grasp is one recording: open hand, grasp, what the step asks for, release. The machine gets
 what the stream detector gives. It says what a person does now, when a recording runs, which markers
-it gets, and whether the grasp was what its step asked for. Its time is that of the samples.
+it gets, and whether the grasp passed the check of its step. Its time is that of the samples.
 """
 
 import math
@@ -99,7 +99,7 @@ class GraspResult(msgspec.Struct, frozen=True):
 
     @property
     def is_done(self) -> bool:
-        """Whether the grasp is not asked for again."""
+        """Whether the protocol does not repeat the grasp."""
         return self.kept or not self.recording
 
 
@@ -130,7 +130,7 @@ class GuidedProtocol:
 
     Args:
         sensors: of the modules that the detector uses.
-        done: results of an earlier run, which are not asked for again.
+        done: results of an earlier run, which are not repeated.
         steps: the protocol.
 
     Attributes:
