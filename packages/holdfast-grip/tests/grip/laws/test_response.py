@@ -93,14 +93,13 @@ class TestTwoSpeeds:
     def test_instability_with_load_gives_a_small_rise_first(self):
         law, one = self.calm()
         before = one.scale
-        one.probability, reasons = 0.85, set()
-        for k in range(1, 9):
+        one.probability, wishes = 0.85, []
+        for k in range(1, 6):
             one.tangential += 0.04
-            (wish,) = wanted(law, [one], 2.0 + k * DT, DT)
-            reasons.add(wish.reason)
-            one.scale = max(one.scale, wish.scale)
-        assert GripReason.LOAD in reasons and GripReason.UNSTABLE not in reasons
-        assert before < one.scale < before + 0.8
+            wishes += wanted(law, [one], 2.0 + k * DT, DT)
+            one.scale = max(one.scale, wishes[-1].scale)
+        assert {wish.reason for wish in wishes} == {GripReason.LOAD, GripReason.RELAX}
+        assert before < one.scale < before + 0.4
 
     def test_a_slip_gives_a_kick(self):
         law, one = self.calm()
