@@ -84,7 +84,7 @@ recordings, by fits that did not use them. Experiment 1: how much of a failed gr
 unstable. Experiment 2: the time from the lock to the first stable estimate, and which
 disturbances are detected. The last table lists single disturbances.""",
         "verdicts",
-        ("experiment_1", "experiment_2", "disturbances"),
+        ("experiment_1", "experiment_2", "experiment_phases", "disturbances"),
     ),
     SectionOutline(
         "What the distance to the paper is due to",

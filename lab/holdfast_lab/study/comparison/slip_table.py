@@ -27,7 +27,8 @@ from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
 from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.tasks import Task
 
-QUICK_SLIP_METHODS = ("holdfast", "holdfast_stability", "slip_servo", "jl_local_logreg", "anyskin")
+QUICK_SLIP_METHODS = ("holdfast", "holdfast_stability", "slip_servo", "jl_local_logreg", "anyskin",
+                      "always_stable")  # fmt: skip
 """Methods of a quick study."""
 TESTED_ROLES = ("others", "fresh")
 """Roles of the corpora on which the methods are tested, where they exist."""
