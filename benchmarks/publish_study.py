@@ -8,9 +8,9 @@ The tables of real recordings (`real*`) are those of another run, `holdfast stud
 recordings alone, so that they can be made anew with each model that ships.
 
 `publish` copies all tables as CSV from the folder of a finished study to docs/study/, in place of
-the old ones, and `study.json` with the names of the tables. The pages of `PAGES` are written from templates in docs/study/
-(`*.md.j2`). Change the templates, not the pages: every figure in them is taken from these files,
-and lab/tests/test_docs_study.py renders them again.
+the old ones, and `study.json` with the names of the tables. The pages of `PAGES` are written from
+templates in docs/study/ (`*.md.j2`). Change the templates, not the pages: every figure in them is
+taken from these files, and lab/tests/test_docs_study.py renders them again.
 """
 
 import argparse
