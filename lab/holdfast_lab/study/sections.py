@@ -176,10 +176,8 @@ them.""",
     ),
     SectionOutline(
         "Sensitivity",
-        """What happens if one condition changes: the noise of the readings, the margin by which
-labels of disturbances are extended, the profile of the twin (how hard it grips and how it is
-disturbed), or the sampling rate. Be careful with a method whose curve falls early: it may fail on
-another hand.""",
+        """What happens if one condition changes: the noise of the readings, or the sampling
+rate. Be careful with a method whose curve falls early: it may fail on another hand.""",
         "sensitivity",
     ),
     SectionOutline(
