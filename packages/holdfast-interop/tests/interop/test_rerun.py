@@ -1,5 +1,7 @@
 """Files and the live view of Rerun, read back by its own reader; .ci/rerun runs this."""
 
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -126,7 +128,7 @@ class TestLive:
             port = server.getsockname()[1]
         words = ["--save", "live.rrd", "--bind", "127.0.0.1", "--port", str(port)]
         command = [sys.executable, "-m", "rerun", *words]
-        viewer = subprocess.Popen(command, cwd=tmp_path)
+        viewer = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
         try:
             wait_for(port)
             with open_source(str(tmp_path / "grasp.mcap"), speed=20) as source:
@@ -138,7 +140,7 @@ class TestLive:
                         n += sum("thumb" in fingers for _, fingers in update.estimates)
                 assert (publisher.n_failed, publisher.n_dropped) == (0, 0)
         finally:
-            viewer.terminate()
+            os.killpg(viewer.pid, signal.SIGTERM)  # the command is the parent of the viewer
             viewer.wait(30)
         found = entities(tmp_path / "live.rrd")
         assert n > 1000
