@@ -8,10 +8,9 @@ The tables of real recordings (`real*`) are those of another run, `holdfast stud
 recordings alone, so that they can be made anew with each model that ships.
 
 `publish` copies all tables as CSV from the folder of a finished study to docs/study/, in place of
-the old ones, and `study.json` with the names of the tables. The pages docs/study.md,
-docs/study-changes.md and docs/study/real-data.md are written from templates in docs/study/
-(`*.md.j2`). Change the templates, not the pages: every figure in them is taken from these files,
-and lab/tests/test_docs_study.py renders them again.
+the old ones, and `study.json` with the names of the tables. The pages of `PAGES` are written from
+templates in docs/study/ (`*.md.j2`). Change the templates, not the pages: every figure in them is
+taken from these files, and lab/tests/test_docs_study.py renders them again.
 """
 
 import argparse
@@ -28,7 +27,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from holdfast_lab.study.citation import compares_methods
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = ("study.md", "study-changes.md", "study/real-data.md")
+PAGES = ("study.md", "study-changes.md", "study/paper.md", "study/real-data.md")
+FIGURES = ("experiment-1.png", "experiment-2.png")
+"""Figures of the report that a page shows; they are copied to docs/img/."""
 MISSING = "–"
 NUMBERS = ("ours", "paper", "difference")
 VALUES = (*NUMBERS, "n", "low", "high")
@@ -130,6 +131,8 @@ class Figures:
         columns: Sequence[str] = (),
         digits: int = 1,
         digits_of: Mapping[str, int] | None = None,
+        intervals: Sequence[str] | None = None,
+        shown: Mapping[str, Sequence[str]] | None = None,
     ) -> str:
         """Return rows of a table as Markdown, with intervals and the paper's values.
 
@@ -141,19 +144,27 @@ class Figures:
             columns: the values that are shown, in this order; all by default.
             digits: after the decimal point.
             digits_of: the same of single columns.
+            intervals: columns with their interval; all by default.
+            shown: values of keys whose rows are shown, in the order of the rows; all by default.
         """
-        found = self.rows(table, where)
+        found = [
+            row
+            for row in self.rows(table, where)
+            if all(row.get(key) in values for key, values in (shown or {}).items())
+        ]
         if not found:
             return f"(The run has no rows for this table: {table}.)"
-        shown = list(columns) or list(dict.fromkeys(str(row[column]) for row in found))
+        names = list(columns) or list(dict.fromkeys(str(row[column]) for row in found))
         cells: dict[tuple[str, ...], dict[str, str]] = {}
         for row in found:
             head = tuple(str(row.get(key, "")) for key in lines)
-            places = (digits_of or {}).get(str(row[column]), digits)
-            cells.setdefault(head, {}).setdefault(str(row[column]), _cell_text(row, places))
-        table_lines = [[*lines, *shown], ["---"] * len(lines) + ["--:"] * len(shown)]
+            name = str(row[column])
+            places = (digits_of or {}).get(name, digits)
+            kept = row if intervals is None or name in intervals else {**row, "interval": None}
+            cells.setdefault(head, {}).setdefault(name, _cell_text(kept, places))
+        table_lines = [[*lines, *names], ["---"] * len(lines) + ["--:"] * len(names)]
         table_lines += [
-            [*head, *(by_column.get(each, MISSING) for each in shown)]
+            [*head, *(by_column.get(each, MISSING) for each in names)]
             for head, by_column in cells.items()
         ]
         return "\n".join(f"| {' | '.join(map(_escape, each))} |" for each in table_lines)
@@ -237,6 +248,10 @@ def publish(run: Path, docs: Path, real: Path | None = None) -> None:
         old.unlink()
     for name, folder in folders.items():
         shutil.copyfile(folder / "tables" / f"{name}.csv", target / f"{name}.csv")
+    for name in FIGURES:
+        if (run / "figures" / name).is_file():
+            (docs / "img").mkdir(exist_ok=True)
+            shutil.copyfile(run / "figures" / name, docs / "img" / name)
     summary["tables"] = list(folders)
     text = json.dumps(summary, ensure_ascii=False, indent=1)
     (target / "study.json").write_text(f"{text}\n", encoding="utf-8")

@@ -20,7 +20,7 @@ from holdfast import Model, Recording, detect, load_dataset
 from holdfast.contact import NO_CONTACT
 from holdfast.errors import ModelError
 
-SPLITS = ("tuning", "new-objects", "new-hand-and-objects")
+SPLITS = ("tuning", "new-objects", "new-hand-and-objects", "slips", "knocks", "aged-skins")
 SCHEMA = pa.schema(
     [
         ("recording", pa.string()),

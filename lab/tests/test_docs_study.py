@@ -39,7 +39,7 @@ class TestPublished:
         assert {path.stem for path in PUBLISHED.glob("*.csv")} == set(summary["tables"])
         templates = {f"{Path(page).name}.j2" for page in script.PAGES}
         others = {p.name for p in PUBLISHED.iterdir() if p.suffix not in (".csv", ".md")}
-        assert others == {"study.json", "grip", *templates}
+        assert others == {"study.json", "grip", "sources", *templates}
 
     def test_the_links_of_the_pages_exist(self, summary):
         for page, text in script.render(summary, PUBLISHED).items():

@@ -16,8 +16,7 @@ from holdfast.twin.profile import profile
 from . import blocks
 
 README = blocks.ROOT / "README.md"
-DEMO, RECORDINGS = ("", "Look at what the demo made"), ("Your own recordings",)
-HAND = ("Your own hand", "Python")
+DEMO, HAND, FILES, CODE = ("",), ("I have a hand",), ("I have files",), ("I write code",)
 SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
@@ -34,26 +33,23 @@ def short_demo(monkeypatch):
     )
 
 
-def test_the_demo_and_what_it_made(folder, short_demo):
+def test_the_demo(folder, short_demo):
     replaced = {"uv run holdfast demo": "holdfast demo --no-browser --speed 0"}
-    assert blocks.run_page(README, replaced, DEMO) == 2
-    assert (folder / "mug.png").exists()
+    assert blocks.run_page(README, replaced, DEMO) == 1
 
 
-def test_recordings_of_ones_own(folder, csv_recordings):
+def test_files_of_ones_own_and_code(folder, csv_recordings):
     csv_recordings("my-data", fingers=("thumb",), plain=True)
-    assert blocks.run_page(README, {}, RECORDINGS) == 1
+    assert blocks.run_page(README, {}, FILES) == 1
     assert (folder / "model.json").exists()
+    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
+    replaced = {'open_source("xela://auto")': 'open_source("live.parquet", speed=0)'}
+    assert blocks.run_page(README, replaced, CODE) == 2
 
 
 def test_a_hand_of_ones_own(folder, hand):
-    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
-    replaced = {
-        'open_source("xela://auto")': 'open_source("live.parquet", speed=0)',
-        "xela://auto": f"'{hand}' --port 0",
-        "holdfast play": "holdfast play --port 0",
-    }
-    assert blocks.run_page(README, replaced, HAND) == 3
+    replaced = {"serve builtin:any xela://auto": f"serve builtin:any '{hand}' --port 0"}
+    assert blocks.run_page(README, replaced, HAND) == 1
 
 
 def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
@@ -63,9 +59,12 @@ def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
         name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
         for name, m in recording.modules.items()
     }
-    save_recording(dataclasses.replace(recording, modules=modules), folder / "live.parquet")
+    (folder / "recordings").mkdir()
+    for name in ("live.parquet", "recordings/grasp1.parquet"):
+        save_recording(dataclasses.replace(recording, modules=modules), folder / name)
     replaced = {'open_source("xela://auto")': 'open_source("live.parquet", speed=0)'}
-    blocks.run_page(README, replaced, ("Python",))
+    replaced["print(states"] = "str(states"
+    blocks.run_page(README, replaced, CODE)
     lines = capsys.readouterr().out.splitlines()
     assert lines
     for line in lines:
@@ -74,7 +73,7 @@ def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
 
 def test_every_section_is_run():
     sections = {block.section for block in blocks.blocks_of(README)}
-    assert sections == {*DEMO, *RECORDINGS, *HAND}
+    assert sections == {*DEMO, *HAND, *FILES, *CODE}
 
 
 def test_the_links_exist():

@@ -8,7 +8,7 @@ import pytest
 from . import blocks
 
 PAGES = ("benchmark.md", "real-data.md", "study.md", *(
-    f"study/{name}.md" for name in ("adaptation", "built-in-models", "labels-by-rules", "live",
+    f"study/{name}.md" for name in ("built-in-models", "labels-by-rules", "live",
                                     "real-data", "slips", "twin")
 ))  # fmt: skip
 TABLE = re.compile(r"(?:^\|.*\n)+", re.M)

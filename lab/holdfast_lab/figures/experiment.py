@@ -32,11 +32,14 @@ from holdfast.plots.time_series import (
     phase_handles,
     shade_phases,
 )
+from holdfast.sensors.types import Array
 
 STATE_TITLES = {STABLE: "1: stable", UNSTABLE: "0: not stable", NO_CONTACT: "0: no contact"}
 LABEL_STRIP = "label"
 AMPLITUDE_COLOUR = COMPONENT_COLOURS["F_a"]
 MEAN_COLOUR = "#56b4e9"
+PROBABILITY_COLOURS = ("#0072b2", "#d55e00")
+"""Colours of P(stable) of the first and the second method."""
 
 
 def draw_forces(series: FingerSeries) -> Figure:
@@ -79,31 +82,38 @@ def draw_features(series: FingerSeries) -> Figure:
 def draw_experiment(
     series: FingerSeries,
     predicted: Mapping[str, StateCodes],
+    stable: Mapping[str, Array],
     span: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw F_a, sigma, the label and predicted states.
+    """Draw F_a, sigma, P(stable), the label and predicted states.
 
     The paper's figures of experiment 1 (a failed grasp) and 2 (locked, disturbed, released).
 
     Args:
         series: of the finger.
         predicted: by title of the method: (n,) state codes, UNKNOWN without a decision.
+        stable: by title of the method: (n,) probability that the contact is stable, or NaN.
         span: the part to show [s]; everything by default.
     """
     strips = {LABEL_STRIP: series.labels, **predicted}
-    figure = page_figure(3.7 + 0.3 * len(strips))
-    rows = figure.subplots(3, 1, sharex=True, height_ratios=(1.5, 1.1, 0.3 * len(strips)))
-    for axes in rows[:2]:
+    figure = page_figure(4.7 + 0.3 * len(strips))
+    rows = figure.subplots(4, 1, sharex=True, height_ratios=(1.5, 1.1, 0.9, 0.3 * len(strips)))
+    for axes in rows[:3]:
         shade_phases(axes, series, named=axes is rows[0])
     draw_curve(rows[0], series, series.amplitude, AMPLITUDE_COLOUR)
     draw_sigma(rows[1], series)
-    _draw_strips(rows[2], series, strips)
+    for values, colour in zip(stable.values(), PROBABILITY_COLOURS, strict=False):
+        draw_curve(rows[2], series, values, colour)
+    rows[2].set_ylim(-0.05, 1.05)
+    _draw_strips(rows[3], series, strips)
     add_labels(rows[0], y=f"$F_a$ {series.unit_label}")
     add_labels(rows[1], y=f"$\\sigma$ {series.unit_label}")
+    add_labels(rows[2], y="P(stable)")
     _finish(figure, rows, series)
     if span is not None:
         rows[0].set_xlim(span)
-    add_legend(figure, _state_handles(strips.values()))
+    lines = [line_handle(c, title) for title, c in zip(stable, PROBABILITY_COLOURS, strict=False)]
+    add_legend(figure, [*lines, *_state_handles(strips.values())])
     return figure
 
 

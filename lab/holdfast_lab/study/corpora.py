@@ -1,7 +1,7 @@
 """Recordings of a study: those that the twin simulates, the real ones, and the plan of both."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -32,8 +32,10 @@ class TwinCorpus(NamedTuple):
         seed_offset: number that is added to the seed.
         other_objects: use another set of objects.
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
-        repeats: grasps of each object and case in a full study; None for `N_REPEATS`.
+        repeats: grasps of each object and case; None for `N_REPEATS`.
         noise: rms of a reading at rest [count]; None for that of the sensor.
+        cases: 1 (held), 2 (held and disturbed), or both.
+        faults: troubles of the skins, as in `--faults`.
     """
 
     profile: str = "reference"
@@ -42,6 +44,8 @@ class TwinCorpus(NamedTuple):
     glitch_rate: float | None = None
     repeats: int | None = None
     noise: float | None = None
+    cases: str = "1,2"
+    faults: str = ""
 
 
 TWIN_CORPORA = {
@@ -50,18 +54,28 @@ TWIN_CORPORA = {
     "others": TwinCorpus(other_objects=True),
     "gentle": TwinCorpus("gentle", repeats=3),
     "vigorous": TwinCorpus("vigorous", repeats=3),
-    "finger": TwinCorpus("finger-reference", repeats=2),
-    "noiseless": TwinCorpus(noise=0.0, repeats=2),
     **{
         f"glitch-{n}": TwinCorpus(seed_offset=2, other_objects=True, glitch_rate=n / 60, repeats=2)
         for n in (0, 1, 7)
     },
 }
-QUICK_CORPORA = {name: TWIN_CORPORA[name] for name in ("main", "others")}
+"""Corpora of the paper's tables, of events and of splits."""
+FULL_CORPORA = TWIN_CORPORA | {
+    "finger": TwinCorpus("finger-reference", repeats=2),
+    "noiseless": TwinCorpus(noise=0.0, repeats=2),
+    "aged": TwinCorpus(other_objects=True, seed_offset=3, cases="2", repeats=3,
+                       faults="invented-months=4"),
+    "impacts": TwinCorpus("coupled", other_objects=True, seed_offset=3, cases="2", repeats=3),
+    "slips": TwinCorpus("slips", other_objects=True, seed_offset=3, cases="2", repeats=3),
+    "taught": TwinCorpus("slips", seed_offset=4, cases="2", repeats=1),
+    "taught-pushes": TwinCorpus(seed_offset=4, cases="2", repeats=1),
+}  # fmt: skip
+"""Those of a full study. The seeds were fixed before the first run."""
+QUICK_CORPORA = {
+    "main": TwinCorpus(repeats=2), "others": TwinCorpus(other_objects=True, repeats=1)
+}  # fmt: skip
 N_REPEATS = 5
 """Grasps of each object and case, as in the protocol of the paper."""
-QUICK_REPEATS = {"main": 2, "others": 1}
-"""Grasps of each object and case in each corpus of a quick study."""
 
 
 def plan_study(
@@ -72,6 +86,7 @@ def plan_study(
     jobs: int,
     *,
     quick: bool,
+    full: bool = False,
     notify: Notify,
     steps: GraspSteps[list[str]],
 ) -> tuple[StudyPlan, list[str]]:
@@ -81,22 +96,23 @@ def plan_study(
     """
     if data is None:
         folder = out / "data" / "quick" if quick else out / "data"
+        settings = QUICK_CORPORA if quick else FULL_CORPORA if full else TWIN_CORPORA
         corpora = twin_corpora(
-            folder, seed, quick=quick, jobs=jobs, tare=tare, notify=notify, steps=steps
+            folder, seed, settings, jobs=jobs, tare=tare, notify=notify, steps=steps
         )
     else:
         corpora = {"main": scan_corpus("main", data, tare)}
         if not corpora["main"].is_simulated:
-            return StudyPlan(corpora, corpora["main"], quick, seed), []
+            return StudyPlan(corpora, corpora["main"], quick, seed, full), []
     real, left_out = real_corpus(out / "data" / "real", notify)
-    return StudyPlan(corpora, real, quick, seed), left_out
+    return StudyPlan(corpora, real, quick, seed, full), left_out
 
 
 def twin_corpora(
     out: Path,
     seed: int,
+    settings: Mapping[str, TwinCorpus],
     *,
-    quick: bool,
     jobs: int,
     tare: str,
     notify: Notify,
@@ -107,7 +123,7 @@ def twin_corpora(
     Args:
         out: folder of the corpora.
         seed: of the grasps.
-        quick: only the corpora and grasps of a quick study.
+        settings: of each corpus, by name.
         jobs: number of processes.
         tare: how the baseline is found.
         notify: called with each message.
@@ -117,11 +133,9 @@ def twin_corpora(
         OutputError: existing recordings have another seed.
     """
     corpora = {}
-    settings = QUICK_CORPORA if quick else TWIN_CORPORA
     for number, (name, corpus) in enumerate(settings.items(), 1):
         notify(f"recordings of the twin, {number} of {len(settings)}: {name}")
-        repeats = QUICK_REPEATS[name] if quick else corpus.repeats or N_REPEATS
-        simulate_corpus(out / name, corpus, seed, repeats, jobs, notify, steps)
+        simulate_corpus(out / name, corpus, seed, corpus.repeats or N_REPEATS, jobs, notify, steps)
         corpora[name] = scan_corpus(name, out / name, tare)
     return corpora
 
@@ -145,7 +159,7 @@ def simulate_corpus(
     grasps = [
         replace(grasp, glitch_rate=corpus.glitch_rate, noise=corpus.noise)
         for grasp in twin_recordings.plan_grasps(
-            "", "1,2", repeats, corpus.profile, seed, table=table
+            "", corpus.cases, repeats, corpus.profile, seed, table=table, faults=corpus.faults
         )
     ]
     folder.mkdir(parents=True, exist_ok=True)

@@ -18,6 +18,11 @@ ROLES = {
     "glitch-0": "other objects, without glitches of the hand's controller",
     "glitch-1": "other objects, with 1 glitch a minute",
     "glitch-7": "other objects, with 7 glitches a minute",
+    "aged": "other objects, skins aged by four months",
+    "impacts": "other objects; hand, arm and object are knocked",
+    "slips": "other objects, slips that no push causes",
+    "taught": "what teaches a model the slips of this hand",
+    "taught-pushes": "the same, with pushes",
     "real": "recordings of a real hand or gripper",
 }
 """What the recordings of each role are."""

@@ -108,9 +108,12 @@ class StudyPlan(msgspec.Struct, frozen=True):
             objects, other seeds), "others" (other objects), "gentle" and "vigorous" (other
             profiles), "finger" (the protocol of holdfast 0.1), "noiseless" (no noise but rounding),
             "glitch-0", "glitch-1" and "glitch-7" (other objects, with so many glitches of the
-            hand's controller a minute).
+            hand's controller a minute), "aged" (other objects, skins aged by four months),
+            "impacts" (other objects, the hand and its object are knocked), "slips" (other objects,
+            slips that no push causes), and "taught" (what a user would record to teach a hand).
         real: recordings of a real hand; None if there are none.
         quick: fewer windows, methods and trials.
+        full: with the parts beyond the paper's tables, events and splits.
         seed: of all random numbers.
     """
 
@@ -118,6 +121,7 @@ class StudyPlan(msgspec.Struct, frozen=True):
     real: Corpus | None = None
     quick: bool = False
     seed: int = 0
+    full: bool = False
 
     @property
     def main(self) -> Corpus:

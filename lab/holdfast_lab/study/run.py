@@ -17,7 +17,13 @@ from holdfast_lab.study.citation import (
     bibliography,
     methods_text,
 )
-from holdfast_lab.study.comparison import all_methods, real_recordings, sensitivity, slip_table
+from holdfast_lab.study.comparison import (
+    all_methods,
+    real_recordings,
+    sensitivity,
+    shipped,
+    slip_table,
+)
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper import (
     attribution,
@@ -60,10 +66,13 @@ PARTS: Mapping[str, StudyPart] = {
     "claims": claims,
     "comparison": all_methods,
     "slips": slip_table,
+    "shipped": shipped,
     "sensitivity": sensitivity,
     "real": real_recordings,
 }
 """The parts of the study, by name."""
+ONLY_FULL = ("labels", "attribution", "claims", "slips", "shipped", "sensitivity")
+"""Those beyond the paper's tables, events and splits. A quick study has them at a small size."""
 
 
 def run_study(
@@ -103,24 +112,27 @@ def run_study(
     # First, so that hours of work are not lost to a folder that is refused.
     check_output_folder(out, STUDY, force=force)
     start = time.perf_counter()
-    tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
+    skipped = () if plan.full or plan.quick else ONLY_FULL
+    parts = {name: part for name, part in PARTS.items() if name not in skipped}
+    tasks = [task for part in parts.values() for task in part.tasks(plan)]
     results = TaskRunner(Path(out), engine, progress, notify).run(tasks)
     notify("making tables and figures")
     outputs = {
         name: PartOutput(part.tables(plan, results), part.figures(plan, results))
-        for name, part in PARTS.items()
+        for name, part in parts.items()
     }
     seconds = {"data": made_in, "study": time.perf_counter() - start}
     # The contents of `study.json`, except the tables.
     summary = {
         "seed": plan.seed,
         "quick": plan.quick,
+        "full": plan.full,
         "data": environment.data(plan),
         "versions": versions(),
         "machine": machine(),
         "seconds": {name: round(value, 1) for name, value in seconds.items()},
         "tasks": len(tasks),
-        "left_out": [*left_out, *whole_hand_note(plan)],
+        "left_out": [*left_out, *whole_hand_note(plan), *full_note(skipped)],
     }
     sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
     # Those of the sections, because they carry the note on the twin.
@@ -141,3 +153,8 @@ def whole_hand_note(plan: StudyPlan) -> list[str]:
         return []
     titles = ", ".join(method.title for method in METHODS.values() if method.whole_hand)
     return [f"{titles}, because only the {plan.main.fingers[0]} has labels of both classes."]
+
+
+def full_note(skipped: Sequence[str]) -> list[str]:
+    """Return a sentence on the parts that only a full study has, else nothing."""
+    return [f"{', '.join(skipped)}: give --full."] if skipped else []

@@ -87,7 +87,9 @@ def simulate_split(folder: Path, split: "BenchmarkSplit", engine: "Engine") -> N
         RandomizedHands.simulate(folder, grasps, hands, engine=engine, force=False)
         return
     table = OTHER_OBJECTS if split.other_objects else None
-    planned = plan_grasps("", "1,2", split.repeats, "reference", split.seed, table=table)
+    planned = plan_grasps(
+        "", "1,2", split.repeats, split.profile, split.seed, table=table, faults=split.faults
+    )
     simulate_grasps(
         planned, folder, engine=engine, force=False, notify=print_message, steps=progress
     )

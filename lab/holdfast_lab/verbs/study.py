@@ -31,6 +31,14 @@ def study(
         bool, typer.Option("--twin", help="First simulate recordings with the physical twin.")
     ] = False,
     quick: QuickOption = False,
+    full: Annotated[
+        bool,
+        typer.Option(
+            "--full",
+            help="Also labels, attribution, claims, slips of fingers, sensitivity, and the models "
+            "that ship: on knocks, aged skins and slips by speed, untaught and taught.",
+        ),
+    ] = False,
     parallel: EngineOptions,
     seed: SeedOption = 0,
     tare: TareOption = "0.5",
@@ -78,6 +86,8 @@ def study(
     if (path is None) != twin:
         given = "both" if twin else "neither"
         raise ValueError(f"a folder of recordings or --twin expected, {given} given")
+    if quick and full:
+        raise ValueError("--quick or --full expected, both given")
     if seed < 0:
         raise ValueError(f"a seed of at least 0 expected, {seed} given")
     Tare.parse(tare)
@@ -86,7 +96,8 @@ def study(
     started_at = time.perf_counter()
     try:
         plan, left_out = plan_study(
-            path, out, seed, tare, parallel.jobs, quick=quick, notify=print_message, steps=progress
+            path, out, seed, tare, parallel.jobs, quick=quick, full=full,
+            notify=print_message, steps=progress
         )  # fmt: skip
         tables = run_study(
             plan, out, engine, progress=progress, notify=print_message, force=force,

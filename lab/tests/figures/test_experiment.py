@@ -105,8 +105,12 @@ def test_predictions_are_strips_with_their_accuracy():
     given = series()
     late = np.roll(given.labels, 10)
     late[:10] = UNKNOWN
-    figure = drawn(draw_experiment(given, {"LogReg": late, "SVM": given.labels}, span=(0.2, 1.2)))
-    axes = figure.axes[2]
+    predicted = {"LogReg": late, "SVM": given.labels}
+    stable = {"LogReg": np.linspace(0, 1, 200), "SVM": np.full(200, 0.25)}
+    figure = drawn(draw_experiment(given, predicted, stable, span=(0.2, 1.2)))
+    first, second = (line.get_ydata() for line in figure.axes[2].lines[:2])
+    assert (first[-1], set(second)) == (1.0, {0.25})
+    axes = figure.axes[3]
     assert [text.get_text() for text in axes.get_yticklabels()] == [
         "label", "LogReg\n92.9 % correct", "SVM\n100.0 % correct",
     ]  # fmt: skip
@@ -129,13 +133,13 @@ def test_sigma_with_high_peaks_has_a_logarithmic_axis():
 @pytest.mark.parametrize("n", [0, 4])
 def test_a_series_of_few_samples_is_drawn(n):
     given = series(n)
-    for figure in (draw_forces(given), draw_features(given), draw_experiment(given, {})):
+    for figure in (draw_forces(given), draw_features(given), draw_experiment(given, {}, {})):
         drawn(figure)
 
 
 def test_a_series_without_labels_and_phases_is_drawn():
     given = series(labels=np.zeros(200, dtype=int), phases=np.full(200, ""))
-    axes = drawn(draw_experiment(given, {"SVM": given.labels})).axes[2]
+    axes = drawn(draw_experiment(given, {"SVM": given.labels}, {})).axes[3]
     assert axes.get_yticklabels()[1].get_text() == "SVM\nno label"
 
 

@@ -54,7 +54,7 @@ def flat_map():
         (flat_map, 2),
         (lambda: plot_sensor(replace(sensor("anyskin"), name=NAME)), 1),
         (lambda: draw_forces(series(name=NAME)), 1),
-        (lambda: draw_experiment(series(), {NAME: series().labels}), 1),
+        (lambda: draw_experiment(series(), {NAME: series().labels}, {}), 1),
         (lambda: draw_dots({"x": ESTIMATES}, {NAME}), 1),
         (lambda: draw_groups({"x": {NAME: ESTIMATES}}, "y"), 2),
         (lambda: draw_reliability({NAME: np.array([[0.5, 0.5, 10.0]])}), 1),

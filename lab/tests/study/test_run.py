@@ -156,3 +156,38 @@ def _short(recording):
         for name, module in recording.modules.items()
     }  # fmt: skip
     return recording.with_labels(labels)
+
+
+def test_a_study_has_the_parts_of_the_paper_and_a_full_one_all(plan, monkeypatch, tmp_path):
+    monkeypatch.setattr(run, "PARTS", {"paper": paper_tables, "slips": NoPart})
+    monkeypatch.setattr(paper_tables, "tasks", lambda plan: [])
+    monkeypatch.setattr(paper_tables, "tables", lambda plan, results: [])
+    monkeypatch.setattr(paper_tables, "figures", lambda plan, results: [])
+    for settings, asked in (({}, 0), ({"quick": True}, 1), ({"full": True}, 1)):
+        NoPart.asked = 0
+        out = tmp_path / repr(settings)
+        run_study(StudyPlan(plan.corpora, **settings), out)
+        assert NoPart.asked == asked
+        left_out = summary(out)["left_out"]
+        assert any(
+            each.endswith("slips, shipped, sensitivity: give --full.") for each in left_out
+        ) == (not settings)
+
+
+class NoPart:
+    """A part without results that counts how often it is asked for tasks."""
+
+    asked = 0
+
+    @classmethod
+    def tasks(cls, plan):
+        cls.asked += 1
+        return []
+
+    @staticmethod
+    def tables(plan, results):
+        return []
+
+    @staticmethod
+    def figures(plan, results):
+        return []

@@ -58,8 +58,7 @@ def test_own_recordings(capsys, data, tmp_path):
 def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
-    monkeypatch.setattr(corpora, "QUICK_CORPORA", {"main": corpora.TwinCorpus()})
-    monkeypatch.setattr(corpora, "QUICK_REPEATS", {"main": 1})
+    monkeypatch.setattr(corpora, "QUICK_CORPORA", {"main": corpora.TwinCorpus(repeats=1)})
     known = twin_recordings.plan_grasps
     monkeypatch.setattr(
         twin_recordings, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
@@ -94,6 +93,8 @@ class TestBadInput:
         assert "there is no folder" in refusal(capsys, tmp_path / "no", "--out", tmp_path / "out")
 
     def test_numbers(self, capsys, data):
+        both = refusal(capsys, data, "--quick", "--full")
+        assert both == "--quick or --full expected, both given"
         assert refusal(capsys, data, "--seed", -1) == "a seed of at least 0 expected, -1 given"
         assert refusal(capsys, data, "--jobs", 0) == "jobs other than 0 expected, 0 given"
         assert "tare" in refusal(capsys, data, "--tare", "often")

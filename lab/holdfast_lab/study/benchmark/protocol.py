@@ -31,6 +31,9 @@ class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
         other_objects: use the objects that no other split has.
         randomized: every recording has another hand, sensor and object.
         scored: whether results are reported for it.
+        since: version of the benchmark that has it first.
+        profile: of the twin.
+        faults: troubles of the skins, as in `--faults`.
         digests: of the content of each recording, by name.
     """
 
@@ -40,14 +43,19 @@ class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
     other_objects: bool = False
     randomized: bool = False
     scored: bool = True
+    since: int = 1
+    profile: str = "reference"
+    faults: str = ""
     digests: dict[str, str] = {}
 
 
 class BenchmarkProtocol(msgspec.Struct, frozen=True):
     """A version of the benchmark.
 
+    A version adds splits, and changes none: recordings and results of an older one stay valid.
+
     Attributes:
-        version: a new one for every change of data or rules.
+        version: a new one for every split that is added.
         splits: by name.
     """
 

@@ -18,7 +18,7 @@ from holdfast_lab.tasks import Task
 
 REFERENCE_METHOD = "logreg"
 """The paper's method, which all others are compared with."""
-MAIN_METHODS = (*PAPER_FAMILY, "zhang", "holdfast")
+MAIN_METHODS = (*PAPER_FAMILY, "zhang", "holdfast", "noise_floor", "always_stable")
 """Methods that are evaluated on every corpus."""
 QUICK_METHODS = (*PAPER_FAMILY, "holdfast")
 """Those of them that a quick study evaluates on every corpus."""

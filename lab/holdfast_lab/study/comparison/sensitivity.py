@@ -1,20 +1,17 @@
 """Part of the study: results when one condition is varied.
 
-The conditions are noise on the readings, the margin of labels, the sampling rate and the profile
-of the twin. One more table compares how noise affects the paper's sigma and an energy.
+The conditions are noise on the readings and the sampling rate. One more table compares how noise
+affects the paper's sigma and an energy.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from holdfast.contact import UNSTABLE_MARGIN
-from holdfast.twin.profile import profile, profiles
 from holdfast_lab.figures.curves import PlottedCurve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
 from holdfast_lab.study.comparison.jobs import (
-    SPLIT_TITLES,
     Results,
     evaluation_task,
     method_effort,
@@ -46,12 +43,8 @@ NOISE_LEVELS = (0.0, 1.0, 2.0, 4.0, 8.0)
 """Standard deviations of the added noise [unit of the readings]."""
 SAMPLE_STEPS = (1, 2, 3, 5)
 """Numbers n of which every n-th sample is kept."""
-MARGINS = (0.0, 0.05, UNSTABLE_MARGIN, 0.2)
-"""Margins of labels [s]."""
-PROFILES = ("recording", "gentle", "vigorous")
 
 NOISE_NAME = "noise"
-MARGIN = "margin [s]"
 RATE_NAME = "rate [Hz]"
 SAMPLE_FIGURES = ("accuracy [%]", "FDR [%]", "AUC contact")
 SIGMA_DIFFERENCE = "accuracy less sigma's [points]"
@@ -104,9 +97,9 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 
 def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
-    """Return a table for each condition, for the profiles, and for sigma against energy."""
+    """Return a table for each condition, and for sigma against energy."""
     swept = [sweep_table(plan, results, sweep) for sweep in sweeps(plan)]
-    return [*swept, profile_table(plan, results), sigma_energy_table(plan, results)]
+    return [*swept, sigma_energy_table(plan, results)]
 
 
 def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
@@ -124,7 +117,7 @@ def varied_methods(plan: StudyPlan) -> list[str]:
 
 
 def sweeps(plan: StudyPlan) -> list[Sweep]:
-    """Return the conditions that are varied. The margin is one only if the truth is known."""
+    """Return the conditions that are varied."""
     first = plan.main.load()[0]
     unit = first.modules[plan.main.fingers[0]].unit
     noise = Sweep(
@@ -134,21 +127,6 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
         _noise(plan),
         f"Standard deviation of white noise added to every reading [{unit}], in training and "
         "in test; the readings already contain the noise of the twin.",
-    )
-    by_margin: dict[float, Variation] = {}
-    if first.truth is not None and "phase" in first.truth.hand:
-        # The margin that the labels of the recordings have already is no variation.
-        known = str(first.metadata.get("profile"))
-        default = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
-        for margin in (0.0, UNSTABLE_MARGIN) if plan.quick else MARGINS:
-            by_margin[margin] = Variation(margin=None if margin == default else margin)
-    margins = Sweep(
-        "margins",
-        "Sensitivity to the margin of labels",
-        MARGIN,
-        by_margin,
-        "Time by which labels extend every disturbance at both ends, in training and in the "
-        "figures by sample; alarms are counted by labels without margin.",
     )
     rates = Sweep(
         "rates",
@@ -161,7 +139,7 @@ def sweeps(plan: StudyPlan) -> list[Sweep]:
         "Every 1st, 2nd, ... sample, in training and in test. Windows keep their number of "
         "samples, so they last longer.",
     )
-    return [sweep for sweep in (noise, margins, rates) if sweep.variations]
+    return [noise, rates]
 
 
 def _noise(plan: StudyPlan) -> dict[float, Variation]:
@@ -182,8 +160,7 @@ def _task(plan: StudyPlan, method: str, variation: Variation) -> Task:
 
 
 def _task_name(method: str, variation: Variation) -> str:
-    margin = "" if variation.margin is None else f"/margin-{variation.margin:g}"
-    return f"sensitivity/{method}/noise-{variation.noise:g}/every-{variation.every}{margin}"
+    return f"sensitivity/{method}/noise-{variation.noise:g}/every-{variation.every}"
 
 
 def sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
@@ -198,25 +175,6 @@ def sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
     return ResultTable(
         sweep.name, sweep.title, f"{sweep.note} {NOTE}", rows, lines, digits_of=DIGITS
     )
-
-
-def profile_table(plan: StudyPlan, results: Results) -> ResultTable:
-    """Return the table of other profiles of the twin, without a new fit."""
-    rows: list[Row] = []
-    for method in varied_methods(plan):
-        evaluations = results[_task_name(method, Variation())]
-        for key in PROFILES:
-            name = plan.corpora[key].name if key in plan.corpora else key
-            if name in evaluations:
-                on = "same profile, by recording" if key == "recording" else SPLIT_TITLES[key]
-                keys: Keys = {"method": METHODS[method].title, "on": on}
-                rows += _rows(keys, evaluations[name], plan.seed)
-    note = (
-        "Fitted to main, evaluated on recordings with another grip force and other disturbances "
-        "by the operator, without a new fit; alarms at the threshold chosen on main."
-    )
-    title = "Sensitivity to the profile"
-    return ResultTable("profiles", title, note, rows, ("method", "on"), digits_of=DIGITS)
 
 
 def sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:

@@ -17,6 +17,7 @@ from holdfast_lab.study.methods.method import (
     hand_signal,
     stretchwise,
 )
+from holdfast_lab.study.methods.untrained import ALWAYS_STABLE, NOISE_FLOOR
 from holdfast_lab.study.methods.wavelets import (
     ENERGY,
     LOG_HAND,
@@ -50,6 +51,8 @@ METHODS: dict[str, Method] = {
         *JAMES_LEPORA,
         TCN,
         TREES,
+        NOISE_FLOOR,
+        ALWAYS_STABLE,
     )
 }
 """All methods by name, in the order of the tables."""

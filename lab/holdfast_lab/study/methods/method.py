@@ -26,7 +26,8 @@ from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
 HAND = "hand"
 """Key of the features of a whole-hand method."""
 
-Category = Literal["paper", "friction", "vibration", "differentiation", "learning", "holdfast"]
+Category = Literal["paper", "friction", "vibration", "differentiation", "learning", "holdfast",
+                   "untrained"]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,12 +15,8 @@ from holdfast_lab.study.methods.wavelets import TREES
 Target = Literal["sliding", "stability"]
 """What a method is fitted to: true sliding of a finger, or the labels of stability."""
 
-RIVALS = (
-    "logreg", "svm", "log_two", "log_hand", "energy", "zhang", "friction",
-    "slip_servo", "spectrum", "difference", "tangential", "anyskin",
-    "jl_local_logreg", "jl_local_svm", "jl_global_logreg", "jl_global_svm",
-)  # fmt: skip
-"""Names of the other methods, of `METHODS`."""
+RIVALS = tuple(name for name in METHODS if name not in ("holdfast", "tcn"))
+"""Names of the other methods, of `METHODS`; the network takes hours."""
 
 
 @dataclass(frozen=True)

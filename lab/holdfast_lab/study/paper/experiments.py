@@ -49,6 +49,7 @@ class ExampleRecording(msgspec.Struct, frozen=True):
         recording: name of the recording.
         finger: that is drawn.
         states: by name of a method: (n,) state codes, by a fit without this recording.
+        stable: by name of a method: (n,) probability that the finger is stable; -1 if unknown.
     """
 
     experiment: Experiment
@@ -56,6 +57,7 @@ class ExampleRecording(msgspec.Struct, frozen=True):
     recording: str
     finger: str
     states: dict[str, list[int]] = {}
+    stable: dict[str, list[float]] = {}
 
 
 def tasks(plan: StudyPlan) -> list[Task]:
@@ -114,8 +116,10 @@ def predict_examples(
                 )
             corpus = _select(corpora[example.role], example.finger, example.recording)
             (shown,) = corpus_features(training.method, corpus)
-            states = fitted.scores(shown).fingers[example.finger].states()
-            example.states[name] = states.tolist()
+            scores = fitted.scores(shown).fingers[example.finger]
+            example.states[name] = scores.states().tolist()
+            # JSON has no NaN.
+            example.stable[name] = np.nan_to_num(scores.probability, nan=-1.0).round(4).tolist()
     # The first figures show what the paper does, so a recording with disturbances.
     first = _first(main, finger, EXPERIMENT_CASES["disturbed"]) or main.recordings[0]
     return [ExampleRecording("protocol", "main", first, finger), *examples]
@@ -172,14 +176,18 @@ def experiment_figure(example: ExampleRecording, series: FingerSeries) -> Report
     """Return the figure of an experiment with predicted states."""
     name, title = CAPTIONS[example.experiment]
     predicted = {TITLES[method]: np.array(states) for method, states in example.states.items()}
+    stable = {
+        TITLES[method]: np.where(np.array(values) < 0, np.nan, values)
+        for method, values in example.stable.items()
+    }
     fits = (
         "fits to all other recordings"
         if example.role == "main"
         else f"fits to the main recordings (this recording is from {example.role!r})"
     )
     caption = (
-        f"{title}. F_a, sigma, the label, and the states that LogReg and SVM predict by {fits}. "
-        "Beside each strip: the fraction of labelled samples that are correct. Chosen: the first "
-        "recording by name."
+        f"{title}. F_a, sigma, P(stable), the label, and the states that LogReg and SVM predict "
+        f"by {fits}. Beside each strip: the fraction of labelled samples that are correct. "
+        "Chosen: the first recording by name."
     )
-    return ReportFigure(name, caption, draw_experiment(series, predicted))
+    return ReportFigure(name, caption, draw_experiment(series, predicted, stable))

@@ -13,16 +13,23 @@ from holdfast.features import Tare
 from holdfast.labelling.rules import signal
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.truth_labels import LabelRule, fingers_with_truth, relabel
-from holdfast.recordings import Recording, Tactile, Truth, label_states, labels_from_samples
+from holdfast.recordings import Label, Recording, Tactile, Truth, label_states, labels_from_samples
+from holdfast_lab.study.methods import hand_signal
+from holdfast_lab.study.methods.wavelets import detail_energy
 
-LabelSource = Literal["recording", "exact", "drawn", "sliding", "no_glitches"]
+LabelSource = Literal["recording", "exact", "drawn", "sliding", "no_glitches", "own_energy"]
 """Where labels come from.
 
 `recording`: those of the recording. `exact`: from the truth without margin. `drawn`: by the rule
 `signal` from the force alone. `sliding`: from the truth, but in a held contact only sliding is
 unstable; disturbances without sliding and glitches are stable. `no_glitches`: from the truth, but
-a glitch of the hand's controller is stable.
+a glitch of the hand's controller is stable. `own_energy`: by a threshold on the energy of the Haar
+details of the normal force, which is nearly a feature of the classifier.
 """
+OWN_ENERGY, OWN_FORCE, OWN_WINDOW = 4400.0, 60.0, 4
+"""Energy [count^2] from which on a contact is labelled unstable, normal force [count] from which on
+there is a contact, and N_w, of the public prototype of the paper's first author
+(github.com/Douniakit/tactile_data)."""
 
 
 def has_truth(recording: Recording) -> bool:
@@ -42,6 +49,8 @@ def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recordin
     """
     if source == "drawn":
         return recording.with_labels(signal.propose(recording, Tare.parse(tare)))
+    if source == "own_energy":
+        return recording.with_labels(own_energy_labels(recording, tare))
     truth = recording.truth
     if source == "recording" or truth is None or not has_truth(recording):
         return recording
@@ -52,6 +61,29 @@ def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recordin
         return exact
     modules = {name: _only_sliding(module, truth, name) for name, module in exact.modules.items()}
     return replace(exact, modules=modules)
+
+
+def own_energy_labels(recording: Recording, tare: str) -> dict[str, tuple[Label, ...]]:
+    """Return labels of each finger by the energy of the details of its normal force."""
+    labels = {}
+    for name, finger in hand_signal(recording, Tare.parse(tare)).fingers.items():
+        energy = np.full(len(finger.times), np.nan)
+        for rows in finger.stretches:
+            energy[rows] = detail_energy(finger.normal_force[rows], OWN_WINDOW)
+        states: list[tuple[ContactState, Cause | None] | None] = []
+        for value, force in zip(energy, finger.normal_magnitude, strict=True):
+            if np.isnan(value):
+                states.append(None)
+            elif force <= OWN_FORCE:
+                states.append((ContactState.NO_CONTACT, None))
+            else:
+                stable = value < OWN_ENERGY
+                states.append((ContactState.STABLE if stable else ContactState.UNSTABLE, None))
+        period = recording.modules[name].period
+        labels[name] = labels_from_samples(
+            finger.times, states, period=period, evidence="force", author="energy"
+        )
+    return labels
 
 
 def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:

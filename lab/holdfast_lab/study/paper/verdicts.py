@@ -39,7 +39,7 @@ from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
-VERDICT_METHODS = ("logreg", "svm", "holdfast")
+VERDICT_METHODS = ("logreg", "svm", "holdfast", "noise_floor", "always_stable")
 QUICK_VERDICT_METHODS = ("logreg", "holdfast")
 ROLE_TITLES = {
     "main": "by recording",
@@ -52,6 +52,9 @@ ROLE_TITLES = {
 ONLY_FAILED = ("gentle", "vigorous")
 """Roles of which only the failed grasps are evaluated."""
 VERDICT_DIGITS = {"delay median [s]": 3, "delay 95 % [s]": 3, "disturbances": 0, "failed grasps": 0}
+
+GRASP_PHASES = (Phase.CLOSING, *HELD_PHASES)
+"""Phases of a grasp, until the release begins."""
 
 Keys = dict[str, Key]
 
@@ -85,6 +88,7 @@ class GraspVerdict(msgspec.Struct, frozen=True):
         contact: [samples in contact from the start of the closing to the release, of those not
             called stable], all fingers.
         unstable: the same of the samples labelled unstable.
+        phases: by phase, samples of all fingers in contact, and those not called stable.
         first_stable: by finger, time from the lock to the first stable estimate [s]; infinite
             without one.
         lasting_stable: the same, to the first estimate that stays stable for half a second.
@@ -97,6 +101,7 @@ class GraspVerdict(msgspec.Struct, frozen=True):
     case: str
     contact: tuple[int, int]
     unstable: tuple[int, int]
+    phases: dict[str, tuple[int, int]]
     first_stable: list[float]
     lasting_stable: list[float]
     disturbances: list[DisturbanceOutcome]
@@ -121,9 +126,9 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
-    """Return the tables of experiment 1, experiment 2 and single disturbances."""
+    """Return the tables of experiment 1, experiment 2, phases and single disturbances."""
     by_method = {n: results[f"verdicts/{n}"] for n in _methods(plan) if f"verdicts/{n}" in results}
-    makers = (failed_table, disturbed_table, single_table)
+    makers = (failed_table, disturbed_table, phase_table, single_table)
     made = [make(by_method, plan.seed) for make in makers] if by_method else []
     return [table for table in made if table.rows]
 
@@ -179,6 +184,7 @@ def verdict_of(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
     # Samples of a grasp, from the start of the closing until the release begins: all of them and
     # those not called stable, in contact and labelled unstable.
     contact, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
+    phases = {str(phase): np.zeros(2, dtype=int) for phase in GRASP_PHASES}
     for finger in decisions.fingers.values():
         if truth is None:
             break
@@ -193,6 +199,9 @@ def verdict_of(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
         is_unstable = grasp & (finger.labels == UNSTABLE)
         contact += (grasp.sum(), (grasp & not_stable).sum())
         unstable += (is_unstable.sum(), (is_unstable & not_stable).sum())
+        for name in phases:
+            within = grasp & (phase == name)
+            phases[name] += (within.sum(), (within & not_stable).sum())
     stable_after = [
         stable_after_lock(finger.times, finger.states, truth)
         for finger in decisions.fingers.values()
@@ -205,6 +214,7 @@ def verdict_of(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
         case=case,
         contact=(int(contact[0]), int(contact[1])),
         unstable=(int(unstable[0]), int(unstable[1])),
+        phases={name: (int(n), int(n_called)) for name, (n, n_called) in phases.items()},
         first_stable=[first for first, _ in known],
         lasting_stable=[lasting for _, lasting in known],
         disturbances=find_disturbances(decisions.hand, truth),
@@ -353,6 +363,26 @@ def disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Ite
     delays = [[d.delay for d in grasp.disturbances] for grasp in chosen]
     yield quantile_row(keys | {"figure": "delay median [s]"}, delays, 0.5, seed)
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
+
+
+def phase_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    """Return the table of what is called unstable in each phase of the experiments."""
+    rows = []
+    for name, verdicts in by_method.items():
+        for title, is_failed in (("1: failed", True), ("2: held", False)):
+            chosen = [v for v in verdicts if (v.case == "failed") == is_failed and v.case != "1"]
+            for phase in map(str, GRASP_PHASES) if chosen else ():
+                n, called = np.array([grasp.phases[phase] for grasp in chosen]).T
+                keys: Keys = {"experiment": title, "method": METHODS[name].title, "phase": phase}
+                rows.append(ratio_row(keys, called, n, seed))
+    note = (
+        "Samples of fingers in contact that are not called stable [%], of all recordings of the "
+        "experiments, by fits without them. In experiment 2, locked is a held object without a "
+        "disturbance: what is called unstable there is an error, or a glitch of the hand."
+    )
+    title = "Experiments 1 and 2: called unstable, by phase [%]"
+    lines = ("experiment", "method")
+    return ResultTable("experiment_phases", title, note, rows, lines, column="phase")
 
 
 def single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
@@ -64,7 +62,6 @@ def few():
         patch.setattr(sensitivity, "VARIED_METHODS", ("logreg",))
         patch.setattr(sensitivity, "NOISE_LEVELS", (0.0, 2.0))
         patch.setattr(sensitivity, "SAMPLE_STEPS", (1, 5))
-        patch.setattr(sensitivity, "MARGINS", (0.0, 0.1))
         yield
 
 
@@ -319,18 +316,16 @@ def test_without_a_variation_the_job_is_that_of_the_comparison(plan, few):
 
 def test_tables_and_figures_of_the_conditions(plan, results):
     tables = {table.name: table for table in sensitivity.tables(plan, results)}
-    assert tuple(tables) == ("noise", "margins", "rates", "profiles", "sigma_energy")
+    assert tuple(tables) == ("noise", "rates", "sigma_energy")
     for table in tables.values():
         assert to_html(table) and to_json(table)
     noise = rows_of(tables["noise"], method=METHODS["logreg"].title, figure="accuracy [%]")
     assert [row.keys["noise"] for row in noise] == [0.0, 2.0]
     rates = rows_of(tables["rates"], method=METHODS["logreg"].title, figure="accuracy [%]")
     assert [row.keys["rate [Hz]"] for row in rates] == [30.0, 150.0]
-    profiles = {row.keys["on"] for row in tables["profiles"].rows}
-    assert profiles == {"same profile, by recording", "gentle profile"}
     drawn = sensitivity.figures(plan, results)
     assert [each.name for each in drawn] == [
-        "noise_curves", "margins_curves", "rates_curves", "sigma_energy_curves",
+        "noise_curves", "rates_curves", "sigma_energy_curves",
     ]  # fmt: skip
     for each in drawn:
         each.figure.draw_without_rendering()
@@ -343,10 +338,3 @@ def test_sigma_beside_energy_is_compared_in_pairs(plan, results):
     by = {row.keys["measure"]: row.ours for row in rows_of(table, figure="accuracy [%]", noise=2.0)}
     for row in less:
         assert row.ours == pytest.approx(by[row.keys["measure"]] - by["sigma of F_a"])
-
-
-def test_without_a_truth_there_are_no_margins(plan, tmp_path):
-    blind = [replace(recording_with_truth(f"grasp-{s}", s), truth=None) for s in range(2)]
-    corpus = scan_corpus("main", save_all(tmp_path / "main", blind))
-    assert [s.name for s in sensitivity.sweeps(StudyPlan({"main": corpus}))] == ["noise", "rates"]
-    assert [s.name for s in sensitivity.sweeps(plan)] == ["noise", "margins", "rates"]

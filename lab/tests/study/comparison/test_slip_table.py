@@ -65,7 +65,7 @@ def test_one_recording_has_no_interval():
     assert all(row.interval is None for row in slip_rows({}, evaluation(intervals=None)))
 
 
-@pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 19)])
+@pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 24)])
 def test_each_method_has_a_task_and_lines(quick, n):
     plan = StudyPlan({"main": corpus("main"), "others": corpus("others")}, quick=quick)
     made = tasks(plan)

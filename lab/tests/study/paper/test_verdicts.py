@@ -89,7 +89,9 @@ def plan(tmp_path_factory):
 
 def test_the_tables(plan):
     results = {task.name: task.function(*task.arguments) for task in verdicts.tasks(plan)}
-    one, two, single = verdicts.tables(plan, results)
+    one, two, phases, single = verdicts.tables(plan, results)
+    called = {(r.keys["experiment"], r.keys["phase"]): r.ours for r in phases.rows}
+    assert called["1: failed", "disturbed"] and called["2: held", "disturbed"]
     failed = {(r.keys["on"], r.keys["figure"]): r.ours for r in one.rows}
     assert failed["vigorous profile", "failed grasps"] == 2
     assert {on for on, _ in failed} == {"vigorous profile"}

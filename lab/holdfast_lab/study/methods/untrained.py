@@ -1,0 +1,72 @@
+"""Methods that learn nothing: what calling every contact stable gives, and the noise floor."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from holdfast.classifiers import Parameters, Samples
+from holdfast.classifiers.fitting import Fitted
+from holdfast.classifiers.linear import Linear
+from holdfast.features import DEFAULT_WINDOW
+from holdfast.features.specs import FeatureSpec
+from holdfast.features.stream import extract
+from holdfast.features.tables import StreamPlan
+from holdfast.model import ANY_FINGER, Model
+from holdfast.sensors.types import Array
+from holdfast_lab.study.methods.method import HandSignal, Method, stretchwise
+
+if TYPE_CHECKING:
+    from optuna import Trial
+
+
+@dataclass(frozen=True)
+class FixedRule:
+    """A rule that no sample changes.
+
+    Attributes:
+        rule: of the probability.
+        name: of the recipe.
+        reference: reference parameters: none.
+    """
+
+    rule: Linear
+    name: str = "fixed"
+    reference: Parameters = field(default_factory=dict)
+
+    def suggest(self, trial: "Trial") -> Parameters:
+        """Return no parameters; there are none to search."""
+        del trial
+        return {}
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
+        """Return the rule; the arguments are not used."""
+        del samples, parameters, seed
+        return Fitted(self.rule)
+
+
+def noise_feature(hand: HandSignal) -> Mapping[str, Array]:
+    """Return the feature of `builtin:noise-floor`: log of sigma over the noise of the tare."""
+    sensors = {name: finger.sensor for name, finger in hand.fingers.items()}
+    specs = dict.fromkeys(sensors, (FeatureSpec("sigma", DEFAULT_WINDOW, "noise"),))
+    plan = StreamPlan(sensors, specs, DEFAULT_WINDOW, hand.tare, hand.rate)
+    return {name: rows.features for name, rows in extract(plan, hand.recording).items()}
+
+
+ALWAYS_STABLE = Method(
+    "always_stable",
+    "always stable in contact",
+    "untrained",
+    "nothing: every contact is stable, and nothing slides; the contact threshold is that of all "
+    "methods",
+    lambda hand: stretchwise(hand, lambda finger: finger.amplitude[:, None]),
+    FixedRule(Linear((0.0,), (1.0,), ((0.0,),), (1.0,))),
+)
+NOISE_FLOOR = Method(
+    "noise_floor",
+    "noise floor (untrained)",
+    "untrained",
+    "ours: builtin:noise-floor, stable while sigma at N_w = 14 is under three times the noise of "
+    "the tare",
+    noise_feature,
+    FixedRule(Model.load("builtin:noise-floor").finger(ANY_FINGER).stable.linear),
+)
