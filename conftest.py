@@ -5,6 +5,7 @@ import re
 import shutil
 import signal
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
@@ -33,6 +34,8 @@ hypothesis.settings.register_profile("checks", deadline=None, max_examples=50, d
 hypothesis.settings.register_profile("quick", deadline=None, max_examples=5)
 hypothesis.settings.load_profile("checks" if os.environ.get("CI") else "home")
 
+collect_ignore = [] if find_spec("rerun") else ["packages/holdfast-interop/holdfast_interop/rerun"]
+"""Modules that need a package of no group, see .ci/rerun."""
 SLOW_FOLDERS = ("tests/attack", "tests/cli/label", "tests/docs", "tests/examples")
 """Folders without quick tests."""
 SLOW_FILE = re.compile(

@@ -1,5 +1,6 @@
-"""Formats of other tools for `holdfast export`: LeRobot and Foxglove."""
+"""Formats of other tools for `holdfast export`, and the view of `holdfast serve --rerun`."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -7,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.terminal.console import print_message
-from holdfast.errors import require_extras
+from holdfast.errors import HoldfastError, is_installed, require_extras
 
 if TYPE_CHECKING:
     from holdfast.io import Dataset
+    from holdfast.live.stream_detector import StreamDetector
+    from holdfast_interop.rerun.publisher import RerunPublisher
 
 
 @dataclass(frozen=True)
@@ -24,13 +27,22 @@ class LeRobotOptions:
 
 
 @dataclass(frozen=True)
-class FoxgloveOptions:
-    """Options of files for Foxglove."""
+class ViewerOptions:
+    """Options of files for Foxglove and Rerun."""
 
     model: Annotated[
         str | None,
-        typer.Option(help="Model whose estimates Foxglove shows: a file or builtin:NAME."),
+        typer.Option(help="Model whose estimates are shown: a file or builtin:NAME."),
     ] = None
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """Options of the live view."""
+
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Also send to the Rerun viewer on this machine.")
+    ] = False
 
 
 class LeRobot:
@@ -59,13 +71,13 @@ class LeRobot:
 class Foxglove:
     """MCAP files with plots, states, a log and an arrow for each taxel, and a layout for them."""
 
-    OPTIONS = FoxgloveOptions()
+    OPTIONS = ViewerOptions()
 
     @staticmethod
     def export(
         recordings: "Dataset",
         out: Path,
-        options: FoxgloveOptions,
+        options: ViewerOptions,
         *,
         force: bool,
         progress: Any,  # noqa: ANN401
@@ -78,3 +90,55 @@ class Foxglove:
         totals = foxglove.export(recordings, out, model=loaded, force=force, progress=progress)
         print_message(f"hint: import the layout {out / foxglove.LAYOUT_FILE} in Foxglove")
         return {**totals, "layout": out / foxglove.LAYOUT_FILE}
+
+
+class Rerun:
+    """Files for Rerun, and its live view: states, forces, taxels with arrows, and events."""
+
+    OPTIONS = ViewerOptions()
+
+    @staticmethod
+    def export(
+        recordings: "Dataset",
+        out: Path,
+        options: ViewerOptions,
+        *,
+        force: bool,
+        progress: Any,  # noqa: ANN401
+    ) -> dict[str, Any]:
+        """Write the files, and return how many."""
+        require_rerun()
+        from holdfast.model import Model
+        from holdfast_interop.rerun import exporter
+
+        loaded = None if options.model is None else Model.load(options.model)
+        return exporter.export(recordings, out, model=loaded, force=force, progress=progress)
+
+
+class LiveRerun:
+    """The live view of Rerun."""
+
+    OPTIONS = LiveOptions()
+
+    @staticmethod
+    def publisher(
+        stream: "StreamDetector", panels: Mapping[str, Any], options: LiveOptions
+    ) -> "RerunPublisher":
+        """Return the publisher of a stream; it is not open yet."""
+        require_rerun()
+        from holdfast_interop.rerun.publisher import RerunPublisher
+
+        return RerunPublisher(stream)
+
+
+def require_rerun() -> None:
+    """Check that Rerun is installed.
+
+    Raises:
+        HoldfastError: it is not; no extra of holdfast itself has it, as it needs 700 MB.
+    """
+    if not is_installed("rerun"):
+        raise HoldfastError(
+            "this needs the package rerun, which is not installed: "
+            "pip install 'holdfast-interop[rerun]'"
+        )

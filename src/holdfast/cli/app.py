@@ -344,14 +344,16 @@ Values = dict[str, Any]
 
 
 def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[inspect.Parameter]:
-    """Return the options of a group as parameters; those of plug-ins one after the other."""
+    """Return the options of a group as parameters; those of plug-ins one after the other.
+
+    Plug-ins of a group that have an option of the same name share it.
+    """
     if issubclass(group, PluginOptions):
-        plugins = group.plugins().values()
-        return [
-            option
-            for plugin in plugins
-            for option in _options_of(type(plugin.OPTIONS), plugin.OPTIONS)
-        ]
+        shared: dict[str, inspect.Parameter] = {}
+        for plugin in group.plugins().values():
+            for option in _options_of(type(plugin.OPTIONS), plugin.OPTIONS):
+                shared.setdefault(option.name, option)
+        return list(shared.values())
     return [
         option.replace(
             kind=inspect.Parameter.KEYWORD_ONLY,

@@ -8,11 +8,9 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from holdfast.detector import Detection, detect
-from holdfast.errors import RecordingError
 from holdfast.exporters.output import whole_files
 from holdfast.files import file_stem
 from holdfast.recordings import Recording
-from holdfast_interop.foxglove.hand_frames import frames_of
 from holdfast_interop.foxglove.messages import Message, messages
 from holdfast_interop.foxglove.schemas import (
     ARROWS_TOPIC,
@@ -30,6 +28,8 @@ from holdfast_interop.foxglove.schemas import (
     schema_of,
     series_label,
 )
+from holdfast_interop.scene.hand_frames import frames_of
+from holdfast_interop.scene.taxel_arrows import scene_instants
 
 if TYPE_CHECKING:
     from holdfast.model import Model
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 LAYOUT_FILE = "holdfast-layout.json"
 EXPORT_CHUNK_SIZE = 1 << 20
 """Number of bytes from which a chunk of the file ends."""
-MAX_SCENE_SECONDS = 86_400.0
-"""Longest recording that is exported [s]."""
 
 
 def export(
@@ -93,11 +91,7 @@ def write_recording(recording: Recording, path: Path, model: "Model | None") -> 
         RecordingError: the recording is longer than a day.
         ModelError: the model does not fit to it.
     """
-    if recording.duration > MAX_SCENE_SECONDS:
-        raise RecordingError(
-            f"{recording.name}: {recording.duration:.3g} s given, at most {MAX_SCENE_SECONDS:g} s "
-            "expected; cut it"
-        )
+    scene_instants(recording)  # refuses what is too long before any work
     detection = None if model is None else detect(model, recording)
     frames, origin = frames_of(recording)
     with path.open("wb") as stream:

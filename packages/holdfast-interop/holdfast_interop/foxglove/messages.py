@@ -2,20 +2,17 @@
 
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import UNKNOWN, ContactState, faults_of
-from holdfast.detector import Detection, FingerTrace
+from holdfast.contact import UNKNOWN
+from holdfast.detector import Detection
 from holdfast.detector.detection import CAUSE_BY_CODE, REASON_BY_CODE, STATE_BY_CODE
-from holdfast.detector.slips import SlipWatch
 from holdfast.recordings import GAP_PERIODS, Recording
 from holdfast.sensors.types import Array, Integers
-from holdfast_interop.foxglove.hand_frames import Frame, module_frame
 from holdfast_interop.foxglove.schemas import (
     ARROWS_TOPIC,
     EMPTY_SHAPES,
@@ -34,26 +31,24 @@ from holdfast_interop.foxglove.schemas import (
     finger_topic,
     series_label,
 )
-from holdfast_interop.foxglove.taxel_arrows import (
+from holdfast_interop.scene.hand_frames import Frame, module_frame
+from holdfast_interop.scene.taxel_arrows import (
+    SCENE_RATE,
     SHORTEST_ARROW,
     ModuleArrows,
     arrow_scale,
     module_forces,
     orientations,
-    zeroed,
+    scene_instants,
 )
+from holdfast_interop.scene.tracks import ARROW_COLOURS, Traces, Track, events, series, state_codes
 
-SCENE_RATE = 30.0
-"""Arrows and moving frames per second [Hz]."""
 REPEAT_SECONDS = 1.0
 """Time after which a state is sent again if it does not change [s]."""
 INFO, WARNING = 2, 3
 """Levels of Foxglove's log."""
 
 Colour = dict[str, float]
-Track = tuple[Array, npt.NDArray[Any]]
-"""Times (n,) [s] and values (n,)."""
-Traces = Mapping[str, FingerTrace]
 Stamp = Callable[[float], dict[str, int]]
 
 
@@ -62,13 +57,6 @@ def rgba(red: float, green: float, blue: float, alpha: float = 1.0) -> Colour:
     return {"r": red, "g": green, "b": blue, "a": alpha}
 
 
-ARROW_COLOURS = {
-    ContactState.UNKNOWN: rgba(0.34, 0.71, 0.91),
-    ContactState.NO_CONTACT: rgba(0.78, 0.78, 0.78),
-    ContactState.UNSTABLE: rgba(0.88, 0.54, 0.24),
-    ContactState.STABLE: rgba(0.0, 0.62, 0.45),
-}
-"""Colours of the arrows of a finger, by its state (or, without a model, its label)."""
 TAXEL_COLOUR = rgba(0.4, 0.4, 0.4, 0.6)
 TAXEL_DIAMETER = 0.0012
 NAME_SIZE = 0.006
@@ -78,6 +66,15 @@ ARROW_WIDTHS = (0.0006, 0.0015)
 HEAD_SHARE = 0.3
 """Length of the head of an arrow as a share of the arrow."""
 _STRAIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+SERIES_TOPICS = {
+    "force": FORCE_TOPIC,
+    "instability": INSTABILITY_TOPIC,
+    "stable_probability": STABLE_TOPIC,
+    "slip_probability": SLIP_TOPIC,
+    "slip_speed": SPEED_TOPIC,
+    "true_slip_speed": TRUE_SPEED_TOPIC,
+}
+"""Topic of each quantity of `series`."""
 
 
 class Message(NamedTuple):
@@ -100,10 +97,7 @@ def messages(
         stamp: makes the time stamp of a message of a time [s].
     """
     traces = {} if detection is None else detection.fingers
-    # From the start, so that the arrows of all modules are of the same instants. At a rate for
-    # eyes: arrows at every sample would make files of gigabytes.
-    n_instants = int(recording.duration * SCENE_RATE) + 1
-    instants = recording.start + np.arange(n_instants) / SCENE_RATE
+    instants = scene_instants(recording)
     parts = [
         transform_messages(frames, instants, stamp),  # before what is drawn in these frames
         taxel_messages(recording, stamp),
@@ -118,30 +112,9 @@ def messages(
 
 def scalar_messages(recording: Recording, traces: Traces) -> list[Iterator[Message]]:
     """Return the series of plots; a topic has the values of all fingers."""
-    forces: dict[str, Track] = {}
-    for name, module in recording.modules.items():
-        if name in traces:
-            forces[name] = traces[name].times, np.linalg.norm(traces[name].force, axis=1)
-        elif module.n_samples:
-            force = np.einsum("tij,ntj->ni", module.sensor.rotations, zeroed(recording, name))
-            forces[name] = module.times, np.linalg.norm(force, axis=1)
-    topics: dict[str, dict[str, Track]] = {FORCE_TOPIC: forces}
-    for topic, column in (
-        (INSTABILITY_TOPIC, "instability"),
-        (STABLE_TOPIC, "stable_probability"),
-        (SLIP_TOPIC, "slip_probability"),
-        (SPEED_TOPIC, "slip_speed"),
-    ):
-        columns = {name: (trace.times, getattr(trace, column)) for name, trace in traces.items()}
-        topics[topic] = {name: track for name, track in columns.items() if track[1] is not None}
-    truth = recording.truth
-    if truth is not None:
-        topics[TRUE_SPEED_TOPIC] = {
-            finger: (truth.times, 1000.0 * arrays["slip_speed"])  # [mm/s], as the estimate has it
-            for finger, arrays in truth.fingers.items()
-            if "slip_speed" in arrays and arrays["slip_speed"].ndim == 1
-        }
-    return [_series(topic, tracks) for topic, tracks in topics.items() if tracks]
+    return [
+        _series(SERIES_TOPICS[name], tracks) for name, tracks in series(recording, traces).items()
+    ]
 
 
 def _series(topic: str, tracks: Mapping[str, Track]) -> Iterator[Message]:
@@ -220,46 +193,19 @@ def changes_of_state(
 
 def log_messages(recording: Recording, traces: Traces) -> Iterator[Message]:
     """Yield markers, alarms, slips and faults."""
-    events = [(time, INFO, "marker", text) for time, text in recording.markers]
-    for finger, trace in traces.items():
-        times, causes = trace.times.tolist(), trace.cause.tolist()
-        # An alarm is a change from STABLE to anything else but UNKNOWN.
-        pairs = pairwise(STATE_BY_CODE[code] for code in trace.state.tolist())
-        for time, (before, state), cause in zip(times[1:], pairs, causes[1:], strict=True):
-            if before is ContactState.STABLE and state not in (before, ContactState.UNKNOWN):
-                why = f" ({CAUSE_BY_CODE[cause]})" if CAUSE_BY_CODE[cause] else ""
-                text = f"alarm: {state.value}{why}, was {before.value}"
-                events.append((time, WARNING, finger, text))
-        masks = trace.faults.astype(np.int64)
-        new = masks & ~np.concatenate([[0], masks[:-1]])
-        for k in np.flatnonzero(new).tolist():
-            text = f"fault: {', '.join(faults_of(int(new[k])))}"
-            events.append((times[k], WARNING, finger, text))
-        for slip in SlipWatch().update(finger, trace.estimates()):
-            if slip.end is None:
-                text = f"slip begins, probability {slip.max_probability:.2f}"
-                events.append((slip.begin, WARNING, finger, text))
-            else:
-                far = "" if slip.distance is None else f", {slip.distance:.2f} mm"
-                text = f"slip ends after {slip.end - slip.begin:.3f} s{far}"
-                events.append((slip.end, INFO, finger, text))
-    for time, level, name, text in sorted(events):
-        document = {"level": level, "message": text, "name": name, "file": "", "line": 0}
-        yield Message(time, LOG_TOPIC, document)
+    for event in events(recording, traces):
+        level = WARNING if event.is_warning else INFO
+        document = {
+            "level": level, "message": event.text, "name": event.name, "file": "", "line": 0
+        }  # fmt: skip
+        yield Message(event.time, LOG_TOPIC, document)
 
 
 def arrow_messages(
     recording: Recording, traces: Traces, instants: Array, stamp: Stamp
 ) -> Iterator[Message]:
     """Yield the arrows of all modules at each instant; none of a module in a gap."""
-    # The codes of the states that colour the arrows: estimates, or else labels.
-    states = {
-        name: (traces[name].times, traces[name].state)
-        if name in traces
-        else (module.times, module.label_states)
-        for name, module in recording.modules.items()
-        if module.n_samples
-    }
+    states = state_codes(recording, traces)
     arrows = module_forces(recording, instants)
     scale = arrow_scale(arrows)
     places = {name: recording.modules[name].sensor.positions for name in arrows}
@@ -270,7 +216,7 @@ def arrow_messages(
             times, codes = states[name]
             # Estimates begin later than readings: before the first, its colour.
             row = max(int(np.searchsorted(times, time, side="right")) - 1, 0)
-            colour = ARROW_COLOURS[STATE_BY_CODE[codes[row]]]
+            colour = rgba(*ARROW_COLOURS[STATE_BY_CODE[codes[row]]])
             drawn = [] if k is None else shapes_of_arrows(module, k, scale, places[name], colour)
             entities.append(_entity(name, stamp(time), arrows=drawn))
         yield Message(time, ARROWS_TOPIC, {"deletions": [], "entities": entities})

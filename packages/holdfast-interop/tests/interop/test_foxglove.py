@@ -18,7 +18,7 @@ from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast_interop.foxglove.exporter import LAYOUT_FILE, export, layout
 from holdfast_interop.foxglove.schemas import SCHEMAS
-from holdfast_interop.foxglove.taxel_arrows import LONGEST_ARROW, orientations
+from holdfast_interop.scene.taxel_arrows import LONGEST_ARROW, orientations
 
 
 class File:

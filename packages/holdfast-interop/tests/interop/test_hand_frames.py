@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import hand, sensor
-from holdfast_interop.foxglove.hand_frames import allegro_links, frames_of, quaternions
+from holdfast_interop.scene.hand_frames import allegro_links, frames_of, quaternions
 
 
 def module(name):

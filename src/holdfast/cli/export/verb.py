@@ -37,7 +37,8 @@ def export(
 
     Recordings need --format: lerobot is a LeRobot data set (v3.0), which holdfast import brings
     back without loss; foxglove is MCAP files with plots, states, a log and an arrow for each
-    taxel, and a layout for them; csv is the generic CSV of docs/importing.md.
+    taxel, and a layout for them; rerun is the same for Rerun; csv is the generic CSV of
+    docs/importing.md.
 
     Example:
       holdfast export builtin:twin model.h --like grasp.parquet

@@ -4,11 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from holdfast.errors import RecordingError
 from holdfast.features.start import declared_baselines
 from holdfast.features.tare import Tare, baseline_of, offline_tare
 from holdfast.recordings import GAP_PERIODS, Recording
 from holdfast.sensors.types import Array, Integers
 
+SCENE_RATE = 30.0
+"""Arrows and moving frames per second [Hz]."""
+MAX_SCENE_SECONDS = 86_400.0
+"""Longest recording that is exported [s]."""
 BASELINE_SECONDS = 0.5
 """Time at the start whose mean is subtracted, unless the metadata have the baseline [s]."""
 LONGEST_ARROW = 0.02
@@ -17,6 +22,23 @@ STRONG_SHARE = 0.999
 """Quantile of the largest readings of all samples that has the longest arrow."""
 SHORTEST_ARROW = 0.0004
 """Arrows that are shorter are left out [m]."""
+
+
+def scene_instants(recording: Recording) -> Array:
+    """Return the instants of arrows and moving frames, (n,) [s].
+
+    Raises:
+        RecordingError: the recording is longer than a day.
+    """
+    if recording.duration > MAX_SCENE_SECONDS:
+        raise RecordingError(
+            f"{recording.name}: {recording.duration:.3g} s given, at most {MAX_SCENE_SECONDS:g} s "
+            "expected; cut it"
+        )
+    # From the start, so that the arrows of all modules are of the same instants. At a rate for
+    # eyes: arrows at every sample would make files of gigabytes.
+    n_instants = int(recording.duration * SCENE_RATE) + 1
+    return np.asarray(recording.start + np.arange(n_instants) / SCENE_RATE)
 
 
 class ModuleArrows(NamedTuple):

@@ -1,0 +1,1 @@
+"""Rerun: files of recordings, and a live view."""

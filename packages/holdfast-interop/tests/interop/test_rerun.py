@@ -1,0 +1,161 @@
+"""Files and the live view of Rerun, read back by its own reader; .ci/rerun runs this."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from command_line import Verb
+from holdfast.cli import main
+from holdfast.detector import detect
+from holdfast.detector.detection import STATE_BY_CODE
+from holdfast.errors import SourceError, is_installed
+from holdfast.io import save_recording
+from holdfast.live.stream_detector import StreamDetector
+from holdfast.model import Model
+from holdfast.synthetic import synthetic_recording
+from holdfast_interop.scene.tracks import events
+
+needs_rerun = pytest.mark.skipif(not is_installed("rerun"), reason="Rerun is not installed")
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    recording = synthetic_recording("grasp", 0, ("thumb", "index"))
+    return replace(recording, markers=((2.5, "grasped"),))
+
+
+@pytest.fixture(scope="module")
+def model():
+    return Model.load("builtin:noise-floor")
+
+
+def entities(path):
+    """Return the columns of each entity of a file, as lists by name; times are in ns."""
+    from pyarrow import types
+    from rerun.chunk import RrdReader
+
+    found = {}
+    for chunk in RrdReader(path).stream():
+        batch, columns = chunk.to_record_batch(), found.setdefault(chunk.entity_path, {})
+        for name, values in zip(batch.schema.names, batch.columns, strict=True):
+            numbers = values.cast("int64") if types.is_temporal(values.type) else values
+            columns.setdefault(name.rpartition(":")[2], []).extend(numbers.to_pylist())
+    return found
+
+
+@pytest.fixture(scope="module")
+def file(grasp, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rerun")
+    save_recording(grasp, folder / "grasp.mcap")
+    words = ["--format", "rerun", "--model", "builtin:noise-floor"]
+    assert main(["export", str(folder / "grasp.mcap"), str(folder / "view"), *words]) == 0
+    return folder / "view" / "grasp.rrd"
+
+
+@pytest.mark.skipif(is_installed("rerun"), reason="Rerun is installed")
+def test_what_is_missing_is_one_line(capsys, grasp, tmp_path):
+    save_recording(grasp, tmp_path / "grasp.mcap")
+    words = (tmp_path / "grasp.mcap", tmp_path / "view", "--format", "rerun")
+    assert "pip install 'holdfast-interop[rerun]'" in Verb("export").refusal(capsys, *words)
+    words = ["builtin:any", str(tmp_path / "grasp.mcap"), "--rerun", "--port", "0", "--once"]
+    assert "holdfast-interop[rerun]" in Verb("serve").refusal(capsys, *words)
+
+
+@needs_rerun
+class TestFile:
+    def test_it_has_one_recording_and_one_layout(self, file):
+        from rerun.chunk import RrdReader
+
+        reader = RrdReader(file)
+        assert (len(reader.recordings()), len(reader.blueprints())) == (1, 1)
+
+    def test_force_and_states_are_those_of_detect(self, file, grasp, model):
+        found, traces = entities(file), detect(model, grasp).fingers
+        for finger, trace in traces.items():
+            force = found[f"/force/{finger}"]["scalars"]
+            np.testing.assert_allclose(np.concatenate(force), np.linalg.norm(trace.force, axis=1))
+            times = np.array(found[f"/force/{finger}"]["time"]) * 1e-9
+            np.testing.assert_allclose(times, trace.times - grasp.start, atol=1e-6)
+            changes = np.flatnonzero(np.diff(trace.state, prepend=-1))
+            words = [STATE_BY_CODE[code].value for code in trace.state[changes].tolist()]
+            lane = found[f"/states/{finger}"]
+            assert [word for row in lane["state"] if row for word in row] == words
+
+    def test_events_are_a_log(self, file, grasp, model):
+        log = entities(file)["/events"]["text"]
+        expected = [f"{e.name}: {e.text}" for e in events(grasp, detect(model, grasp).fingers)]
+        assert [row[0] for row in log] == expected
+        assert "marker: grasped" in expected
+
+    def test_taxels_are_points_with_arrows(self, file, grasp):
+        found = entities(file)
+        sensor = grasp.modules["thumb"].sensor
+        points = found["/hand/palm_link/thumb/taxels"]["positions"]
+        np.testing.assert_allclose(points[0], sensor.positions, atol=1e-7)
+        arrows = found["/hand/palm_link/thumb/arrows"]["vectors"]
+        assert len(arrows) == int(grasp.duration * 30) + 1
+        assert max(map(len, arrows)) <= sensor.n_taxels
+        assert np.linalg.norm(np.concatenate([a for a in arrows if a]), axis=1).max() > 0.015
+
+
+@needs_rerun
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")  # the viewer was ended
+class TestLive:
+    def test_no_viewer_is_one_line(self, grasp, model, tmp_path):
+        from holdfast import open_source
+        from holdfast_interop.rerun.publisher import RerunPublisher
+
+        save_recording(grasp, tmp_path / "grasp.mcap")
+        with open_source(str(tmp_path / "grasp.mcap"), speed=0) as source:
+            publisher = RerunPublisher(StreamDetector(model, source), port=1)
+            with pytest.raises(SourceError, match="no Rerun viewer listens on port 1 "):
+                publisher.open()
+
+    @pytest.mark.timeout(120)
+    def test_a_viewer_gets_every_estimate(self, grasp, model, tmp_path):
+        from holdfast import open_source
+        from holdfast_interop.rerun.publisher import RerunPublisher
+
+        save_recording(grasp, tmp_path / "grasp.mcap")
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+        words = ["--save", "live.rrd", "--bind", "127.0.0.1", "--port", str(port)]
+        command = [sys.executable, "-m", "rerun", *words]
+        viewer = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
+        try:
+            wait_for(port)
+            with open_source(str(tmp_path / "grasp.mcap"), speed=20) as source:
+                stream, n = StreamDetector(model, source), 0
+                with RerunPublisher(stream, port) as publisher:
+                    while not source.ended:
+                        update = stream.read()
+                        publisher.put(update)
+                        n += sum("thumb" in fingers for _, fingers in update.estimates)
+                assert (publisher.n_failed, publisher.n_dropped) == (0, 0)
+        finally:
+            os.killpg(viewer.pid, signal.SIGTERM)  # the command is the parent of the viewer
+            viewer.wait(30)
+        found = entities(tmp_path / "live.rrd")
+        assert n > 1000
+        assert len(found["/force/thumb"]["scalars"]) == n
+        assert {"/states/hand", "/states/thumb", "/events"} <= found.keys()
+        assert any(found["/hand/palm_link/thumb/arrows"]["vectors"])
+
+
+def wait_for(port):
+    """Wait until a port is listened on."""
+    for _ in range(600):
+        try:
+            socket.create_connection(("127.0.0.1", port), 1).close()
+        except OSError:
+            time.sleep(0.1)
+        else:
+            return
+    pytest.fail("the viewer does not listen")
