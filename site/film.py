@@ -26,12 +26,12 @@ from holdfast.recorded import BOX_SLIPS
 OUT = Path(__file__).parents[1] / "docs" / "img" / "live.webp"
 DURATION = 20.0
 """Of the film [s]."""
-FRAME_PERIOD = 0.25
+FRAME_PERIOD = 0.4
 """Time between two pictures [s]."""
 VIEW = {"width": 1280, "height": 800}
-SIZE = (960, 600)
+SIZE = (880, 550)
 """Of the film [pixels]."""
-QUALITY = 45
+QUALITY = 35
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
 
