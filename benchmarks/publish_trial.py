@@ -1,28 +1,31 @@
 """Publish a comparison of grip laws in docs/study/, and write the page that quotes it.
 
-    python benchmarks/publish_trial.py publish TRIALS [HARD]
+    python benchmarks/publish_trial.py publish MILD HARD [--before NOW BEFORE] [--set NAME FOLDER]
     python benchmarks/publish_trial.py render
 
 `publish` copies trial.json, the tables and trials as CSV, the film and some figures from the
-folder of a finished `holdfast trial` to docs/study/grip/, in place of the old ones, and writes the
-page; HARD is the folder of a run with the hard plant. `render` writes the page again.
-docs/study/grip-trials.md is written from grip-trials.md.j2 in that folder. Change the template, not
-the page: every figure in it is taken from trial.json, and lab/tests/test_docs_trial.py renders it
-again.
+folders of finished `holdfast trial` to docs/study/grip/, in place of the old ones, and writes the
+page. MILD and HARD are runs of the two plants. Each --before gives a run of today and one of an
+earlier law on the same trials, in which `holdfast` is compared in pairs, and each --set a run with
+another model or with impacts. `render` writes the page again. docs/study/grip-trials.md is written
+from grip-trials.md.j2 in that folder. Change the template, not the page: every figure in it is
+taken from the published files, and lab/tests/test_docs_trial.py renders it again.
 """
 
 import argparse
 import json
+import math
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from holdfast_lab.report.table_layouts import to_markdown
-from holdfast_lab.trial.report import summary_text
-from holdfast_lab.trial.tables import all_tables
+from holdfast_lab.trial.document import OWN_LAW
+from holdfast_lab.trial.run import TrialResult
+from holdfast_lab.trial.summary import Summary, compare, summarize
 
 DOCS = Path(__file__).parents[1] / "docs" / "study"
 PAGE = "grip-trials.md"
@@ -30,25 +33,38 @@ FIGURES = ("film.webp", "force.png", "distributions.png", "course.png")
 """Figures that are copied; a run without a film has some of them only."""
 NOT_PUBLISHED = ("trials",)
 """Parts of trial.json that are published as CSV only."""
-HARD_TABLES = ("laws", "slips", "forces", "drops")
-"""Tables of the run with the hard plant that the page has."""
+SETS = "sets.json"
+"""File of the other runs: each with its laws, and the pairs with an earlier law."""
 DIGITS = 6
 """Significant digits of published numbers."""
 
 
-def publish(run: Path, docs: Path, hard: Path | None = None) -> None:
-    """Copy the results of a run to docs/study/grip/, in place of the old ones.
+def publish(
+    run: Path,
+    docs: Path,
+    hard: Path,
+    before: Sequence[tuple[Path, Path]] = (),
+    others: Mapping[str, Path] | None = None,
+) -> None:
+    """Copy the results of two runs to docs/study/grip/, in place of the old ones.
 
     Args:
-        run: folder of a finished comparison.
+        run: folder of a finished comparison, with the mild plant.
         docs: folder of the pages of the study.
         hard: folder of one with the hard plant, published as hard.json.
+        before: pairs of folders with `holdfast` on the same trials: today's, an earlier law's.
+        others: folders of other runs by name, of which the laws are published.
 
     Raises:
-        FileNotFoundError: the folder has no finished comparison.
+        FileNotFoundError: a folder has no finished comparison.
     """
-    documents = {"trial.json": run} | ({} if hard is None else {"hard.json": hard})
+    documents = {"trial.json": run, "hard.json": hard}
     texts = {name: _published(folder / "trial.json") for name, folder in documents.items()}
+    sets = {
+        "before": [_paired(now, earlier) for now, earlier in before],
+        "others": {name: _laws_of(folder) for name, folder in (others or {}).items()},
+    }
+    texts[SETS] = json.dumps(_rounded(sets), indent=1, ensure_ascii=False) + "\n"
     target = docs / "grip"
     for old in target.iterdir():
         if old.suffix != ".j2":
@@ -59,6 +75,40 @@ def publish(run: Path, docs: Path, hard: Path | None = None) -> None:
         shutil.copyfile(path, target / path.name)
     for name, text in texts.items():
         (target / name).write_text(text, encoding="utf-8")
+
+
+def _laws_of(folder: Path) -> dict[str, Any]:
+    """Return the laws of a run, and what it was made with."""
+    document = json.loads((folder / "trial.json").read_text("utf-8"))
+    return {name: document[name] for name in ("n_trials", "seed", "model", "laws")} | {
+        "plant": document["plant"]["name"],
+        "impacts": document.get("impacts_per_trial", 0),
+    }
+
+
+def _paired(run: Path, before: Path) -> dict[str, Any]:
+    """Return an earlier law on the trials of a run, and the difference of today's to it."""
+    now, earlier = (
+        [
+            msgspec.convert(_without_null(one), TrialResult)
+            for one in json.loads((folder / "trial.json").read_text("utf-8"))["trials"]
+            if one["law"] == OWN_LAW
+        ]
+        for folder in (run, before)
+    )
+    numbers = {one.number for one in now}
+    earlier = [one for one in earlier if one.number in numbers]
+    document = json.loads((before / "trial.json").read_text("utf-8"))
+    names = {"model": document["model"], "plant": document["plant"]["name"]}
+    return names | {"law": summarize(earlier), "difference": compare(now, earlier)}
+
+
+def _without_null(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a stored result with infinite values, which JSON has as null."""
+    lacking = {"slip": math.inf} if result["dropped"] or not result["held"] else {}
+    return {name: value for name, value in result.items() if value is not None} | {
+        name: value for name, value in lacking.items() if result[name] is None
+    }
 
 
 def _published(path: Path) -> str:
@@ -93,24 +143,29 @@ def _values(folder: Path) -> dict[str, Any]:
     """Return what the template uses; `trial` is None if no run is published."""
     if not (folder / "trial.json").exists():
         return {"trial": None}
-    document, tables = _tables(folder / "trial.json")
-    hard, hard_tables = None, {}
-    if (folder / "hard.json").exists():
-        hard, hard_tables = _tables(folder / "hard.json")
+    document, hard, sets = (
+        json.loads((folder / name).read_text("utf-8")) for name in ("trial.json", "hard.json", SETS)
+    )
     return {
         "trial": document,
-        "summary": summary_text(document),
-        "tables": tables,
-        "figures": [name for name in FIGURES if (folder / name).exists()],
         "hard": hard,
-        "hard_tables": [hard_tables[name] for name in HARD_TABLES if name in hard_tables],
+        "before": sets["before"],
+        "others": sets["others"],
+        "figures": [name for name in FIGURES if (folder / name).exists()],
+        "number": _number,
     }
 
 
-def _tables(path: Path) -> tuple[Mapping[str, Any], dict[str, str]]:
-    """Return a published document and its tables as Markdown."""
-    document = json.loads(path.read_text("utf-8"))
-    return document, {table.name: to_markdown(table) for table in all_tables(document)}
+def _number(summary: Summary, field: str, factor: float = 1.0, digits: int = 1) -> str:
+    """Return a number with its interval, as small print; `lost` where it is infinite."""
+    value, interval = summary[field]["value"], summary[field]["interval"]
+    if value is None:
+        return "lost"
+    text = f"{factor * value:.{digits}f}"
+    if not interval or any(end is None for end in interval):
+        return text
+    low, high = (f"{factor * end:.{digits}f}" for end in interval)
+    return f"{text}<br><sub>{low} to {high}</sub>"
 
 
 def _rounded(value: object) -> object:
@@ -129,11 +184,15 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     verb = commands.add_parser("publish")
     verb.add_argument("run", type=Path)
-    verb.add_argument("hard", type=Path, nargs="?")
+    verb.add_argument("hard", type=Path)
+    verb.add_argument("--before", nargs=2, action="append", default=[], metavar=("NOW", "BEFORE"))
+    verb.add_argument("--set", nargs=2, action="append", default=[], metavar=("NAME", "FOLDER"))
     commands.add_parser("render")
     given = parser.parse_args()
     if given.command == "publish":
-        publish(given.run, DOCS, given.hard)
+        before = [(Path(now), Path(earlier)) for now, earlier in given.before]
+        others = {name: Path(folder) for name, folder in given.set}
+        publish(given.run, DOCS, given.hard, before, others)
     write_page(DOCS)
 
 

@@ -24,14 +24,14 @@ from playwright.sync_api import sync_playwright
 from holdfast.recorded import BOX_SLIPS
 
 OUT = Path(__file__).parents[1] / "docs" / "img" / "live.webp"
-DURATION = 20.0
-"""Of the film [s]."""
-FRAME_PERIOD = 0.4
+DURATION = 9.6
+"""Of the film [s]: one replay of the recording at half its speed."""
+FRAME_PERIOD = 0.25
 """Time between two pictures [s]."""
 VIEW = {"width": 1280, "height": 800}
-SIZE = (880, 550)
+SIZE = (960, 600)
 """Of the film [pixels]."""
-QUALITY = 35
+QUALITY = 45
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
 

@@ -58,38 +58,44 @@ def test_the_links_of_the_page_exist():
 
 
 @pytest.fixture
-def run(tmp_path):
-    """Folder of an invented run; docs with the template and files of an older run."""
-    document = document_of(TrialPlan(("fixed", "pr2", "holdfast"), 12), results_of(), 0)
-    document |= {"seconds": {"trials": 90.0}, "machine": {"cores": 2}, "versions": {}}
-    for name in ("run/tables", "run/figures", "docs/grip"):
-        (tmp_path / name).mkdir(parents=True)
-    (tmp_path / "run/trial.json").write_bytes(msgspec.json.encode(document))
-    (tmp_path / "run/trials.csv").write_text("a")
-    (tmp_path / "run/tables/laws.csv").write_text("b")
-    (tmp_path / "run/figures/film.webp").write_bytes(b"c")
+def runs(tmp_path):
+    """Folders of invented runs with both plants; docs with the template and an older run's file."""
+    (tmp_path / "docs/grip").mkdir(parents=True)
     (tmp_path / "docs/grip/old.csv").write_text("old")
     shutil.copy(PUBLISHED / f"{script.PAGE}.j2", tmp_path / "docs/grip")
-    return tmp_path / "run"
+    laws = ("fixed", "fixed-2", "true-slips", "holdfast")
+    for plant in ("mild", "hard"):
+        plan = TrialPlan(laws, 12, plant=plant)
+        document = document_of(plan, results_of(laws), 0)
+        document |= {"seconds": {"trials": 90.0}, "machine": {"cores": 2}, "versions": {}}
+        for name in ("tables", "figures"):
+            (tmp_path / plant / name).mkdir(parents=True)
+        (tmp_path / plant / "trial.json").write_bytes(msgspec.json.encode(document))
+        (tmp_path / plant / "trials.csv").write_text("a")
+        (tmp_path / plant / "tables/laws.csv").write_text("b")
+        (tmp_path / plant / "figures/film.webp").write_bytes(b"c")
+    return tmp_path
 
 
-def test_a_run_is_published_in_place_of_the_old_one(run):
-    docs = run.parent / "docs"
-    script.publish(run, docs)
+def test_runs_are_published_in_place_of_the_old_one(runs):
+    docs, mild, hard = runs / "docs", runs / "mild", runs / "hard"
+    script.publish(mild, docs, hard, [(mild, mild)], {"impacts": hard})
     assert {path.name for path in (docs / "grip").iterdir()} == {
-        "trial.json", "trials.csv", "laws.csv", "film.webp", f"{script.PAGE}.j2",
+        "trial.json", "hard.json", "sets.json", "trials.csv", "laws.csv", "film.webp",
+        f"{script.PAGE}.j2",
     }  # fmt: skip
     assert "trials" not in json.loads((docs / "grip/trial.json").read_text())
     script.write_page(docs)
     page = (docs / script.PAGE).read_text()
-    assert "12 trials of the twin with each law, seed 0" in page
-    assert "| fixed | 63.6<br><sub>" in page
-    assert "holdfast dropped 0.0 (0.0 to 0.0) % of the objects" in page
+    assert "12 trials of each plant with each law, seed 0 (mild) and 0 (hard)" in page
+    assert "| `fixed` | 63.6<br><sub>" in page
+    assert "`holdfast` dropped 0.0 % of the objects" in page
     assert "(grip/film.webp)" in page and "(grip/force.png)" not in page
-    assert "**Each law minus fixed, on the same trials**" in page
+    assert "| `builtin:any` | mild | 11 | 0.0<br><sub>0.0 to 0.0</sub> |" in page
+    assert "| impacts | hard, 0 | `holdfast` | 11 |" in page
 
 
-def test_a_folder_without_a_run_changes_nothing(tmp_path, run):
+def test_a_folder_without_a_run_changes_nothing(runs):
     with pytest.raises(FileNotFoundError):
-        script.publish(tmp_path / "none", run.parent / "docs")
-    assert (run.parent / "docs/grip/old.csv").exists()
+        script.publish(runs / "none", runs / "docs", runs / "hard")
+    assert (runs / "docs/grip/old.csv").exists()

@@ -63,6 +63,7 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
         "plant": msgspec.to_builtins(plant_named(plan.plant)),
         "limits": msgspec.to_builtins(LIMITS),
         "seed": plan.seed,
+        "impacts_per_trial": plan.n_impacts,
     }
 
 

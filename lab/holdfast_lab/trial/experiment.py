@@ -96,7 +96,7 @@ def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
     tasks = {law: plan.course_task(number, law) for law in laws}
     done = runner.run(list(tasks.values()))
     courses = {law: done[task.name] for law, task in tasks.items()}
-    trial = draw_trial(number, plan.seed, plan.plant)
+    trial = draw_trial(number, plan.seed, plan.plant, plan.n_impacts)
     lost_at = courses[BASELINE_LAW].lost_at
     when = "" if lost_at is None else f"; {BASELINE_LAW} loses it {lost_at:.2f} s later"
     what = (

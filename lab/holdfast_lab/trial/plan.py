@@ -40,6 +40,7 @@ class TrialPlan:
         seed: seed of the trials.
         model: name or path of the detector's model.
         plant: name of the plant.
+        n_impacts: number of impacts before the load of each trial.
 
     Raises:
         ValueError: a law or plant does not exist or is given twice, or a number is too small.
@@ -51,6 +52,7 @@ class TrialPlan:
     seed: int = 0
     model: str = "builtin:any"
     plant: str = MILD
+    n_impacts: int = 0
 
     def __post_init__(self) -> None:
         plant_named(self.plant)
@@ -61,6 +63,8 @@ class TrialPlan:
             raise ValueError(f"the law {twice[0]!r} is given twice")
         if self.n < 1:
             raise ValueError(f"at least 1 trial expected, {self.n} given")
+        if self.n_impacts < 0:
+            raise ValueError(f"at least 0 impacts expected, {self.n_impacts} given")
         if self.seed < 0:
             raise ValueError(f"a seed of at least 0 expected, {self.seed} given")
         # Before hours of trials: the model has all fingers of the twin, and can be used live.
@@ -78,28 +82,39 @@ class TrialPlan:
         """Digest of the content of the model."""
         return Model.load(self.model).digest
 
+    @property
+    def _set(self) -> tuple[str, str, str, int]:
+        """What the tasks of all trials share."""
+        return self.model, self.model_digest, self.plant, self.n_impacts
+
     def trial_task(self, number: int, law: str) -> Task:
         """Return the task of one trial with one law."""
         version = law_version(law, SIMULATION)
-        arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
+        arguments = (self.seed, number, law, *self._set)
         return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
 
     def course_task(self, number: int, law: str) -> Task:
         """Return the task of the course of one trial with one law."""
-        arguments = (self.seed, number, law, self.model, self.model_digest, self.plant)
+        arguments = (self.seed, number, law, *self._set)
         version = law_version(law, COURSE)
         return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
 
     def film_task(self, number: int, laws: tuple[str, str]) -> Task:
         """Return the task of the film of one trial with two laws."""
-        arguments = (self.seed, number, laws, self.model, self.model_digest, self.plant)
+        arguments = (self.seed, number, laws, *self._set)
         versions = (law_version(law, FILM) for law in laws)
         version = sha256("".join(versions).encode()).hexdigest()
         return Task(f"film/{number}", film_of, arguments, bytes, version=version)
 
 
 def run_numbered(
-    seed: int, number: int, law: str, model: str, digest: str, plant: str = MILD
+    seed: int,
+    number: int,
+    law: str,
+    model: str,
+    digest: str,
+    plant: str = MILD,
+    n_impacts: int = 0,
 ) -> TrialResult:
     """Run one trial of a set with a law.
 
@@ -110,24 +125,37 @@ def run_numbered(
         model: name or path of the model.
         digest: digest of its content.
         plant: name of the plant.
+        n_impacts: number of impacts before the load.
 
     Raises:
         ModelError: the model has another content.
     """
     _check_digest(model, digest)
-    return run_trial(draw_trial(number, seed, plant), law, model)
+    return run_trial(draw_trial(number, seed, plant, n_impacts), law, model)
 
 
 def course_of(
-    seed: int, number: int, law: str, model: str, digest: str, plant: str = MILD
+    seed: int,
+    number: int,
+    law: str,
+    model: str,
+    digest: str,
+    plant: str = MILD,
+    n_impacts: int = 0,
 ) -> TrialCourse:
     """Return the course of one trial of a set, with the arguments of `run_numbered`."""
     _check_digest(model, digest)
-    return TrialCourse.of(follow(draw_trial(number, seed, plant), law, model))
+    return TrialCourse.of(follow(draw_trial(number, seed, plant, n_impacts), law, model))
 
 
 def film_of(
-    seed: int, number: int, laws: tuple[str, str], model: str, digest: str, plant: str = MILD
+    seed: int,
+    number: int,
+    laws: tuple[str, str],
+    model: str,
+    digest: str,
+    plant: str = MILD,
+    n_impacts: int = 0,
 ) -> bytes:
     """Return the film of one trial with two laws side by side, as a WebP file.
 
@@ -135,7 +163,7 @@ def film_of(
         OutputError: no back end of MuJoCo works here.
     """
     _check_digest(model, digest)
-    return film(draw_trial(number, seed, plant), laws, model)
+    return film(draw_trial(number, seed, plant, n_impacts), laws, model)
 
 
 # Once in a process, because every trial asks for the same model.

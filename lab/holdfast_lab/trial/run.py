@@ -52,6 +52,8 @@ LIMIT_SHARE = 0.99
 SLIP_MEMORY = 0.3
 """A reaction within this time after a fingertip slid is not false [s]: glitches of the hand's
 controller make fingertips slide before the load comes."""
+IMPACT_MEMORY = 0.5
+"""A rise within this time after an impact began is a reaction to it [s]."""
 NEVER_BEGAN, AT_LIMIT, WHILE_SLIPPING = DROP_REASONS = ("never began", "limit of force", "slip")
 """Why an object was lost: the loop never began, a finger was at the highest scale, or neither."""
 Mask = npt.NDArray[np.bool_]
@@ -91,6 +93,8 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
         peak_ratio: largest normal force over the largest least force that stops a slide.
         quiet_time: time of control before the load in which nothing slid shortly before [s].
         n_false: number of rises of force in this time.
+        n_impacts: number of impacts that the loop saw before the load.
+        n_impact_reactions: number of these after which the force rose.
     """
 
     number: int
@@ -113,6 +117,8 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     peak_ratio: float = math.nan
     quiet_time: float = 0.0
     n_false: int = 0
+    n_impacts: int = 0
+    n_impact_reactions: int = 0
 
 
 def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult:
@@ -251,6 +257,9 @@ class _TrialLog:
         self._was_rising = self._at_limit = False
         self._quiet_time = 0.0
         self._n_false = 0
+        self._impacts = trial.impacts()
+        self._n_impacts = self._n_impact_reactions = 0
+        self._impact_at, self._is_answered = -math.inf, False
 
     def add(self, simulation: Simulation, command: GripCommand, scales: Array) -> None:
         """Add a sample."""
@@ -270,12 +279,21 @@ class _TrialLog:
             slides = bool(speeds.max() > SLIP_SPEED)
             if slides:
                 self._slid_at = held_for
+            if self._impacts and held_for >= self._impacts[0].start:
+                self._impact_at = self._impacts.pop(0).start
+                self._n_impacts += 1
+                self._is_answered = False
+            struck = held_for - self._impact_at <= IMPACT_MEMORY
             quiet = (
-                held_for - self._slid_at > SLIP_MEMORY and held_for - self._began_at > START_TIME
+                held_for - self._slid_at > SLIP_MEMORY
+                and held_for - self._began_at > START_TIME
+                and not struck
             )
             self._quiet_time += quiet / RATE
             if command.state is LoopState.REACT and not self._was_rising:
                 self._n_false += quiet
+                self._n_impact_reactions += struck and not self._is_answered
+                self._is_answered = struck
         self._was_rising = command.state is LoopState.REACT
         self._at_limit = bool((scales >= LIMIT_SHARE * self._highest_scale).any())
         least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
@@ -320,6 +338,8 @@ class _TrialLog:
             reaction=reaction,
             quiet_time=self._quiet_time,
             n_false=self._n_false,
+            n_impacts=self._n_impacts,
+            n_impact_reactions=self._n_impact_reactions,
             **_force_ratios(rows[loaded | controlled]),
         )
 

@@ -40,7 +40,8 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         `n_friction_reacting` and `drops`, their number by reason; `dropped` [%], `slip_median`,
         `slip_p75` and `slip_p90` [m], `slipped_over_3mm` [%], `reaction_median` and, of friction
         trials, `friction_reaction_median` [s], `force_ratio_mean`, `static_ratio_mean`,
-        `coulomb_ratio_mean`, `peak_ratio_mean` and `false_reactions_per_minute`. Each of these is
+        `coulomb_ratio_mean`, `peak_ratio_mean`, `false_reactions_per_minute` and
+        `impact_reactions` [% of `n_impacts`]. Each of these is
         {"value": x, "interval": [low, high]}, null where it is infinite or not known.
 
     Example:
@@ -78,6 +79,11 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         "peak_ratio_mean": _mean([result.peak_ratio for result in held]),
         "false_reactions_per_minute": _ratio(
             [60.0 * result.n_false for result in held], [result.quiet_time for result in held]
+        ),
+        "n_impacts": sum(result.n_impacts for result in held),
+        "impact_reactions": _ratio(
+            [100.0 * result.n_impact_reactions for result in held],
+            [float(result.n_impacts) for result in held],
         ),
     }
 

@@ -15,16 +15,21 @@ Sizes of the loads, on physical grounds, relative to the weight W and mass m of 
 - friction: falls to 0.4 to 0.65 of its value, as of a surface that becomes wet;
 - shake: 6 to 12 m/s^2 at 2 to 4 Hz for 1.5 s;
 - transport: 6 to 12 m/s^2, a motion of 0.5 to 0.8 s, as of a fast robot arm.
+
+With impacts, a tool knocks on the object, a person taps it or something bumps into the arm before
+the load comes, with the sizes of the profile `coupled`: causes that need no force.
 """
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from holdfast.twin.hand import FINGERS, GRAVITY
+from holdfast.twin.impacts import Impact, draw_impacts
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.objects import OTHER_OBJECTS, GraspObject, load_objects
 from holdfast.twin.plant import MILD, plant_named
@@ -44,6 +49,10 @@ CLOSING_SPEED = (0.012, 0.03)
 """Speed of closing [m/s], that of the profile `reference`."""
 PROFILE = "reference"
 """Profile of the tremor of the operator and the glitches of the hand's controller."""
+IMPACT_PROFILE = "coupled"
+"""Profile of the sizes of impacts."""
+IMPACT_SPACING = 1.0
+"""Time in which there is one impact, by which the load comes later for each [s]."""
 AXIS_DIRECTIONS = [(s * x, s * y, s * z) for x, y, z in np.eye(3).tolist() for s in (1.0, -1.0)]
 LOAD_KINDS = tuple(LoadKind)
 
@@ -59,6 +68,7 @@ class Trial:
         load: load on the object.
         speed: speed of closing [m/s].
         latency: latency of sensor and bus [samples].
+        n_impacts: number of impacts before the load.
     """
 
     number: int
@@ -67,6 +77,7 @@ class Trial:
     load: Load
     speed: float
     latency: int = 0
+    n_impacts: int = 0
 
     @property
     def unseen(self) -> bool:
@@ -85,7 +96,16 @@ class Trial:
         grips = force * used / used[1:].sum()
         grips[0] = THUMB_SHARE * force
         chosen = msgspec.structs.replace(profile(PROFILE), hold=self.duration + 1.0)
-        return Plan(chosen, grips, self.speed, BEFORE_TIME, 0.0, ())
+        return Plan(chosen, grips, self.speed, BEFORE_TIME, 0.0, (), impacts=self.impacts())
+
+    def impacts(self) -> list[Impact]:
+        """Return the impacts before the load."""
+        ranges = profile(IMPACT_PROFILE).impacts
+        if ranges is None or not self.n_impacts:
+            return []
+        times = [self.load.start - k * IMPACT_SPACING for k in range(self.n_impacts, -1, -1)]
+        every = msgspec.structs.replace(ranges, share=1.0)
+        return draw_impacts(self.grasp.generator("impacts"), every, list(pairwise(times)))
 
 
 def least_force(item: GraspObject) -> float:
@@ -112,13 +132,14 @@ def draw_trials(n: int, seed: int = 0, plant: str = MILD) -> list[Trial]:
     return [draw_trial(number, seed, plant) for number in range(n)]
 
 
-def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
+def draw_trial(number: int, seed: int = 0, plant: str = MILD, n_impacts: int = 0) -> Trial:
     """Draw one trial of a set, which does not depend on the others.
 
     Args:
         number: number of the trial, from 0.
         seed: of all random numbers.
         plant: name of the plant.
+        n_impacts: number of impacts before the load.
 
     Raises:
         ValueError: there is no such plant.
@@ -130,7 +151,7 @@ def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     generator = np.random.default_rng([seed, number])
     grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table, plant=plant)
     # Every kind takes the same draws first, so that a change of one kind changes no other.
-    start = float(generator.uniform(*QUIET_TIME))
+    start = float(generator.uniform(*QUIET_TIME)) + n_impacts * IMPACT_SPACING
     direction = AXIS_DIRECTIONS[int(generator.integers(len(AXIS_DIRECTIONS)))]
     share = float(generator.random())
 
@@ -155,7 +176,7 @@ def draw_trial(number: int, seed: int = 0, plant: str = MILD) -> Trial:
     shortest, longest = plant_named(plant).latency
     # From a stream of its own: a plant with another latency has the same loads.
     latency = int(grasp.generator("latency").integers(shortest, longest + 1))
-    return Trial(number, grasp, 3 if three else 4, load, speed, latency)
+    return Trial(number, grasp, 3 if three else 4, load, speed, latency, n_impacts)
 
 
 @cache

@@ -40,6 +40,9 @@ def trial(
     ] = None,
     seed: SeedOption = 0,
     plant: Annotated[str, typer.Option("--plant", help="Hand of the twin: mild or hard.")] = "mild",
+    impacts: Annotated[
+        int, typer.Option("--impacts", help="Impacts of tools before the load of each trial.")
+    ] = 0,
     parallel: EngineOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -66,7 +69,7 @@ def trial(
 
     names = tuple(name.strip() for name in laws.split(",")) if laws else ALL_ROWS
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
-    plan = TrialPlan(names, number, seed, model, plant)
+    plan = TrialPlan(names, number, seed, model, plant, impacts)
     check_output_folder(out, COMPARISON, force=force)
     chosen = parallel.start()
     try:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.twin.loads import LoadKind
-from holdfast_lab.trial.trials import GRIP_MULTIPLE, draw_trials, least_force
+from holdfast_lab.trial.trials import GRIP_MULTIPLE, draw_trial, draw_trials, least_force
 
 
 def test_the_same_seed_draws_the_same_trials():
@@ -49,3 +49,15 @@ def test_loads_are_in_proportion_to_the_object():
         assert low <= load.size <= high
         assert np.linalg.norm(load.direction) == pytest.approx(1.0)
         assert 2.5 <= load.start <= 3.5
+
+
+def test_impacts_come_before_the_load_which_is_the_same():
+    for plain, struck in zip(
+        draw_trials(5, seed=3), (draw_trial(k, 3, n_impacts=3) for k in range(5)), strict=True
+    ):
+        assert struck.load._replace(start=plain.load.start) == plain.load
+        assert struck.load.start == pytest.approx(plain.load.start + 3.0)
+        impacts = struck.impacts()
+        assert len(impacts) == 3 and not plain.impacts()
+        assert all(plain.load.start < impact.start < struck.load.start for impact in impacts)
+        assert len(struck.plan().impacts) == 3

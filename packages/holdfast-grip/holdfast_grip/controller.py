@@ -24,6 +24,8 @@ STABLE_TIME_BEFORE_GRIP = 0.2
 CALM_TIME_BEFORE_GRIP = 1.0
 """The same, for which fingers with `CALM_SHARE` of the force have been STABLE: longer than a person
 takes to let go of the object [s]."""
+STEADY_BAND = 0.15
+"""Share by which the sums of the normal and the tangential forces may change in a steady grip."""
 CALM_SHARE = 0.7
 """Share of the normal force on STABLE fingers from which a grip may begin."""
 DETECTOR_RATE = 150.0
@@ -46,11 +48,13 @@ class GripController:
     """Controller of the grip force of one hand, estimate by estimate.
 
     The grip begins when the hand has been STABLE for 0.2 s, or when for 1 s the fingers that are
-    STABLE, two at least, carried 70 % of the normal force and no finger was UNKNOWN. Forces and
-    scales refer to this moment, and the fingers in contact are the loaded fingers. The controller
-    reads the raw probability of every sample, not the debounced state. UNKNOWN never lowers a
-    force, and no force changes without a new sample. No input raises an exception or gives a
-    command outside the limits.
+    STABLE, two at least, carried 70 % of the normal force and no finger was UNKNOWN. Where the
+    model has a slip rule, 1 s without a slip in which the forces stay the same also begins it: so
+    a grip that is lighter than those the model was trained on is held too. Forces and scales refer
+    to this moment, and the fingers in contact are the loaded fingers. The controller reads the raw
+    probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
+    changes without a new sample. No input raises an exception or gives a command outside the
+    limits.
 
     Args:
         limits: limits of the commands.
@@ -150,7 +154,9 @@ class GripController:
         # Set by `resume`: the next update may have any time.
         self._clock_is_new = False
         # NaN is in no order with a time, so what has not begun never lasts long enough.
-        self._stable_since = self._calm_since = math.nan
+        self._stable_since = self._calm_since = self._steady_since = math.nan
+        # Sums of normal and tangential forces at the begin of a steady grip.
+        self._steady_forces = math.nan, math.nan
         self._valid_since = math.nan
         # On the law's clock, so that a cooldown goes on over a jump of the source's.
         self._raised_at = -math.inf
@@ -288,9 +294,12 @@ class GripController:
         self._stable_since = _since(self._stable_since, time, still=is_stable)
         is_calm = is_stable or self._is_calm(estimate)
         self._calm_since = _since(self._calm_since, time, still=is_calm)
+        is_steady = not is_stable and self._is_steady(estimate)
+        self._steady_since = _since(self._steady_since, time, still=is_steady)
         if (
             time - self._stable_since >= STABLE_TIME_BEFORE_GRIP
             or time - self._calm_since >= CALM_TIME_BEFORE_GRIP
+            or time - self._steady_since >= CALM_TIME_BEFORE_GRIP
         ):
             self._begin(estimate, time)
         return GripCommand(time, self.state, dict(commands))
@@ -311,6 +320,28 @@ class GripController:
             if finger.state is ContactState.STABLE:
                 calm, n_stable = calm + touch.normal, n_stable + 1
         return n_stable >= MIN_FINGERS and calm >= CALM_SHARE * total
+
+    def _is_steady(self, estimate: HandEstimate) -> bool:
+        """Return whether nothing slides and the forces are those of the samples before.
+
+        A change by more than `STEADY_BAND` begins another grip, whose forces are compared then.
+        """
+        total = across = 0.0
+        n_touching = 0
+        for name, finger in estimate.fingers.items():
+            touch = self._new_touch(name)
+            known = finger.state is not _UNKNOWN and touch.read(finger)
+            # Without a slip rule, a steady slide would look like a steady grip.
+            if not known or finger.slip_probability is None or touch.slides:
+                return False
+            total, across = total + touch.normal, across + touch.tangential
+            n_touching += touch.touching
+        before, across_before = self._steady_forces
+        band = STEADY_BAND * total
+        if abs(total - before) <= band and abs(across - across_before) <= band:
+            return n_touching >= MIN_FINGERS
+        self._steady_forces = total, across
+        return False
 
     def _new_touch(self, name: str) -> Touch:
         return Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)

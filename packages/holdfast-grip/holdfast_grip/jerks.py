@@ -60,24 +60,35 @@ class JerkMonitor:
         """
         last, before = self._last, self._speed
         self.jerked = False
-        if not np.isfinite(angles).all():
-            self.reset()
-            return
-        if last is None or last.shape != angles.shape:
-            self.reset()
-            self._last = angles
+        if last is None or before is None or last.shape != angles.shape:
+            self._begin(angles)
             return
         self._last, self._speed = angles, angles - last
-        if before is None:
+        change = self._speed - before
+        total = float(change @ change)
+        # A sum that is not finite is the cheapest check of all angles.
+        if not math.isfinite(total):
+            self.reset()
             return
-        change = np.abs(self._speed - before)
-        square = float(change @ change) / len(change)
+        square = total / len(change)
         # Compare before the spread follows, so that a jerk is not part of its own measure.
-        spread = math.sqrt(self._square)
-        # A hand whose joints rest exactly has no spread to compare with.
-        is_known = self._n_changes >= MIN_SPREAD_REPORTS and spread > 0.0
-        self.jerked = is_known and float(change.max()) > JERK_RATIO * spread
+        limit = JERK_RATIO * math.sqrt(self._square)
+        # A hand whose joints rest exactly has no spread to compare with. No change exceeds the
+        # root of the sum, so the largest one is only looked for where it can matter.
+        if self._n_changes >= MIN_SPREAD_REPORTS and 0.0 < limit < math.sqrt(total):
+            self.jerked = float(np.abs(change).max()) > limit
         self._n_changes += 1
         if self.jerked:  # the spread is that of the hold
             square = min(square, JERK_RATIO * self._square)
         self._square += (square - self._square) / min(self._n_changes, SPREAD_REPORTS)
+
+    def _begin(self, angles: Array) -> None:
+        """Take one of the first two reports."""
+        last = self._last
+        if not np.isfinite(angles).all():
+            self.reset()
+        elif last is None or last.shape != angles.shape:
+            self.reset()
+            self._last = angles
+        else:
+            self._last, self._speed = angles, angles - last

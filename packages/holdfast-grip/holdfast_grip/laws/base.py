@@ -28,6 +28,7 @@ class Touch:
         cause: cause of the instability, where the model names one.
         slides: whether the slip rule of the model decides that the finger slides; False without
             such a rule.
+        knows_slips: whether the model has a slip rule.
         slip_probability: probability that the finger slides; 0 without a slip rule.
         instability: sigma, in the unit of the readings times the mean factor.
         force: (F_x, F_y, F_z) in the fingertip frame [N with a calibration, else the readings'].
@@ -48,6 +49,7 @@ class Touch:
         "instability",
         "jerked",
         "known",
+        "knows_slips",
         "normal",
         "probability",
         "scale",
@@ -66,7 +68,8 @@ class Touch:
         self.known = self.touching = False
         self.probability = self.instability = math.nan
         self.cause: Cause | None = None
-        self.slides, self.slip_probability = False, 0.0
+        self.slides = self.knows_slips = False
+        self.slip_probability = 0.0
         self.force = (0.0, 0.0, 0.0)
         self.normal = self.tangential = 0.0
         self.start_normal = 0.0
@@ -87,6 +90,7 @@ class Touch:
         self.probability = probability = estimate.stable_probability
         self.cause = estimate.cause
         slip = estimate.slip_probability
+        self.knows_slips = slip is not None
         self.slides = slip is not None and estimate.cause is Cause.SLIP
         self.slip_probability = 0.0 if slip is None else slip
         self.instability = estimate.instability * (a + b + c) / 3
@@ -116,10 +120,12 @@ class Law(ABC):
         needs_newtons: whether the law needs forces in newtons.
         dead_time: time after the start of a reaction in which the law starts no other one on
             that finger [s]; the rise of force itself shakes the contact.
+        notice: a message for the user, which the loop logs and clears; empty without one.
     """
 
     needs_newtons: ClassVar[bool] = False
     dead_time: float = 0.0
+    notice: str = ""
 
     @abstractmethod
     def start(self, touches: Sequence[Touch], thumb: int) -> None:

@@ -9,26 +9,33 @@ Its rules have no units, so that they carry over between counts and newtons:
 1. Doubt. The doubt in a finger is its probability of not being stable, or more if the slip rule of
    the model decides that it slides. The doubt in the hand is the mean over the fingers, weighted
    by their share of the normal force in the calm grip: a finger that carries little says little.
-2. Reaction. The doubt above a level, summed over time, starts a step: at once if the hand surely
-   slides, after some time if one finger does. The step grows with the doubt, and is smaller the
-   harder the hand presses already. Where friction falls, all contacts slide smoothly and the hand
-   carries less than in the calm grip: the missing share of the load adds to a doubt that is above
-   its level, and the step is larger, because friction may fall further. A force that falls takes a
-   part of the load with it, which is not missing.
-3. Hysteresis. A step shakes the contacts itself. So there is a refractory time without any step,
+   Where the model has a slip rule, instability alone counts for less than a slip, and only what
+   exceeds that of the calm grip: a light grip that the model never saw is always "unstable".
+2. Advance. The first of two speeds. While the hand is a little unstable and its load grows, the
+   force follows the load that is foreseen for the time that the hand needs to respond, before
+   anything slips. People raise grip and load force in parallel (R. S. Johansson and G. Westling,
+   Exp. Brain Res. 56 (1984) 550-564). A calm hand gives it back.
+3. Reaction, the second speed. The doubt above a level, summed over time, starts a step: at once if
+   the hand surely slides, after some time if one finger does. The step grows with the doubt, and is
+   smaller the harder the hand presses already. Where friction falls, all contacts slide smoothly
+   and the hand carries less than in the calm grip: the missing share of the load adds to a doubt
+   that is above its level, and the step is larger, because friction may fall further. A force that
+   falls takes a part of the load with it, which is not missing.
+4. Hysteresis. A step shakes the contacts itself. So there is a refractory time without any step,
    and then, until the episode is over, a higher level. A force that falls stirs the contacts a
-   little, and has a level of its own.
-4. Margin. While the hand is in doubt it keeps the ratio of tangential to normal force T/N of the
-   calm grip: if the load grows so that T/N is beyond a margin, the force follows before anything
-   slips. People raise grip and load force in parallel (R. S. Johansson and G. Westling, Exp. Brain
-   Res. 56 (1984) 550-564).
-5. Jerks. Where the hand reports its joints, a jerk of its own controller explains a doubt that
-   begins with it. For a short time such a doubt starts nothing, unless load is missing. A doubt
-   that lasts longer is a slip that the jerk began.
-6. Relaxation. In a calm grip the force falls slowly, to a margin above what the load needs at the
+   little, and has a level of its own. What still slides when the hand has responded is no shaking.
+5. What explains a doubt. A jerk of the hand's own controller, where the hand reports its joints;
+   and a hand that presses more than it was told, as such a jerk makes it. Neither explains a
+   missing load, nor a slide that the slip rule decides.
+6. Response. At the start the hand presses a little more for 0.2 s, and the law measures how long
+   the sensors take to see it: latency, lag and bus together. A slow hand keeps a reserve of force
+   in proportion to that time, because a slide runs on until the force comes.
+7. Relaxation. In a calm grip the force falls slowly, to a margin above what the load needs at the
    friction that a step has shown: T/N of the fingers that slide, or of all fingers where none is
    decided to slide. The calm grip held at its own T/N, so the friction is not much lower than
    that. It is forgotten slowly.
+
+Rules 6 and the shares of rule 1 and 2 need a slip rule; without one the law reacts to instability.
 """
 
 import math
@@ -36,6 +43,7 @@ from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
 from holdfast_grip.laws.base import Law, Touch, Wish
+from holdfast_grip.laws.response import ResponseTimer
 
 _NONE, _RELAX = GripReason.NONE, GripReason.RELAX
 
@@ -57,24 +65,49 @@ PRESS_TIME = 0.1
 """Time for which a step is wanted after it began, so that the limit of speed lets it end [s]."""
 JERK_TIME = 0.25
 """Time for which a jerk of the hand explains a doubt [s]: two periods of its ringing, 8 Hz."""
-JERK_LAG = 0.007
+LONGEST_JERK = 1.0
+"""The same, where a slip rule tells a slide from what the jerk explains [s]."""
+JERK_LAG = 0.02
 """Time after a doubt began within which a jerk explains it [s]: joints and taxels have clocks and
 delays of their own."""
+SHORT_JERK_LAG = 0.007
+"""The same without a slip rule: a jerk would hide the slide of a hand that slid before it."""
+UNSTABLE_SHARE = 0.7
+"""Weight of an instability that no slip rule confirms. With 0.4 the hand answered too few slides
+of the hard plant (12 % dropped in place of 6), with 1 jerks made 3 false rises in place of 1."""
+SLIP_STEP, SLIP_MARGIN = 0.2, 0.1
+"""What step and margin are larger by with a slip rule, which starts fewer of them."""
+RESPONSE_MARGIN = 0.04
+"""Time after the response of the hand from which a slide that goes on starts another step [s]."""
+RESERVE = 3.0
+"""Reserve of a calm hand for its response time, as a share of the first grip [1/s]."""
+ADVANCE_LEVEL, ADVANCE_PAUSE = 0.05, 0.03
+"""Instability from which the force follows the load, and the time between two such rises [s]."""
+SQUEEZE, SQUEEZE_LOAD = 1.02, 0.97
+"""Ratio to the commanded force and to the calm load from which a hand holds by pressing more."""
 JERK_MISSING_LOAD = 0.1
 """Share of the load of the calm grip that is missing from which a jerk explains nothing: half of
 what contacts lose when all begin to slide, where kinetic friction is 20 to 27 % lower."""
+PROBE_DELAY, PROBE_TIME, PROBE_RISE = 0.05, 0.26, 0.06
+"""When the loop presses more, how long, and by what share, to measure the response of the hand."""
+LONGEST_LEAD = 0.12
+"""Longest response time that counts [s]: the rate at which a load changes is known no further."""
+CHANGED_RESPONSE = 0.03, 0.5
+"""Change of the response time of which the user is told, in seconds and as a share."""
 NEVER = -math.inf
 
 
 class _Finger:
     """Forces and doubt of a finger."""
 
-    __slots__ = ("doubt", "load", "press", "share", "slides")
+    __slots__ = ("base", "doubt", "load", "press", "share", "slides")
 
     def __init__(self, touch: Touch) -> None:
         self.load = touch.tangential
         self.press = self.share = touch.normal
         self.doubt, self.slides = 0.0, False
+        # Doubt of the calm grip, which says nothing about a slip.
+        self.base = 1.0 - touch.probability if touch.touching else 1.0
 
     def follow(self, touch: Touch, part: float) -> None:
         """Take a part of the difference to the present forces, and the present doubt."""
@@ -134,6 +167,11 @@ class Stability(Law):
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Take the present grip as the calm one."""
+        self._knows_slips = knows_slips = any(touch.knows_slips for touch in touches)
+        self._least_step = self.least_step + (SLIP_STEP if knows_slips else 0.0)
+        self._margin = self.margin + (SLIP_MARGIN if knows_slips else 0.0)
+        self._advance_level = ADVANCE_LEVEL if knows_slips else self.hold_level
+        self._advance_pause = ADVANCE_PAUSE if knows_slips else PRESS_TIME
         self._fingers = [_Finger(touch) for touch in touches]
         self._start_force = sum(touch.start_normal for touch in touches)
         self._load = sum(finger.load for finger in self._fingers)
@@ -149,17 +187,27 @@ class Stability(Law):
         # Newest jerk that explains a doubt, and newest time without a doubt.
         self._jerked_at = self._rested_at = NEVER
         self._reason = GripReason.UNSTABLE
+        # Response time of the hand: 0 until it is known, and where it cannot be measured.
+        self.response, self._timer = 0.0, ResponseTimer()
+        self._probes = knows_slips  # until the response was measured
+        self._n_changed = 0  # steps in a row with another response
+        self._started_at = math.nan
+        self._first_press, self._n_first = 0.0, 0
+        # Rate of the load; doubt of what is unstable, and of what slides.
+        self._load_rate = self._unstable = self._sliding = 0.0
+        self._slides = False
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
         """Return the scale that doubt, load and friction need, the same for all fingers."""
         scale = max(touch.scale for touch in touches)
-        doubt = self._observe(touches, dt)
+        doubt = self._observe(touches, scale, dt)
         if doubt > self.calm:
             self._unsettled_at = time
-        if doubt <= self.hold_level:
+        if self._unstable <= self.hold_level:
             self._rested_at = time
         # A jerk explains only a doubt that follows it; all touches have the same jerk.
-        if touches[0].jerked and time - self._rested_at <= JERK_LAG:
+        lag = JERK_LAG if self._knows_slips else SHORT_JERK_LAG
+        if touches[0].jerked and time - self._rested_at <= lag:
             self._jerked_at = time
         is_calm = time - self._unsettled_at > self.settle_time
         if is_calm:
@@ -172,13 +220,20 @@ class Stability(Law):
             self._calm_scale = scale
             for finger in self._fingers:
                 finger.share += part * (finger.press - finger.share)
+                finger.base += part * (finger.doubt - finger.base)
         # It rises slowly, so the floor falls: an old slip says little about this contact.
         self._friction *= 1.0 + dt / self.memory
+        if self._probes or self._timer.running:
+            self._measure(touches, time)
         self._react(doubt, scale, time, dt)
         # The limit of speed may spread a step over several samples.
         pressing = time - max(self._stepped_at, self._followed_at) < PRESS_TIME
         if pressing and self._target > scale:
             wish = self._target, self._reason
+        elif self._probes and PROBE_DELAY <= time - self._started_at < PROBE_TIME:
+            wish = max(scale, 1.0 + PROBE_RISE), GripReason.MARGIN
+        elif self._knows_slips and not self._probes and scale < self._lowest():
+            wish = self._lowest(), GripReason.MARGIN
         # UNKNOWN never lowers a force.
         elif is_calm and all(touch.known for touch in touches):
             wish = self._relaxed(scale, time, dt), _RELAX
@@ -186,32 +241,104 @@ class Stability(Law):
             wish = scale, _NONE
         return [wish] * len(touches)
 
-    def _observe(self, touches: Sequence[Touch], dt: float) -> float:
+    def _lowest(self) -> float:
+        """Return the lowest scale in calm: a slow hand needs a reserve until it responds."""
+        return self.lowest + RESERVE * self.response
+
+    def _measure(self, touches: Sequence[Touch], time: float) -> None:
+        """Measure the response of the hand: by a small rise at the start, and then by its steps."""
+        press = sum(touch.normal for touch in touches)
+        if self._probes:
+            if math.isnan(self._started_at):
+                self._started_at = time
+            if time - self._started_at < PROBE_DELAY:
+                self._first_press += press
+                self._n_first += 1
+            elif not self._timer.running:
+                self._timer.begin(time, self._first_press / max(self._n_first, 1))
+                # The rise shakes the contacts, as a step does.
+                self._stepped_at = time
+            if self._slides:  # a slide changes the force too
+                self._timer.stop()
+                self._probes = False
+                self.notice = "no response time of the hand: something slid at the start"
+        if self._timer.update(time, press):
+            self._take_response(self._timer.result)
+
+    def _take_response(self, response: float) -> None:
+        """Take the first response time; compare later ones with it."""
+        if self._probes:
+            self._probes = False
+            if math.isnan(response):
+                self.notice = "no response time of the hand: its force did not follow the command"
+            else:
+                self.response = min(response, LONGEST_LEAD)
+            return
+        least, share = CHANGED_RESPONSE
+        change = abs(response - self.response)
+        # A step in a slide measures roughly: two in a row must agree.
+        is_changed = self.response > 0 and change > max(least, share * self.response)
+        self._n_changed = self._n_changed + 1 if is_changed else 0
+        if self._n_changed == 2:
+            self.notice = (
+                f"the response time of the hand changed from {1e3 * self.response:.0f} to "
+                f"{1e3 * response:.0f} ms: start again, so that the law knows it"
+            )
+
+    def _observe(self, touches: Sequence[Touch], scale: float, dt: float) -> float:
         """Follow the forces; return the doubt in the hand."""
         # At most the whole step: after a pause the filter would overshoot.
         part = min(dt / SMOOTHING, 1.0)
-        doubt = total = load = press = 0.0
+        doubt = unstable = sliding = total = load = press = 0.0
         for finger, touch in zip(self._fingers, touches, strict=True):
             if touch.known:
                 finger.follow(touch, part)
-            doubt += finger.share * finger.doubt
+            kick = excess = finger.doubt
+            if touch.knows_slips:
+                excess = max(0.0, finger.doubt - finger.base)
+                kick = finger.doubt if finger.slides else UNSTABLE_SHARE * excess
+            unstable += finger.share * excess
+            if finger.slides:
+                sliding += finger.share * finger.doubt
+            doubt += finger.share * kick
             total += finger.share
             load += finger.load
             press += finger.press
+        # The rate at which the filtered load changes.
+        self._load_rate += part * ((load - self._load) / dt - self._load_rate) if dt > 0 else 0.0
         self._load, self._press = load, press
-        return doubt / total if total > 0 else 0.0
+        self._slides = any(finger.slides for finger in self._fingers)
+        self._unstable = unstable / total if total > 0 else 0.0
+        if total <= 0:
+            return 0.0
+        self._sliding = sliding / total
+        # A hand that presses more than it was told, and carries its load, holds: as when its
+        # controller jerks.
+        squeezes = press * self._calm_scale > SQUEEZE * self._calm_press * scale
+        if self._knows_slips and squeezes and load >= SQUEEZE_LOAD * self._calm_load:
+            return self._sliding
+        return doubt / total
 
     def _react(self, doubt: float, scale: float, time: float, dt: float) -> None:
         """Begin a step if the doubt lasts; else follow a load that grows."""
         since = time - self._stepped_at
         # A jerk of the hand explains a doubt, unless load is missing.
         is_held = self._load >= (1.0 - JERK_MISSING_LOAD) * self._calm_load
-        if since < self.refractory or (is_held and time - self._jerked_at < JERK_TIME):
+        lasts = JERK_TIME
+        if self._knows_slips:
+            # Until the instability that it began has come to rest; a slide is no part of it.
+            lasts = LONGEST_JERK if self._rested_at <= self._jerked_at else 0.0
+            is_held = is_held and not self._slides
+        # What still slides when the hand has responded to a step needs another one.
+        refractory = self.refractory
+        if self._knows_slips and self._sliding >= SLIDING_DOUBT:
+            refractory = min(refractory, self.response + RESPONSE_MARGIN)
+        if since < refractory or (is_held and time - self._jerked_at < lasts):
             self._sum = 0.0
             return
         is_falling = time - self._fell_at < self.episode
         missing, load = 0.0, self._calm_load
-        if doubt > self.hold_level:
+        if self._unstable > self.hold_level:
             # Load that a falling force takes along is not missing: 50 false rises in 34 long holds
             # became 14 (docs/decisions/0025).
             if is_falling and self._calm_press > 0:
@@ -227,7 +354,7 @@ class Stability(Law):
         self._sum = max(0.0, self._sum + (evidence - level) * dt)
         if self._sum >= self.reaction:
             self._step(min(evidence, LARGEST_DOUBT), scale, time, missing)
-        elif doubt > self.hold_level:
+        elif self._unstable > self._advance_level:
             self._follow_load(scale, time)
 
     def _step(self, evidence: float, scale: float, time: float, missing: float) -> None:
@@ -240,28 +367,33 @@ class Stability(Law):
                 ratio = sum(finger.load for finger in sliding) / press
                 least = max(LEAST_FRICTION, HELD_SHARE * self._calm_ratio)
                 self._friction = min(self._friction, max(ratio, least))
-        step = self.least_step + self.step_growth * evidence
+        step = self._least_step + self.step_growth * evidence
         if missing > 0:
             step += FALLING_STEP
         self._target = scale + step / max(scale, 1.0)
         self._stepped_at, self._reason, self._sum = time, GripReason.UNSTABLE, 0.0
+        if self.response > 0:
+            self._timer.begin(time, self._press)
 
     def _follow_load(self, scale: float, time: float) -> None:
         """Follow a load that has grown beyond the margin; a fall of N alone is no growth."""
         if not (self._press > 0 and self._calm_ratio > 0 and self._calm_load > 0):
             return
-        by_growth = self._calm_scale * self._load / self._calm_load
-        needed = min(by_growth, scale * self._load / self._press / self._calm_ratio)
-        if needed > self.growth * scale and time - self._followed_at > PRESS_TIME:
-            self._target = self.growth * needed
+        # The load when the hand will have responded; without a response time, that of now.
+        load = self._load + max(self.response * self._load_rate, 0.0)
+        by_growth = self._calm_scale * load / self._calm_load
+        needed = min(by_growth, scale * load / self._press / self._calm_ratio)
+        if needed > self.growth * scale and time - self._followed_at > self._advance_pause:
+            # With a short pause it may follow during a step, whose end may be higher.
+            self._target = max(self.growth * needed, self._target if self._knows_slips else 0.0)
             self._followed_at, self._reason = time, GripReason.LOAD
 
     def _relaxed(self, scale: float, time: float, dt: float) -> float:
         """Return a scale that falls to what the load needs, `lowest` at least."""
         # What the load needs at the friction that slips have shown.
         force = self._friction * self._start_force
-        needed = self.margin * self._load / force if force > 0 else 0.0
-        relaxed = min(scale, max(scale * (1.0 - self.fall * dt), self.lowest, needed))
+        needed = self._margin * self._load / force if force > 0 else 0.0
+        relaxed = min(scale, max(scale * (1.0 - self.fall * dt), self._lowest(), needed))
         if relaxed < scale:
             self._fell_at = time
         return relaxed

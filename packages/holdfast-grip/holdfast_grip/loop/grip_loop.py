@@ -119,6 +119,10 @@ class GripLoop:
             self.controller.observe(angles)
         self.controller.report(fault)
         command = self._update(estimate, time)
+        law = self.controller.law
+        if law.notice:
+            self._log(f"grip: {law.notice}", command.time)
+            law.notice = ""
         violated = self.guard.violation
         admitted = self.guard.admit(command, clock)
         if self.guard.violation != violated:

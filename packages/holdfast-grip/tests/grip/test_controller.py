@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grip.build import FINGERS, NORMAL, RATE, finger, hand, holding, run, scales
-from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
+from holdfast.contact import Cause, ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.sensors import flat_sensor, sensor
 from holdfast_grip import LAWS, GripController, GripReason, Limits, LoopState
 from holdfast_grip.command import event_texts
@@ -33,6 +33,35 @@ steps = st.lists(
     ),
     max_size=30,
 )
+
+
+class TestSteadyStart:
+    """A grip that the model calls unstable begins when nothing slides and the forces stay."""
+
+    def state_after(self, seconds, *, slip=0.01, cause=None, growth=0.0, rule=True):
+        controller = GripController(Limits())
+        for k in range(round(seconds * RATE)):
+            now = k / RATE
+            fingers = {
+                name: msgspec.structs.replace(
+                    finger(name, now, ContactState.UNSTABLE, probability=0.1,
+                           normal=NORMAL[name] * (1.0 + growth * now)),
+                    slip_probability=slip if rule else None,
+                    cause=cause,
+                )
+                for name in FINGERS
+            }  # fmt: skip
+            controller.update(HandEstimate(now, ContactState.UNSTABLE, fingers), now)
+        return controller.state
+
+    def test_it_begins_after_a_second(self):
+        assert self.state_after(0.9) is LoopState.IDLE
+        assert self.state_after(1.2) is not LoopState.IDLE
+
+    def test_forces_that_change_a_slide_and_a_model_without_slips_begin_nothing(self):
+        assert self.state_after(1.5, growth=0.3) is LoopState.IDLE
+        assert self.state_after(1.5, slip=0.9, cause=Cause.SLIP) is LoopState.IDLE
+        assert self.state_after(1.5, rule=False) is LoopState.IDLE
 
 
 class TestAnyInput:

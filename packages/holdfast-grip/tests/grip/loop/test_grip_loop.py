@@ -63,6 +63,15 @@ def stepped(loop, time, n=10, **changes):
     return time
 
 
+def test_a_notice_of_the_law_is_one_line(tape):
+    controller, time = holding()
+    texts = []
+    with GripLoop(controller, tape, log=lambda text, _: texts.append(text)) as loop:
+        controller.law.notice = "no response time of the hand"
+        stepped(loop, time)
+    assert texts.count("grip: no response time of the hand") == 1
+
+
 def test_a_dry_run_sends_nothing_and_logs_everything(tape):
     controller, time = holding()
     texts = []
