@@ -67,7 +67,7 @@ def choose_compiler() -> None:
         command = f"{sys.executable} -m ziglang cc"
         if sys.platform == "linux":  # for every glibc since 2.17, as other wheels
             command += f" -target {platform.machine()}-linux-gnu.2.17"
-            # Debian's Python.h includes a file of that folder; the compiler's own headers come first
+            # Debian's Python.h includes a file of it; the compiler's own headers come first
             command += " -idirafter /usr/include"
     if command is None:
         sys.exit("no C compiler: install one (Debian: apt install gcc libc6-dev), or set CC")
