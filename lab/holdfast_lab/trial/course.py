@@ -11,7 +11,7 @@ from holdfast.twin.hand import RATE
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast.twin.world import World
 from holdfast_lab.trial.run import RunningTrial, least_force_at
-from holdfast_lab.trial.trials import Trial
+from holdfast_lab.trial.trials import IMPACT_SPACING, Trial
 
 LEAD_TIME = 0.5
 """Time before the load with which a course begins [s]."""
@@ -83,7 +83,8 @@ def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
         command = running.step()
         n_lost += running.is_lost
         held_for = running.simulation.held_for
-        if held_for < trial.load.start - LEAD_TIME:
+        # An impact may already cost the object.
+        if held_for < trial.load.start - LEAD_TIME - trial.n_impacts * IMPACT_SPACING:
             continue
         tips = running.simulation.world.contact.tips
         # Without contact a fingertip moves over nothing: it does not slide.

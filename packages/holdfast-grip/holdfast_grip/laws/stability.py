@@ -75,7 +75,7 @@ SHORT_JERK_LAG = 0.007
 UNSTABLE_SHARE = 0.7
 """Weight of an instability that no slip rule confirms. With 0.4 the hand answered too few slides
 of the hard plant (12 % dropped in place of 6), with 1 jerks made 3 false rises in place of 1."""
-SLIP_STEP, SLIP_MARGIN = 0.2, 0.1
+KICK_STEP, KICK_MARGIN = 0.2, 0.1
 """What step and margin are larger by with a slip rule, which starts fewer of them."""
 RESPONSE_MARGIN = 0.04
 """Time after the response of the hand from which a slide that goes on starts another step [s]."""
@@ -168,8 +168,8 @@ class Stability(Law):
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Take the present grip as the calm one."""
         self._knows_slips = knows_slips = any(touch.knows_slips for touch in touches)
-        self._least_step = self.least_step + (SLIP_STEP if knows_slips else 0.0)
-        self._margin = self.margin + (SLIP_MARGIN if knows_slips else 0.0)
+        self._least_step = self.least_step + (KICK_STEP if knows_slips else 0.0)
+        self._margin = self.margin + (KICK_MARGIN if knows_slips else 0.0)
         self._advance_level = ADVANCE_LEVEL if knows_slips else self.hold_level
         self._advance_pause = ADVANCE_PAUSE if knows_slips else PRESS_TIME
         self._fingers = [_Finger(touch) for touch in touches]
