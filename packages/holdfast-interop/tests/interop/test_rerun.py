@@ -63,9 +63,9 @@ def file(grasp, tmp_path_factory):
 def test_what_is_missing_is_one_line(capsys, grasp, tmp_path):
     save_recording(grasp, tmp_path / "grasp.mcap")
     words = (tmp_path / "grasp.mcap", tmp_path / "view", "--format", "rerun")
-    assert "pip install 'holdfast-interop[rerun]'" in Verb("export").refusal(capsys, *words)
+    assert "pip install 'rerun-sdk>=0.41'" in Verb("export").refusal(capsys, *words)
     words = ["builtin:any", str(tmp_path / "grasp.mcap"), "--rerun", "--port", "0", "--once"]
-    assert "holdfast-interop[rerun]" in Verb("serve").refusal(capsys, *words)
+    assert "rerun-sdk" in Verb("serve").refusal(capsys, *words)
 
 
 @needs_rerun
