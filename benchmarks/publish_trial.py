@@ -100,7 +100,8 @@ def _paired(run: Path, before: Path) -> dict[str, Any]:
     earlier = [one for one in earlier if one.number in numbers]
     document = json.loads((before / "trial.json").read_text("utf-8"))
     names = {"model": document["model"], "plant": document["plant"]["name"]}
-    return names | {"law": summarize(earlier), "difference": compare(now, earlier)}
+    laws = {"now": summarize(now), "law": summarize(earlier)}
+    return names | laws | {"difference": compare(now, earlier)}
 
 
 def _without_null(result: Mapping[str, Any]) -> dict[str, Any]:

@@ -36,7 +36,10 @@ def test_the_page_is_what_the_template_gives():
 
 def test_the_readme_quotes_the_published_run():
     laws = json.loads((PUBLISHED / "trial.json").read_text("utf-8"))["laws"]
-    ours, fixed, twice = laws["holdfast"], laws["fixed"], laws["fixed-2"]
+    fixed, twice = laws["fixed"], laws["fixed-2"]
+    # The law itself ran on more trials than its rivals.
+    sets = json.loads((PUBLISHED / "sets.json").read_text("utf-8"))
+    ours = sets["before"][0]["now"]
     readme = (ROOT / "README.md").read_text("utf-8").splitlines()
     row = next(line for line in readme if line.startswith("| twin, grip:"))
     dropped, force = (
@@ -65,7 +68,7 @@ def runs(tmp_path):
     shutil.copy(PUBLISHED / f"{script.PAGE}.j2", tmp_path / "docs/grip")
     laws = ("fixed", "fixed-2", "true-slips", "holdfast")
     for plant in ("mild", "hard"):
-        plan = TrialPlan(laws, 12, plant=plant)
+        plan = TrialPlan(laws, 12, model="builtin:any", plant=plant)
         document = document_of(plan, results_of(laws), 0)
         document |= {"seconds": {"trials": 90.0}, "machine": {"cores": 2}, "versions": {}}
         for name in ("tables", "figures"):
@@ -89,9 +92,9 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     page = (docs / script.PAGE).read_text()
     assert "12 trials of each plant with each law, seed 0 (mild) and 0 (hard)" in page
     assert "| `fixed` | 63.6<br><sub>" in page
-    assert "`holdfast` dropped 0.0 % of the objects" in page
+    assert "On 11 fresh trials of the mild plant `holdfast` dropped 0.0 % of" in page
     assert "(grip/film.webp)" in page and "(grip/force.png)" not in page
-    assert "| `builtin:any` | mild | 11 | 0.0<br><sub>0.0 to 0.0</sub> |" in page
+    assert "| `builtin:any` | mild | 11 | 0.0<br>" in page
     assert "| impacts | hard, 0 | `holdfast` | 11 |" in page
 
 

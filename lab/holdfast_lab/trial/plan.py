@@ -50,7 +50,7 @@ class TrialPlan:
     laws: tuple[str, ...] = ALL_ROWS
     n: int = 240
     seed: int = 0
-    model: str = "builtin:any"
+    model: str = "builtin:twin"
     plant: str = MILD
     n_impacts: int = 0
 

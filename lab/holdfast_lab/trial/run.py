@@ -121,14 +121,14 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
     n_impact_reactions: int = 0
 
 
-def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult:
+def run_trial(trial: Trial, law: str, model: str = "builtin:twin") -> TrialResult:
     """Run a trial with a law.
 
     Args:
         trial: the trial.
         law: name of the law.
-        model: name of the model of the detector. `builtin:any` was trained on any grip;
-            `builtin:twin` calls the light grips of the trials unstable.
+        model: name of the model of the detector; `builtin:twin` was trained on the twin's hand,
+            and `builtin:any` on others.
     """
     running = RunningTrial(trial, law, model)
     log = _TrialLog(trial, limits_of(law))

@@ -30,10 +30,10 @@ def trial(
         str,
         typer.Option(
             "--model",
-            help="Model of the detector: builtin:any, as builtin:twin calls the light grips of "
-            "the trials unstable, or one that was taught.",
+            help="Model of the detector: builtin:twin, one that was taught, or builtin:any, for "
+            "which the hand of the twin is new.",
         ),
-    ] = "builtin:any",
+    ] = "builtin:twin",
     quick: QuickOption = False,
     n: Annotated[
         int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS))
