@@ -139,6 +139,7 @@ class TestLive:
                         publisher.put(update)
                         n += sum("thumb" in fingers for _, fingers in update.estimates)
                 assert (publisher.n_failed, publisher.n_dropped) == (0, 0)
+            wait_until_written(tmp_path / "live.rrd")
         finally:
             os.killpg(viewer.pid, signal.SIGTERM)  # the command is the parent of the viewer
             viewer.wait(30)
@@ -147,6 +148,14 @@ class TestLive:
         assert len(found["/force/thumb"]["scalars"]) == n
         assert {"/states/hand", "/states/thumb", "/events"} <= found.keys()
         assert any(found["/hand/palm_link/thumb/arrows"]["vectors"])
+
+
+def wait_until_written(path):
+    """Wait until a file has not grown for a second: the viewer writes what came some time later."""
+    size, before = path.stat().st_size, -1
+    while size != before:
+        time.sleep(1)
+        size, before = path.stat().st_size, size
 
 
 def wait_for(port):
