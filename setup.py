@@ -67,6 +67,8 @@ def choose_compiler() -> None:
         command = f"{sys.executable} -m ziglang cc"
         if sys.platform == "linux":  # for every glibc since 2.17, as other wheels
             command += f" -target {platform.machine()}-linux-gnu.2.17"
+            # Debian's Python.h includes a file of it; the compiler's own headers come first
+            command += " -idirafter /usr/include"
     if command is None:
         sys.exit("no C compiler: install one (Debian: apt install gcc libc6-dev), or set CC")
     os.environ["CC"] = command
@@ -86,9 +88,11 @@ class BuildKernel(build_ext):
         if self.compiler.compiler_type == "unix":
             for extension in self.extensions:
                 extension.extra_compile_args, extension.libraries = FLAGS, ["m"]
-            # sysconfig has the path of the libraries of the machine that built Python
+            # sysconfig has the path of the libraries of the machine that built Python, and Debian's
+            # an option that the linker of the package index refuses
+            unwanted = ["-Wl,-rpath"] + ["-Wl,-Bsymbolic"] * ("ziglang" in os.environ["CC"])
             self.compiler.linker_so = [
-                word for word in self.compiler.linker_so if not word.startswith("-Wl,-rpath")
+                word for word in self.compiler.linker_so if not word.startswith(tuple(unwanted))
             ]
         super().build_extensions()
 

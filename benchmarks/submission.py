@@ -55,7 +55,8 @@ def main(folder: Path, name: str, out: Path) -> None:
     """Write the scores of a model for all splits that it fits."""
     model = Model.load(name)
     with pq.ParquetWriter(out, SCHEMA, compression="zstd") as writer:
-        for split in SPLITS:
+        # A folder of version 1 has not all of them.
+        for split in filter(lambda name: (folder / name).is_dir(), SPLITS):
             try:
                 for recording in load_dataset(folder / split):
                     for table in scores_of(model, split, recording):

@@ -95,6 +95,14 @@ def test_a_negative_seed(capsys, tmp_path):
     assert (code, out, err.count("\n")) == (2, "", 1)
 
 
+def test_a_folder_that_cannot_be_made(capsys, tmp_path):
+    (tmp_path / "file").touch()
+    code, out, err = run(capsys, tmp_path / "file" / "demo")
+    assert (code, out) == (2, "")
+    assert err.startswith("holdfast: cannot write to ")
+    assert err.endswith("file/demo: Not a directory\n")
+
+
 def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, monkeypatch):
     pages = []
 

@@ -19,8 +19,9 @@ def make_data(folder: Path, engine: "Engine", *, as_json: bool) -> None:
     """
     from holdfast_lab.study.benchmark.protocol import differing, digest_of, load_split, protocol
 
-    document: dict[str, object] = {"version": protocol().version}
-    for name, split in protocol().splits.items():
+    version = protocol(folder)
+    document: dict[str, object] = {"version": version.version}
+    for name, split in version.splits.items():
         print_message(f"{name}: {split.holds}")
         simulate_split(folder / name, split, engine)
         recordings = load_split(folder, name)
@@ -35,7 +36,7 @@ def make_data(folder: Path, engine: "Engine", *, as_json: bool) -> None:
     if as_json:
         print_json(document)
     else:
-        print_line(f"{folder}: the benchmark, version {protocol().version}")
+        print_line(f"{folder}: the benchmark, version {version.version}")
 
 
 def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
@@ -53,7 +54,8 @@ def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
 
     if not path.is_file():
         raise ValueError(f"{path}: no such file; a submission as .csv or .parquet expected")
-    result = score_submission(read_submission(path), folder, protocol())
+    version = protocol(folder)
+    result = score_submission(read_submission(path), folder, version)
     if result.differ:
         print_message(
             f"{len(result.differ)} recordings are not those of the protocol, such as "
@@ -64,7 +66,7 @@ def print_scores(path: Path, folder: Path, *, as_json: bool) -> None:
     if as_json:
         tables = {table.name: to_json(table) for table in result.tables}
         print_json({
-            "submission": path.name, "version": protocol().version, "differ": result.differ,
+            "submission": path.name, "version": version.version, "differ": result.differ,
             "left_out": result.left_out, "tables": tables,
         })  # fmt: skip
         return

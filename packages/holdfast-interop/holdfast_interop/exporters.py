@@ -135,10 +135,9 @@ def require_rerun() -> None:
     """Check that Rerun is installed.
 
     Raises:
-        HoldfastError: it is not; no extra of holdfast itself has it, as it needs 700 MB.
+        HoldfastError: it is not; it is in no default, as it needs 700 MB.
     """
     if not is_installed("rerun"):
         raise HoldfastError(
-            "this needs the package rerun, which is not installed: "
-            "pip install 'holdfast-interop[rerun]'"
+            "this needs the package rerun, which is not installed: pip install 'rerun-sdk>=0.41'"
         )

@@ -17,7 +17,7 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_paragraph
 from holdfast.cli.terminal.progress import progress
-from holdfast.errors import require_extras
+from holdfast.errors import OutputError, require_extras
 from holdfast.files import refuse_overwrite
 
 DEMO_MODEL = "builtin:twin"
@@ -66,7 +66,10 @@ def demo(
         raise ValueError(f"--seed: at least 0 expected, {seed} given")
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        raise OutputError(f"cannot write to {out}: {cause.strerror}") from cause
     refuse_overwrite(model, force=force)  # before minutes of simulation
     print_message("1/5  a real recording: a robot carries a box between two uSkin sensors")
     real = show_real_recording(speed)

@@ -12,7 +12,9 @@ from holdfast.io import Dataset, load_dataset
 from holdfast.recordings import Recording
 from holdfast_lab.study.plan import content_digest
 
-PROTOCOL_FILE = "protocol.json"
+PROTOCOL_FILES = ("protocol-1.json", "protocol.json")
+"""Files of all versions, the newest last. Older ones stay, so that recordings that somebody has of
+them can still be checked and scored."""
 TUNING = "tuning"
 """Split from which the scorer chooses the thresholds."""
 DIGEST_LENGTH = 32
@@ -31,7 +33,6 @@ class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
         other_objects: use the objects that no other split has.
         randomized: every recording has another hand, sensor and object.
         scored: whether results are reported for it.
-        since: version of the benchmark that has it first.
         profile: of the twin.
         faults: troubles of the skins, as in `--faults`.
         digests: of the content of each recording, by name.
@@ -43,7 +44,6 @@ class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
     other_objects: bool = False
     randomized: bool = False
     scored: bool = True
-    since: int = 1
     profile: str = "reference"
     faults: str = ""
     digests: dict[str, str] = {}
@@ -52,10 +52,8 @@ class BenchmarkSplit(msgspec.Struct, frozen=True, kw_only=True):
 class BenchmarkProtocol(msgspec.Struct, frozen=True):
     """A version of the benchmark.
 
-    A version adds splits, and changes none: recordings and results of an older one stay valid.
-
     Attributes:
-        version: a new one for every split that is added.
+        version: a new one for every change of data or rules.
         splits: by name.
     """
 
@@ -64,10 +62,29 @@ class BenchmarkProtocol(msgspec.Struct, frozen=True):
 
 
 @cache
-def protocol() -> BenchmarkProtocol:
-    """Return the protocol of this version of holdfast."""
-    data = files("holdfast_lab.study.benchmark").joinpath(PROTOCOL_FILE).read_bytes()
-    return msgspec.json.decode(data, type=BenchmarkProtocol)
+def protocols() -> tuple[BenchmarkProtocol, ...]:
+    """Return all versions of the protocol, the newest last."""
+    folder = files("holdfast_lab.study.benchmark")
+    return tuple(
+        msgspec.json.decode(folder.joinpath(name).read_bytes(), type=BenchmarkProtocol)
+        for name in PROTOCOL_FILES
+    )
+
+
+def protocol(folder: Path | None = None) -> BenchmarkProtocol:
+    """Return the version whose recordings a folder has; the newest if it has those of none.
+
+    Args:
+        folder: with a folder for each split; None for the newest version.
+    """
+    newest = protocols()[-1]
+    if folder is None or not (folder / TUNING).is_dir():
+        return newest
+    # One recording tells the versions apart: the twin that made them differs in its last bits.
+    first = next(iter(load_dataset(folder / TUNING)))
+    digest = digest_of(first)
+    made = (p for p in protocols() if p.splits[TUNING].digests.get(first.name) == digest)
+    return next(made, newest)
 
 
 def load_split(folder: Path, split: str) -> Dataset:

@@ -29,7 +29,7 @@ from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
-MODELS = ("builtin:noise-floor", "builtin:any", "builtin:twin")
+SHIPPED_MODELS = ("builtin:noise-floor", "builtin:any", "builtin:twin")
 TESTED = {
     "others": "unseen objects",
     "aged": "skins aged by 4 months",
@@ -45,7 +45,7 @@ SPEED_LIMITS = (0.0, 2.0, 5.0, 10.0, 15.0, 18.0, math.inf)
 """Limits of the mean speed of a slip [mm/s]."""
 SOON = 0.1
 """Delay up to which a slip counts as found [s]."""
-NEVER = "always stable, never a slip"
+NO_REPORT = "always stable, never a slip"
 FIGURES_NOTE = (
     "Each model as it ships, at its own thresholds, without calibration. Events are of the hand, "
     "slips of single fingers, as in the tables of methods. False slip alarms: of a finger, for a "
@@ -54,7 +54,7 @@ FIGURES_NOTE = (
 )
 
 
-class RecordingCounts(msgspec.Struct, frozen=True):
+class ModelCounts(msgspec.Struct, frozen=True):
     """What a model decided about one recording.
 
     Attributes:
@@ -84,7 +84,7 @@ class RecordingCounts(msgspec.Struct, frozen=True):
     impacts: tuple[int, int]
 
 
-Counted = dict[str, list[RecordingCounts]]
+Counted = dict[str, list[ModelCounts]]
 """Counts of each recording, by role of the corpus."""
 
 
@@ -95,7 +95,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
         return []
     made = [
         Task(f"shipped/{name}", shipped_counts, (name, tests), Counted, cost=10.0)
-        for name in MODELS
+        for name in SHIPPED_MODELS
     ]
     if all(role in plan.corpora for role in TEACHING):
         teaching = [plan.corpora[role] for role in TEACHING]
@@ -114,7 +114,7 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         return []
     # From a model with a slip rule, or there would be no slips to miss.
     counted_by = found["builtin:twin"]
-    found[NEVER] = {role: list(map(silenced, counts)) for role, counts in counted_by.items()}
+    found[NO_REPORT] = {role: list(map(silenced, counts)) for role, counts in counted_by.items()}
     rows, by_speed = [], []
     for role, title in TESTED.items():
         for name, counted in found.items():
@@ -180,7 +180,7 @@ def counts_of(model: Model, tests: Mapping[str, Corpus]) -> Counted:
     }
 
 
-def count_recording(model: Model, recording: Recording) -> RecordingCounts:
+def count_recording(model: Model, recording: Recording) -> ModelCounts:
     """Return what a model decides about a recording."""
     decisions = compute_decisions(model, recording)
     stable, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
@@ -193,7 +193,7 @@ def count_recording(model: Model, recording: Recording) -> RecordingCounts:
     missed = hand.n_events * (hand.missed[str(POST_DURATIONS[0])] or 0.0) / 100
     slips = slip_counts(decisions)
     counted = SlipCounts.total(counts for counts, _ in slips)
-    return RecordingCounts(
+    return ModelCounts(
         stable=(int(stable[0]), int(stable[1])),
         unstable=(int(unstable[0]), int(unstable[1])),
         events=(hand.n_events, missed),
@@ -219,7 +219,7 @@ def slip_counts(decisions: Decisions) -> list[tuple[SlipCounts, list[float]]]:
     return counted
 
 
-def silenced(counts: RecordingCounts) -> RecordingCounts:
+def silenced(counts: ModelCounts) -> ModelCounts:
     """Return what a hand gives that is always called stable and never slips."""
     return msgspec.structs.replace(
         counts,
@@ -234,7 +234,7 @@ def silenced(counts: RecordingCounts) -> RecordingCounts:
     )
 
 
-def model_rows(keys: RowKeys, counts: Sequence[RecordingCounts]) -> Iterator[Row]:
+def model_rows(keys: RowKeys, counts: Sequence[ModelCounts]) -> Iterator[Row]:
     """Yield the rows of one model on one corpus."""
     pairs = {
         "stable called STABLE [%]": [each.stable for each in counts],
@@ -263,7 +263,7 @@ def model_rows(keys: RowKeys, counts: Sequence[RecordingCounts]) -> Iterator[Row
     yield count_row({**keys, "figure": "slips"}, [len(each.delays) for each in counts])
 
 
-def speed_rows(keys: RowKeys, counts: Sequence[RecordingCounts]) -> Iterator[Row]:
+def speed_rows(keys: RowKeys, counts: Sequence[ModelCounts]) -> Iterator[Row]:
     """Yield the delays of the slips by their mean speed."""
     for low, high in pairwise(SPEED_LIMITS):
         delays = [

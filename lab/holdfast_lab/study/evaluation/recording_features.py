@@ -40,19 +40,14 @@ class Variation(msgspec.Struct, frozen=True):
         noise: standard deviation of white noise added to every reading [unit of the readings].
             Counts stay integers.
         every: keep only every n-th sample, as a slower sensor of the same kind gives them.
-        margin: time by which labels made from the truth extend disturbances at both ends [s].
-            None keeps the labels of the recording.
     """
 
     noise: float = 0.0
     every: int = 1
-    margin: float | None = None
 
     def apply(self, recording: Recording) -> Recording:
         """Return the varied recording. The same recording always gets the same noise."""
-        if self.margin is not None:
-            recording = relabel(recording, LabelRule(margin=self.margin))
-        if self == Variation(margin=self.margin):
+        if self == Variation():
             return recording
         modules: dict[str, Tactile] = {}
         for index, (name, module) in enumerate(recording.modules.items()):

@@ -28,6 +28,7 @@ from holdfast_lab.study.benchmark.protocol import (
     BenchmarkSplit,
     digest_of,
     protocol,
+    protocols,
 )
 from holdfast_lab.study.benchmark.scoring import log_odds
 from study.example_recordings import SLIPS, recording_with_truth
@@ -56,7 +57,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def folder(made, monkeypatch):
-    monkeypatch.setattr(protocol_module, "protocol", lambda: made[1])
+    monkeypatch.setattr(protocol_module, "protocols", lambda: (made[1],))
     return made[0]
 
 
@@ -215,7 +216,7 @@ def test_other_recordings_are_named(capsys, folder, made, truth, tmp_path, monke
     split = splits["new-objects"]
     digests = {**split.digests, "grasp4": "00"}
     splits["new-objects"] = BenchmarkSplit(holds="", seed=0, repeats=1, digests=digests)
-    monkeypatch.setattr(protocol_module, "protocol", lambda: BenchmarkProtocol(7, splits))
+    monkeypatch.setattr(protocol_module, "protocols", lambda: (BenchmarkProtocol(7, splits),))
     path = write_csv(tmp_path / "s.csv", truth)
     document, err = scored(capsys, folder, path)
     assert document["differ"] == ["new-objects/grasp4"]
@@ -301,7 +302,7 @@ def test_the_recordings_are_simulated_and_compared(capsys, monkeypatch, tmp_path
         "tuning": BenchmarkSplit(holds="one can", seed=3, repeats=1, scored=False),
         "new-hand-and-objects": BenchmarkSplit(holds="a hand", seed=4, repeats=1, randomized=True),
     }
-    monkeypatch.setattr(protocol_module, "protocol", lambda: BenchmarkProtocol(7, splits))
+    monkeypatch.setattr(protocol_module, "protocols", lambda: (BenchmarkProtocol(7, splits),))
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
     known = twin_recordings.plan_grasps
@@ -337,10 +338,24 @@ def test_the_protocol_has_digests_of_all_splits():
     assert len(set(digests)) == len(digests)
 
 
-def test_a_new_version_leaves_the_recordings_of_version_1():
-    old = {name: split.digests for name, split in protocol().splits.items() if split.since == 1}
-    assert len(old) == 4
-    # Never renew this digest: results of version 1 would no longer be comparable.
+def test_the_digests_of_version_1_stay():
+    first, newest = protocols()
+    assert (first.version, newest.version) == (1, 2)
+    assert newest is protocol()
+    assert set(first.splits) < set(newest.splits)
+    old = {name: split.digests for name, split in first.splits.items()}
+    # Never renew this digest: recordings of version 1 could no longer be checked.
     assert sha256(json.dumps(old, sort_keys=True).encode()).hexdigest() == (
         "e7389ddc5ebe01c045724bc6dcb8be6a94ca3d99516c10a68c7abd4f936ef1b0"
     )
+
+
+def test_a_folder_has_the_version_of_its_recordings(made, monkeypatch, tmp_path):
+    folder, old = made
+    other = {name: msgspec.structs.replace(s, digests={}) for name, s in old.splits.items()}
+    newest = BenchmarkProtocol(8, other)
+    monkeypatch.setattr(protocol_module, "protocols", lambda: (old, newest))
+    assert protocol(folder).version == 7
+    assert protocol(tmp_path).version == protocol().version == 8
+    monkeypatch.setattr(protocol_module, "protocols", lambda: (newest, newest))
+    assert protocol(folder).version == 8

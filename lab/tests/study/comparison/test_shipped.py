@@ -3,8 +3,8 @@ import math
 import pytest
 
 from holdfast_lab.study.comparison.shipped import (
-    NEVER,
-    RecordingCounts,
+    NO_REPORT,
+    ModelCounts,
     model_rows,
     shipped_counts,
     silenced,
@@ -16,7 +16,7 @@ from holdfast_lab.study.comparison.shipped import (
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import recording_with_truth, save_all
 
-COUNTS = RecordingCounts(
+COUNTS = ModelCounts(
     stable=(100, 90), unstable=(50, 40), events=(4, 1.0), alarms=(3, 2.0),
     delays=[-0.01, 0.1, math.inf, 0.2], speeds=[1.0, 3.0, 4.0, 30.0], over_1mm=(2, 1),
     false_slips=6, finger_minutes=4.0, hand_minutes=2.0, impacts=(10, 2),
@@ -81,5 +81,5 @@ def test_the_tables_of_recordings(tmp_path):
     results["shipped/builtin:twin"] = results["shipped/builtin:any"]
     results["taught/2"] = taught_counts(2, [corpora["taught"]], tests)
     models, speeds = tables(plan, results)
-    assert {row.keys["model"] for row in models.rows} >= {"builtin:any", NEVER}
+    assert {row.keys["model"] for row in models.rows} >= {"builtin:any", NO_REPORT}
     assert all(row.keys["on"] == "unseen objects" for row in speeds.rows)

@@ -48,7 +48,7 @@ def test_a_margin_extends_disturbances_if_the_truth_is_known():
     recording = recording_with_truth("grasp", 3)
     n = {}
     for margin in (0.0, 0.1, 0.2):
-        module = Variation(margin=margin).apply(recording).modules["index"]
+        module = relabel(recording, LabelRule(margin=margin)).modules["index"]
         states = label_states(module.labels, module.times)
         shaken = (states == UNSTABLE) & (module.times > 4) & (module.times < 8)
         n[margin] = int(shaken.sum())

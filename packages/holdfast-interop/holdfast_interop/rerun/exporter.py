@@ -89,7 +89,7 @@ def write_recording(recording: Recording, path: Path, model: "Model | None") -> 
     tracks = series(recording, traces)
     frames, _ = frames_of(recording)
     with rr.RecordingStream("holdfast") as stream:
-        stream.save(path, default_blueprint=blueprint(tracks))
+        stream.save(path, default_blueprint=blueprint(tracks, frames))
         stream.send_recording_name(recording.name)
         write_hand(stream, recording, frames, traces, instants)
         for quantity, fingers in tracks.items():

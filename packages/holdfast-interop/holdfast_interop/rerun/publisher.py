@@ -86,15 +86,16 @@ class RerunPublisher(Openable):
                 "`rerun --bind 127.0.0.1`"
             ) from None
         self._view = rr.RecordingStream("holdfast")
-        quantities = ("force", *QUANTITIES)
-        url = f"rerun+http://127.0.0.1:{self._port}/proxy"
-        self._view.connect_grpc(url, default_blueprint=blueprint(quantities))
         modules = {
             name: Tactile(sensor, np.zeros(1), np.zeros((1, sensor.n_taxels, 3)))
             for name, sensor in self._stream.fingers.items()
         }
         recording = Recording("live", modules)
-        self._paths = draw_hand(self._view, recording, frames_of(recording)[0])
+        frames, _ = frames_of(recording)
+        layout = blueprint(("force", *QUANTITIES), frames)
+        url = f"rerun+http://127.0.0.1:{self._port}/proxy"
+        self._view.connect_grpc(url, default_blueprint=layout)
+        self._paths = draw_hand(self._view, recording, frames)
         name_states(self._view, [entity(STATE_LANES, name) for name in (*modules, "hand")])
         self._closing.clear()
         self._thread = Thread(target=self._run, name="holdfast-rerun", daemon=True)

@@ -30,6 +30,8 @@ SERIES_NAMES = {
 ARROW_RADIUS, TAXEL_RADIUS = 0.0003, 0.0006
 """Radii of the arrows and of the dots [m]."""
 DOT_COLOUR = (0.4, 0.4, 0.4)
+EYE = np.array([0.24, 0.12, 0.12])
+"""Where the hand is looked at from, relative to the middle of its modules [m]."""
 NO_LABEL = "no label"
 
 
@@ -83,13 +85,17 @@ def long_enough(vectors: Array) -> Any:  # noqa: ANN401
     return np.linalg.norm(vectors, axis=-1) > SHORTEST_ARROW
 
 
-def blueprint(quantities: Iterable[str]) -> Any:  # noqa: ANN401
+def blueprint(quantities: Iterable[str], frames: Iterable[Frame]) -> Any:  # noqa: ANN401
     """Return the layout: the hand above the log, and the plots above the states."""
+    modules = module_frame("")
+    # All parents of modules stand at the origin of the world.
+    middle = np.mean([f.poses[0][:3] for f in frames if f.name.startswith(modules)], axis=0)
+    eye = rrb.EyeControls3D(position=middle + EYE, look_target=middle, eye_up=(0.0, 0.0, 1.0))
     plots = [
         rrb.TimeSeriesView(origin=quantity, name=SERIES_NAMES[quantity]) for quantity in quantities
     ]
     left = rrb.Vertical(
-        rrb.Spatial3DView(origin=HAND, name="Hand"),
+        rrb.Spatial3DView(origin=HAND, name="Hand", eye_controls=eye),
         rrb.TextLogView(origin=EVENT_LOG, name="Events"),
         row_shares=[3, 1],
     )

@@ -63,9 +63,9 @@ def file(grasp, tmp_path_factory):
 def test_what_is_missing_is_one_line(capsys, grasp, tmp_path):
     save_recording(grasp, tmp_path / "grasp.mcap")
     words = (tmp_path / "grasp.mcap", tmp_path / "view", "--format", "rerun")
-    assert "pip install 'holdfast-interop[rerun]'" in Verb("export").refusal(capsys, *words)
+    assert "pip install 'rerun-sdk>=0.41'" in Verb("export").refusal(capsys, *words)
     words = ["builtin:any", str(tmp_path / "grasp.mcap"), "--rerun", "--port", "0", "--once"]
-    assert "holdfast-interop[rerun]" in Verb("serve").refusal(capsys, *words)
+    assert "rerun-sdk" in Verb("serve").refusal(capsys, *words)
 
 
 @needs_rerun
@@ -139,6 +139,7 @@ class TestLive:
                         publisher.put(update)
                         n += sum("thumb" in fingers for _, fingers in update.estimates)
                 assert (publisher.n_failed, publisher.n_dropped) == (0, 0)
+            wait_until_written(tmp_path / "live.rrd")
         finally:
             os.killpg(viewer.pid, signal.SIGTERM)  # the command is the parent of the viewer
             viewer.wait(30)
@@ -147,6 +148,14 @@ class TestLive:
         assert len(found["/force/thumb"]["scalars"]) == n
         assert {"/states/hand", "/states/thumb", "/events"} <= found.keys()
         assert any(found["/hand/palm_link/thumb/arrows"]["vectors"])
+
+
+def wait_until_written(path):
+    """Wait until a file has not grown for a second: the viewer writes what came some time later."""
+    size, before = path.stat().st_size, -1
+    while size != before:
+        time.sleep(1)
+        size, before = path.stat().st_size, size
 
 
 def wait_for(port):
