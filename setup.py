@@ -20,8 +20,10 @@ from setuptools.command.build_ext import build_ext
 
 PACKAGE = Path("src/holdfast")  # backends run in the folder of pyproject.toml
 EXTENSIONS = {
-    "kernel._extension": ("module.c", "haar.c", "force.c", "counts.c", "offline.c"),
-    "twin.steps": ("module.c",),
+    "kernel._extension": [
+        f"kernel/{name}.c" for name in ("module", "haar", "force", "counts", "offline")
+    ],
+    "twin.steps": ["twin/c/module.c"],
 }
 """Names of the extension modules, and the C files that are compiled for each."""
 DEFINITIONS = {
@@ -102,7 +104,7 @@ if __name__ == "__main__":
     extensions = [
         Extension(
             f"holdfast.{name}",
-            [str(PACKAGE / name.split(".")[0] / source) for source in sources],
+            [str(PACKAGE / source) for source in sources],
             define_macros=[*DEFINITIONS.items(), ("HOLDFAST_SOURCES", f'"{digest}"')],
             py_limited_api=True,
         )

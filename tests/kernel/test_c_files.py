@@ -25,7 +25,7 @@ FLAGS = (
             f"kernel/{name}.c"
             for name in ("module", "haar", "force", "counts", "kernel", "offline")
         ),
-        "twin/module.c",
+        "twin/c/module.c",
     ],
 )
 def test_no_warning(compiler, level, name, tmp_path):

@@ -6,7 +6,7 @@ The build runs this file by itself, so it imports nothing of the package.
 import hashlib
 from pathlib import Path
 
-FOLDERS = ("kernel", "twin")
+FOLDERS = ("kernel", "twin/c")
 """Folders of the package with C files."""
 
 

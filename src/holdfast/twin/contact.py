@@ -1,6 +1,6 @@
 """Contact of soft fingertips with an object: its constants and its state.
 
-`holdfast.twin.steps.touch` computes the forces, in contact.c.
+`holdfast.twin.steps.touch` computes the forces, in c/contact.c.
 """
 
 from typing import NamedTuple

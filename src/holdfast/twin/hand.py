@@ -1,6 +1,6 @@
 """Model of the Allegro hand v4 and the object for MuJoCo: boxes and capsules without contacts.
 
-MuJoCo integrates the motion of the bodies. contact.c computes the forces between skin and object,
+MuJoCo integrates the motion of the bodies. c/contact.c computes the forces between skin and object,
 which hand.c applies as external forces.
 """
 

@@ -1,4 +1,4 @@
-"""Functions in C, see `steps.h`. They refuse anything but arrays in C order of the right shape."""
+"""Functions in C (`c/steps.h`). They refuse all but arrays in C order of the right shape."""
 
 import numpy as np
 

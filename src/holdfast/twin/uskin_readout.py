@@ -1,4 +1,4 @@
-"""Parameters and state of the readout of a uSkin fingertip, which uskin_readout.c computes.
+"""Parameters and state of the readout of a uSkin fingertip, which c/uskin_readout.c computes.
 
 Every parameter has its source.
 """
@@ -163,7 +163,7 @@ class Taxels(NamedTuple):
 
 
 class _Constants(NamedTuple):
-    """What a fingertip does not change, for uskin_readout.c.
+    """What a fingertip does not change, for c/uskin_readout.c.
 
     Attributes:
         taxels: properties of the taxels.
@@ -222,7 +222,7 @@ class _State(NamedTuple):
 
 
 _TIME, _RATE = range(2)
-"""Positions in `_State.numbers`; the third, the temperature, is that of uskin_readout.c alone."""
+"""Positions in `_State.numbers`; the third, the temperature, is that of c/uskin_readout.c alone."""
 
 
 class Readout:

@@ -4,7 +4,7 @@
  * fields of a struct are read from the attributes of the same names. All arrays are checked at each
  * call, before anything is computed: type, order in memory, and shape, where an axis of one name
  * has one length in all arguments. The GIL is kept: a step takes microseconds. */
-#include "../kernel/arrays.h"
+#include "../../kernel/arrays.h"
 
 #include "steps.c"
 
