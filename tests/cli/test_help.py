@@ -8,7 +8,7 @@ from holdfast.cli import app, main
 
 SHOWN = {
     "detect": "--summary --in-contact --sensor --seconds --json",
-    "serve": "--host --port --token-file --record-to --speed --once --in-contact --ros1 --ros2 "
+    "serve": "--host --port --token-file --record-to --speed --once --in-contact --rerun --ros1 --ros2 "
     "--json",
     "record": "--seconds --object --case --note --set --camera --force --json",
     "play": "--host --port --speed --once --json",
@@ -27,8 +27,8 @@ SHOWN = {
     "--speed --in-contact --json",
     "export": "--like --sensor --fingers --float --format --model --fps --force --json",
     "datasets": "--only --yes --force --json",
-    "trial": "--out --laws --model --quick --n --plant --jobs --force --json",
-    "study": "--out --twin --quick --jobs --tare --benchmark --force --json",
+    "trial": "--out --laws --model --quick --n --plant --impacts --jobs --force --json",
+    "study": "--out --twin --quick --full --jobs --tare --benchmark --force --json",
     "label auto": "--tare --poses --track --video --author --dry-run --force --json",
     "label compare": "--annotator --json",
     "label audit": "--page --author --json",
