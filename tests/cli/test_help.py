@@ -8,8 +8,8 @@ from holdfast.cli import app, main
 
 SHOWN = {
     "detect": "--summary --in-contact --sensor --seconds --json",
-    "serve": "--host --port --token-file --record-to --speed --once --in-contact --rerun --ros1 --ros2 "
-    "--json",
+    "serve": "--host --port --token-file --record-to --speed --once --in-contact --rerun --ros1 "
+    "--ros2 --json",
     "record": "--seconds --object --case --note --set --camera --force --json",
     "play": "--host --port --speed --once --json",
     "import": "--format --sensor --columns --no-labels --suffix --jobs --force --json",
