@@ -160,11 +160,14 @@ class RunningTrial:
         self.trial = trial
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
-        self._detector = Detector(_model(model), sensors)
+        detecting = _model(model)
+        self._detector = Detector(detecting, sensors)
         self._law, self._sees_truth = row_named(law), law == TRUE_SLIPS
         self._controller = GripController(
-            limits_of(law), self._law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
-        )
+            limits_of(law), self._law, sensors=sensors,
+            newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT,
+            reports_slips=detecting.reports_slips or self._sees_truth,
+        )  # fmt: skip
         self.scales = np.ones(len(FINGERS))
         self._reports_joints = reports_joints
         self._late: deque[tuple[dict[str, Counts], Array]] = deque()

@@ -64,6 +64,8 @@ class GripController:
         newtons_per_unit: calibration, one factor or one for each axis of the fingertip frame;
             None if the readings are in N, or for laws that need none.
         thumb: finger opposite to all others, which balances them; None if there is none.
+        reports_slips: whether the model ever reports a slip (`Model.reports_slips`); the law goes
+            by instability alone if it does not.
 
     Raises:
         ValueError: there is no such law, it needs newtons and the readings are counts without a
@@ -86,8 +88,10 @@ class GripController:
         sensors: Mapping[str, Sensor] | None = None,
         newtons_per_unit: float | tuple[float, float, float] | None = None,
         thumb: str | None = "thumb",
+        reports_slips: bool = True,
     ) -> None:
         self.limits = limits
+        self._reports_slips = reports_slips
         self.law = law_named(law) if isinstance(law, str) else law
         sensors = sensors or {}
         # A law that needs newtons must not take counts for them, nor newtons be scaled twice.
@@ -332,7 +336,7 @@ class GripController:
             touch = self._new_touch(name)
             known = finger.state is not _UNKNOWN and touch.read(finger)
             # Without a slip rule, a steady slide would look like a steady grip.
-            if not known or finger.slip_probability is None or touch.slides:
+            if not known or not touch.knows_slips or touch.slides:
                 return False
             total, across = total + touch.normal, across + touch.tangential
             n_touching += touch.touching
@@ -344,7 +348,8 @@ class GripController:
         return False
 
     def _new_touch(self, name: str) -> Touch:
-        return Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
+        normal = self._normals.get(name, (1.0, 0.0, 0.0))
+        return Touch(name, normal, self._factors, reports_slips=self._reports_slips)
 
     def _begin(self, estimate: HandEstimate, time: float) -> None:
         held = (ContactState.STABLE, ContactState.UNSTABLE)

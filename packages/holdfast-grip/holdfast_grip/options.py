@@ -203,8 +203,9 @@ def open_loop(
             "train a model of all fingers"
         )
     controller = GripController(
-        limits, settings.law, sensors=stream.fingers, newtons_per_unit=settings.newtons
-    )
+        limits, settings.law, sensors=stream.fingers, newtons_per_unit=settings.newtons,
+        reports_slips=stream.model.reports_slips,
+    )  # fmt: skip
     loop = GripLoop(controller, hand, armed=settings.armed, watchdog=watchdog, log=log)
     with ExitStack() as stack:
         if watchdog is not None:

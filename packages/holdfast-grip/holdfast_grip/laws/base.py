@@ -19,6 +19,7 @@ class Touch:
         finger: name of the finger.
         normal: unit vector of the skin's normal in the fingertip frame.
         factors: factor of each axis of the readings' forces, for a calibration.
+        reports_slips: whether the model ever reports a slip.
 
     Attributes:
         finger: name of the finger.
@@ -28,8 +29,8 @@ class Touch:
         cause: cause of the instability, where the model names one.
         slides: whether the slip rule of the model decides that the finger slides; False without
             such a rule.
-        knows_slips: whether the model has a slip rule.
-        slip_probability: probability that the finger slides; 0 without a slip rule.
+        knows_slips: whether the model has a slip rule, and reports slips.
+        slip_probability: probability that the finger slides; 0 unless it `knows_slips`.
         instability: sigma, in the unit of the readings times the mean factor.
         force: (F_x, F_y, F_z) in the fingertip frame [N with a calibration, else the readings'].
         normal: force along the normal of the skin, at least 0 [as `force`].
@@ -52,6 +53,7 @@ class Touch:
         "knows_slips",
         "normal",
         "probability",
+        "reports_slips",
         "scale",
         "slides",
         "slip_probability",
@@ -61,9 +63,15 @@ class Touch:
     )
 
     def __init__(
-        self, finger: str, normal: Three = (1.0, 0.0, 0.0), factors: Three = (1.0, 1.0, 1.0)
+        self,
+        finger: str,
+        normal: Three = (1.0, 0.0, 0.0),
+        factors: Three = (1.0, 1.0, 1.0),
+        *,
+        reports_slips: bool = True,
     ) -> None:
         self._normal, self._factors = normal, factors
+        self.reports_slips = reports_slips
         self.finger = finger
         self.known = self.touching = False
         self.probability = self.instability = math.nan
@@ -89,7 +97,8 @@ class Touch:
         self.touching = estimate.state is not _NO_CONTACT
         self.probability = probability = estimate.stable_probability
         self.cause = estimate.cause
-        slip = estimate.slip_probability
+        # A slip rule that never decides a slip has a probability all the same, which only ranks.
+        slip = estimate.slip_probability if self.reports_slips else None
         self.knows_slips = slip is not None
         self.slides = slip is not None and estimate.cause is Cause.SLIP
         self.slip_probability = 0.0 if slip is None else slip

@@ -2,6 +2,7 @@ from typing import NamedTuple
 
 import pytest
 
+from holdfast.contact import Cause, ContactEstimate, ContactState, Reason
 from holdfast_grip import LAWS, GripReason
 from holdfast_grip.laws import Stability, Touch, law_named
 from holdfast_grip.laws.costanzo import LARGEST_DYNAMIC_FORCE, STATIC_MARGIN, Costanzo
@@ -20,6 +21,17 @@ def touch(normal=2.0, tangential=0.6, probability=0.95, instability=0.001, name=
     made.force, made.normal, made.tangential = (normal, tangential, 0.0), normal, tangential
     made.start_normal = 2.0
     return made
+
+
+@pytest.mark.parametrize("reports_slips", [True, False])
+def test_a_slip_rule_that_reports_no_slip_is_none(reports_slips):
+    made = Touch("index", reports_slips=reports_slips)
+    made.read(
+        ContactEstimate(0.0, ContactState.STABLE, Reason.NONE, 0.9, 0.0, (2, 0, 0),
+                        slip_probability=0.8, cause=Cause.SLIP)
+    )  # fmt: skip
+    assert (made.knows_slips, made.slides) == (reports_slips, reports_slips)
+    assert made.slip_probability == (0.8 if reports_slips else 0.0)
 
 
 def started(name, touches, thumb=-1):
