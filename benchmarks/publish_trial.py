@@ -166,7 +166,7 @@ def _number(summary: Summary, field: str, factor: float = 1.0, digits: int = 1) 
     if not interval or any(end is None for end in interval):
         return text
     low, high = (f"{factor * end:.{digits}f}" for end in interval)
-    return f"{text}<br><sub>{low} to {high}</sub>"
+    return text if low == high else f"{text}<br><sub>{low} to {high}</sub>"
 
 
 def _rounded(value: object) -> object:
