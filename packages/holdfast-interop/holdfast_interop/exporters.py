@@ -13,6 +13,7 @@ from holdfast.errors import HoldfastError, is_installed, require_extras
 if TYPE_CHECKING:
     from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
+    from holdfast.model import Model
     from holdfast_interop.rerun.publisher import RerunPublisher
 
 
@@ -34,6 +35,12 @@ class ViewerOptions:
         str | None,
         typer.Option(help="Model whose estimates are shown: a file or builtin:NAME."),
     ] = None
+
+    def load_model(self) -> "Model | None":
+        """Load the model; None without the option."""
+        from holdfast.model import Model
+
+        return None if self.model is None else Model.load(self.model)
 
 
 @dataclass(frozen=True)
@@ -83,11 +90,10 @@ class Foxglove:
         progress: Any,  # noqa: ANN401
     ) -> dict[str, Any]:
         """Write the files, and return what they have."""
-        from holdfast.model import Model
         from holdfast_interop.foxglove import exporter as foxglove
 
-        loaded = None if options.model is None else Model.load(options.model)
-        totals = foxglove.export(recordings, out, model=loaded, force=force, progress=progress)
+        model = options.load_model()
+        totals = foxglove.export(recordings, out, model=model, force=force, progress=progress)
         print_message(f"hint: import the layout {out / foxglove.LAYOUT_FILE} in Foxglove")
         return {**totals, "layout": out / foxglove.LAYOUT_FILE}
 
@@ -108,11 +114,10 @@ class Rerun:
     ) -> dict[str, Any]:
         """Write the files, and return how many."""
         require_rerun()
-        from holdfast.model import Model
         from holdfast_interop.rerun import exporter
 
-        loaded = None if options.model is None else Model.load(options.model)
-        return exporter.export(recordings, out, model=loaded, force=force, progress=progress)
+        model = options.load_model()
+        return exporter.export(recordings, out, model=model, force=force, progress=progress)
 
 
 class LiveRerun:

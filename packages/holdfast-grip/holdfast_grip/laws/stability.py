@@ -1,4 +1,4 @@
-"""The law of holdfast: one grip force for the hand, from slips, stability, load and friction.
+"""The law `holdfast`: one force scale for the hand, from slips, stability, load and friction.
 
 The law has one force scale for all fingers. In a quiet grasp forces and moments balance, and a
 common factor keeps both balances, however many fingers stand on either side. A law with a scale
@@ -35,7 +35,7 @@ Its rules have no units, so that they carry over between counts and newtons:
    decided to slide. The calm grip held at its own T/N, so the friction is not much lower than
    that. It is forgotten slowly.
 
-Rules 6 and the shares of rule 1 and 2 need a slip rule; without one the law reacts to instability.
+Rule 6 and the shares of rules 1 and 2 need a slip rule; without one the law reacts to instability.
 """
 
 import math
@@ -66,7 +66,8 @@ PRESS_TIME = 0.1
 JERK_TIME = 0.25
 """Time for which a jerk of the hand explains a doubt [s]: two periods of its ringing, 8 Hz."""
 LONGEST_JERK = 1.0
-"""The same, where a slip rule tells a slide from what the jerk explains [s]."""
+"""Longest time for which a jerk explains a doubt where the model has a slip rule, which decides
+whether a finger slides [s]."""
 JERK_LAG = 0.02
 """Time after a doubt began within which a jerk explains it [s]: joints and taxels have clocks and
 delays of their own."""
@@ -93,7 +94,7 @@ PROBE_DELAY, PROBE_TIME, PROBE_RISE = 0.05, 0.26, 0.06
 LONGEST_LEAD = 0.12
 """Longest response time that counts [s]: the rate at which a load changes is known no further."""
 CHANGED_RESPONSE = 0.03, 0.5
-"""Change of the response time of which the user is told, in seconds and as a share."""
+"""Change of the response time that is reported to the user, in seconds and as a share."""
 NEVER = -math.inf
 
 
