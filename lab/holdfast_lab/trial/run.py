@@ -142,13 +142,12 @@ class RunningTrial:
     """One trial with one law, sample by sample.
 
     The command that follows from a sample acts from the next sample on, 6.7 ms later. In a plant
-    with latency, samples and joint angles arrive late. Oracles know the truth at once.
+    with latency, samples arrive late. Oracles know the truth at once.
 
     Args:
         trial: the trial.
         law: name of the law.
         model: name of the model of the detector.
-        reports_joints: whether the hand reports its joint angles.
 
     Attributes:
         trial: the trial.
@@ -156,7 +155,7 @@ class RunningTrial:
         scales: (4,) force scales of the last command.
     """
 
-    def __init__(self, trial: Trial, law: str, model: str, *, reports_joints: bool = True) -> None:
+    def __init__(self, trial: Trial, law: str, model: str) -> None:
         self.trial = trial
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
@@ -169,8 +168,7 @@ class RunningTrial:
             reports_slips=detecting.reports_slips or self._sees_truth,
         )  # fmt: skip
         self.scales = np.ones(len(FINGERS))
-        self._reports_joints = reports_joints
-        self._late: deque[tuple[dict[str, Counts], Array]] = deque()
+        self._late: deque[dict[str, Counts]] = deque()
 
     @property
     def is_lost(self) -> bool:
@@ -187,17 +185,15 @@ class RunningTrial:
         self.simulation.step(self.scales)
         time = (self.simulation.n_samples - 1) / RATE
         # A queue of samples is the latency: each is used when `latency` others have come.
-        self._late.append((self.simulation.read(), self.simulation.joint_angles()))
+        self._late.append(self.simulation.read())
         if len(self._late) <= self.trial.latency:
             return GripCommand(time, LoopState.IDLE, {})
-        samples, angles = self._late.popleft()
+        samples = self._late.popleft()
         estimate = self._detector.update(samples, time)
         if self._sees_truth:
             estimate = true_estimate(estimate, self.simulation)
         if isinstance(self._law, KnownLoad):
             self._law.know(self.simulation, self.trial)
-        if self._reports_joints:
-            self._controller.observe(angles)
         command = self._controller.update(estimate, time)
         # Fingers that a command leaves out keep the force of the first grip.
         scales = {finger: each.scale for finger, each in command.fingers.items()}

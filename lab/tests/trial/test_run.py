@@ -82,18 +82,6 @@ def test_samples_arrive_late_by_the_latency():
         assert (sample == same).all()
 
 
-def test_a_hand_that_reports_no_joints_has_no_jerks():
-    jerks = {}
-    for reports in (True, False):
-        trial = replace(CAN, grasp=replace(CAN.grasp, glitch_rate=3.0))
-        running = RunningTrial(trial, "fixed", "builtin:noise-floor", reports_joints=reports)
-        jerks[reports] = 0
-        for _ in range(300):
-            running.step()
-            jerks[reports] += running._controller._jerks.jerked
-    assert jerks[True] > 0 and jerks[False] == 0
-
-
 def test_the_hard_plant_is_deterministic_and_another_hand():
     hard = replace(CAN, grasp=replace(CAN.grasp, plant="hard"), latency=3)
     first = run_trial(hard, "fixed")

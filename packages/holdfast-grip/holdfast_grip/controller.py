@@ -8,7 +8,6 @@ from holdfast.contact import ContactState, HandEstimate, Reason
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast_grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
-from holdfast_grip.jerks import JerkMonitor
 from holdfast_grip.laws import Law, Touch, law_named
 from holdfast_grip.laws.base import Three
 from holdfast_grip.limits import Limits
@@ -125,7 +124,6 @@ class GripController:
         self._ceiling = OVERLOAD * ceiling
         self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
         self._waiting = GripWait(MIN_FINGERS)
-        self._jerks = JerkMonitor()
         self.reset()
 
     def reset(self) -> None:
@@ -134,9 +132,6 @@ class GripController:
         self._waiting.reset()
         # Fingers of the grip, set by `_begin`; empty without a grip.
         self._touches: list[Touch] = []
-        # Set by `observe`, cleared when the law has got it.
-        self._jerked = False
-        self._jerks.reset()
         # Joint angles: the first ones, those when the grip began, and the newest; None without.
         self._open_angles: Array | None = None
         self._grip_angles: Array | None = None
@@ -221,16 +216,12 @@ class GripController:
     def observe(self, angles: Array) -> None:
         """Process the joint angles that the hand's driver reports, before the next `update`.
 
-        A hand whose own controller jerks shakes its contacts. A law may wait with its reaction
-        then, see `Touch.jerked`. A grip whose joints opened when the object was let go ended as
-        planned: the loop waits for the next one. Without this call no jerk and no release is
-        known, and nothing else changes.
+        A grip whose joints opened when the object was let go ended as planned: the loop waits for
+        the next one. Without this call no release is known, and nothing else changes.
 
         Args:
             angles: (n_joints,) measured angle of each joint, in any order that stays [rad].
         """
-        self._jerks.update(angles)
-        self._jerked |= self._jerks.jerked
         self._angles = angles
         if self._open_angles is None:
             self._open_angles = angles
@@ -362,7 +353,7 @@ class GripController:
         # A hand with a single sensor begins with one finger.
         if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
             return
-        self._touches, self._time, self._jerked = touches, time, False
+        self._touches, self._time = touches, time
         self._grip_angles = self._angles
         for touch in touches:
             touch.start()
@@ -456,10 +447,6 @@ class GripController:
         """Apply the law within the limits."""
         limits, commands, highest = self.limits, self._commands, self._highest
         clock = time + self._shift
-        if self._jerked is not self._touches[0].jerked:
-            for touch in self._touches:
-                touch.jerked = self._jerked
-        self._jerked = False
         wishes = self.law.wishes(self._touches, clock, dt)
         if len(wishes) != len(self._touches):
             raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))

@@ -38,7 +38,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     min_scale: float = 0.8
     max_scale: float = 3.0
-    rise: float = 30.0
+    rise: float = 100.0
     fall: float = 3.0
     cooldown: float = 0.1
     max_force: float | None = None

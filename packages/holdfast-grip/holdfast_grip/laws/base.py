@@ -37,8 +37,6 @@ class Touch:
         tangential: force along the skin [as `force`].
         start_normal: `normal` when the grip began [as `force`].
         scale: force scale that was commanded last.
-        jerked: whether the hand's own joints jerked since the last sample; False where the hand
-            reports no joints.
     """
 
     __slots__ = (
@@ -48,7 +46,6 @@ class Touch:
         "finger",
         "force",
         "instability",
-        "jerked",
         "known",
         "knows_slips",
         "normal",
@@ -82,7 +79,6 @@ class Touch:
         self.normal = self.tangential = 0.0
         self.start_normal = 0.0
         self.scale = 1.0
-        self.jerked = False
 
     def read(self, estimate: ContactEstimate) -> bool:
         """Copy an estimate that is not UNKNOWN; return False if a number is not finite."""

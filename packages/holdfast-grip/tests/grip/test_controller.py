@@ -343,7 +343,7 @@ class TestSilence:
         assert command.reason is GripReason.STALE
 
     def test_the_force_goes_on_with_the_next_estimate(self):
-        controller, time = holding()
+        controller, time = holding(rise=30.0)
         commands, time = run(controller, time, 0.02, **SLIPPING)
         controller.update(hand(time, **SLIPPING), time + 0.004)
         after = controller.update(hand(time + 1 / RATE, **SLIPPING), time + 1 / RATE)

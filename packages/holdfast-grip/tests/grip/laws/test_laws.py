@@ -305,8 +305,12 @@ class TestStability:
         one = touch()
         law = started("holdfast", [one])
         self.scale_after(law, [one], 0.5)
-        one.tangential, one.probability = 0.9, 0.83
-        (wish,) = [wanted(law, [one], 0.5 + k * DT, DT)[0] for k in range(1, 9)][-1:]
+        one.probability = 0.83
+        for k in range(1, 20):
+            one.tangential = 0.6 + 0.03 * min(k, 10)
+            (wish,) = wanted(law, [one], 0.5 + k * DT, DT)
+            if wish.scale > 1.0:
+                break
         assert wish.scale > 1.2
         assert wish.reason is GripReason.LOAD
 

@@ -73,7 +73,7 @@ def test_a_notice_of_the_law_is_one_line(tape):
 
 
 def test_a_dry_run_sends_nothing_and_logs_everything(tape):
-    controller, time = holding()
+    controller, time = holding(rise=30.0)
     texts = []
     with GripLoop(controller, tape, log=lambda text, _: texts.append(text)) as loop:
         stepped(loop, time, index=SLIPPING)
