@@ -242,9 +242,12 @@ class GripController:
             ValueError: the law breaks its contract, as with a scale of NaN; no estimate raises it.
         """
         is_new = estimate.time != self._estimated_at
+        # Each finger is made when it is read, so each is read once.
+        fingers = dict(estimate.fingers.items())
+        estimate = HandEstimate(estimate.time, estimate.state, fingers)
         if is_new:  # the last estimate, given again, is no repeated reading
             self._estimated_at = estimate.time
-            for name, finger in estimate.fingers.items():
+            for name, finger in fingers.items():
                 self._monitors[name].update(finger)
         fault, self._reported = self._reported, _NONE
         if self._clock_is_new and math.isfinite(time):

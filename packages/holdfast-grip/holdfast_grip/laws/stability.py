@@ -223,12 +223,12 @@ class Stability(Law):
         self._first_press, self._n_first = 0.0, 0
         # Rate of the load; instability beyond that of the calm grip, and that of the calm grip.
         self._load_rate = self._unstable = self._base = 0.0
-        self._slides = False
+        self._scale, self._slides, self._all_known = 1.0, False, True
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
         """Return the scale that doubt, load and friction need, the same for all fingers."""
-        scale = max(touch.scale for touch in touches)
-        doubt = self._observe(touches, scale, dt)
+        doubt = self._observe(touches, dt)
+        scale = self._scale
         if doubt > self.calm:
             self._unsettled_at = time
         if self._unstable <= self.hold_level:
@@ -263,7 +263,7 @@ class Stability(Law):
         elif self._knows_slips and not self._probes and scale < self._lowest():
             wish = self._lowest(), GripReason.MARGIN
         # UNKNOWN never lowers a force.
-        elif is_calm and all(touch.known for touch in touches):
+        elif is_calm and self._all_known:
             wish = self._relaxed(scale, time, dt), _RELAX
         else:
             wish = scale, _NONE
@@ -313,31 +313,37 @@ class Stability(Law):
                 f"{1e3 * response:.0f} ms: start again, so that the law knows it"
             )
 
-    def _observe(self, touches: Sequence[Touch], scale: float, dt: float) -> float:
-        """Follow the forces; return the doubt in the hand."""
+    def _observe(self, touches: Sequence[Touch], dt: float) -> float:
+        """Follow the forces and the scale; return the doubt in the hand."""
         # At most the whole step: after a pause the filter would overshoot.
         part = min(dt / SMOOTHING, 1.0)
-        unstable = sliding = base = total = load = press = shock = 0.0
+        unstable = sliding = base = total = load = press = shock = scale = 0.0
+        known = slides = 0
+        knows_slips = self._knows_slips
         for finger, touch in zip(self._fingers, touches, strict=True):
             if touch.known:
+                known += 1
                 shock += finger.follow(touch, part)
-            excess = finger.doubt
-            if self._knows_slips:
-                excess = max(0.0, finger.doubt - finger.base)
-            unstable += finger.share * excess
+            share, excess = finger.share, finger.doubt
             if finger.slides:
-                sliding += finger.share * finger.doubt
-            base += finger.share * finger.base
-            total += finger.share
+                slides += 1
+                sliding += share * excess
+            if knows_slips:
+                base += share * finger.base
+                excess -= finger.base
+            if excess > 0.0:
+                unstable += share * excess
+            total += share
             load += finger.load
             press += finger.press
+            scale = max(scale, touch.scale)
         # The rate at which the filtered load changes.
         self._load_rate += part * ((load - self._load) / dt - self._load_rate) if dt > 0 else 0.0
-        self._load, self._press, self._shock = load, press, shock
-        self._slides = any(finger.slides for finger in self._fingers)
+        self._load, self._press, self._shock, self._scale = load, press, shock, scale
+        self._all_known, self._slides = known == len(touches), slides > 0
         self._unstable = unstable / total if total > 0 else 0.0
         self._base = base / total if total > 0 else 0.0
-        if not self._knows_slips or total <= 0:
+        if not knows_slips or total <= 0:
             return self._unstable
         # A finger that is decided to slide confirms the instability of the others.
         if self._slides:
@@ -371,6 +377,10 @@ class Stability(Law):
 
     def _react(self, doubt: float, scale: float, time: float, dt: float) -> None:
         """Begin a step if the doubt lasts; else follow a load that grows."""
+        is_blind = self._knows_slips and self._base > BLIND
+        # In nearly all samples of a hold nothing asks for a reaction.
+        if max(doubt, self._unstable) <= self._advance_level and not (self._sum or is_blind):
+            return
         since = time - self._stepped_at
         refractory = self.refractory
         # What still slides when the hand has responded to a step needs another one.
@@ -382,7 +392,6 @@ class Stability(Law):
             return
         is_falling = time - self._fell_at < self.episode
         missing, load = 0.0, self._calm_load
-        is_blind = self._knows_slips and self._base > BLIND
         if self._unstable > self.hold_level or is_blind:
             # Load that a falling force takes along is not missing: 50 false rises in 34 long holds
             # became 14 (docs/decisions/0025).
