@@ -76,6 +76,14 @@ def test_missing_and_empty_folders(tmp_path):
     )
 
 
+def test_a_folder_of_recordings_in_the_folder_is_named(folder):
+    deep = folder / "demo" / "recordings"
+    deep.mkdir(parents=True)
+    (folder / "a.parquet").rename(deep / "a.parquet")
+    with pytest.raises(RecordingError, match=f"expected: {deep} has some$"):
+        load_dataset(folder / "demo")
+
+
 def test_recordings_can_be_declared_to_begin_in_contact(folder):
     assert "starts_loaded" not in load_dataset(folder)[0].metadata
     dataset = load_dataset(folder, in_contact=True)

@@ -75,10 +75,13 @@ def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = 
         by_name.update({p.stem: p for p in place.glob(f"[!.]*{suffix}") if is_recording(p)})
     if not by_name:
         n_entries = len(list(place.iterdir()))
+        # As the folder of `holdfast demo`, whose recordings are one level deeper.
+        deeper = (p.parent for p in sorted(place.glob("[!.]*/*")) if is_recording(p))
+        found = next(deeper, None)
+        advice = f"{found} has some" if found else "`holdfast import` makes them"
         raise RecordingError(
             f"no recording in {place} ({n_entries} other entries); files "
-            f"{' or '.join('*' + suffix for suffix in SUFFIXES)} expected: "
-            "`holdfast import` makes them"
+            f"{' or '.join('*' + suffix for suffix in SUFFIXES)} expected: {advice}"
         )
     paths = [by_name[name] for name in sorted(by_name)]
     return Dataset(paths, labels=labels, in_contact=in_contact)

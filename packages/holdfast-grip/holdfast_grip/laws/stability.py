@@ -233,10 +233,7 @@ class Stability(Law):
             self._unsettled_at = time
         if self._unstable <= self.hold_level:
             self._rested_at = time
-        # A shock explains only a doubt that begins with it.
-        lag = SHOCK_LAG if self._knows_slips else SHORT_SHOCK_LAG
-        if self._is_shock(dt) and time - self._rested_at <= lag:
-            self._shocked_at = time
+        self._notice_shock(time, dt)
         is_calm = time - self._unsettled_at > self.settle_time
         if is_calm:
             # Follow the forces of the calm grip.
@@ -355,13 +352,15 @@ class Stability(Law):
             return 0.0
         return UNSTABLE_SHARE * self._unstable
 
-    def _is_shock(self, dt: float) -> bool:
-        """Return whether the forces change suddenly in this sample, and follow their noise."""
+    def _notice_shock(self, time: float, dt: float) -> None:
+        """Take the time of a shock that begins with the doubt, and follow the noise."""
         limit = max(SHOCK * self._calm_press, SHOCK_NOISE * self._noise)
+        lag = SHOCK_LAG if self._knows_slips else SHORT_SHOCK_LAG
+        if self._shock > limit and time - self._rested_at <= lag:
+            self._shocked_at = time
         # At most twice the noise, so that a shock is no part of its own measure.
         part = min(dt / NOISE_TIME, 1.0)
         self._noise += part * (min(self._shock, 2.0 * self._noise) - self._noise)
-        return self._shock > limit
 
     def _is_explained(self, time: float) -> bool:
         """Return whether a shock explains the doubt."""
