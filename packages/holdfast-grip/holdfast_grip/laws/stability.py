@@ -70,6 +70,8 @@ SHOCK, SHOCK_NOISE = 0.03, 4.0
 """Change of the change of the forces between two samples from which it is a shock: sum over the
 fingers as a share of the normal force, and over its running mean. On the twin at 150 Hz it is 0.05
 to 0.3 in impacts and jerks, and 0.01 to 0.03 when a load comes or a slide begins."""
+SHOCK_SAMPLE = 1 / 150
+"""Time between two samples for which `SHOCK` holds; it grows with a longer time [s]."""
 NOISE_TIME = 0.5
 """Time constant of that running mean [s]."""
 BLOW_TIME = 0.03
@@ -354,7 +356,9 @@ class Stability(Law):
 
     def _notice_shock(self, time: float, dt: float) -> None:
         """Take the time of a shock that begins with the doubt, and follow the noise."""
-        limit = max(SHOCK * self._calm_press, SHOCK_NOISE * self._noise)
+        # A load that comes smoothly changes its rate more within a longer sample.
+        longer = max(dt / SHOCK_SAMPLE, 1.0)
+        limit = max(SHOCK * longer * self._calm_press, SHOCK_NOISE * self._noise)
         lag = SHOCK_LAG if self._knows_slips else SHORT_SHOCK_LAG
         if self._shock > limit and time - self._rested_at <= lag:
             self._shocked_at = time
