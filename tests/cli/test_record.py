@@ -417,7 +417,7 @@ def test_a_camera_is_recorded_beside_the_samples(grasp, tmp_path, capsys):
         writer.write(np.zeros((48, 64, 3), np.uint8))
     writer.release()
     out = tmp_path / "run.mcap"
-    assert run(capsys, grasp, out, "--camera", film, "--seconds", "1")[0] == 0
+    assert run(capsys, grasp, out, "--camera", film, "--seconds", "2")[0] == 0
     recording = load_recording(out)
     stamps = np.array((tmp_path / "run.times").read_text().split(), float)
     # On the clock of the samples, which does not begin at 0, one picture each 20 ms.
