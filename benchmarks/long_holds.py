@@ -12,12 +12,12 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
-from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
+from holdfast.contact import CONTACT_FORCE
 from holdfast.parallel import Engine
-from holdfast.twin.hand import RATE
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast_grip.command import LoopState
-from holdfast_lab.trial.run import IMPACT_MEMORY, SLIP_MEMORY, START_TIME, RunningTrial
+from holdfast_lab.trial.quiet_hold import QuietHold
+from holdfast_lab.trial.run import RunningTrial
 from holdfast_lab.trial.trials import Trial, draw_trial
 
 SLID = 1e-4
@@ -35,36 +35,18 @@ class Hold(NamedTuple):
 
 def run_hold(trial: Trial, model: str) -> Hold:
     """Run a trial until its load."""
-    running = RunningTrial(trial, "holdfast", model)
-    coming = [impact.start for impact in trial.impacts()]
-    began, slid_at, struck_at, was_rising = math.nan, -math.inf, -math.inf, False
-    n_quiet, n_false, seen = 0, 0, []
+    running, hold = RunningTrial(trial, "holdfast", model), QuietHold(trial.impacts())
     while not (running.is_over or running.is_lost):
         command = running.step()
         now, tips = running.simulation.held_for, running.simulation.world.contact.tips
         if now >= trial.load.start:
             break
-        if math.isnan(began) and command.state is not LoopState.IDLE:
-            began = now
-        speed = tips[tips[:, TIP_LOAD] > CONTACT_FORCE, TIP_SLIP].max(initial=0.0)
-        if speed > SLIP_SPEED:
-            slid_at = now
-        if coming and now >= coming[0]:
-            struck_at = coming.pop(0)
-            if now > began:
-                seen.append([0.0, False])
-        rises = command.state is LoopState.REACT and not was_rising
-        was_rising = command.state is LoopState.REACT
-        if now - struck_at <= IMPACT_MEMORY:
-            if seen:
-                seen[-1][0] += speed / RATE if speed > SLIP_SPEED else 0.0
-                seen[-1][1] |= rises
-        elif now - slid_at > SLIP_MEMORY and now - began > START_TIME:
-            n_quiet += 1
-            n_false += rises
-    impacts = [(distance > SLID, answered) for distance, answered in seen]
-    lost = running.is_lost and not math.isnan(began)  # else the first grip failed
-    return Hold(n_quiet / RATE, n_false, lost, impacts)
+        if command.state is not LoopState.IDLE:
+            speed = tips[tips[:, TIP_LOAD] > CONTACT_FORCE, TIP_SLIP].max(initial=0.0)
+            hold.add(now, float(speed), command)
+    impacts = [(impact.distance > SLID, impact.is_answered) for impact in hold.impacts]
+    lost = running.is_lost and not math.isnan(hold.began_at)  # else the first grip failed
+    return Hold(hold.quiet_time, hold.n_false, lost, impacts)
 
 
 def share(answered: list[bool]) -> str:

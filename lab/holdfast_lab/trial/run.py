@@ -24,6 +24,7 @@ from holdfast_grip.command import GripCommand, LoopState
 from holdfast_grip.controller import GripController
 from holdfast_grip.limits import Limits
 from holdfast_lab.trial.needed_force import needed_force
+from holdfast_lab.trial.quiet_hold import QuietHold
 from holdfast_lab.trial.reference_rows import (
     TRUE_SLIPS,
     KnownLoad,
@@ -45,15 +46,8 @@ NEWTONS_PER_FINGERTIP_COUNT = (
 tangential axes of the fingertip frame [N/count]."""
 RISE = 1.02
 """Ratio of a force scale to that at the start of the load from which it counts as a reaction."""
-START_TIME = 0.3
-"""Time after the loop began in which a rise of force is the law's start, and no reaction [s]."""
 LIMIT_SHARE = 0.99
 """Share of the highest scale from which a finger is at its limit of force."""
-SLIP_MEMORY = 0.3
-"""A reaction within this time after a fingertip slid is not false [s]: glitches of the hand's
-controller make fingertips slide before the load comes."""
-IMPACT_MEMORY = 0.5
-"""A rise within this time after an impact began is a reaction to it [s]."""
 NEVER_BEGAN, AT_LIMIT, WHILE_SLIPPING = DROP_REASONS = ("never began", "limit of force", "slip")
 """Why an object was lost: the loop never began, a finger was at the highest scale, or neither."""
 Mask = npt.NDArray[np.bool_]
@@ -252,13 +246,8 @@ class _TrialLog:
         self._scales: list[Array] = []
         self._slid = np.zeros(len(FINGERS))
         self._began_at = math.nan
-        self._slid_at = -math.inf
-        self._was_rising = self._at_limit = False
-        self._quiet_time = 0.0
-        self._n_false = 0
-        self._impacts = trial.impacts()
-        self._n_impacts = self._n_impact_reactions = 0
-        self._impact_at, self._is_answered = -math.inf, False
+        self._at_limit = False
+        self._quiet = QuietHold(trial.impacts())
 
     def add(self, simulation: Simulation, command: GripCommand, scales: Array) -> None:
         """Add a sample."""
@@ -274,26 +263,7 @@ class _TrialLog:
         if began or is_loaded:
             self._slid += np.where(speeds > SLIP_SPEED, speeds, 0.0) / RATE
         if began and not is_loaded:
-            # Count rises before the load, and the time in which one would be false.
-            slides = bool(speeds.max() > SLIP_SPEED)
-            if slides:
-                self._slid_at = held_for
-            if self._impacts and held_for >= self._impacts[0].start:
-                self._impact_at = self._impacts.pop(0).start
-                self._n_impacts += 1
-                self._is_answered = False
-            struck = held_for - self._impact_at <= IMPACT_MEMORY
-            quiet = (
-                held_for - self._slid_at > SLIP_MEMORY
-                and held_for - self._began_at > START_TIME
-                and not struck
-            )
-            self._quiet_time += quiet / RATE
-            if command.state is LoopState.REACT and not self._was_rising:
-                self._n_false += quiet
-                self._n_impact_reactions += struck and not self._is_answered
-                self._is_answered = struck
-        self._was_rising = command.state is LoopState.REACT
+            self._quiet.add(held_for, float(speeds.max()), command)
         self._at_limit = bool((scales >= LIMIT_SHARE * self._highest_scale).any())
         least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
         force = float(tips[:, TIP_LOAD].sum())
@@ -335,10 +305,10 @@ class _TrialLog:
             slipped=bool(slipping.any()),
             raised_before=raised_before,
             reaction=reaction,
-            quiet_time=self._quiet_time,
-            n_false=self._n_false,
-            n_impacts=self._n_impacts,
-            n_impact_reactions=self._n_impact_reactions,
+            quiet_time=self._quiet.quiet_time,
+            n_false=self._quiet.n_false,
+            n_impacts=len(self._quiet.impacts),
+            n_impact_reactions=sum(impact.is_answered for impact in self._quiet.impacts),
             **_force_ratios(rows[loaded | controlled]),
         )
 

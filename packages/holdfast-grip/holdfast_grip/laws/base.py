@@ -42,6 +42,7 @@ class Touch:
     __slots__ = (
         "_factors",
         "_normal",
+        "_reports_slips",
         "cause",
         "finger",
         "force",
@@ -50,7 +51,6 @@ class Touch:
         "knows_slips",
         "normal",
         "probability",
-        "reports_slips",
         "scale",
         "slides",
         "slip_probability",
@@ -68,7 +68,7 @@ class Touch:
         reports_slips: bool = True,
     ) -> None:
         self._normal, self._factors = normal, factors
-        self.reports_slips = reports_slips
+        self._reports_slips = reports_slips
         self.finger = finger
         self.known = self.touching = False
         self.probability = self.instability = math.nan
@@ -94,7 +94,7 @@ class Touch:
         self.probability = probability = estimate.stable_probability
         self.cause = estimate.cause
         # A slip rule that never decides a slip has a probability all the same, which only ranks.
-        slip = estimate.slip_probability if self.reports_slips else None
+        slip = estimate.slip_probability if self._reports_slips else None
         self.knows_slips = slip is not None
         self.slides = slip is not None and estimate.cause is Cause.SLIP
         self.slip_probability = 0.0 if slip is None else slip

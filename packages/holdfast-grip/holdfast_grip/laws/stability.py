@@ -1,6 +1,6 @@
-"""The law `holdfast`: one force scale for the hand, from slips, stability, load and friction.
+"""The law `holdfast`: it sets one force scale for all fingers of the hand.
 
-The law has one force scale for all fingers. In a quiet grasp forces and moments balance, and a
+It reads slips, stability, load and friction. In a quiet grasp forces and moments balance, and a
 common factor keeps both balances, however many fingers stand on either side. A law with a scale
 for each finger has to correct the balance while it relaxes, and each correction is a rise.
 

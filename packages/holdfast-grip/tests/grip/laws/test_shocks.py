@@ -3,6 +3,7 @@
 import pytest
 
 from grip.laws.test_laws import DT, started, touch, wanted
+from grip.laws.test_response import knowing
 from holdfast_grip.laws.stability import BLOW_TIME, LONGEST_SHOCK, SHOCK_TIME, UNCONFIRMED
 
 BEGIN = 1.5
@@ -24,8 +25,7 @@ def first_rise(
         ramp: time over which the forces change.
         dt: time between two samples.
     """
-    one = touch()
-    one.knows_slips = knows_slips
+    one = knowing() if knows_slips else touch()
     law = started("holdfast", [one])
     one.scale = 1.0
     for k in range(round((BEGIN + seconds + 0.3) / dt)):
@@ -83,8 +83,7 @@ def test_a_slide_confirms_the_doubt():
 
 def test_noise_of_a_light_grip_is_no_blow():
     """The noise is larger than the share of the force that is a shock elsewhere."""
-    one = touch(normal=0.2, tangential=0.06)
-    one.knows_slips = True
+    one = knowing(normal=0.2, tangential=0.06)
     law = started("holdfast", [one])
     rises = []
     for k in range(round((BEGIN + 0.3) / DT)):
