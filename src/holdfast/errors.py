@@ -18,6 +18,8 @@ line and exits with 2.
 import sys
 from importlib.util import find_spec
 
+from holdfast.removed import removal
+
 EXTRA_MODULES = {
     "parquet": ("pyarrow",),
     "pandas": ("pandas",),
@@ -181,13 +183,15 @@ def missing_extra(cause: ModuleNotFoundError) -> MissingExtra | None:
 
 
 def missing_part(kind: str, name: str, what: str) -> HoldfastError | None:
-    """Return the error of a part of another package; None if no package has such a part.
+    """Return the error of a part that was removed, or that another package has; else None.
 
     Args:
         kind: of the plug-in: `verbs`, `sources`, ..., or `options`.
         name: of the plug-in.
         what: what the name stands for, as in "the verb hold".
     """
+    if text := removal(kind, name, what):
+        return HoldfastError(text)
     for distribution, parts in PACKAGE_PARTS.items():
         if name in parts.get(kind, ()):
             return HoldfastError(

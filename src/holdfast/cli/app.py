@@ -25,6 +25,7 @@ from holdfast.cli.options import RARE, SourceArgument
 from holdfast.cli.terminal.console import break_silence, print_error, print_line
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
 from holdfast.plugins import PluginGroup
+from holdfast.removed import removal
 
 VERB_GROUPS = {
     "Your hand and your recordings": {
@@ -236,6 +237,11 @@ class _GroupedVerbs(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 (of click)
         """Take a verb and its command as one name."""
         name = " ".join(args[:2])
+        # A path may have the name of a command that was removed.
+        if name not in SUB_VERBS and not Path(*args[1:2]).exists():
+            for removed in (name, args[0]):
+                if text := removal("verbs", removed, f"the verb {removed}"):
+                    raise HoldfastError(text)
         return super().resolve_command(ctx, [name, *args[2:]] if name in SUB_VERBS else args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 (of click)

@@ -1,0 +1,26 @@
+import pytest
+
+from command_line import Verb
+from holdfast.removed import LAST_COMMIT, REMOVED
+
+COMMANDS = {
+    "verbs": "{}",
+    "options": "{}",
+    "sources": "detect builtin:any {}:///x",
+    "importers": "import . out --format {}",
+    "exporters": "export . out --format {}",
+    "hands": "hold builtin:any . --hand {}:",
+}
+"""Command with a part of each kind."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(kind, name) for kind, names in REMOVED.items() for name in names]
+)
+def test_what_was_removed_is_one_line_with_what_to_use_instead(
+    kind, name, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    message = Verb().refusal(capsys, *COMMANDS[kind].format(name).split())
+    assert LAST_COMMIT in message
+    assert message.endswith(REMOVED[kind][name])
