@@ -46,6 +46,17 @@ TRAININGS = {
     "any": "hands --features any --trials 0",
     "adapted": "main --init builtin:any",
 }
+REAL_SETS = ("uskin_pick_move", "gtac", "gtac_v2", "eflesh_slip")
+DETECT_EVERY = 5
+"""One of so many real recordings is a case of `detect`."""
+CONTENT = """
+import sys
+from holdfast import load_recording
+recording = load_recording(sys.argv[1])
+for name, module in recording.modules.items():
+    print(name, module.sensor.name, module.times.tobytes(), module.readings.tobytes())
+print(recording.markers)
+"""
 LIVE = """
 import sys, msgspec
 from holdfast import Model, StreamDetector, load_recording, open_source, save_recording
@@ -64,14 +75,14 @@ def recordings(folder):
         holdfast("simulate", name, *options.split(), "--jobs", 2, cwd=folder)
         yield f"simulate/{name}", files(folder / name)
         yield f"info/{name}", document(holdfast("info", name, "--json", cwd=folder))
-    for name in ("uskin_pick_move", "gtac"):
+    for name in REAL_SETS:
         if (DATA / name).is_dir():
             holdfast("import", DATA / name, f"real-{name}", cwd=folder)
             yield f"import/{name}", files(folder / f"real-{name}")
 
 
 def decisions(folder):
-    paths = [*sorted((folder / "main").glob("*.parquet"))[:2], *sorted(folder.glob("real-*/*"))]
+    paths = sorted((folder / "main").glob("*.parquet"))[:2]
     for model in MODELS:
         for path in paths:
             place = path.relative_to(folder)
@@ -81,9 +92,7 @@ def decisions(folder):
             f"evaluate/{model}",
             document(holdfast("evaluate", model, "main", "--json", cwd=folder)),
         )
-    live = [sys.executable, "-c", LIVE, first(folder)]
-    lines = subprocess.run(live, cwd=folder, capture_output=True, check=True).stdout
-    yield "live", digest(lines)
+    yield "live", digest(python(LIVE, first(folder), cwd=folder))
     yield "mcap", digest((folder / "copy.mcap").read_bytes())
     yield "sensors", digest(holdfast("sensors", "--json", cwd=folder))
 
@@ -95,6 +104,42 @@ def models(folder):
     options = ("-o", "tuned.json", "--false-alarms", 2, "--force")
     holdfast("tune", "builtin:any", "main", *options, cwd=folder)
     yield "tune", document((folder / "tuned.json").read_text())
+
+
+def hands(folder):
+    """Models of one's own hand, the C header, and a recording of a source."""
+    holdfast("calibrate", "builtin:any", "main", "-o", "mine.json", "--force", cwd=folder)
+    yield "calibrate", document((folder / "mine.json").read_text())
+    words = ("teach", "--from", "main", "-o", "taught.json", "--force", "--json")
+    taught = json.loads(holdfast(*words, cwd=folder))
+    yield "teach", document(json.dumps(taught))
+    yield "teach/model", document((folder / "taught.json").read_text())
+    for model in ("builtin:twin", "builtin:any", "mine.json", "taught.json"):
+        holdfast("export", model, "model.h", "--like", first(folder), "--force", cwd=folder)
+        yield f"header/{model}", digest((folder / "model.h").read_bytes())
+    holdfast("record", first(folder), "again.mcap", "--speed", 0, "--force", cwd=folder)
+    yield "record", digest(python(CONTENT, "again.mcap", cwd=folder))
+
+
+def real(folder):
+    """README's commands on the real recordings; a refusal is an answer too."""
+    for name in REAL_SETS:
+        recordings = f"real-{name}"
+        if not (folder / recordings).is_dir():
+            continue
+        yield f"info/{name}", digest(holdfast("info", recordings, "--json", cwd=folder))
+        mine = f"{name}.json"
+        words = ("calibrate", "builtin:any", recordings, "-o", mine, "--force", "--json")
+        yield f"calibrate/{name}", digest(refusal_or_output(*words, cwd=folder))
+        for model in ("builtin:any", *([mine] if (folder / mine).exists() else ())):
+            words = ("evaluate", model, recordings, "--json")
+            yield f"evaluate/{model}/{name}", digest(refusal_or_output(*words, cwd=folder))
+            for path in sorted((folder / recordings).iterdir())[::DETECT_EVERY]:
+                words = ("detect", model, path.relative_to(folder), "--json")
+                yield (
+                    f"detect/{model}/{path.relative_to(folder)}",
+                    digest(refusal_or_output(*words, cwd=folder)),
+                )
 
 
 def grip(folder):
@@ -133,7 +178,10 @@ def studies(folder):
         yield f"study/{name}", digest(json.dumps(without_clock(rows), sort_keys=True))
 
 
-PARTS = {part.__name__: part for part in (recordings, decisions, models, grip, sockets, studies)}
+PARTS = {
+    part.__name__: part
+    for part in (recordings, decisions, models, hands, real, grip, sockets, studies)
+}
 """All parts, in the order in which each needs the files of those before it."""
 
 
@@ -144,6 +192,18 @@ def holdfast(*words, cwd, check=True):
     if check and done.returncode:
         raise SystemExit(f"{words}: exit {done.returncode}: {done.stderr}")
     return done.stdout
+
+
+def refusal_or_output(*words, cwd):
+    """Return the exit code, and what a verb prints on stdout."""
+    done = subprocess.run([HOLDFAST, *map(str, words)], cwd=cwd, capture_output=True, check=False)
+    return f"{done.returncode} ".encode() + done.stdout
+
+
+def python(program, *words, cwd):
+    """Return what a program prints."""
+    command = [sys.executable, "-c", program, *map(str, words)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, check=True).stdout
 
 
 @contextlib.contextmanager

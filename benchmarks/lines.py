@@ -1,11 +1,12 @@
-"""Lines of code by room: what is neither docstring, comment nor blank, after the formatter.
+"""Lines of code of all tracked files, without blanks, comments and docstrings.
 
-    python benchmarks/lines.py                   # this checkout
-    python benchmarks/lines.py --at v0.2.0       # a commit, beside this checkout
-    python benchmarks/lines.py --sum src/holdfast/model,lab/holdfast_lab/study/evaluation
+    python benchmarks/lines.py                 # this checkout, beside the totals of --at
+    python benchmarks/lines.py --at f7d623e5   # with the same counts of a commit
+    python benchmarks/lines.py --rooms         # each folder, at most three deep
 
-What moves from one folder to another changes nothing in the total. Public names are functions,
-classes and methods without a leading underscore; the docstrings of the modules count to none.
+Python, C, JavaScript, CSS, HTML, shell and awk count, as the formatters leave them; `# fmt: skip`
+is counted, because it hides lines from the formatter. Vendored files and data are listed, and do
+not count. Words are those of README, docs and the pages of the packages.
 """
 
 import argparse
@@ -16,103 +17,120 @@ import subprocess
 import tarfile
 import tempfile
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 
-TREES = ("src", "packages", "lab", "benchmarks")
-TESTS = re.compile(r"(^|/)tests?/")
-HIDDEN = re.compile(r"(^|/)(\.|__pycache__)")
+ROOT = Path(__file__).parents[1]
 C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
-Files = dict[str, Counter[str]]
+JS_COMMENT = re.compile(r"/\*.*?\*/|^\s*//[^\n]*", re.DOTALL | re.MULTILINE)
+HTML_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+VENDORED = re.compile(r"(^|/)uplot/")
+DATA = {".csv", ".json", ".mcap", ".parquet", ".png", ".jpg", ".webp", ".svg", ".lock"}
+TESTS = re.compile(r"(^|/)tests?/|^conftest\.py$")
+PAGES = {".js", ".css", ".html"}
+GROUPS = ("src", "packages", "lab", "benchmarks", "pages", "tests", "other")
+"""`pages` are JavaScript, CSS and HTML outside the tests; `other` is `.ci`, `setup.py`, ..."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--at", help="commit to compare with")
-    parser.add_argument("--sum", help="folders, separated by commas, to sum in a last row")
+    parser.add_argument("--rooms", action="store_true", help="count each folder, not each group")
     options = parser.parse_args()
-    now, before = counted(Path(__file__).parents[1]), None
+    place = room_of if options.rooms else group_of
+    now, before = counts(ROOT, place), Counter[str]()
     if options.at:
         with tempfile.TemporaryDirectory() as folder:
-            before = counted(checkout(options.at, Path(folder)))
-    print(f"{'room':<34}{'code':>8}{'docstring':>11}{'names':>8}{'a name':>8}{'before':>9}")
-    for room in sorted({room_of(path) for path in (*now, *(before or {}))}):
-        print_row(room, now, before, lambda path, room=room: room_of(path) == room)
-    print_row("total", now, before, lambda _: True)
-    if options.sum:
-        folders = tuple(f"{name.rstrip('/')}/" for name in options.sum.split(","))
-        print_row("of the folders", now, before, lambda path: path.startswith(folders))
+            before = counts(checkout(options.at, Path(folder)), place)
+    rows = sorted({*now, *before}, key=lambda row: (row.startswith(" "), row))
+    for row in rows if options.rooms else sorted(rows, key=order):
+        past = f"{before[row]:>9,}" if options.at else ""
+        print(f"{row.strip():<44}{now[row]:>9,}{past}")
 
 
-def print_row(title: str, now: Files, before: Files | None, is_in: Callable[[str], bool]) -> None:
-    """Print the sums of the files that are in a room."""
-    counts = sum((counts for path, counts in now.items() if is_in(path)), Counter())
-    past = ""
-    if before is not None:
-        past = f"{sum(counts['code'] for path, counts in before.items() if is_in(path)):>9,}"
-    share = counts["public docstring"] / max(counts["names"], 1)
-    print(f"{title:<34}{counts['code']:>8,}{counts['docstring']:>11,}{counts['names']:>8,}"
-          f"{share:>8.2f}{past}")  # fmt: skip
+def order(row: str) -> tuple[int, str]:
+    return (GROUPS.index(row) if row in GROUPS else len(GROUPS), row)
+
+
+def counts(root: Path, place) -> Counter[str]:
+    """Return the code lines of each place, and rows of all else that is said about a checkout."""
+    rows: Counter[str] = Counter()
+    for name in tracked(root):
+        path = root / name
+        text = path.read_text("utf-8", errors="replace")
+        kind = path.suffix or ("sh" if text.startswith("#!") else "")
+        if path.suffix == ".md" and (name.startswith("docs/") or name == "README.md"):
+            rows[" words of docs and README"] += len(text.split())
+        if VENDORED.search(name) or path.suffix in DATA:
+            rows[f" kB vendored or data: {PurePosixPath(name).parent}"] += path.stat().st_size >> 10
+        elif (code := code_lines(kind, text)) is not None:
+            rows[place(name)] += code
+            rows[" code lines without tests"] += code * (group_of(name) != "tests")
+            rows[" # fmt: skip"] += text.count("# fmt: skip")
+    return rows
+
+
+def tracked(root: Path) -> list[str]:
+    """Return the names of the files of a checkout; of an archive, of all files."""
+    if (root / ".git").exists():
+        listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, check=True)
+        names = listed.stdout.decode().splitlines()
+        return [name for name in names if (root / name).is_file()]
+    return [path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file()]
+
+
+def group_of(name: str) -> str:
+    if TESTS.search(name):
+        return "tests"
+    first = name.partition("/")[0]
+    if first in ("src", "packages", "lab") and PurePosixPath(name).suffix in PAGES:
+        return "pages"
+    return first if first in GROUPS else "other"
+
+
+def room_of(name: str) -> str:
+    return "/".join(PurePosixPath(name).parent.parts[:3]) or "."
+
+
+def code_lines(kind: str, text: str) -> int | None:
+    """Return the code lines of a file; None if its kind does not count."""
+    match kind:
+        case ".py":
+            return python_lines(text)
+        case ".c" | ".h":
+            return filled(C_COMMENT.sub("", text))
+        case ".js" | ".css":
+            return filled(JS_COMMENT.sub("", text))
+        case ".html":
+            return filled(HTML_COMMENT.sub("", text))
+        case ".sh" | ".awk" | "sh":
+            return filled(re.sub(r"^\s*#[^\n]*", "", text, flags=re.MULTILINE))
+    return None
+
+
+def filled(text: str) -> int:
+    return sum(bool(line.strip()) for line in text.split("\n"))
+
+
+def python_lines(text: str) -> int:
+    lines = text.split("\n")
+    code = {n for n, line in enumerate(lines, 1) if line.strip() and line.strip()[0] != "#"}
+    for node in ast.walk(ast.parse(text)):
+        body = getattr(node, "body", None)
+        for statement in body if isinstance(body, list) else []:
+            value = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                code -= set(range(statement.lineno, (statement.end_lineno or 0) + 1))
+    return len(code)
 
 
 def checkout(commit: str, folder: Path) -> Path:
     """Extract the files of a commit into a folder, and return it."""
     archive = subprocess.run(
-        ["git", "archive", "--format=tar", commit, "--", "."],
-        cwd=Path(__file__).parents[1], capture_output=True, check=True,
-    ).stdout  # fmt: skip
+        ["git", "archive", "--format=tar", commit], cwd=ROOT, capture_output=True, check=True
+    ).stdout
     with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
         tar.extractall(folder, filter="data")
     return folder
-
-
-def counted(root: Path) -> Files:
-    """Return the counts of each file of code, without tests."""
-    files: Files = {}
-    for tree in TREES:
-        for path in sorted((root / tree).rglob("*")):
-            name = path.relative_to(root).as_posix()
-            if TESTS.search(name) or HIDDEN.search(name) or not path.is_file():
-                continue
-            if path.suffix == ".py":
-                files[name] = count_python(path.read_text("utf-8"))
-            elif path.suffix in {".c", ".h"}:
-                files[name] = count_c(path.read_text("utf-8"))
-    return files
-
-
-def room_of(path: str) -> str:
-    """Return the room of a file: at most three folders."""
-    return "/".join(PurePosixPath(path).parent.parts[:3])
-
-
-def count_python(text: str) -> Counter[str]:
-    lines = text.split("\n")
-    code = {n for n, line in enumerate(lines, 1) if line.strip() and line.strip()[0] != "#"}
-    counts: Counter[str] = Counter()
-    for node in ast.walk(ast.parse(text)):
-        body = getattr(node, "body", None)
-        for k, statement in enumerate(body if isinstance(body, list) else []):
-            if is_text(statement):
-                span = range(statement.lineno, (statement.end_lineno or statement.lineno) + 1)
-                code -= set(span)
-                counts["docstring"] += len(span)
-                definition = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-                if k == 0 and definition and not node.name.startswith("_"):
-                    counts["public docstring"] += len(span)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            counts["names"] += not node.name.startswith("_")
-    counts["code"] = len(code)
-    return counts
-
-
-def is_text(statement: ast.stmt) -> bool:
-    value = statement.value if isinstance(statement, ast.Expr) else None
-    return isinstance(value, ast.Constant) and isinstance(value.value, str)
-
-
-def count_c(text: str) -> Counter[str]:
-    return Counter(code=sum(bool(line.strip()) for line in C_COMMENT.sub("", text).split("\n")))
 
 
 if __name__ == "__main__":
