@@ -1,9 +1,6 @@
 """A skin whose nodes are coupled, against Hertz, Cattaneo and Mindlin, and its own equations."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,6 +12,7 @@ from holdfast.twin.skin import COUPLED, COUPLED_PITCH
 from holdfast.twin.steps import MAX_COUPLED, probe, relief, touch
 from holdfast.twin.world import fingertip_of
 
+from . import mindlin
 from .grip import GRAVITY, Grip
 
 pytestmark = pytest.mark.slow
@@ -24,20 +22,9 @@ PLACEMENTS = 6
 
 
 @pytest.fixture(scope="module")
-def mindlin() -> ModuleType:
-    path = Path(__file__).parents[2] / "benchmarks" / "mindlin.py"
-    spec = importlib.util.spec_from_file_location("mindlin", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def errors(mindlin: ModuleType) -> dict[str, Array]:
+def errors() -> dict[str, Array]:
     """Errors by name, of several placements of the nodes [%]."""
-    theory = mindlin.Theory(mindlin.modulus_of(COUPLED, []))
+    theory = mindlin.Theory(2 * COUPLED.shear_modulus / (1 - mindlin.POISSON))
     rows = [
         mindlin.errors(mindlin.measure(COUPLED, COUPLED_PITCH, placement), theory)
         for placement in range(PLACEMENTS)
@@ -45,7 +32,7 @@ def errors(mindlin: ModuleType) -> dict[str, Array]:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def test_the_theory_has_its_limits(mindlin: ModuleType) -> None:
+def test_the_theory_has_its_limits() -> None:
     """All slides: 3 mu P (2 - nu) / (16 G a); a small force: that of bodies that stick."""
     theory = mindlin.Theory(200e3)
     unit = 3 * 0.6 * 2.0 * 1.5 / (16 * 50e3 * theory.radius)

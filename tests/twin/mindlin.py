@@ -1,15 +1,9 @@
-"""The contact of the twin against Hertz, Cattaneo and Mindlin: the tables of docs/mindlin.md.
-
-    python benchmarks/mindlin.py                  # both skins, at the pitch of their fingertips
-    python benchmarks/mindlin.py --pitch 0.001    # finer nodes
-    python benchmarks/mindlin.py --plot docs/img/mindlin.png
+"""The contact of the twin against Hertz, Cattaneo and Mindlin.
 
 A ball with the radius of a fingertip is pressed on a flat face and drawn along it, in slow steps,
-first one way and then back. The nodes lie in a square lattice; all figures are means over
-placements of the lattice, and in brackets is the worst placement.
+first one way and then back. The nodes lie in a square lattice.
 """
 
-import argparse
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,9 +11,8 @@ import numpy as np
 
 from holdfast.twin.contact import constants_of, new_contact
 from holdfast.twin.objects import object_named
-from holdfast.twin.skin import COUPLED, COUPLED_PITCH, Skin
 from holdfast.twin.steps import touch
-from holdfast.twin.surface import NODE_PITCH, Surface
+from holdfast.twin.surface import Surface
 
 RADIUS = 0.0135
 """Radius of the ball [m], as that of the fingertip."""
@@ -36,9 +29,6 @@ STEP_TIME = 1.0
 """Time between two steps [s]: so long that neither damping nor falling friction acts."""
 N_STEPS = 240
 """Steps from rest until all of the contact slides."""
-N_PLACEMENTS = 8
-SKINS = {"separate": Skin(), "coupled": COUPLED}
-PITCHES = {"separate": NODE_PITCH, "coupled": COUPLED_PITCH}
 
 
 def ball(pitch, placement):
@@ -211,66 +201,3 @@ def errors(result, theory):
         difference = np.interp(share, drawn, way) - theory.back(share, turned)
         found[f"back at {share:g}: displacement"] = difference / theory.way(SHARES[-1])
     return {name: 100 * value for name, value in found.items()}
-
-
-def modulus_of(skin, results):
-    """Return the modulus of a skin: with separate springs, that by which Hertz has its depth."""
-    if skin.shear_modulus:
-        return 2 * skin.shear_modulus / (1 - POISSON)
-    depth = np.mean([result.depths[LOADS.index(LOAD)] for result in results])
-    return np.sqrt(9 * LOAD**2 / (16 * RADIUS * depth**3))
-
-
-def draw(path, found):
-    """Draw forces against ways of a placement of each skin, and the mean of the stick radii."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
-    colours = dict(zip(SKINS, ("#c0392b", "#1f6fb2"), strict=True))
-    there, back = np.linspace(0, SHARES[-1], 100), np.linspace(SHARES[-1], -SHARES[-1], 200)
-    for name, (results, theory) in found.items():
-        # Each by its own theory, so that skins of another modulus are in one picture.
-        unit = theory.way(1.0)
-        for rows in (results[0].slips, results[0].back):
-            axes[0].plot(rows[:, 2] / unit, rows[:, 0], color=colours[name], lw=2)
-        radii = [np.interp(there, *r.slips.T[:2]) / r.radius for r in results]
-        axes[1].plot(there, np.mean(radii, 0), color=colours[name], lw=2, label=f"{name} nodes")
-    axes[0].plot(theory.way(there) / unit, there, "k--", lw=1.2)
-    axes[0].plot([theory.back(q, SHARES[-1]) / unit for q in back], back, "k--", lw=1.2)
-    axes[1].plot(there, stuck(there), "k--", lw=1.2, label="Cattaneo and Mindlin")
-    axes[0].set(xlabel="way / way at which all slides", ylabel="tangential force / friction limit")
-    axes[1].set(xlabel="tangential force / friction limit", ylabel="stick radius / contact radius")
-    axes[1].legend()
-    for ax in axes:
-        ax.grid(alpha=0.3)
-    figure.savefig(path, dpi=110)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--pitch", type=float, help="Distance of the nodes [m].")
-    parser.add_argument("--plot", help="File of a picture of the curves.")
-    parser.add_argument("--skins", default=",".join(SKINS), help="Some of: %(default)s.")
-    options = parser.parse_args()
-    columns, found = {}, {}
-    for name in options.skins.split(","):
-        skin = SKINS[name]
-        pitch = options.pitch or PITCHES[name]
-        results = [measure(skin, pitch, placement) for placement in range(N_PLACEMENTS)]
-        theory = Theory(modulus_of(skin, results))
-        columns[name] = [errors(result, theory) for result in results]
-        found[name] = results, theory
-        print(f"{name}: E* {theory.modulus / 1e3:.0f} kPa, pitch {1e3 * pitch:g} mm")
-    print("| error [%] |", " | ".join(columns), "|")
-    for row in next(iter(columns.values()))[0]:
-        cells = []
-        for placements in columns.values():
-            values = np.array([placement[row] for placement in placements])
-            cells.append(f"{values.mean():+.1f} ({values[np.abs(values).argmax()]:+.1f})")
-        print("|", row, "|", " | ".join(cells), "|")
-    if options.plot:
-        draw(options.plot, found)
-
-
-if __name__ == "__main__":
-    main()
