@@ -29,7 +29,6 @@ def test_the_defaults_are_those_of_the_deployed_model():
             {"max_samples": 0},
             "trials of at least 0 and samples of at least 1 expected; 30 and 0 given",
         ),
-        ({"objective": "auc"}, "unknown objective 'auc'; there are error, log_loss"),
         ({"seed": -1}, "a seed from 0 to 2^32 - 1 expected, -1 given"),
         (
             {"contact_threshold": -1.0},
@@ -69,8 +68,6 @@ def test_features_of_the_slip_rule():
     [
         ({}, "log_loss"),
         ({"classifier": "svm"}, "error"),
-        ({"objective": "error"}, "error"),
-        ({"classifier": "svm", "objective": "log_loss"}, "log_loss"),
     ],
 )
 def test_the_objective_of_the_search(given, objective):

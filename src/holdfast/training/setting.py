@@ -11,7 +11,7 @@ from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Ta
 from holdfast.features.haar import check_window
 from holdfast.features.specs import SLIP_FEATURES
 from holdfast.model import ANY_FINGER, Debounce, Model
-from holdfast.training.tuning import OBJECTIVES, Objective
+from holdfast.training.tuning import Objective
 
 Split = Literal["recording", "object", "time", "random"]
 SPLITS: tuple[Split, ...] = ("recording", "object", "time", "random")
@@ -43,9 +43,6 @@ class Setting:
             `time` of every recording, or `random` samples. The random split repeats the paper's
             protocol. The metrics of the last two are too good.
         trials: of the search for hyper-parameters; 0 uses the reference parameters.
-        objective: loss that the search minimises: `error` (the share of wrong decisions, as in
-            the paper) or `log_loss`; None for that of the classifier: `error` for the SVM, which
-            has no probability of its own, else `log_loss`.
         seed: of all random numbers.
         shared: one classifier for all fingers instead of one for each; None for that of
             relative features alone, which are the same on every finger and sensor.
@@ -71,7 +68,6 @@ class Setting:
     tare: Tare | None = None
     split: Split = "recording"
     trials: int = 30
-    objective: Objective | None = None
     seed: int = 0
     shared: bool | None = None
     contact_threshold: float | None = None
@@ -86,10 +82,6 @@ class Setting:
         check_window(self.window)
         if self.split not in SPLITS:
             raise ValueError(f"unknown split {self.split!r}; there are {', '.join(SPLITS)}")
-        if self.objective not in (None, *OBJECTIVES):
-            raise ValueError(
-                f"unknown objective {self.objective!r}; there are {', '.join(OBJECTIVES)}"
-            )
         if self.trials < 0 or self.max_samples < 1:
             raise ValueError(
                 f"trials of at least 0 and samples of at least 1 expected; "
@@ -197,9 +189,11 @@ class Setting:
 
     @property
     def search_objective(self) -> Objective:
-        """The objective of the search."""
-        if self.objective is not None:
-            return self.objective
+        """Loss that the search minimises.
+
+        For the SVM, which has no probability of its own, it is the share of wrong decisions, as in
+        the paper; else the log loss.
+        """
         return "error" if self.init is None and self.classifier == "svm" else "log_loss"
 
     @property

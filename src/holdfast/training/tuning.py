@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 INNER_FOLDS = 5
 
 Objective = Literal["error", "log_loss"]
-OBJECTIVES: tuple[Objective, ...] = ("error", "log_loss")
 
 
 def search(

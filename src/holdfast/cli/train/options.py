@@ -60,14 +60,6 @@ class TrainingOptions:
         int,
         typer.Option(help="Trials of the parameter search; 0 uses the reference parameters."),
     ] = 30
-    objective: Annotated[
-        str | None,
-        typer.Option(
-            help="Loss that the search minimises: error (share of wrong decisions) or log_loss.",
-            show_default="log_loss; error for svm",
-        ),
-        RARE,
-    ] = None
     seed: SeedOption = 0
     shared: Annotated[
         bool | None,
