@@ -31,7 +31,6 @@ EXTRA_MODULES = {
     "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),
-    "onnx": ("onnx", "onnxruntime"),
     "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
@@ -44,7 +43,6 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "video": "holdfast label markers, record --camera, and stickers in videos",
-    "onnx": "classifiers as ONNX files",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
     "ros": "topics of ROS without a ROS 2 installation, and bags",

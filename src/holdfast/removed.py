@@ -8,11 +8,18 @@ REMOVED: dict[str, dict[str, str]] = {
     "options": {},
     "sources": {},
     "importers": {},
-    "exporters": {},
+    "exporters": {
+        "onnx": "holdfast export MODEL model.h carries a model to other programs",
+    },
     "hands": {},
+    "rules": {
+        "onnx": "train a model with holdfast train, or apply a classifier of your own to what "
+        "holdfast.features_frame returns",
+    },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
-`verbs`, `options`, `sources`, ...; an option has its verb before it, as in "serve --hand"."""
+`verbs`, `options`, `sources`, ..., and `rules`, the rules of heads in model files; an option has
+its verb before it, as in "serve --hand"."""
 
 
 def removal(kind: str, name: str, what: str) -> str:

@@ -46,7 +46,7 @@ VERB_GROUPS = {
         "demo": "Detect on real and simulated recordings; train; replay live.",
         "simulate": "Simulate recordings of grasps with the physical twin.",
         "hold": "Control the grip force of a hand by the estimates of a source.",
-        "export": "Export a model as C or ONNX, or recordings to other tools.",
+        "export": "Export a model as C, or recordings to other tools.",
         "datasets": "List public recordings, download them and import them.",
         "sensors": "List the known sensors and hands, or show one of them.",
         "doctor": "Check the installation and the sources, or the modules of one.",
