@@ -86,7 +86,7 @@ def test_fields_that_contradict_each_other_are_refused(head, changes, message):
 
 
 def test_a_head_of_onnx_is_refused_with_what_to_use_instead(tmp_path):
-    fields = json.loads(encode(MODEL))
+    fields = json.loads(encode(Model(fingers={ANY_FINGER: finger_model()})))
     head = fields["fingers"][ANY_FINGER]["heads"][0]
     head["rule"] = {"type": "onnx", "file": "a.onnx", "sha256": "0" * 64, "n_features": 3}
     path = tmp_path / "model.json"
