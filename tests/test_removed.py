@@ -10,6 +10,7 @@ COMMANDS = {
     "importers": "import . out --format {}",
     "exporters": "export . out --format {}",
     "hands": "hold builtin:any . --hand {}:",
+    "labels": "label export {} out .",
     "rules": "info {}.json",
 }
 """Command with a part of each kind."""

@@ -49,7 +49,7 @@ EXTRA_PURPOSES = {
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "grip": "holdfast hold: control of the grip force of a hand",
-    "interop": "LeRobot, Foxglove, Rerun, Label Studio and public data sets",
+    "interop": "LeRobot, Foxglove, Rerun and public data sets",
 }
 """Purpose of each extra, also of those that install packages beside the core."""
 
@@ -89,7 +89,6 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "importers": ("anyskin-slip", "arq-crisp", "eflesh", "gtac", "lerobot", "uskin-pick-move"),
         "exporters": ("foxglove", "lerobot", "rerun"),
         "publishers": ("rerun",),
-        "labels": ("label-studio",),
         "options": ("export --fps", "export --model", "serve --rerun"),
     },
 }
