@@ -3,7 +3,7 @@
 LAST_COMMIT = "f7d623e5"
 """Commit of version 0.3.0, which still has all of it."""
 
-AUDIT = "holdfast evaluate MODEL RECORDINGS --plot FILE shows where labels and model differ"
+AUDIT = "holdfast evaluate MODEL RECORDINGS --plot FILE shows where labels and model differ most"
 COMPARE = "holdfast label export csv FOLDER RECORDINGS, once for each set of labels"
 LABELS = "labels as CSV, by holdfast label export csv and holdfast label import FILE"
 
