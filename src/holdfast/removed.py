@@ -5,7 +5,7 @@ LAST_COMMIT = "f7d623e5"
 
 AUDIT = "holdfast evaluate MODEL RECORDINGS --plot FILE shows where labels and model differ most"
 COMPARE = "holdfast label export csv FOLDER RECORDINGS, once for each set of labels"
-LABELS = "labels as CSV, by holdfast label export csv and holdfast label import FILE"
+LABELS_AS_CSV = "labels as CSV, by holdfast label export csv and holdfast label import FILE"
 
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {
@@ -27,12 +27,12 @@ REMOVED: dict[str, dict[str, str]] = {
         "label --fps": "holdfast label auto tracking RECORDING --video FILE --fps RATE",
         "label --motion": "holdfast label auto tracking RECORDING --motion FILE",
         "label --column": "holdfast label auto tracking RECORDING --motion FILE --column NAME",
-        "label --annotator": LABELS,
-        "label import --annotator": LABELS,
+        "label --annotator": LABELS_AS_CSV,
+        "label import --annotator": LABELS_AS_CSV,
     },
     "sources": {},
     "importers": {},
-    "labels": {"label-studio": LABELS},
+    "labels": {"label-studio": LABELS_AS_CSV},
     "exporters": {
         "onnx": "holdfast export MODEL model.h carries a model to other programs",
     },
